@@ -1,0 +1,20 @@
+//! The buses that drivebench speaks, byte by byte.
+//!
+//! This crate holds rules and no machinery: nothing in it learns the time, draws a random number,
+//! blocks or prints. Bytes and time are arguments; bytes and deadlines are return values. Each rule
+//! stands in one place with the section of the manual that it obeys ("ND21 9.6" is section 9.6 of the
+//! *ND21 User Manual 1/96*).
+//!
+//! * [`time`]: virtual time, exact for every rate of every line;
+//! * [`line`]: an asynchronous serial line: its rate, and what a receiver reads from it;
+//! * [`novobus`]: the ring of the Novotron ND21;
+//! * [`nd21`]: the cells of that drive that its bus end itself needs.
+#![no_std]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+pub mod line;
+pub mod nd21;
+pub mod novobus;
+pub mod time;

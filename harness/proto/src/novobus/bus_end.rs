@@ -1,0 +1,348 @@
+//! A drive's end of the bus (ND21 9.1-9.9): a byte with its line status in, at most one byte out, and
+//! deadlines for the time-out.
+//!
+//! When to call what: [`BusEnd::receive`] with every byte that arrives; after each call ask
+//! [`BusEnd::deadline`], and call [`BusEnd::handle_deadline`] when it has come. What goes out goes out
+//! on a line that carries one byte at a time; keeping the order is the caller's part.
+
+use super::address::{ADDRESSED, passed_on};
+use super::error::BusError;
+use super::error_mode::{ErrorMode, Marks};
+use super::memory::{Memory, PAGE};
+use super::parameter_channel::ParameterChannel;
+use super::properties::{EmptyShortTelegram, Properties, ShortAddress};
+use super::sync::{Addressing, Header, SyncByte};
+use crate::line::Received;
+use crate::nd21;
+use crate::time::Instant;
+
+/// What a drive does about a byte or a deadline.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Step {
+    /// The byte that goes out, if one does.
+    pub byte: Option<u8>,
+    /// What there is to remark.
+    pub marks: Marks,
+}
+
+impl Step {
+    const fn plain(byte: u8) -> Self {
+        Self {
+            byte: Some(byte),
+            marks: Marks::NONE,
+        }
+    }
+}
+
+/// When a bus end wants to be called without a byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Deadline {
+    /// At this time, unless a byte comes first.
+    At(Instant),
+    /// As soon as the line is free and everything received has been answered.
+    LineFree,
+}
+
+/// A drive's end of the bus.
+#[derive(Clone, Debug)]
+pub struct BusEnd {
+    state: State,
+    /// When the last byte was received; `None` until the first one arms the monitoring (9.9).
+    last_received: Option<Instant>,
+    /// Whether an address byte has passed since power-up and since the last check sequence.
+    short_address_valid: bool,
+    channel: ParameterChannel,
+    cause: Option<BusError>,
+    properties: Properties,
+}
+
+/// What the next byte is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum State {
+    /// A sync byte.
+    Sync,
+    /// The address byte of a telegram.
+    Address(Header),
+    /// A net byte of a telegram for another drive; so many to come.
+    Passing { left: u8 },
+    /// A net byte of a telegram for this drive.
+    Addressed { left: u8, next: Net },
+    /// Any byte: the drive is in the error mode.
+    Error(ErrorMode),
+    /// The same, silent after a time-out until the given time (9.9).
+    Silent(ErrorMode, Instant),
+    /// The same, sending zeros unasked (9.9).
+    Sending(ErrorMode),
+}
+
+/// Which net byte of a telegram for this drive comes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Net {
+    /// The high byte of the process data.
+    ProcessHigh,
+    /// Their low byte: the high byte received, the low byte to send.
+    ProcessLow { received: u8, to_send: u8 },
+    /// A byte of the parameter channel.
+    Parameter,
+}
+
+impl BusEnd {
+    /// A bus end as it is after power-up: waiting for a sync byte.
+    #[must_use]
+    pub fn new(properties: Properties) -> Self {
+        Self {
+            state: State::Sync,
+            last_received: None,
+            short_address_valid: false,
+            channel: ParameterChannel::default(),
+            cause: None,
+            properties,
+        }
+    }
+
+    /// How the drive behaves where the manual leaves it open.
+    pub fn properties_mut(&mut self) -> &mut Properties {
+        &mut self.properties
+    }
+
+    /// Whether the drive is in the error mode.
+    #[must_use]
+    pub const fn in_error(&self) -> bool {
+        matches!(
+            self.state,
+            State::Error(_) | State::Silent(..) | State::Sending(_)
+        )
+    }
+
+    /// The error for which it last went into the error mode, since power-up.
+    #[must_use]
+    pub const fn cause(&self) -> Option<BusError> {
+        self.cause
+    }
+
+    /// Takes a received byte.
+    #[inline]
+    pub fn receive<M: Memory>(&mut self, now: Instant, received: Received, memory: &mut M) -> Step {
+        self.last_received = Some(now);
+        match &mut self.state {
+            // Nearly every byte of a large ring: not for this drive, and not looked at (9.3).
+            State::Passing { left } if received.error.is_none() => {
+                *left -= 1;
+                if *left == 0 {
+                    self.state = State::Sync;
+                }
+                Step::plain(received.byte)
+            }
+            _ => self.consider(received, memory),
+        }
+    }
+
+    /// Takes a byte that this drive looks at.
+    fn consider<M: Memory>(&mut self, received: Received, memory: &mut M) -> Step {
+        match &mut self.state {
+            State::Error(mode) | State::Sending(mode) => {
+                let response = mode.receive(received, self.properties.broken_sequence);
+                self.leave_error_mode_if(response.marks);
+                return Step {
+                    byte: Some(response.byte),
+                    marks: response.marks,
+                };
+            }
+            State::Silent(mode, _) => {
+                let marks = mode.overhear(received);
+                self.leave_error_mode_if(marks);
+                return Step { byte: None, marks };
+            }
+            _ => {}
+        }
+        let result = match received.error {
+            Some(error) => Err(error.into()),
+            None => self.normal(received.byte, memory),
+        };
+        result.unwrap_or_else(|error| self.detect(error, received, memory))
+    }
+
+    /// When this bus end next wants [`Self::handle_deadline`] to be called.
+    #[must_use]
+    pub fn deadline<M: Memory>(&self, memory: &M) -> Option<Deadline> {
+        match &self.state {
+            State::Error(_) => None,
+            State::Silent(_, until) => Some(Deadline::At(*until)),
+            State::Sending(_) => Some(Deadline::LineFree),
+            _ => {
+                let last = self.last_received?;
+                memory
+                    .monitors_time_out()
+                    .then(|| Deadline::At(last + self.properties.time_out))
+            }
+        }
+    }
+
+    /// Does what is due at [`Self::deadline`] (ND21 9.9): first the time-out is detected; then, after
+    /// a further silence, zeros go out, one whenever the line is free.
+    pub fn handle_deadline<M: Memory>(&mut self, now: Instant, memory: &mut M) -> Step {
+        match &mut self.state {
+            State::Silent(mode, _) => {
+                let mut mode = mode.clone();
+                let marks = mode.send_zero();
+                self.state = State::Sending(mode);
+                Step {
+                    byte: Some(0),
+                    marks,
+                }
+            }
+            State::Sending(mode) => Step {
+                byte: Some(0),
+                marks: mode.send_zero(),
+            },
+            State::Error(_) => Step::default(),
+            _ => {
+                self.blame(BusError::TimeOut, memory);
+                self.state = State::Silent(
+                    ErrorMode::enter_after_time_out(),
+                    now + self.properties.time_out_wait,
+                );
+                Step {
+                    byte: None,
+                    marks: Marks::DETECTED,
+                }
+            }
+        }
+    }
+
+    /// A byte in normal mode, without a line error.
+    fn normal<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Step, BusError> {
+        match &mut self.state {
+            State::Sync => self.sync_byte(byte, memory),
+            State::Address(header) => {
+                let header = *header;
+                let sum = passed_on(byte);
+                memory.write(nd21::BUS_ADDR, sum);
+                self.short_address_valid = true;
+                self.begin_net_bytes(header, sum == ADDRESSED);
+                Ok(Step::plain(sum))
+            }
+            State::Addressed { left, next } => {
+                let step = match *next {
+                    Net::ProcessHigh => {
+                        let [high, low] = process_data_out(memory);
+                        *next = Net::ProcessLow {
+                            received: byte,
+                            to_send: low,
+                        };
+                        Step::plain(high)
+                    }
+                    Net::ProcessLow { received, to_send } => {
+                        process_data_in(memory, [received, byte]);
+                        *next = Net::Parameter;
+                        Step::plain(to_send)
+                    }
+                    Net::Parameter => {
+                        let answer =
+                            self.channel
+                                .receive(byte, self.properties.read_long, memory)?;
+                        if answer.reset {
+                            *self = Self::new(self.properties);
+                            return Ok(Step {
+                                byte: Some(answer.byte),
+                                marks: answer.marks,
+                            });
+                        }
+                        Step {
+                            byte: Some(answer.byte),
+                            marks: answer.marks,
+                        }
+                    }
+                };
+                *left -= 1;
+                if *left == 0 {
+                    self.state = State::Sync;
+                }
+                Ok(step)
+            }
+            State::Passing { .. } | State::Error(_) | State::Silent(..) | State::Sending(_) => {
+                Ok(Step::plain(byte))
+            }
+        }
+    }
+
+    /// ND21 9.2.
+    fn sync_byte<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Step, BusError> {
+        let header = match SyncByte::decode(byte).map_err(|_| BusError::Sync)? {
+            SyncByte::Synco => return Ok(Step::plain(byte)),
+            SyncByte::Pause => return Ok(Step::default()),
+            SyncByte::Telegram(header) => header,
+        };
+        if header.net_length() == 0
+            && self.properties.empty_short_telegram == EmptyShortTelegram::Error
+        {
+            return Err(BusError::Sync);
+        }
+        if header.addressing() == Addressing::AddressFollows {
+            self.state = State::Address(header);
+            return Ok(Step::plain(byte));
+        }
+        let valid =
+            self.short_address_valid || self.properties.short_address == ShortAddress::KeptSum;
+        let mut sum = memory.read(nd21::BUS_ADDR);
+        if valid && header.addressing() == Addressing::NextDrive {
+            sum = passed_on(sum);
+            memory.write(nd21::BUS_ADDR, sum);
+        }
+        self.begin_net_bytes(header, valid && sum == ADDRESSED);
+        Ok(Step::plain(byte))
+    }
+
+    fn begin_net_bytes(&mut self, header: Header, addressed: bool) {
+        let left = header.net_length();
+        self.state = match (left, addressed) {
+            (0, _) => State::Sync,
+            (_, false) => State::Passing { left },
+            (_, true) => State::Addressed {
+                left,
+                next: if header.process_data() {
+                    Net::ProcessHigh
+                } else {
+                    Net::Parameter
+                },
+            },
+        };
+    }
+
+    fn detect<M: Memory>(&mut self, error: BusError, offending: Received, memory: &mut M) -> Step {
+        self.blame(error, memory);
+        self.state = State::Error(ErrorMode::enter(offending));
+        Step {
+            byte: Some(0),
+            marks: Marks::DETECTED,
+        }
+    }
+
+    fn blame<M: Memory>(&mut self, error: BusError, memory: &mut M) {
+        self.cause = Some(error);
+        memory.bus_error(error);
+    }
+
+    /// After the 41 of a check sequence: normal mode, half-received commands forgotten, no short
+    /// address valid.
+    fn leave_error_mode_if(&mut self, marks: Marks) {
+        if marks.contains(Marks::RECOVERED) {
+            self.state = State::Sync;
+            self.channel = ParameterChannel::default();
+            self.short_address_valid = false;
+        }
+    }
+}
+
+/// Latches the process data that go out: the word at FF00|DataOut, high byte first (ND21 9.4, 14.10.3).
+fn process_data_out<M: Memory>(memory: &mut M) -> [u8; 2] {
+    let address = PAGE | u16::from(memory.read(nd21::DATA_OUT));
+    [memory.read(address), memory.read(address.wrapping_add(1))]
+}
+
+/// Writes the process data that came in to FF00|DataIn, high byte first (ND21 9.4, 14.10.3).
+fn process_data_in<M: Memory>(memory: &mut M, data: [u8; 2]) {
+    let address = PAGE | u16::from(memory.read(nd21::DATA_IN));
+    memory.write(address, data[0]);
+    memory.write(address.wrapping_add(1), data[1]);
+}

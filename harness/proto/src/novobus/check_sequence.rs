@@ -1,0 +1,66 @@
+//! The check sequence, which resets the drives after an error (ND21 9.8).
+
+/// How many zeros the master sends before the five bytes (ND21 9.8), and how many a drive sends before
+/// it begins to increment (9.7).
+pub const ZEROS: u8 = 17;
+
+/// The five bytes that end the error mode (ND21 9.8).
+pub const SEQUENCE: [u8; 5] = [0xFF, 0x44, 0x72, 0x4C, 0x41];
+
+/// The whole check sequence as the master sends it: 17 zeros and the five bytes (ND21 9.8).
+pub const CHECK_SEQUENCE: [u8; ZEROS as usize + SEQUENCE.len()] = {
+    let mut bytes = [0; ZEROS as usize + SEQUENCE.len()];
+    let mut i = 0;
+    while i < SEQUENCE.len() {
+        bytes[ZEROS as usize + i] = SEQUENCE[i];
+        i += 1;
+    }
+    bytes
+};
+
+/// Watches a stream of bytes for [`SEQUENCE`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Watch {
+    matched: u8,
+}
+
+/// What a byte was to the [`Watch`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Not part of a sequence.
+    None,
+    /// The FF that starts one; it may start anew where another broke off.
+    Started,
+    /// One of the bytes between.
+    Continued,
+    /// The 41 that completes one.
+    Complete,
+}
+
+impl Watch {
+    /// Takes the next byte; `good` is false where the line status said that it was damaged.
+    pub fn see(&mut self, byte: u8, good: bool) -> Progress {
+        if !good {
+            self.matched = 0;
+            return Progress::None;
+        }
+        if byte == SEQUENCE[usize::from(self.matched)] {
+            self.matched += 1;
+            if self.matched == 1 {
+                return Progress::Started;
+            }
+            if usize::from(self.matched) == SEQUENCE.len() {
+                self.matched = 0;
+                return Progress::Complete;
+            }
+            return Progress::Continued;
+        }
+        // No byte of the sequence but the first is an FF, so only a fresh start can follow a break-off.
+        self.matched = u8::from(byte == SEQUENCE[0]);
+        if self.matched == 1 {
+            Progress::Started
+        } else {
+            Progress::None
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The error mode: how a ring spells out which drive saw the fault (ND21 9.7-9.9).
+//!
+//! From the offending byte on, a drive
+//!
+//! 1. sends 00 for every byte ("!" is the first of them);
+//! 2. counts the good zeros that it receives in a row, the offending byte included; with the eighth
+//!    ("*") it knows that the drive before it is in the error mode too, and remembers it;
+//! 3. with "*" behind it and 17 zeros sent ("#" is the seventeenth) it sends received + 1, beginning
+//!    with the byte in hand. Only the drive that was first never sees "*", so what reaches the master
+//!    is 00 ... 00 and then that drive's address;
+//! 4. with "*" behind it it looks for the check sequence, forwards its bytes unchanged ("@" marks the
+//!    FF) and is back in normal mode after the last.
+//!
+//! After a time-out (9.9) received + 1 starts with the "*" itself, as the printed figure has it.
+
+use super::check_sequence::{Progress, Watch, ZEROS};
+use super::properties::BrokenSequence;
+use crate::line::Received;
+
+/// Zeros in a row that show that the drive before is in the error mode: a telegram holds at most seven
+/// (ND21 9.7).
+pub const UPSTREAM_ZEROS: u8 = 8;
+
+/// What happened at a byte, in the manual's own marks (ND21 9.7, 9.8). Several can coincide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Marks(u8);
+
+impl Marks {
+    /// Nothing to remark.
+    pub const NONE: Self = Self(0);
+    /// `!`: the drive detects an error.
+    pub const DETECTED: Self = Self(1);
+    /// `*`: it detects that the preceding drive is in error mode.
+    pub const UPSTREAM: Self = Self(1 << 1);
+    /// `#`: the 17th sent zero byte.
+    pub const SEVENTEENTH: Self = Self(1 << 2);
+    /// `@`: the first byte of the check sequence.
+    pub const SEQUENCE: Self = Self(1 << 3);
+    /// The last byte of the check sequence: back in normal mode.
+    pub const RECOVERED: Self = Self(1 << 4);
+    /// `>`: an answer byte, contents of a memory cell.
+    pub const ANSWER: Self = Self(1 << 5);
+    /// `+`: a new checking byte.
+    pub const CHECKSUM: Self = Self(1 << 6);
+
+    /// Both.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether all of `other` are among these.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// A drive in the error mode.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorMode {
+    zeros_received: u8,
+    zeros_sent: u8,
+    upstream: bool,
+    after_time_out: bool,
+    watch: Watch,
+    in_sequence: bool,
+}
+
+/// What the error mode makes of a byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Response {
+    /// What goes out for it.
+    pub byte: u8,
+    /// What it was.
+    pub marks: Marks,
+}
+
+impl ErrorMode {
+    /// Enters the error mode with the offending byte; 00 goes out in its place.
+    #[must_use]
+    pub fn enter(offending: Received) -> Self {
+        Self {
+            zeros_received: u8::from(offending.is(0)),
+            zeros_sent: 1,
+            upstream: false,
+            after_time_out: false,
+            watch: Watch::default(),
+            in_sequence: false,
+        }
+    }
+
+    /// Enters the error mode after a time-out: no byte is to blame, and none is answered.
+    #[must_use]
+    pub fn enter_after_time_out() -> Self {
+        Self {
+            zeros_received: 0,
+            zeros_sent: 0,
+            upstream: false,
+            after_time_out: true,
+            watch: Watch::default(),
+            in_sequence: false,
+        }
+    }
+
+    /// Takes the next byte (rules 1 to 4).
+    pub fn receive(&mut self, received: Received, broken_sequence: BrokenSequence) -> Response {
+        let good = received.error.is_none();
+        let mut marks = self.count(received.is(0));
+        if self.upstream {
+            let was_in_sequence = self.in_sequence;
+            let progress = self.watch.see(received.byte, good);
+            self.in_sequence = matches!(progress, Progress::Started | Progress::Continued);
+            let forward = match progress {
+                Progress::Started => {
+                    marks = marks.and(Marks::SEQUENCE);
+                    true
+                }
+                Progress::Continued => true,
+                Progress::Complete => {
+                    marks = marks.and(Marks::RECOVERED);
+                    true
+                }
+                Progress::None => was_in_sequence && broken_sequence == BrokenSequence::Forwarded,
+            };
+            if forward {
+                return Response {
+                    byte: received.byte,
+                    marks,
+                };
+            }
+        }
+        if self.increments() {
+            let byte = received.byte.wrapping_add(1);
+            return Response { byte, marks };
+        }
+        Response {
+            byte: 0,
+            marks: marks.and(self.send_zero()),
+        }
+    }
+
+    /// Takes a byte that is not answered, in the silence after a time-out (ND21 9.9): rules 2 and 4
+    /// hold, nothing goes out.
+    pub fn overhear(&mut self, received: Received) -> Marks {
+        let marks = self.count(received.is(0));
+        if !self.upstream {
+            return marks;
+        }
+        match self.watch.see(received.byte, received.error.is_none()) {
+            Progress::Started => marks.and(Marks::SEQUENCE),
+            Progress::Complete => marks.and(Marks::RECOVERED),
+            Progress::Continued | Progress::None => marks,
+        }
+    }
+
+    /// Notes that a 00 goes out, asked for or not.
+    pub fn send_zero(&mut self) -> Marks {
+        self.zeros_sent = self.zeros_sent.saturating_add(1);
+        if self.zeros_sent == ZEROS {
+            Marks::SEVENTEENTH
+        } else {
+            Marks::NONE
+        }
+    }
+
+    /// Rule 2.
+    fn count(&mut self, good_zero: bool) -> Marks {
+        if !good_zero {
+            self.zeros_received = 0;
+            return Marks::NONE;
+        }
+        self.zeros_received = self.zeros_received.saturating_add(1);
+        if self.zeros_received == UPSTREAM_ZEROS && !self.upstream {
+            self.upstream = true;
+            return Marks::UPSTREAM;
+        }
+        Marks::NONE
+    }
+
+    /// Rule 3.
+    fn increments(&self) -> bool {
+        self.upstream && (self.after_time_out || self.zeros_sent >= ZEROS)
+    }
+}

@@ -1,0 +1,27 @@
+//! What stands in a ring: anything that answers bytes with bytes.
+
+use harness_proto::line::Received;
+use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::Instant;
+
+/// A drive as the ring sees it: bytes and deadlines, no topology.
+pub trait Device {
+    /// A byte has arrived.
+    fn receive(&mut self, now: Instant, received: Received) -> Step;
+
+    /// When the device wants to act by itself.
+    fn deadline(&self) -> Option<Deadline>;
+
+    /// The deadline has come.
+    fn handle_deadline(&mut self, now: Instant) -> Step;
+
+    /// The power has come back after it had been off: everything but the EEPROM is lost.
+    fn power_on(&mut self);
+
+    /// Whether the device is in the bus's error mode.
+    fn in_error(&self) -> bool;
+
+    /// Why it last went into the error mode.
+    fn cause(&self) -> Option<BusError>;
+}

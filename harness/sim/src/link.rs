@@ -1,0 +1,329 @@
+//! One link of a ring: a wire that carries one byte at a time, and what can go wrong on it.
+
+use crate::fault::{Flips, LinkFault, Plan};
+use harness_proto::line::{LineError, Received};
+use harness_proto::time::{Instant, Span};
+use std::collections::VecDeque;
+
+/// A byte on a wire, at both of its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineByte {
+    /// When its stop bit has passed.
+    pub at: Instant,
+    /// What the transmitter put on the wire; `None` for a byte that nobody sent.
+    pub sent: Option<u8>,
+    /// What the receiver read; `None` where nothing arrived.
+    pub received: Option<u8>,
+    /// What the receiver noticed.
+    pub error: Option<LineError>,
+    /// Whether the byte goes back to one that the master sent, rather than to a time-out.
+    pub(crate) solicited: bool,
+}
+
+impl LineByte {
+    /// What arrives at the receiver, if anything does.
+    #[must_use]
+    pub fn arrival(&self) -> Option<Received> {
+        let error = self.error;
+        self.received.map(|byte| Received { byte, error })
+    }
+}
+
+/// A [`LineByte`] in two words: composed of single bytes, a line byte is stored in pieces and loaded
+/// whole, which costs more than all the rest of passing a byte on.
+#[derive(Clone, Copy, Debug)]
+struct UnderWay {
+    at: Instant,
+    word: u32,
+}
+
+impl UnderWay {
+    const SENT: u32 = 1 << 16;
+    const RECEIVED: u32 = 1 << 17;
+    const SOLICITED: u32 = 1 << 18;
+    const ERROR_SHIFT: u32 = 24;
+
+    /// A byte that arrives as it was sent.
+    #[inline]
+    fn whole(at: Instant, byte: u8, solicited: bool) -> Self {
+        let word = (u32::from(byte) * 0x0101) | Self::SENT | Self::RECEIVED;
+        let solicited = if solicited { Self::SOLICITED } else { 0 };
+        Self {
+            at,
+            word: word | solicited,
+        }
+    }
+
+    fn pack(byte: LineByte) -> Self {
+        let sent = byte.sent.map_or(0, |b| Self::SENT | u32::from(b));
+        let received = byte
+            .received
+            .map_or(0, |b| Self::RECEIVED | u32::from(b) << 8);
+        let solicited = if byte.solicited { Self::SOLICITED } else { 0 };
+        let error = match byte.error {
+            None => 0,
+            Some(LineError::Parity) => 1,
+            Some(LineError::Framing) => 2,
+            Some(LineError::Break) => 3,
+            Some(LineError::Overrun) => 4,
+        };
+        Self {
+            at: byte.at,
+            word: sent | received | solicited | error << Self::ERROR_SHIFT,
+        }
+    }
+
+    #[inline]
+    fn unpack(self) -> LineByte {
+        let [sent, received, _, error] = self.word.to_le_bytes();
+        LineByte {
+            at: self.at,
+            sent: (self.word & Self::SENT != 0).then_some(sent),
+            received: (self.word & Self::RECEIVED != 0).then_some(received),
+            error: match error {
+                0 => None,
+                1 => Some(LineError::Parity),
+                2 => Some(LineError::Framing),
+                3 => Some(LineError::Break),
+                _ => Some(LineError::Overrun),
+            },
+            solicited: self.solicited(),
+        }
+    }
+
+    #[inline]
+    fn solicited(self) -> bool {
+        self.word & Self::SOLICITED != 0
+    }
+
+    /// Lets the byte be lost on the wire.
+    fn lose(&mut self) {
+        self.word &= Self::SENT | Self::SOLICITED | 0xFF;
+    }
+}
+
+/// A wire from one transmitter to one receiver.
+#[derive(Clone, Debug)]
+pub struct Link {
+    byte_time: Span,
+    /// When the transmitter can start its next byte.
+    line_free: Instant,
+    /// When the last byte arrived: bytes arrive one after another.
+    last_arrival: Instant,
+    under_way: VecDeque<UnderWay>,
+    transmitted: u64,
+    plan: Plan<LinkFault>,
+    cut: bool,
+    /// Until when the line is held at 0.
+    held_until: Instant,
+    log: Option<Vec<LineByte>>,
+    arrived: u64,
+}
+
+impl Link {
+    pub(crate) fn new(byte_time: Span) -> Self {
+        Self {
+            byte_time,
+            line_free: Instant::START,
+            last_arrival: Instant::START,
+            under_way: VecDeque::new(),
+            transmitted: 0,
+            plan: Plan::default(),
+            cut: false,
+            held_until: Instant::START,
+            log: Some(Vec::new()),
+            arrived: 0,
+        }
+    }
+
+    /// Everything that this link has carried, in order; empty where nothing is recorded.
+    #[must_use]
+    pub fn log(&self) -> &[LineByte] {
+        self.log.as_deref().unwrap_or_default()
+    }
+
+    pub(crate) fn stop_recording(&mut self) {
+        self.log = None;
+    }
+
+    /// When the transmitter can start its next byte.
+    pub(crate) fn line_free(&self) -> Instant {
+        self.line_free
+    }
+
+    /// How many bytes have been transmitted, begun ones included.
+    pub(crate) fn transmitted(&self) -> u64 {
+        self.transmitted
+    }
+
+    /// How many bytes have reached the receiver's end, lost ones included.
+    pub(crate) fn arrived(&self) -> u64 {
+        self.arrived
+    }
+
+    /// Whether a byte is under way that goes back to the master's.
+    pub(crate) fn carries_solicited(&self) -> bool {
+        self.under_way.iter().any(|byte| byte.solicited())
+    }
+
+    /// Faults whose byte has not come yet.
+    pub(crate) fn waiting_faults(&self) -> impl Iterator<Item = (u64, LinkFault)> + '_ {
+        self.plan.waiting()
+    }
+
+    /// Arms a fault for the `byte`-th byte transmitted on this link, counted from 1.
+    pub(crate) fn arm(&mut self, byte: u64, fault: LinkFault) {
+        self.plan.add(byte, fault);
+    }
+
+    /// From now on nothing arrives; a byte on the wire is lost.
+    pub(crate) fn cut(&mut self, now: Instant) {
+        self.cut = true;
+        self.lose_after(now);
+    }
+
+    /// From now on everything arrives again.
+    pub(crate) fn join(&mut self) {
+        self.cut = false;
+    }
+
+    /// The line is held at 0 from now on.
+    pub(crate) fn hold(&mut self, now: Instant, span: Span) {
+        self.lose_after(now);
+        self.held_until = self.held_until.max(now + span);
+        let at = self.last_arrival.max(now) + self.byte_time;
+        self.last_arrival = at;
+        let byte = LineByte {
+            at,
+            sent: None,
+            received: Some(0),
+            error: Some(LineError::Break),
+            solicited: true,
+        };
+        let place = self.under_way.partition_point(|other| other.at <= at);
+        self.under_way.insert(place, UnderWay::pack(byte));
+    }
+
+    /// The transmitter loses its power: what it has not finished is never sent.
+    pub(crate) fn silence(&mut self, now: Instant) {
+        self.lose_after(now);
+        self.line_free = self.line_free.min(now);
+    }
+
+    fn lose_after(&mut self, now: Instant) {
+        for byte in &mut self.under_way {
+            if byte.at > now {
+                byte.lose();
+            }
+        }
+    }
+
+    /// Puts a byte on the wire as soon as it is free, at `now` at the earliest.
+    #[inline]
+    pub(crate) fn transmit(&mut self, now: Instant, byte: u8, solicited: bool) {
+        let start = now.max(self.line_free);
+        self.line_free = start + self.byte_time;
+        self.transmitted += 1;
+        let on_wire = UnderWay::whole(self.line_free, byte, solicited);
+        match self.plan.take(self.transmitted) {
+            None if !self.cut && start >= self.held_until => self.deliver(on_wire),
+            first => self.transmit_damaged(first, start, on_wire.unpack()),
+        }
+    }
+
+    #[cold]
+    fn transmit_damaged(&mut self, first: Option<LinkFault>, start: Instant, mut byte: LineByte) {
+        let mut flips = Flips::default();
+        let mut copies = 1;
+        let mut next = first;
+        while let Some(fault) = next {
+            match fault {
+                LinkFault::Flip(more) => flips = flips.and(more),
+                LinkFault::Replace(data) => byte.received = Some(data),
+                LinkFault::Drop => byte.received = None,
+                LinkFault::Duplicate => copies = 2,
+                LinkFault::Insert(data) => {
+                    let lost = self.cut || start < self.held_until;
+                    self.deliver(UnderWay::pack(LineByte {
+                        at: byte.at,
+                        sent: None,
+                        received: (!lost).then_some(data),
+                        error: None,
+                        solicited: true,
+                    }));
+                }
+                LinkFault::Delay(span) => byte.at += span,
+                LinkFault::Break(span) => {
+                    self.held_until = self.held_until.max(start + span);
+                    byte.received = Some(0);
+                    byte.error = Some(LineError::Break);
+                }
+                LinkFault::Overrun => byte.error = Some(LineError::Overrun),
+                LinkFault::Cut => self.cut = true,
+                LinkFault::Join => self.cut = false,
+            }
+            next = self.plan.take(self.transmitted);
+        }
+        if byte.error != Some(LineError::Break) {
+            byte.received = byte.received.map(|data| data ^ flips.data);
+            byte.error = byte.error.or(flips.noticed());
+            if start < self.held_until {
+                byte.received = None;
+            }
+        }
+        if self.cut {
+            byte.received = None;
+        }
+        if byte.received.is_none() {
+            byte.error = None;
+            copies = 1;
+        }
+        self.deliver(UnderWay::pack(byte));
+        if copies == 2 {
+            self.deliver(UnderWay::pack(LineByte { sent: None, ..byte }));
+        }
+    }
+
+    /// Lines a byte up behind those under way.
+    #[inline]
+    fn deliver(&mut self, mut byte: UnderWay) {
+        byte.at = byte.at.max(self.last_arrival + self.byte_time);
+        self.last_arrival = byte.at;
+        self.under_way.push_back(byte);
+    }
+
+    /// When the next byte arrives.
+    #[inline]
+    pub(crate) fn next_arrival(&self) -> Instant {
+        self.under_way
+            .front()
+            .map_or(Instant::NEVER, |byte| byte.at)
+    }
+
+    /// Takes the next byte from the wire, for a receiver that listens.
+    #[inline]
+    pub(crate) fn take(&mut self) -> Option<LineByte> {
+        let byte = self.under_way.pop_front()?.unpack();
+        self.record(byte);
+        Some(byte)
+    }
+
+    /// Takes the next byte from the wire where nobody listens.
+    pub(crate) fn take_unheard(&mut self) {
+        if let Some(byte) = self.under_way.pop_front() {
+            self.record(LineByte {
+                received: None,
+                error: None,
+                ..byte.unpack()
+            });
+        }
+    }
+
+    #[inline]
+    fn record(&mut self, byte: LineByte) {
+        self.arrived += 1;
+        if let Some(log) = &mut self.log {
+            log.push(byte);
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! The command line.
+
+use super::exit::Exit;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
+use std::path::PathBuf;
+
+/// Plays scripted conversations with serial servo drives and compares every byte with the manual.
+///
+/// Without a command all built-in scenarios are played on the simulated ring.
+#[derive(Debug, Parser)]
+#[command(name = "drivebench", version, after_help = EXAMPLES, after_long_help = after_long_help())]
+#[command(disable_help_subcommand = true)]
+pub struct Arguments {
+    /// What to do; `run` where nothing is said.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// When to use colours.
+    #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
+    pub color: When,
+    /// When to show a progress bar (on standard error).
+    #[arg(long, global = true, value_enum, default_value_t = Progress::Auto)]
+    pub progress: Progress,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  drivebench                                 play all built-in scenarios
+  drivebench run --filter 9.7                play those that pin section 9.7
+  drivebench run my-machine.scn tests/       play a file and all files of a folder
+  drivebench trace 9.7-parity-error          the 100-axis table of ND21 9.7
+  drivebench trace my.scn --format json      every byte on every link, for tools
+  drivebench check my.scn                    look for mistakes, play nothing
+  drivebench manual                          which tables of the manual are pinned";
+
+fn after_long_help() -> String {
+    format!("{EXAMPLES}\n\n{}", Exit::HELP)
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Play scenarios and say which passed.
+    Run(RunArguments),
+    /// Show what scenarios there are and which table of the manual each pins.
+    List(Selection),
+    /// Read a scenario and say what is wrong with it; nothing is played.
+    Check(CheckArguments),
+    /// Play a scenario and print every byte on every link.
+    Trace(TraceArguments),
+    /// Show which tables and examples of the manual are pinned, and the errata ledger.
+    Manual(ManualArguments),
+    /// Print a completion script for a shell.
+    Completions {
+        /// For which shell.
+        shell: Shell,
+    },
+    /// Print the man page (roff), or write one for every command into a folder.
+    Man {
+        /// The folder; it must be there.
+        folder: Option<PathBuf>,
+    },
+}
+
+/// Which scenarios.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Selection {
+    /// Files, folders, or names of built-in scenarios; all built-in ones where none is given.
+    #[arg(value_name = "FILE|FOLDER")]
+    pub paths: Vec<PathBuf>,
+    /// Only those with this text in their name, title or source.
+    #[arg(long, value_name = "TEXT")]
+    pub filter: Option<String>,
+}
+
+/// For `run`.
+#[derive(Clone, Debug, Default, Args)]
+pub struct RunArguments {
+    /// Which scenarios.
+    #[command(flatten)]
+    pub selection: Selection,
+    /// Play on a ring of this many drives, where a scenario allows it.
+    #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
+    pub ring: Option<u8>,
+    /// Count a skipped scenario as missing (exit code 5).
+    #[arg(long)]
+    pub require_all: bool,
+}
+
+/// For `check`.
+#[derive(Clone, Debug, Args)]
+pub struct CheckArguments {
+    /// Files, folders, or names of built-in scenarios.
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// For a ring of this many drives.
+    #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
+    pub ring: Option<u8>,
+}
+
+/// For `trace`.
+#[derive(Clone, Debug, Args)]
+pub struct TraceArguments {
+    /// A file, or the name of a built-in scenario.
+    pub file: PathBuf,
+    /// In which form.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    pub format: Format,
+    /// Play on a ring of this many drives.
+    #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
+    pub ring: Option<u8>,
+    /// Only these rows of the table, counted from 1.
+    #[arg(long, value_name = "FIRST..LAST", value_parser = rows)]
+    pub rows: Option<Rows>,
+}
+
+/// For `manual`.
+#[derive(Clone, Debug, Args)]
+pub struct ManualArguments {
+    /// Only what is not pinned yet.
+    #[arg(long)]
+    pub missing: bool,
+    /// Only entries with this text in them.
+    #[arg(long, value_name = "TEXT")]
+    pub filter: Option<String>,
+}
+
+/// The forms of a trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// The manual's own table: one column a drive.
+    Table,
+    /// One object for tools, described in the documentation.
+    Json,
+}
+
+/// When to do something that suits a terminal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum When {
+    /// On a terminal (and NO_COLOR is heeded).
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// When to show a progress bar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Progress {
+    /// On a terminal.
+    Auto,
+    /// Always.
+    Bar,
+    /// Never.
+    None,
+}
+
+/// Rows of a table, counted from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rows {
+    /// The first.
+    pub first: usize,
+    /// The last.
+    pub last: usize,
+}
+
+fn ring_size(text: &str) -> Result<u8, String> {
+    let number: u64 = text
+        .parse()
+        .map_err(|_| "a number of drives is expected, 1 to 250 (ND21 8.4)".to_owned())?;
+    harness_proto::novobus::address::RingSize::new(number)
+        .map(harness_proto::novobus::address::RingSize::drives)
+        .map_err(|error| error.to_string())
+}
+
+fn rows(text: &str) -> Result<Rows, String> {
+    let wrong = || "rows are given as FIRST..LAST, counted from 1, such as 1..30".to_owned();
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let rows = Rows {
+        first: first.parse().map_err(|_| wrong())?,
+        last: last.parse().map_err(|_| wrong())?,
+    };
+    if rows.first == 0 || rows.last < rows.first {
+        return Err(wrong());
+    }
+    Ok(rows)
+}

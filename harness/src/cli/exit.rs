@@ -1,0 +1,57 @@
+//! Exit codes.
+
+use crate::scenario::verdict::Verdict;
+use std::process::ExitCode;
+
+/// What the program says when it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Exit {
+    /// Everything passed.
+    Passed = 0,
+    /// A drive behaved otherwise than the scenario says.
+    Failed = 1,
+    /// Wrong usage, or a scenario with mistakes.
+    Usage = 2,
+    /// The bench itself failed.
+    RigError = 3,
+    /// Nothing was selected.
+    NothingSelected = 4,
+    /// Everything passed, but not everything could be shown.
+    Incomplete = 5,
+}
+
+impl Exit {
+    /// Every code with its meaning, for `--help`.
+    pub const HELP: &str = "\
+Exit codes:
+  0  everything passed
+  1  a drive behaved otherwise than a scenario says
+  2  wrong usage, or a scenario with mistakes
+  3  the bench itself failed
+  4  nothing was selected
+  5  passed but incomplete (skipped scenarios under --require-all, or inconclusive ones)";
+
+    /// The code for the verdicts of a run; `require_all` counts skipped scenarios as missing.
+    #[must_use]
+    pub fn of(verdicts: &[Verdict], require_all: bool) -> Self {
+        let any = |verdict| verdicts.contains(&verdict);
+        if verdicts.is_empty() {
+            Self::NothingSelected
+        } else if any(Verdict::Aborted) {
+            Self::Usage
+        } else if any(Verdict::Failed) {
+            Self::Failed
+        } else if any(Verdict::Inconclusive) || require_all && any(Verdict::Skipped) {
+            Self::Incomplete
+        } else {
+            Self::Passed
+        }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}

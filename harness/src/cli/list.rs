@@ -1,0 +1,54 @@
+//! `drivebench list`.
+
+use super::args::Selection;
+use super::exit::Exit;
+use super::output::Output;
+use super::run::select;
+use std::fmt::Write as _;
+
+/// Shows what scenarios there are.
+pub(super) fn list(selection: &Selection, output: &mut Output) -> std::io::Result<Exit> {
+    let entries = match select(selection, None) {
+        Ok(entries) => entries,
+        Err(errors) => {
+            errors.iter().for_each(|error| output.library_error(error));
+            return Ok(Exit::Usage);
+        }
+    };
+    if entries.is_empty() {
+        output.complain("no scenario was selected");
+        return Ok(Exit::NothingSelected);
+    }
+    let mut text = String::new();
+    for entry in &entries {
+        let sources: Vec<_> = entry
+            .scenario
+            .sources
+            .iter()
+            .map(|s| s.text.as_str())
+            .collect();
+        let rings: Vec<_> = entry
+            .scenario
+            .rings
+            .iter()
+            .map(|ring| {
+                if ring.smallest == ring.largest {
+                    ring.smallest.to_string()
+                } else {
+                    format!("{}..{}", ring.smallest, ring.largest)
+                }
+            })
+            .collect();
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(
+            text,
+            "{:44} ring {:8} {:26} {}",
+            entry.short_name(),
+            rings.join(", "),
+            sources.join(", "),
+            entry.scenario.title
+        );
+    }
+    output.result(&text)?;
+    Ok(Exit::Passed)
+}

@@ -1,0 +1,62 @@
+//! The command line of `drivebench`: standard output is for results, standard error for people.
+
+mod args;
+mod check;
+mod exit;
+mod list;
+mod man;
+mod manual;
+mod output;
+mod run;
+mod trace;
+
+pub use args::Arguments;
+pub use exit::Exit;
+
+use args::{Command, RunArguments};
+use clap::Parser;
+use output::Output;
+use std::process::ExitCode;
+
+/// Runs the program with the arguments of the process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            let exit = if error.use_stderr() {
+                Exit::Usage
+            } else {
+                Exit::Passed
+            };
+            // Where neither stream can be written to, the exit code still tells.
+            let _unwritable = error.print();
+            return exit.into();
+        }
+    };
+    let mut output = Output::new(arguments.color, arguments.progress);
+    let command = arguments
+        .command
+        .unwrap_or_else(|| Command::Run(RunArguments::default()));
+    match dispatch(command, &mut output) {
+        Ok(exit) => exit.into(),
+        // The reader of a pipe has seen enough: `drivebench list | head`.
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Exit::Passed.into(),
+        Err(error) => {
+            output.complain(&format!("failed to write: {error}"));
+            Exit::RigError.into()
+        }
+    }
+}
+
+fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
+    match command {
+        Command::Run(arguments) => run::run(&arguments, output),
+        Command::List(selection) => list::list(&selection, output),
+        Command::Check(arguments) => check::check(&arguments, output),
+        Command::Trace(arguments) => trace::trace(&arguments, output),
+        Command::Manual(arguments) => manual::manual(&arguments, output),
+        Command::Completions { shell } => man::completions(shell, output),
+        Command::Man { folder } => man::man(folder.as_deref(), output),
+    }
+}

@@ -1,0 +1,98 @@
+//! The two streams of the program, and how mistakes are shown on the second.
+
+use super::args::{Progress, When};
+use crate::library::LibraryError;
+use crate::scenario::problem::Problems;
+use crate::scenario::verdict::Verdict;
+use miette::{GraphicalReportHandler, GraphicalTheme};
+use std::io::{IsTerminal, Write};
+
+/// Where results and messages go.
+pub(super) struct Output {
+    colour_out: bool,
+    colour_err: bool,
+    pub(super) progress: bool,
+}
+
+impl Output {
+    pub(super) fn new(color: When, progress: Progress) -> Self {
+        let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        let colour = |terminal: bool| match color {
+            When::Always => true,
+            When::Never => false,
+            When::Auto => terminal && !no_color,
+        };
+        let err = std::io::stderr().is_terminal();
+        Self {
+            colour_out: colour(std::io::stdout().is_terminal()),
+            colour_err: colour(err),
+            progress: match progress {
+                Progress::Auto => err,
+                Progress::Bar => true,
+                Progress::None => false,
+            },
+        }
+    }
+
+    /// Writes a result.
+    pub(super) fn result(&mut self, text: &str) -> std::io::Result<()> {
+        let mut out = std::io::stdout().lock();
+        out.write_all(text.as_bytes())?;
+        out.flush()
+    }
+
+    /// Writes a message for people.
+    pub(super) fn complain(&mut self, text: &str) {
+        let label = paint("error", "1;31", self.colour_err);
+        self.say(&format!("{label}: {text}\n"));
+    }
+
+    /// Writes to standard error; where that is closed, nobody wants to read it.
+    pub(super) fn say(&mut self, text: &str) {
+        let _unwritable = std::io::stderr().lock().write_all(text.as_bytes());
+    }
+
+    /// Shows every mistake of a scenario with the line it stands in.
+    pub(super) fn mistakes(&mut self, problems: &Problems) {
+        let theme = if self.colour_err {
+            GraphicalTheme::unicode()
+        } else {
+            GraphicalTheme::unicode_nocolor()
+        };
+        let handler = GraphicalReportHandler::new_themed(theme).with_width(100);
+        for diagnostic in problems.diagnostics() {
+            let mut text = String::new();
+            if handler.render_report(&mut text, diagnostic).is_ok() {
+                self.say(&text);
+            }
+        }
+        self.complain(&problems.to_string());
+    }
+
+    /// Shows why there is no scenario.
+    pub(super) fn library_error(&mut self, error: &LibraryError) {
+        match error {
+            LibraryError::Mistakes(problems) => self.mistakes(problems),
+            other => self.complain(&other.to_string()),
+        }
+    }
+
+    /// A verdict for standard output, padded.
+    pub(super) fn verdict(&self, verdict: Verdict) -> String {
+        let colour = match verdict {
+            Verdict::Passed => "32",
+            Verdict::Skipped => "33",
+            Verdict::Inconclusive => "35",
+            Verdict::Failed | Verdict::Aborted => "1;31",
+        };
+        paint(&format!("{verdict:12}"), colour, self.colour_out)
+    }
+}
+
+fn paint(text: &str, colour: &str, on: bool) -> String {
+    if on {
+        format!("\x1b[{colour}m{text}\x1b[0m")
+    } else {
+        text.to_owned()
+    }
+}

@@ -1,0 +1,211 @@
+//! `drivebench run`.
+
+use super::args::{RunArguments, Selection};
+use super::exit::Exit;
+use super::output::Output;
+use crate::library::{Entry, LibraryError, sources};
+use crate::link::Link;
+use crate::report::mismatch::mismatch;
+use crate::scenario::run::{Finding, Outcome, run as play};
+use crate::scenario::simulate::simulated;
+use crate::scenario::syntax::Bus;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+use harness_sim::trace::Trace;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::fmt::Write as _;
+
+/// Reads every scenario selected; a ring size is taken where the scenario allows it.
+///
+/// # Errors
+/// The first file that is not there, or the mistakes of every scenario that has some.
+pub(super) fn select(
+    selection: &Selection,
+    ring: Option<u8>,
+) -> Result<Vec<Entry>, Vec<LibraryError>> {
+    let sources = sources(&selection.paths).map_err(|error| vec![error])?;
+    let mut entries = Vec::new();
+    let mut errors: Vec<LibraryError> = Vec::new();
+    for source in sources {
+        match Entry::new(source.clone(), None) {
+            Ok(entry) => {
+                let fits = |size: &u8| {
+                    let first = entry.scenario.rings.first();
+                    first.is_some_and(|range| (range.smallest..=range.largest).contains(size))
+                };
+                match ring.filter(fits) {
+                    None => entries.push(entry),
+                    size => match Entry::new(source, size) {
+                        Ok(entry) => entries.push(entry),
+                        Err(problems) => errors.push(problems.into()),
+                    },
+                }
+            }
+            Err(problems) => errors.push(problems.into()),
+        }
+    }
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    if let Some(text) = &selection.filter {
+        entries.retain(|entry| entry.matches(text));
+    }
+    Ok(entries)
+}
+
+/// Plays scenarios, one line each.
+pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let entries = match select(&arguments.selection, arguments.ring) {
+        Ok(entries) => entries,
+        Err(errors) => {
+            errors.iter().for_each(|error| output.library_error(error));
+            output.say("nothing was played\n");
+            return Ok(Exit::Usage);
+        }
+    };
+    if entries.is_empty() {
+        output.complain("no scenario was selected; `drivebench list` shows what there is");
+        return Ok(Exit::NothingSelected);
+    }
+    let bar = progress_bar(entries.len(), output.progress);
+    let mut verdicts = Vec::new();
+    let mut took = Span::ZERO;
+    for entry in &entries {
+        bar.set_message(entry.short_name().to_owned());
+        let played = play_entry(entry);
+        let outcome = &played.outcome;
+        took = took + outcome.took;
+        verdicts.push(outcome.verdict);
+        let line = line(entry, outcome, output);
+        bar.suspend(|| output.result(&line))?;
+        let details = details(entry, &played);
+        bar.suspend(|| output.say(&details));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    output.result(&summary(&verdicts, took))?;
+    Ok(Exit::of(&verdicts, arguments.require_all))
+}
+
+/// A scenario that was played, with what it left.
+pub(super) struct Played {
+    pub(super) outcome: Outcome,
+    pub(super) traces: Vec<Trace>,
+}
+
+/// Plays a scenario on simulated rings.
+pub(super) fn play_entry(entry: &Entry) -> Played {
+    let Some(plan) = &entry.plan else {
+        let name = Bus::NAMES
+            .iter()
+            .find(|(_, bus)| *bus == entry.scenario.bus);
+        let bus = name.map_or("", |(name, _)| name);
+        return Played {
+            outcome: Outcome {
+                verdict: Verdict::Skipped,
+                finding: None,
+                remarks: vec![format!("the bench has no bus `{bus}` yet")],
+                took: Span::ZERO,
+            },
+            traces: Vec::new(),
+        };
+    };
+    let mut link = simulated(plan);
+    let outcome = play(plan, &mut link);
+    Played {
+        outcome,
+        traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
+    }
+}
+
+fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
+    let rings = entry.plan.iter().flat_map(|plan| &plan.rings);
+    let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
+    format!(
+        "{} {:44} {:>5} drives {:>12}  {}\n",
+        output.verdict(outcome.verdict).trim_end_matches(' '),
+        entry.short_name(),
+        drives.join("+"),
+        outcome.took.to_string(),
+        entry.scenario.title
+    )
+}
+
+/// What there is to say about a scenario beside its line, for people.
+pub(super) fn details(entry: &Entry, played: &Played) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    for remark in &played.outcome.remarks {
+        let _infallible = writeln!(text, "  note: {remark}");
+    }
+    if let Some(finding) = &played.outcome.finding {
+        text.push_str(&explain(entry, finding, &played.traces));
+    }
+    text
+}
+
+/// A finding: the line it is about, and the bytes that differ.
+fn explain(entry: &Entry, finding: &Finding, traces: &[Trace]) -> String {
+    let place = place(entry, finding);
+    let sources: Vec<_> = entry
+        .scenario
+        .sources
+        .iter()
+        .map(|s| s.text.clone())
+        .collect();
+    let mut text = format!("\n{place}: {}\n", finding.message);
+    let line = entry.source.text.get(finding.span.start..finding.span.end);
+    for line in line.unwrap_or_default().lines() {
+        let _infallible = writeln!(text, "    {line}");
+    }
+    let bytes = mismatch(finding, traces, &sources);
+    if bytes.is_empty() {
+        if !sources.is_empty() {
+            let _infallible = writeln!(text, "see {}", sources.join(", "));
+        }
+    } else {
+        text.push('\n');
+        text.push_str(&bytes);
+    }
+    text.push('\n');
+    text
+}
+
+/// `file:line:column` of a finding.
+fn place(entry: &Entry, finding: &Finding) -> String {
+    let before = entry
+        .source
+        .text
+        .get(..finding.span.start)
+        .unwrap_or_default();
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+    format!("{}:{line}:{column}", entry.name)
+}
+
+fn summary(verdicts: &[Verdict], took: Span) -> String {
+    let count = |wanted: Verdict| verdicts.iter().filter(|v| **v == wanted).count();
+    let mut text = format!(
+        "{} passed, {} failed",
+        count(Verdict::Passed),
+        count(Verdict::Failed)
+    );
+    for verdict in [Verdict::Skipped, Verdict::Inconclusive, Verdict::Aborted] {
+        if count(verdict) > 0 {
+            let _infallible = write!(text, ", {} {verdict}", count(verdict));
+        }
+    }
+    let _infallible = writeln!(text, " ({} scenarios, {took} on the line)", verdicts.len());
+    text
+}
+
+fn progress_bar(length: usize, shown: bool) -> ProgressBar {
+    let target = if shown && length > 1 {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::with_draw_target(Some(length as u64), target).with_style(style)
+}

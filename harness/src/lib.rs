@@ -1,0 +1,14 @@
+//! drivebench: a test bench for serial servo drives, physical or simulated.
+//!
+//! A [`scenario`] is a conversation with a bus in the manual's own notation. It is played on a
+//! [`link`], which is the ring as the master sees it; what came of it is shown by a [`report`]. The
+//! buses themselves are in `harness_proto`, the simulated rings in `harness_sim`.
+#![forbid(unsafe_code)]
+
+pub mod cli;
+pub mod library;
+pub mod link;
+pub mod locate;
+pub mod manual;
+pub mod report;
+pub mod scenario;

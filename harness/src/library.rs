@@ -1,0 +1,226 @@
+//! Where scenarios come from: the files and folders that are named, or the built-in ones.
+
+use crate::scenario::parse::parse;
+use crate::scenario::plan::{Plan, plan};
+use crate::scenario::problem::{Problems, nearest};
+use crate::scenario::source::{Source, SourceError};
+use crate::scenario::syntax::Scenario;
+use include_dir::{Dir, include_dir};
+use std::path::{Path, PathBuf};
+
+/// The scenarios that the binary carries.
+static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/scenarios");
+
+/// The ending of a scenario's file name.
+pub const ENDING: &str = "scn";
+
+/// The most files that are taken from a folder.
+const MAX_FILES: usize = 10_000;
+/// How deep folders are searched.
+const MAX_DEPTH: usize = 16;
+
+/// Why there is no scenario.
+#[derive(Debug, thiserror::Error)]
+pub enum LibraryError {
+    /// Neither a path nor the name of a built-in scenario.
+    #[error("failed to find {name}: neither a file or folder nor a built-in scenario{}", suggestion(.near.as_deref()))]
+    NotFound {
+        /// What was asked for.
+        name: String,
+        /// The nearest built-in name.
+        near: Option<String>,
+    },
+    /// A folder cannot be read.
+    #[error("failed to read the folder {folder}: {error}")]
+    Folder {
+        /// The folder.
+        folder: String,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// A folder holds more than we take.
+    #[error(
+        "{folder} holds more than {MAX_FILES} scenarios, or folders nest deeper than {MAX_DEPTH}"
+    )]
+    TooMany {
+        /// The folder.
+        folder: String,
+    },
+    /// A file is no scenario.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// A scenario has mistakes.
+    #[error(transparent)]
+    Mistakes(#[from] Box<Problems>),
+}
+
+fn suggestion(near: Option<&str>) -> String {
+    match near {
+        Some(near) => format!("; did you mean `{near}`?"),
+        None => "; `drivebench list` shows the built-in ones".to_owned(),
+    }
+}
+
+/// A scenario, read and settled, and not yet played.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// Where it comes from, for messages: a path or the name of a built-in scenario.
+    pub name: String,
+    /// Its text.
+    pub source: Source,
+    /// What it says.
+    pub scenario: Scenario,
+    /// The same for rings of given sizes; `None` for a bus that is not built yet.
+    pub plan: Option<Plan>,
+}
+
+impl Entry {
+    /// Reads and settles a scenario, for a ring of `size` where that is given.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
+        let scenario = parse(&source)?;
+        let plan = if scenario.bus == crate::scenario::syntax::Bus::Novobus {
+            Some(plan(&scenario, &source, size)?)
+        } else {
+            None
+        };
+        Ok(Self {
+            name: source.name.clone(),
+            source,
+            scenario,
+            plan,
+        })
+    }
+
+    /// The name without folders and ending.
+    #[must_use]
+    pub fn short_name(&self) -> &str {
+        Path::new(&self.name)
+            .file_stem()
+            .and_then(|stem| stem.to_str())
+            .unwrap_or(&self.name)
+    }
+
+    /// Whether the text occurs in the name, the title or a source.
+    #[must_use]
+    pub fn matches(&self, text: &str) -> bool {
+        let text = text.to_lowercase();
+        let mut places = self
+            .scenario
+            .sources
+            .iter()
+            .map(|source| source.text.as_str());
+        [self.name.as_str(), self.scenario.title.as_str()]
+            .into_iter()
+            .chain(places.by_ref())
+            .any(|place| place.to_lowercase().contains(&text))
+    }
+}
+
+/// The text of every scenario named: files, folders with all that is in them, built-in ones by name. A
+/// path wins. Without names, all built-in ones.
+///
+/// # Errors
+/// Something named is not there or cannot be read.
+pub fn sources(names: &[PathBuf]) -> Result<Vec<Source>, LibraryError> {
+    if names.is_empty() {
+        return built_in();
+    }
+    let mut sources = Vec::new();
+    for name in names {
+        if name.is_dir() {
+            let mut files = Vec::new();
+            search(name, 0, &mut files)?;
+            files.sort();
+            for file in files {
+                sources.push(Source::read(&file)?);
+            }
+        } else if name.exists() {
+            sources.push(Source::read(name)?);
+        } else {
+            sources.push(built_in_named(name)?);
+        }
+    }
+    Ok(sources)
+}
+
+fn search(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), LibraryError> {
+    let unreadable = |error| LibraryError::Folder {
+        folder: folder.display().to_string(),
+        error,
+    };
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if path.is_dir() && depth < MAX_DEPTH {
+            search(&path, depth + 1, files)?;
+        } else if path.extension().is_some_and(|ending| ending == ENDING) {
+            files.push(path);
+        }
+        if files.len() > MAX_FILES || depth == MAX_DEPTH {
+            return Err(LibraryError::TooMany {
+                folder: folder.display().to_string(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn built_in() -> Result<Vec<Source>, LibraryError> {
+    let mut files = Vec::new();
+    collect(&BUILT_IN, &mut files);
+    let mut sources = files
+        .into_iter()
+        .map(|(name, bytes)| Source::from_bytes(name, bytes.to_vec()))
+        .collect::<Result<Vec<_>, _>>()?;
+    sources.sort_by(|a, b| natural(&a.name).cmp(&natural(&b.name)));
+    Ok(sources)
+}
+
+/// Numbers in a name sort as numbers: 9.7 before 10.1.
+fn natural(name: &str) -> Vec<(u64, &str)> {
+    name.split_inclusive(|c: char| !c.is_ascii_digit())
+        .map(|part| {
+            let digits = part.trim_end_matches(|c: char| !c.is_ascii_digit());
+            (digits.parse().unwrap_or(u64::MAX), part)
+        })
+        .collect()
+}
+
+fn collect<'a>(dir: &'a Dir<'a>, files: &mut Vec<(String, &'a [u8])>) {
+    for file in dir.files() {
+        if file
+            .path()
+            .extension()
+            .is_some_and(|ending| ending == ENDING)
+        {
+            files.push((file.path().display().to_string(), file.contents()));
+        }
+    }
+    for inner in dir.dirs() {
+        collect(inner, files);
+    }
+}
+
+fn built_in_named(name: &Path) -> Result<Source, LibraryError> {
+    let wanted = name.display().to_string();
+    let bare = |name: &str| name.trim_end_matches(".scn").to_owned();
+    let last = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
+    let sources = built_in()?;
+    let found = sources.iter().find(|source| {
+        bare(&source.name) == bare(&wanted) || bare(&last(&source.name)) == bare(&wanted)
+    });
+    if let Some(source) = found {
+        return Ok(source.clone());
+    }
+    let names: Vec<_> = sources
+        .iter()
+        .map(|source| bare(&last(&source.name)))
+        .collect();
+    let known: Vec<_> = names.iter().map(String::as_str).collect();
+    Err(LibraryError::NotFound {
+        near: nearest(&bare(&last(&wanted)), &known).map(str::to_owned),
+        name: wanted,
+    })
+}

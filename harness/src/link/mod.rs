@@ -1,0 +1,126 @@
+//! What a scenario is played on: a ring as the master sees it, and what else can be seen and done there.
+//!
+//! A scenario sees a link and nothing behind it. Each link says what it can observe and inject; what it
+//! cannot makes a scenario that needs it skipped, never wrong.
+
+mod sim;
+
+pub use sim::SimulatedLink;
+
+use harness_proto::line::Received;
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::{Instant, Span};
+use harness_sim::fault::{DriveFault, LinkFault};
+use harness_sim::trace::Trace;
+
+/// What a rig can be asked to have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Capability {
+    /// Bytes on inner links can be changed.
+    Interposer,
+    /// Bytes on inner links can be seen.
+    Tap,
+    /// Drives' cells can be set and read beside the bus.
+    Memory,
+    /// Drives can be switched off and on.
+    Power,
+    /// Drives may turn.
+    Motion,
+    /// EEPROM may be written.
+    Eeprom,
+    /// Drives may be reset.
+    Reset,
+    /// Two rings.
+    TwoRings,
+}
+
+impl Capability {
+    /// The names in a scenario.
+    pub const NAMES: [(&'static str, Self); 8] = [
+        ("interposer", Self::Interposer),
+        ("tap", Self::Tap),
+        ("memory", Self::Memory),
+        ("power", Self::Power),
+        ("motion", Self::Motion),
+        ("eeprom", Self::Eeprom),
+        ("reset", Self::Reset),
+        ("two-rings", Self::TwoRings),
+    ];
+
+    /// The name in a scenario.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        Self::NAMES
+            .iter()
+            .find(|(_, capability)| *capability == self)
+            .map_or("", |(name, _)| name)
+    }
+}
+
+/// A fault, where it happens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlacedFault {
+    /// On a link of the ring: 0 is the master's outgoing one, N the one that ends at the master.
+    Link(usize, LinkFault),
+    /// In a drive.
+    Drive(u8, DriveFault),
+}
+
+/// When a fault happens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// Now; what needs a byte takes the next one.
+    Now,
+    /// At the n-th byte since the start, counted from 1.
+    Byte(u64),
+    /// At this time.
+    At(Instant),
+}
+
+/// One or two rings as the master sees them.
+pub trait Link {
+    /// What this link can do beside sending and receiving.
+    fn capabilities(&self) -> &[Capability];
+
+    /// How long a byte takes.
+    fn byte_time(&self) -> Span;
+
+    /// The time.
+    fn now(&self) -> Instant;
+
+    /// Sends bytes one after another, behind what is still to be sent. Returns when the last one will
+    /// have left.
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant;
+
+    /// The next byte received that nobody has fetched.
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)>;
+
+    /// Lets time pass until something happens, at most until `until`. False where nothing ever will
+    /// unless the master sends.
+    fn wait(&mut self, until: Instant) -> bool;
+
+    /// Whether bytes of the master's are still on their way round.
+    fn busy(&self) -> bool;
+
+    /// Lets a fault happen.
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment);
+
+    /// What the master receives when it goes on with `count` SYNCO, so that a ring in the error mode
+    /// can spell out its address. Where a link can, it leaves no trace of this.
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received>;
+
+    /// Whether a drive is in the error mode, and why; `None` where this cannot be seen.
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>>;
+
+    /// A drive's cell; `None` where this cannot be seen.
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8>;
+
+    /// Faults whose moment never came, in words.
+    fn unused_faults(&self) -> Vec<String>;
+
+    /// How many drives a ring has.
+    fn drives(&self, ring: usize) -> u8;
+
+    /// Everything seen on a ring.
+    fn trace(&self, ring: usize) -> Trace;
+}

@@ -1,0 +1,192 @@
+//! A link to simulated rings, in virtual time.
+
+use super::{Capability, Link, Moment, PlacedFault};
+use harness_proto::line::Received;
+use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::sync::SYNCO;
+use harness_proto::time::{Instant, Span};
+use harness_sim::bench::Bench;
+use harness_sim::device::Device;
+use harness_sim::plain::PlainDrive;
+use harness_sim::ring::Ring;
+use harness_sim::trace::Trace;
+use std::collections::VecDeque;
+
+/// One or two simulated rings of plain drives.
+#[derive(Clone, Debug)]
+pub struct SimulatedLink {
+    bench: Bench<PlainDrive>,
+    byte_time: Span,
+    /// Faults that wait for their time, in order of it.
+    scheduled: VecDeque<(Instant, usize, PlacedFault)>,
+}
+
+const CAPABILITIES: [Capability; 8] = [
+    Capability::Interposer,
+    Capability::Tap,
+    Capability::Memory,
+    Capability::Power,
+    Capability::Motion,
+    Capability::Eeprom,
+    Capability::Reset,
+    Capability::TwoRings,
+];
+
+impl SimulatedLink {
+    /// A link to the rings of a bench.
+    #[must_use]
+    pub fn new(bench: Bench<PlainDrive>) -> Self {
+        let byte_time = bench.rings().first().map_or(Span::ZERO, Ring::byte_time);
+        Self {
+            bench,
+            byte_time,
+            scheduled: VecDeque::new(),
+        }
+    }
+
+    fn ring(&self, ring: usize) -> Option<&Ring<PlainDrive>> {
+        self.bench.rings().get(ring)
+    }
+
+    fn suffer(&mut self, ring: usize, fault: PlacedFault) {
+        let Some(ring) = self.bench.ring_mut(ring) else {
+            return;
+        };
+        match fault {
+            PlacedFault::Link(link, fault) => ring.suffer_link(link, fault),
+            PlacedFault::Drive(drive, fault) => ring.suffer_drive(drive, fault),
+        }
+    }
+}
+
+impl Link for SimulatedLink {
+    fn capabilities(&self) -> &[Capability] {
+        &CAPABILITIES
+    }
+
+    fn byte_time(&self) -> Span {
+        self.byte_time
+    }
+
+    fn now(&self) -> Instant {
+        self.bench.now()
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        let now = self.now();
+        self.bench.ring_mut(ring).map_or(now, |ring| {
+            ring.send(now, bytes);
+            ring.sent_by()
+        })
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        let ring = self.bench.ring_mut(ring)?;
+        loop {
+            let byte = ring.receive()?;
+            if let Some(received) = byte.arrival() {
+                return Some((byte.at, received));
+            }
+        }
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        let event = self.bench.next_event();
+        let fault = self.scheduled.front().map(|(at, ..)| *at);
+        let next = event.into_iter().chain(fault).min();
+        self.bench.run_until(next.unwrap_or(until).min(until));
+        while let Some(&(at, ring, fault)) = self.scheduled.front()
+            && at <= self.now()
+        {
+            self.scheduled.pop_front();
+            self.suffer(ring, fault);
+        }
+        next.is_some()
+    }
+
+    fn busy(&self) -> bool {
+        self.bench.busy()
+    }
+
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        match moment {
+            Moment::Now => self.suffer(ring, fault),
+            Moment::At(at) => {
+                let place = self.scheduled.partition_point(|(other, ..)| *other <= at);
+                self.scheduled.insert(place, (at, ring, fault));
+            }
+            Moment::Byte(byte) => {
+                let Some(ring) = self.bench.ring_mut(ring) else {
+                    return;
+                };
+                match fault {
+                    PlacedFault::Link(link, fault) => ring.arm_link(link, byte, fault),
+                    PlacedFault::Drive(drive, fault) => ring.arm_drive(drive, byte, fault),
+                }
+            }
+        }
+    }
+
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+        let mut copy = self.clone();
+        while copy.receive(ring).is_some() {}
+        copy.send(ring, &vec![SYNCO; count]);
+        let mut bytes = Vec::new();
+        while copy.busy() && copy.wait(Instant::NEVER) {
+            while let Some((_, byte)) = copy.receive(ring) {
+                bytes.push(byte);
+            }
+        }
+        bytes
+    }
+
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
+        let device = self.ring(ring)?.drive(drive)?;
+        Some(device.cause().filter(|_| device.in_error()))
+    }
+
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
+        Some(self.ring(ring)?.drive(drive)?.memory().peek(address))
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        let mut unused = Vec::new();
+        for (index, ring) in self.bench.rings().iter().enumerate() {
+            let prefix = if index == 0 { "" } else { "2:" };
+            for (link, byte, fault) in ring.unused_link_faults() {
+                let size = usize::from(ring.size().drives());
+                let end = |place: usize| {
+                    if place == 0 || place > size {
+                        "master".to_owned()
+                    } else {
+                        (size - place).to_string()
+                    }
+                };
+                let (from, to) = (end(link), end(link + 1));
+                unused.push(format!("{prefix}{from}->{to} byte {byte}: {fault}"));
+            }
+            for (drive, byte, fault) in ring.unused_drive_faults() {
+                unused.push(format!("drive {prefix}{drive} byte {byte}: {fault}"));
+            }
+        }
+        for (at, _, _) in &self.scheduled {
+            unused.push(format!("a fault at {at}"));
+        }
+        unused
+    }
+
+    fn drives(&self, ring: usize) -> u8 {
+        self.ring(ring).map_or(0, |ring| ring.size().drives())
+    }
+
+    fn trace(&self, ring: usize) -> Trace {
+        self.ring(ring).map_or(
+            Trace {
+                drives: 0,
+                links: Vec::new(),
+                marks: Vec::new(),
+            },
+            Ring::trace,
+        )
+    }
+}

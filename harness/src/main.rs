@@ -1,0 +1,7 @@
+//! The `drivebench` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    harness::cli::main()
+}

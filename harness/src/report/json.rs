@@ -1,0 +1,129 @@
+//! A trace as one JSON object for tools (`drivebench trace --format json`).
+//!
+//! The form is fixed by `"schema": 1`: keys may be added, none is taken away or changed.
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `ring` | how many drives the ring has |
+//! | `links` | the links in ring order, from the master's outgoing to its incoming one |
+//! | `from`, `to` | the ends of a link: `"master"` or a drive's number |
+//! | `bytes` | what the link carried, in order |
+//! | `t_ns` | when the byte's stop bit had passed, in nanoseconds since the start, cut off below |
+//! | `sent` | what the transmitter put on the wire; `null` for a byte that nobody sent |
+//! | `received` | what the receiver read after any fault; `null` where nothing arrived |
+//! | `error` | `null`, `"parity"`, `"framing"`, `"break"`, `"overrun"` or `"dropped"` |
+//! | `marks` | what the drives remarked, in order of time |
+//! | `byte` | at which byte of the drive's inbound link, counted from 1 (at a time-out, the last before it) |
+//! | `kind` | `detected` (!), `upstream` (*), `seventeenth` (#), `sequence` (@) or `recovered` |
+//! | `cause` | for `detected`: `parity`, `framing`, `overrun`, `sync`, `command`, `parameter`, `checksum` or `time-out`; otherwise `null` |
+//! | `second` | the same object for the second ring, where there is one |
+
+use harness_proto::novobus::error_mode::Marks;
+use harness_sim::link::LineByte;
+use harness_sim::trace::{LinkTrace, Mark, Trace};
+use serde::Serialize;
+
+/// The version of the form.
+pub const SCHEMA: u32 = 1;
+
+#[derive(Serialize)]
+struct Object<'a> {
+    schema: u32,
+    ring: u8,
+    links: Vec<LinkObject<'a>>,
+    marks: Vec<MarkObject>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<Box<Object<'a>>>,
+}
+
+#[derive(Serialize)]
+struct LinkObject<'a> {
+    from: String,
+    to: String,
+    #[serde(serialize_with = "bytes")]
+    bytes: &'a [LineByte],
+}
+
+#[derive(Serialize)]
+struct ByteObject {
+    t_ns: u64,
+    sent: Option<u8>,
+    received: Option<u8>,
+    error: Option<&'static str>,
+}
+
+#[derive(Serialize)]
+struct MarkObject {
+    drive: u8,
+    byte: u64,
+    t_ns: u64,
+    kind: &'static str,
+    cause: Option<&'static str>,
+}
+
+/// The traces of one or two rings as a line of JSON.
+///
+/// # Errors
+/// Writing failed; it cannot for a trace.
+pub fn to_string(traces: &[Trace]) -> Result<String, serde_json::Error> {
+    let second = traces.get(1).map(|trace| Box::new(object(trace, None)));
+    match traces.first() {
+        Some(first) => serde_json::to_string(&object(first, second)),
+        None => Ok("null".to_owned()),
+    }
+}
+
+fn object<'a>(trace: &'a Trace, second: Option<Box<Object<'a>>>) -> Object<'a> {
+    Object {
+        schema: SCHEMA,
+        ring: trace.drives,
+        links: trace.links.iter().map(link).collect(),
+        marks: trace.marks.iter().flat_map(marks).collect(),
+        second,
+    }
+}
+
+fn link(link: &LinkTrace) -> LinkObject<'_> {
+    let end = |end: Option<u8>| end.map_or("master".to_owned(), |drive| drive.to_string());
+    LinkObject {
+        from: end(link.from),
+        to: end(link.to),
+        bytes: &link.bytes,
+    }
+}
+
+fn bytes<S: serde::Serializer>(bytes: &&[LineByte], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(bytes.iter().map(|byte| ByteObject {
+        t_ns: byte.at.since_start().as_nanos(),
+        sent: byte.sent,
+        received: byte.received,
+        error: match (byte.received, byte.error) {
+            (None, _) => Some("dropped"),
+            (_, error) => error.map(harness_proto::line::LineError::name),
+        },
+    }))
+}
+
+fn marks(mark: &Mark) -> Vec<MarkObject> {
+    const KINDS: [(Marks, &str); 5] = [
+        (Marks::DETECTED, "detected"),
+        (Marks::UPSTREAM, "upstream"),
+        (Marks::SEVENTEENTH, "seventeenth"),
+        (Marks::SEQUENCE, "sequence"),
+        (Marks::RECOVERED, "recovered"),
+    ];
+    KINDS
+        .into_iter()
+        .filter(|(kind, _)| mark.marks.contains(*kind))
+        .map(|(kind, name)| MarkObject {
+            drive: mark.drive,
+            byte: mark.byte,
+            t_ns: mark.at.since_start().as_nanos(),
+            kind: name,
+            cause: mark
+                .cause
+                .filter(|_| kind == Marks::DETECTED)
+                .map(harness_proto::novobus::error::BusError::name),
+        })
+        .collect()
+}

@@ -1,0 +1,5 @@
+//! Reports: pure functions of a finished run.
+
+pub mod json;
+pub mod mismatch;
+pub mod table;

@@ -1,0 +1,193 @@
+//! Checks: `? located 97`, `? drive 3 memory FF08 = 1234`, `? error 0502 at 97`.
+
+use super::expression::{self, Located};
+use super::parse::{address, drives, equals, named};
+use super::pattern::{self, Pattern};
+use super::problem::{Problem, Spanned};
+use super::scanner::Scanner;
+use super::syntax::Drives;
+use super::times::{self, Duration};
+use harness_proto::novobus::error::BusError;
+
+/// What must hold at a point of a scenario.
+#[derive(Clone, Debug)]
+pub enum Check {
+    /// The ring spells out that this drive saw the fault (ND21 9.7).
+    Located(Drives),
+    /// It does so after at most so many zeros (ND21 9.7: 25).
+    Within(Located),
+    /// These drives are in the error mode, or are not.
+    InError {
+        /// Which drives.
+        drives: Drives,
+        /// Whether they are, or must not be.
+        expected: bool,
+    },
+    /// This drive's error mode has this cause.
+    Error {
+        /// The cause.
+        error: BusError,
+        /// Which drive.
+        drive: Drives,
+    },
+    /// A drive's cells hold these bytes.
+    Memory {
+        /// Which drives.
+        drives: Drives,
+        /// From which address on.
+        address: Spanned<u16>,
+        /// What.
+        bytes: Pattern,
+    },
+    /// So many check sequences came back whole after an error.
+    Corrected(Located),
+    /// So many bytes were sent since the last check, and took this long.
+    Sent {
+        /// How many.
+        bytes: Located,
+        /// How long, to the last digit written.
+        time: Option<Duration>,
+    },
+    /// So many bytes were received since the start.
+    Received(Located),
+}
+
+/// Reads what stands behind `?`.
+pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
+    #[derive(Clone, Copy)]
+    enum Word {
+        Located,
+        Within,
+        Drive,
+        Error,
+        Corrected,
+        Sent,
+        Received,
+    }
+    let words = [
+        ("located", Word::Located),
+        ("within", Word::Within),
+        ("drive", Word::Drive),
+        ("drives", Word::Drive),
+        ("error", Word::Error),
+        ("corrected", Word::Corrected),
+        ("sent", Word::Sent),
+        ("received", Word::Received),
+    ];
+    match named(scanner, &words, "a check")? {
+        Word::Located => Ok(Check::Located(one_drive(scanner)?)),
+        Word::Within => {
+            let zeros = expression::sum(scanner)?;
+            required(scanner, &["zeros", "zero"])?;
+            Ok(Check::Within(zeros))
+        }
+        Word::Drive => drive_check(scanner),
+        Word::Error => {
+            let error = error_code(scanner)?;
+            required(scanner, &["at"])?;
+            scanner.eat_word("drive");
+            let drive = one_drive(scanner)?;
+            Ok(Check::Error { error, drive })
+        }
+        Word::Corrected => Ok(Check::Corrected(expression::sum(scanner)?)),
+        Word::Sent => {
+            let bytes = expression::sum(scanner)?;
+            required(scanner, &["bytes", "byte"])?;
+            let time = if scanner.eat_word("in") {
+                Some(times::duration(scanner)?)
+            } else {
+                None
+            };
+            Ok(Check::Sent { bytes, time })
+        }
+        Word::Received => {
+            let bytes = expression::sum(scanner)?;
+            required(scanner, &["bytes", "byte"])?;
+            Ok(Check::Received(bytes))
+        }
+    }
+}
+
+fn drive_check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
+    #[derive(Clone, Copy)]
+    enum Word {
+        Memory,
+        In,
+        Not,
+        Normal,
+    }
+    let drives = drives(scanner)?;
+    let words = [
+        ("memory", Word::Memory),
+        ("in", Word::In),
+        ("not", Word::Not),
+        ("normal", Word::Normal),
+    ];
+    let expected = match named(scanner, &words, "what must hold")? {
+        Word::Memory => {
+            let address = address(scanner)?;
+            equals(scanner)?;
+            let bytes = pattern::pattern(scanner)?;
+            return Ok(Check::Memory {
+                drives,
+                address,
+                bytes,
+            });
+        }
+        Word::Normal => {
+            return Ok(Check::InError {
+                drives,
+                expected: false,
+            });
+        }
+        Word::In => true,
+        Word::Not => {
+            required(scanner, &["in"])?;
+            false
+        }
+    };
+    required(scanner, &["error"])?;
+    Ok(Check::InError { drives, expected })
+}
+
+fn one_drive(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
+    let drives = drives(scanner)?;
+    match &drives.to {
+        None => Ok(drives),
+        Some(to) => Err(Problem::new(
+            to.span,
+            "several drives stand where one is expected",
+            "one drive expected here",
+        )),
+    }
+}
+
+fn required(scanner: &mut Scanner<'_>, words: &[&str]) -> Result<(), Problem> {
+    if words.iter().any(|word| scanner.eat_word(word)) {
+        return Ok(());
+    }
+    let mut ahead = scanner.clone();
+    let found = ahead.chunk().value;
+    Err(scanner
+        .unexpected(&format!("`{}`", words[0]))
+        .did_you_mean(found, words))
+}
+
+fn error_code(scanner: &mut Scanner<'_>) -> Result<BusError, Problem> {
+    let before = scanner.clone();
+    let word = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '-');
+    let known = word.and_then(|word| {
+        let by_code = u16::from_str_radix(word.value, 16).ok();
+        by_code.and_then(BusError::from_code).or_else(|| {
+            BusError::ALL.into_iter().find(|error| {
+                error.printed_name().eq_ignore_ascii_case(word.value) || error.name() == word.value
+            })
+        })
+    });
+    known.ok_or_else(|| {
+        *scanner = before;
+        scanner
+            .unexpected("an error code from 0501 to 0508 (ND21 14.11.14)")
+            .help("0501 SCIoverrun, 0502 SCIparity, 0503 SCIframing, 0504 NBsync, 0505 NBcommand, 0506 NBparam, 0507 NBchecksum, 0508 NBtimeout")
+    })
+}

@@ -1,0 +1,459 @@
+//! From text to a [`Scenario`]: the header, then the steps, one line each.
+
+use super::expression;
+use super::pattern;
+use super::problem::{Problem, Problems, Span, Spanned};
+use super::scanner::Scanner;
+use super::source::Source;
+use super::step;
+use super::syntax::{Bus, Citation, Drives, RingRange, Scenario, Setup, SetupKind};
+use super::times;
+use crate::link::Capability;
+use harness_proto::line::Rate;
+use harness_proto::nd21;
+use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
+use harness_proto::novobus::properties::PROPERTIES;
+
+/// The most lines of a scenario.
+const MAX_LINES: usize = 20_000;
+
+const HEADER_WORDS: [&str; 9] = [
+    "title", "source", "bus", "ring", "drive", "needs", "line", "strict", "deadline",
+];
+
+/// Reads a scenario.
+///
+/// # Errors
+/// Every line that is no line of the language, or a header that is not complete.
+pub fn parse(source: &Source) -> Result<Scenario, Problems> {
+    let mut reader = Reader::default();
+    let mut offset = 0;
+    for (number, line) in source.text.split('\n').enumerate() {
+        if number == MAX_LINES {
+            reader.problems.push(Problem::new(
+                Span {
+                    start: offset,
+                    end: offset,
+                },
+                format!("the scenario has more than {MAX_LINES} lines"),
+                "the end of the file expected here",
+            ));
+            break;
+        }
+        let text = line.strip_suffix('\r').unwrap_or(line);
+        if let Err(problem) = reader.line(Scanner::new(text, offset)) {
+            reader.problems.push(problem);
+        }
+        offset += line.len() + 1;
+    }
+    reader
+        .finish()
+        .map_err(|problems| Problems::new(&source.name, source.text.clone(), problems))
+}
+
+#[derive(Default)]
+struct Reader {
+    title: Option<String>,
+    sources: Vec<Citation>,
+    bus: Option<Bus>,
+    rings: Option<Vec<RingRange>>,
+    rate: Option<Rate>,
+    setups: Vec<Setup>,
+    needs: Vec<Capability>,
+    strict: bool,
+    deadline: Option<times::Duration>,
+    steps: Vec<super::syntax::Step>,
+    problems: Vec<Problem>,
+}
+
+impl Reader {
+    fn line(&mut self, mut scanner: Scanner<'_>) -> Result<(), Problem> {
+        if scanner.at_end() {
+            return Ok(());
+        }
+        let before = scanner.clone();
+        let word = scanner.word();
+        let header = word.as_ref().filter(|w| HEADER_WORDS.contains(&w.value));
+        let Some(header) = header else {
+            let mut scanner = before;
+            self.steps.push(step::step(&mut scanner)?);
+            return Ok(());
+        };
+        if !self.steps.is_empty() {
+            return Err(Problem::new(
+                header.span,
+                format!("`{}` stands behind the first step", header.value),
+                "header lines come before all steps",
+            )
+            .help(format!(
+                "move the line up, above the first step (line `{}`)",
+                header.value
+            )));
+        }
+        self.header(header, &mut scanner)
+    }
+
+    fn header(&mut self, word: &Spanned<&str>, scanner: &mut Scanner<'_>) -> Result<(), Problem> {
+        match word.value {
+            "title" => {
+                let text = scanner.rest().to_owned();
+                if text.is_empty() {
+                    return Err(scanner.unexpected("a title"));
+                }
+                once(&mut self.title, text, word)
+            }
+            "source" => {
+                self.sources.push(citation(scanner)?);
+                Ok(())
+            }
+            "bus" => {
+                let bus = named(scanner, &Bus::NAMES, "a bus")?;
+                scanner.expect_end()?;
+                once(&mut self.bus, bus, word)
+            }
+            "ring" => {
+                let rings = rings(scanner)?;
+                once(&mut self.rings, rings, word)
+            }
+            "line" => {
+                let rate = rate(scanner)?;
+                once(&mut self.rate, rate, word)
+            }
+            "drive" => {
+                let setup = setup(scanner, word.span)?;
+                self.setups.push(setup);
+                Ok(())
+            }
+            "needs" => {
+                while !scanner.at_end() {
+                    let capability = named(scanner, &Capability::NAMES, "a capability")?;
+                    self.needs.push(capability);
+                    scanner.eat(",");
+                }
+                Ok(())
+            }
+            "strict" => {
+                self.strict = true;
+                scanner.expect_end()
+            }
+            _ => {
+                let deadline = times::duration(scanner)?;
+                scanner.expect_end()?;
+                once(&mut self.deadline, deadline, word)
+            }
+        }
+    }
+
+    fn finish(mut self) -> Result<Scenario, Vec<Problem>> {
+        let start = Span::default();
+        let title = self.title.take();
+        let rings = self.rings.take();
+        let bus = self.bus.unwrap_or(Bus::Novobus);
+        if title.is_none() && self.problems.is_empty() {
+            self.problems.push(
+                Problem::new(
+                    start,
+                    "the scenario has no title",
+                    "a `title` line expected",
+                )
+                .help("add a line such as `title   Parity error between drives 98 and 97`"),
+            );
+        }
+        let rings = match rings {
+            Some(rings) => rings,
+            None if bus == Bus::Novobus && self.problems.is_empty() => {
+                self.problems.push(
+                    Problem::new(
+                        start,
+                        "the scenario does not say how many drives its ring has",
+                        "a `ring` line expected",
+                    )
+                    .help("add a line such as `ring 4` or `ring 3..250 default 100`"),
+                );
+                Vec::new()
+            }
+            None => Vec::new(),
+        };
+        if !self.problems.is_empty() {
+            return Err(self.problems);
+        }
+        Ok(Scenario {
+            title: title.unwrap_or_default(),
+            sources: self.sources,
+            bus,
+            rings,
+            rate: self.rate.unwrap_or_default(),
+            setups: self.setups,
+            needs: self.needs,
+            strict: self.strict,
+            deadline: self.deadline,
+            steps: self.steps,
+        })
+    }
+}
+
+fn once<T>(place: &mut Option<T>, value: T, word: &Spanned<&str>) -> Result<(), Problem> {
+    if place.is_some() {
+        return Err(Problem::new(
+            word.span,
+            format!("`{}` stands twice", word.value),
+            "this line may stand once",
+        ));
+    }
+    *place = Some(value);
+    Ok(())
+}
+
+/// Reads one of a list of words.
+pub(super) fn named<T: Copy>(
+    scanner: &mut Scanner<'_>,
+    names: &[(&str, T)],
+    what: &str,
+) -> Result<T, Problem> {
+    let known: Vec<_> = names.iter().map(|(name, _)| *name).collect();
+    let before = scanner.clone();
+    let Some(word) = scanner.word() else {
+        return Err(scanner.unexpected(&format!("{what} ({})", known.join(", "))));
+    };
+    match names.iter().find(|(name, _)| *name == word.value) {
+        Some((_, value)) => Ok(*value),
+        None => {
+            *scanner = before;
+            Err(scanner
+                .unexpected(&format!("{what} ({})", known.join(", ")))
+                .did_you_mean(word.value, &known))
+        }
+    }
+}
+
+fn citation(scanner: &mut Scanner<'_>) -> Result<Citation, Problem> {
+    let here = scanner.here();
+    let text: Vec<_> = scanner.rest().split_whitespace().collect();
+    let span = Span {
+        start: here.start,
+        end: here.start + scanner.rest().len(),
+    };
+    if text.len() < 2 {
+        return Err(Problem::new(
+            span,
+            "a source is a document and a section",
+            "a document and a section expected here, such as `nd21 9.7`",
+        ));
+    }
+    Ok(Citation {
+        text: text.join(" "),
+        span,
+    })
+}
+
+/// `100`, `3..250 default 100`, and a second ring behind a comma.
+fn rings(scanner: &mut Scanner<'_>) -> Result<Vec<RingRange>, Problem> {
+    let mut rings = vec![ring_range(scanner)?];
+    if scanner.eat(",") {
+        rings.push(ring_range(scanner)?);
+    }
+    scanner.expect_end()?;
+    Ok(rings)
+}
+
+fn ring_range(scanner: &mut Scanner<'_>) -> Result<RingRange, Problem> {
+    let here = scanner.here();
+    let smallest = ring_size(scanner)?;
+    let largest = if scanner.eat("..") {
+        ring_size(scanner)?
+    } else {
+        smallest
+    };
+    let span = scanner.since(here);
+    if smallest > largest {
+        return Err(Problem::new(
+            span,
+            "the range of ring sizes ends before it begins",
+            "the smaller number comes first",
+        ));
+    }
+    let mut default = smallest;
+    if scanner.eat_word("default") {
+        let here = scanner.here();
+        default = ring_size(scanner)?;
+        if !(smallest..=largest).contains(&default) {
+            return Err(Problem::new(
+                scanner.since(here),
+                format!("the default {default} is outside the range"),
+                format!("a number from {smallest} to {largest} expected here"),
+            ));
+        }
+    }
+    Ok(RingRange {
+        smallest,
+        largest,
+        default,
+        span,
+    })
+}
+
+fn ring_size(scanner: &mut Scanner<'_>) -> Result<u8, Problem> {
+    let Some(digits) = scanner.take_while(|c| c.is_ascii_digit()) else {
+        return Err(scanner.unexpected("the number of drives in the ring"));
+    };
+    let number = digits.value.parse().unwrap_or(u64::MAX);
+    let size = RingSize::new(number).map_err(|error| {
+        Problem::new(
+            digits.span,
+            error.to_string(),
+            format!("1 to {MAX_DRIVES} expected here"),
+        )
+    })?;
+    Ok(size.drives())
+}
+
+/// `38400`, `19200 8O1`.
+fn rate(scanner: &mut Scanner<'_>) -> Result<Rate, Problem> {
+    let mut ahead = scanner.clone();
+    let digits = ahead.take_while(|c| c.is_ascii_digit());
+    let rate = digits
+        .and_then(|digits| digits.value.parse().ok())
+        .and_then(Rate::from_bits_per_second);
+    let Some(rate) = rate else {
+        return Err(scanner.unexpected("38400, 19200 or 9600 (ND21 8.3)"));
+    };
+    ahead.eat_word("bit/s");
+    let mut format = ahead.clone();
+    if !format.at_end() {
+        let chunk = format.chunk();
+        if !chunk.value.eq_ignore_ascii_case("8O1") {
+            return Err(ahead.unexpected("8O1: 8 data bits, odd parity, 1 stop bit (ND21 8.3)"));
+        }
+        ahead = format;
+    }
+    *scanner = ahead;
+    scanner.expect_end()?;
+    Ok(rate)
+}
+
+/// `95..99`, `N-1`, `2:0..last`.
+pub(super) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
+    let ring = ring_prefix(scanner);
+    let from = expression::sum(scanner)?;
+    let to = if scanner.eat("..") {
+        Some(expression::sum(scanner)?)
+    } else {
+        None
+    };
+    Ok(Drives { ring, from, to })
+}
+
+/// `2:` in front of a drive or a link of the second ring.
+pub(super) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
+    if scanner.eat("2:") {
+        return 1;
+    }
+    scanner.eat("1:");
+    0
+}
+
+fn setup(scanner: &mut Scanner<'_>, start: Span) -> Result<Setup, Problem> {
+    let drives = drives(scanner)?;
+    let what = named(
+        scanner,
+        &[("memory", 0), ("eeprom", 1), ("property", 2)],
+        "what to set",
+    )?;
+    let what = match what {
+        0 => {
+            let address = address(scanner)?;
+            equals(scanner)?;
+            SetupKind::Memory(address, pattern::pattern(scanner)?)
+        }
+        1 => {
+            let address = eeprom_address(scanner)?;
+            equals(scanner)?;
+            SetupKind::Eeprom(address, pattern::pattern(scanner)?)
+        }
+        _ => property(scanner)?,
+    };
+    scanner.expect_end()?;
+    Ok(Setup {
+        drives,
+        what,
+        span: scanner.since(start),
+    })
+}
+
+fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
+    let known: Vec<_> = PROPERTIES.iter().map(|p| (p.name, p.name)).collect();
+    let here = scanner.here();
+    let name = named(scanner, &known, "a property")?;
+    let name = Spanned {
+        value: name.to_owned(),
+        span: scanner.since(here),
+    };
+    equals(scanner)?;
+    if scanner.peek().is_some_and(|c| c.is_ascii_digit()) {
+        return Ok(SetupKind::Time(name, times::duration(scanner)?));
+    }
+    let Some(word) = scanner.word() else {
+        return Err(scanner.unexpected("a value"));
+    };
+    let word = Spanned {
+        value: word.value.to_owned(),
+        span: word.span,
+    };
+    Ok(SetupKind::Word(name, word))
+}
+
+pub(super) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
+    if scanner.eat("=") {
+        Ok(())
+    } else {
+        Err(scanner.unexpected("`=`"))
+    }
+}
+
+/// The cells that a scenario can call by their printed names (ND21 14.2.1).
+const CELLS: [(&str, u16); 7] = [
+    ("Status", nd21::STATUS),
+    ("DataIn", nd21::DATA_IN),
+    ("DataOut", nd21::DATA_OUT),
+    ("BusAddr", nd21::BUS_ADDR),
+    ("Flags2", nd21::FLAGS2),
+    ("errorcode", nd21::ERROR_CODE),
+    ("HwVersion", nd21::PARAMETERS),
+];
+
+/// A cell: four hexadecimal digits, or a name.
+pub(super) fn address(scanner: &mut Scanner<'_>) -> Result<Spanned<u16>, Problem> {
+    let before = scanner.clone();
+    let Some(word) = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '_') else {
+        return Err(scanner.unexpected("an address of four hexadecimal digits, such as FE13"));
+    };
+    let span = word.span;
+    if let Some((_, value)) = CELLS.iter().find(|(name, _)| *name == word.value) {
+        return Ok(Spanned {
+            value: *value,
+            span,
+        });
+    }
+    match u16::from_str_radix(word.value, 16) {
+        Ok(value) if word.value.len() == 4 => Ok(Spanned { value, span }),
+        _ => {
+            *scanner = before;
+            let names: Vec<_> = CELLS.iter().map(|(name, _)| *name).collect();
+            Err(scanner
+                .unexpected("an address of four hexadecimal digits, such as FE13")
+                .did_you_mean(word.value, &names))
+        }
+    }
+}
+
+fn eeprom_address(scanner: &mut Scanner<'_>) -> Result<Spanned<u8>, Problem> {
+    let before = scanner.clone();
+    let word = scanner.take_while(|c| c.is_ascii_hexdigit());
+    match word.map(|w| (w.value.len(), u8::from_str_radix(w.value, 16), w.span)) {
+        Some((2, Ok(value), span)) => Ok(Spanned { value, span }),
+        _ => {
+            *scanner = before;
+            Err(scanner.unexpected("an EEPROM address of two hexadecimal digits, such as 47"))
+        }
+    }
+}

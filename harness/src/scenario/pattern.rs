@@ -1,0 +1,254 @@
+//! Bytes in a scenario: `88 FB`, `1234`, `80*12`, `xx`, `(2-N)`, `[EC 63]*3`.
+
+use super::expression::{self, Located};
+use super::problem::{Problem, Span};
+use super::scanner::Scanner;
+
+/// The most bytes that one scenario may speak of.
+pub const MAX_BYTES: usize = 1_000_000;
+
+/// How deep brackets may nest.
+const MAX_DEPTH: u32 = 8;
+
+/// One byte of a pattern.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Expected {
+    /// This byte.
+    Byte(u8),
+    /// `xx`: any byte.
+    Any,
+    /// The -checksum over so many bytes before it (ND21 9.6).
+    MinusChecksum(u8),
+}
+
+/// An item of a list of bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Item {
+    what: What,
+    times: Option<Located>,
+    span: Span,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum What {
+    Bytes(Vec<Expected>),
+    Number(Located),
+    Group(Vec<Item>),
+}
+
+/// A list of bytes as written, for a ring of any size.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pattern {
+    items: Vec<Item>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+impl Pattern {
+    /// The bytes in a ring of `size` drives.
+    ///
+    /// # Errors
+    /// A number is no byte, or the bytes are too many.
+    pub fn expand(&self, size: i64) -> Result<Vec<Expected>, Problem> {
+        let mut bytes = Vec::new();
+        expand(&self.items, size, &mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// The same, where every byte must be known.
+    ///
+    /// # Errors
+    /// As [`Self::expand`], and for `xx`.
+    pub fn expand_known(&self, size: i64) -> Result<Vec<u8>, Problem> {
+        self.expand(size)?
+            .into_iter()
+            .map(|byte| match byte {
+                Expected::Byte(byte) => Ok(byte),
+                Expected::Any | Expected::MinusChecksum(_) => Err(Problem::new(
+                    self.span,
+                    "`xx` (any byte) stands where every byte must be known",
+                    "`xx` can only be received",
+                )),
+            })
+            .collect()
+    }
+}
+
+fn expand(items: &[Item], size: i64, bytes: &mut Vec<Expected>) -> Result<(), Problem> {
+    for item in items {
+        let times = match &item.times {
+            None => 1,
+            Some(times) => {
+                let value = times.value(size)?;
+                usize::try_from(value).map_err(|_| {
+                    Problem::new(
+                        item.span,
+                        format!("{value} times is not possible"),
+                        "0 or more expected here",
+                    )
+                })?
+            }
+        };
+        let before = bytes.len();
+        match &item.what {
+            What::Bytes(known) => bytes.extend(known),
+            What::Number(number) => bytes.push(Expected::Byte(low_byte(number, size)?)),
+            What::Group(items) => expand(items, size, bytes)?,
+        }
+        let one = bytes.len() - before;
+        if one.saturating_mul(times).saturating_add(before) > MAX_BYTES {
+            return Err(Problem::new(
+                item.span,
+                format!("more than {MAX_BYTES} bytes in one scenario"),
+                "fewer bytes expected here",
+            ));
+        }
+        if times == 0 {
+            bytes.truncate(before);
+        }
+        for _ in 1..times {
+            bytes.extend_from_within(before..before + one);
+        }
+    }
+    Ok(())
+}
+
+/// `(2-N)` is a byte mod 256, as address bytes are (ND21 9.3).
+fn low_byte(number: &Located, size: i64) -> Result<u8, Problem> {
+    let value = number.value(size)?;
+    if !(-255..=255).contains(&value) {
+        return Err(Problem::new(
+            number.span,
+            format!("{value} is no byte"),
+            "a number between -255 and 255 expected here",
+        ));
+    }
+    let [low, ..] = value.to_le_bytes();
+    Ok(low)
+}
+
+/// Reads bytes up to the end of the line or to something that is none.
+pub(super) fn pattern(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
+    let here = scanner.here();
+    let items = items(scanner, 0)?;
+    if items.is_empty() {
+        return Err(scanner.unexpected("a byte such as 88"));
+    }
+    Ok(Pattern {
+        items,
+        span: scanner.since(here),
+    })
+}
+
+fn items(scanner: &mut Scanner<'_>, depth: u32) -> Result<Vec<Item>, Problem> {
+    let mut items = Vec::new();
+    while let Some(next) = scanner.peek() {
+        if next == ']' {
+            break;
+        }
+        let here = scanner.here();
+        let what = if next == '(' {
+            scanner.eat("(");
+            let number = expression::sum(scanner)?;
+            if !scanner.eat(")") {
+                return Err(scanner.unexpected("`)`"));
+            }
+            What::Number(number)
+        } else if next == '[' {
+            if depth == MAX_DEPTH {
+                return Err(scanner.unexpected("a byte (brackets nest too deep)"));
+            }
+            scanner.eat("[");
+            let inner = self::items(scanner, depth + 1)?;
+            if !scanner.eat("]") {
+                return Err(scanner.unexpected("`]`"));
+            }
+            What::Group(inner)
+        } else {
+            What::Bytes(literal(scanner)?)
+        };
+        let times = if scanner.eat("*") {
+            Some(count(scanner)?)
+        } else {
+            None
+        };
+        items.push(Item {
+            what,
+            times,
+            span: scanner.since(here),
+        });
+    }
+    Ok(items)
+}
+
+/// How many times: a plain number, `N`, `last`, or arithmetic in parentheses.
+fn count(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
+    let here = scanner.here();
+    if scanner.eat("(") {
+        let number = expression::sum(scanner)?;
+        if !scanner.eat(")") {
+            return Err(scanner.unexpected("`)`"));
+        }
+        return Ok(number);
+    }
+    let mut ahead = scanner.clone();
+    let word = ahead.take_while(|c| c.is_ascii_alphanumeric());
+    let expression = match word.map(|word| word.value) {
+        Some("N") => expression::Expression::Size,
+        Some("last") => expression::Expression::Last,
+        Some(digits) => match digits.parse() {
+            Ok(number) => expression::Expression::Number(number),
+            Err(_) => return Err(scanner.unexpected("how many times, such as 17")),
+        },
+        None => return Err(scanner.unexpected("how many times, such as 17")),
+    };
+    *scanner = ahead;
+    Ok(Located {
+        expression,
+        span: scanner.since(here),
+    })
+}
+
+/// `88`, `1234` (two bytes) or `xx`.
+fn literal(scanner: &mut Scanner<'_>) -> Result<Vec<Expected>, Problem> {
+    let before = scanner.clone();
+    let Some(word) = scanner.take_while(|c| c.is_ascii_alphanumeric()) else {
+        return Err(scanner.unexpected("a byte of two hexadecimal digits"));
+    };
+    let text = word.value;
+    if text.eq_ignore_ascii_case("xx") {
+        return Ok(vec![Expected::Any]);
+    }
+    if let Some(position) = text.find(|c: char| !c.is_ascii_hexdigit()) {
+        *scanner = before;
+        let problem = scanner.unexpected("a byte of two hexadecimal digits");
+        let hint = if text.starts_with("0x") || text.starts_with("0X") {
+            Some("bytes are written without 0x, as in the manual: 88".to_owned())
+        } else if text[position..].starts_with(['o', 'O']) {
+            Some(format!("did you mean `{}`?", text.replace(['o', 'O'], "0")))
+        } else {
+            None
+        };
+        return Err(match hint {
+            Some(hint) => problem.help(hint),
+            None => problem,
+        });
+    }
+    if text.len() % 2 == 1 {
+        return Err(Problem::new(
+            word.span,
+            format!("`{text}` has an odd number of digits"),
+            "two hexadecimal digits a byte expected here",
+        )
+        .help(format!("did you mean `0{text}`?")));
+    }
+    let nibble = |b: u8| char::from(b).to_digit(16).unwrap_or(0);
+    Ok(text
+        .as_bytes()
+        .chunks(2)
+        .map(|pair| {
+            let value = nibble(pair[0]) * 16 + nibble(pair[1]);
+            Expected::Byte(u8::try_from(value).unwrap_or(0))
+        })
+        .collect())
+}

@@ -1,0 +1,599 @@
+//! Plays a plan on a link, step by step, and says what came of it.
+
+use super::pattern::Expected;
+use super::plan::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen, PlannedWindow};
+use super::problem::Span;
+use super::verdict::Verdict;
+use crate::link::{Capability, Link, Moment};
+use crate::locate::{self, Location};
+use harness_proto::line::Received;
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
+use harness_proto::novobus::checksum::Checksum;
+use harness_proto::time::{self, Instant};
+use std::fmt::Write as _;
+
+/// How long bytes may be on their way round before the bench gives up waiting for them.
+const MAX_ROUND: time::Span = time::Span::from_millis(60_000);
+
+/// SYNCO sent to let a ring spell out an address: the bound of 25 zeros, and enough behind it to see
+/// that the address stays (ND21 9.7).
+const PROBE: usize = 64;
+
+/// What came of a scenario.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The first thing that was otherwise; playing stops there.
+    pub finding: Option<Finding>,
+    /// What is worth saying although nothing failed.
+    pub remarks: Vec<String>,
+    /// How long it took, on the line's clock.
+    pub took: time::Span,
+}
+
+/// Something that was otherwise than a step says.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The step.
+    pub span: Span,
+    /// What is wrong, in a sentence.
+    pub message: String,
+    /// Where the bytes differ, if bytes are what differs.
+    pub difference: Option<Difference>,
+}
+
+/// Bytes that differ.
+#[derive(Clone, Debug)]
+pub struct Difference {
+    /// Which ring, counted from 0.
+    pub ring: usize,
+    /// Which byte that the master received, counted from 1.
+    pub byte: usize,
+    /// Which byte of the line, counted from 0.
+    pub index: usize,
+    /// What the line says.
+    pub expected: Vec<Expected>,
+    /// What was received, as far as it came.
+    pub received: Vec<Received>,
+}
+
+/// Plays a plan on a link.
+pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
+    let missing: Vec<_> = plan
+        .needs
+        .iter()
+        .filter(|need| !link.capabilities().contains(need))
+        .map(|need| need.name())
+        .collect();
+    if !missing.is_empty() {
+        return Outcome {
+            verdict: Verdict::Skipped,
+            finding: None,
+            remarks: vec![format!("the rig has no {}", missing.join(", no "))],
+            took: time::Span::ZERO,
+        };
+    }
+    let mut runner = Runner {
+        rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
+        line_before: link.now(),
+        deadline: plan.deadline,
+        corrected: 0,
+        sent: 0,
+        sent_from: link.now(),
+        sent_to: link.now(),
+        link,
+    };
+    let result = runner.play(plan);
+    let remarks = runner
+        .link
+        .unused_faults()
+        .into_iter()
+        .map(|fault| format!("this fault never happened: {fault}"))
+        .collect();
+    let took = runner.link.now().since_start();
+    let (verdict, finding) = match result {
+        Ok(()) => (Verdict::Passed, None),
+        Err(Stop { verdict, finding }) => (verdict, Some(*finding)),
+    };
+    Outcome {
+        verdict,
+        finding,
+        remarks,
+        took,
+    }
+}
+
+/// Why playing stops.
+struct Stop {
+    verdict: Verdict,
+    finding: Box<Finding>,
+}
+
+impl Stop {
+    fn failed(span: Span, message: impl Into<String>) -> Self {
+        Self {
+            verdict: Verdict::Failed,
+            finding: Box::new(Finding {
+                span,
+                message: message.into(),
+                difference: None,
+            }),
+        }
+    }
+
+    fn aborted(span: Span, message: impl Into<String>) -> Self {
+        Self {
+            verdict: Verdict::Aborted,
+            ..Self::failed(span, message)
+        }
+    }
+
+    fn differs(mut self, difference: Difference) -> Self {
+        self.finding.difference = Some(difference);
+        self
+    }
+}
+
+/// What the master has received from one ring.
+#[derive(Default)]
+struct RingRecord {
+    received: Vec<(Instant, Received)>,
+    /// The first byte that no line has asked for yet.
+    next: usize,
+    /// The first byte behind the last check sequence.
+    since_recovery: usize,
+}
+
+struct Runner<'a> {
+    link: &'a mut dyn Link,
+    rings: Vec<RingRecord>,
+    /// When the line before was done.
+    line_before: Instant,
+    deadline: time::Span,
+    corrected: u64,
+    sent: u64,
+    sent_from: Instant,
+    sent_to: Instant,
+}
+
+impl Runner<'_> {
+    fn play(&mut self, plan: &Plan) -> Result<(), Stop> {
+        // A fault at a byte is armed from the start, wherever its line stands: its byte is counted
+        // from the start too.
+        for step in &plan.steps {
+            if let PlannedAction::Fault(ring, fault, moment @ (Moment::Byte(_) | Moment::At(_))) =
+                step.action
+            {
+                self.link.inject(ring, fault, moment);
+            }
+        }
+        let mut last = Span::default();
+        for step in &plan.steps {
+            last = step.span;
+            self.step(step)?;
+        }
+        self.settle();
+        if plan.strict {
+            self.nothing_unasked(last)?;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
+        if let PlannedAction::Receive(ring, expected) = &step.action {
+            return self.receive(step, *ring, expected);
+        }
+        let at = match step.when {
+            PlannedWhen::Now => None,
+            PlannedWhen::After(window) => Some(self.line_before + window.from),
+            PlannedWhen::At(window) => Some(Instant::START + window.from),
+        };
+        if let Some(at) = at {
+            if at < self.link.now() {
+                let now = self.link.now();
+                return Err(Stop::aborted(
+                    step.span,
+                    format!("this line is for {at}, but the lines before it took until {now}"),
+                ));
+            }
+            self.pass_until(at);
+            self.line_before = at;
+        }
+        match &step.action {
+            PlannedAction::Send(ring, bytes) => {
+                self.send(*ring, bytes);
+                Ok(())
+            }
+            PlannedAction::Fault(ring, fault, Moment::Now) => {
+                self.link.inject(*ring, *fault, Moment::Now);
+                Ok(())
+            }
+            PlannedAction::Fault(..) | PlannedAction::Receive(..) => Ok(()),
+            PlannedAction::Check(check) => {
+                if at.is_none() {
+                    self.settle();
+                }
+                let result = self.check(check, step.span);
+                self.sent = 0;
+                result
+            }
+            PlannedAction::Telegram(ring, bytes, expected) => {
+                self.settle();
+                self.forget(*ring);
+                self.send(*ring, bytes);
+                self.expect(step.span, *ring, expected, None)
+            }
+            PlannedAction::Recover(ring) => self.recover(*ring, step.span),
+        }
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) {
+        if self.sent == 0 {
+            self.sent_from = self.link.now().max(self.sent_to);
+        }
+        self.sent += bytes.len() as u64;
+        self.line_before = self.link.send(ring, bytes);
+        self.sent_to = self.line_before;
+    }
+
+    /// Lets time pass up to `until`.
+    fn pass_until(&mut self, until: Instant) {
+        while self.link.now() < until {
+            self.link.wait(until);
+            self.fetch();
+        }
+    }
+
+    /// Lets time pass until everything that was sent has come round (or has been lost).
+    fn settle(&mut self) {
+        let end = self.link.now() + MAX_ROUND;
+        while self.link.busy() && self.link.now() < end && self.link.wait(end) {
+            self.fetch();
+        }
+        self.fetch();
+    }
+
+    fn fetch(&mut self) {
+        for (index, record) in self.rings.iter_mut().enumerate() {
+            while let Some(byte) = self.link.receive(index) {
+                record.received.push(byte);
+                if ends_with_sequence(&record.received[record.since_recovery..]) {
+                    record.since_recovery = record.received.len();
+                    self.corrected += 1;
+                }
+            }
+        }
+    }
+
+    /// Bytes that no line has asked for are none of the next line's business.
+    fn forget(&mut self, ring: usize) {
+        self.rings[ring].next = self.rings[ring].received.len();
+    }
+
+    fn receive(
+        &mut self,
+        step: &PlannedStep,
+        ring: usize,
+        expected: &[Expected],
+    ) -> Result<(), Stop> {
+        let window = match step.when {
+            PlannedWhen::Now => None,
+            PlannedWhen::After(window) => Some((self.line_before, window)),
+            PlannedWhen::At(window) => Some((Instant::START, window)),
+        };
+        self.expect(step.span, ring, expected, window)
+    }
+
+    /// The next bytes must be these; with a window, the first of them must come in it.
+    fn expect(
+        &mut self,
+        span: Span,
+        ring: usize,
+        expected: &[Expected],
+        window: Option<(Instant, PlannedWindow)>,
+    ) -> Result<(), Stop> {
+        let first = self.rings[ring].next;
+        for index in 0..expected.len() {
+            let until = match window {
+                Some((base, window)) if index == 0 => base + window.to + window.tolerance,
+                _ => self.link.now().max(self.line_before) + self.deadline,
+            };
+            let arrived = self.next_byte(ring, first + index, until);
+            let received = &self.rings[ring].received[first..];
+            let difference = || Difference {
+                ring,
+                byte: first + index + 1,
+                index,
+                expected: expected.to_vec(),
+                received: received.iter().map(|(_, byte)| *byte).collect(),
+            };
+            let Some((at, byte)) = arrived else {
+                let waited = if until == Instant::NEVER {
+                    self.link.now()
+                } else {
+                    until
+                };
+                let message = format!(
+                    "nothing more was received up to {}, where {} is expected",
+                    waited.min(self.link.now()),
+                    Shown(expected[index])
+                );
+                return Err(Stop::failed(span, message).differs(difference()));
+            };
+            let before: Vec<_> = received[..index].iter().map(|(_, b)| b.byte).collect();
+            if !matches(expected[index], byte, &before) {
+                let message = format!(
+                    "the master received {} where {} is expected",
+                    show(byte),
+                    Shown(expected[index])
+                );
+                return Err(Stop::failed(span, message).differs(difference()));
+            }
+            if let Some((base, window)) = window.filter(|_| index == 0) {
+                let earliest = base + window.from - window.tolerance;
+                if at < earliest {
+                    let message = format!(
+                        "{} came at {at}, {} after the line before; {} at the earliest was expected",
+                        show(byte),
+                        at.since(base),
+                        window.from
+                    );
+                    return Err(Stop::failed(span, message));
+                }
+            }
+            self.rings[ring].next = first + index + 1;
+            self.line_before = at;
+        }
+        Ok(())
+    }
+
+    /// Waits for the `index`-th byte received.
+    fn next_byte(
+        &mut self,
+        ring: usize,
+        index: usize,
+        until: Instant,
+    ) -> Option<(Instant, Received)> {
+        loop {
+            self.fetch();
+            if let Some(byte) = self.rings[ring].received.get(index) {
+                return Some(*byte).filter(|(at, _)| *at <= until);
+            }
+            if self.link.now() >= until || !self.link.wait(until) {
+                return None;
+            }
+        }
+    }
+
+    /// ND21 9.8: 17 zeros and the five bytes; they must come back.
+    fn recover(&mut self, ring: usize, span: Span) -> Result<(), Stop> {
+        self.settle();
+        let before = self.corrected;
+        self.send(ring, &CHECK_SEQUENCE);
+        self.settle();
+        self.forget(ring);
+        self.line_before = self.link.now();
+        if self.corrected > before {
+            return Ok(());
+        }
+        Err(Stop::failed(
+            span,
+            "the check sequence FF 44 72 4C 41 did not come back (ND21 9.8)",
+        ))
+    }
+
+    fn nothing_unasked(&self, span: Span) -> Result<(), Stop> {
+        for (ring, record) in self.rings.iter().enumerate() {
+            if let Some((at, byte)) = record.received.get(record.next) {
+                let message = format!(
+                    "{} was received at {at}, which no line asks for (the scenario is strict)",
+                    show(*byte)
+                );
+                return Err(Stop::failed(span, message).differs(Difference {
+                    ring,
+                    byte: record.next + 1,
+                    index: 0,
+                    expected: Vec::new(),
+                    received: vec![*byte],
+                }));
+            }
+        }
+        Ok(())
+    }
+
+    fn check(&mut self, check: &PlannedCheck, span: Span) -> Result<(), Stop> {
+        let failed = |message: String| Err(Stop::failed(span, message));
+        match check {
+            PlannedCheck::Located(ring, drive) => match self.locate(*ring) {
+                Some(location) if location.drive == *drive => Ok(()),
+                Some(location) => failed(format!(
+                    "the ring spells out drive {}, expected is drive {drive}",
+                    location.drive
+                )),
+                None => failed(format!(
+                    "the ring spells out no address, expected is drive {drive}"
+                )),
+            },
+            PlannedCheck::Within(zeros) => match self.locate(0) {
+                Some(location) if location.zeros.is_none_or(|found| found <= *zeros) => Ok(()),
+                Some(location) => failed(format!(
+                    "the address came after {} zeros, expected are at most {zeros}",
+                    location.zeros.unwrap_or_default()
+                )),
+                None => failed("the ring spells out no address".to_owned()),
+            },
+            PlannedCheck::InError(ring, drives, expected) => {
+                let wrong: Vec<_> = drives
+                    .clone()
+                    .filter(|k| {
+                        self.link
+                            .error_of(*ring, *k)
+                            .is_some_and(|error| error.is_some() != *expected)
+                    })
+                    .collect();
+                if wrong.is_empty() {
+                    return Ok(());
+                }
+                let not = if *expected { " not" } else { "" };
+                failed(format!(
+                    "{} {}{not} in the error mode",
+                    list(&wrong),
+                    are(&wrong)
+                ))
+            }
+            PlannedCheck::Error(ring, drive, error) => {
+                match self.link.error_of(*ring, *drive).flatten() {
+                    Some(found) if found == *error => Ok(()),
+                    Some(found) => failed(format!(
+                        "drive {drive} has error {found}, expected is {error}"
+                    )),
+                    None => failed(format!(
+                        "drive {drive} is not in the error mode, expected is error {error}"
+                    )),
+                }
+            }
+            PlannedCheck::Memory(ring, drives, address, bytes) => {
+                self.check_memory(*ring, drives.clone(), *address, bytes, span)
+            }
+            PlannedCheck::Corrected(times) if *times == self.corrected => Ok(()),
+            PlannedCheck::Corrected(times) => failed(format!(
+                "{} check sequences came back, expected are {times}",
+                self.corrected
+            )),
+            PlannedCheck::Sent(bytes, time) => {
+                if *bytes != self.sent {
+                    return failed(format!(
+                        "{} bytes were sent since the last check, expected are {bytes}",
+                        self.sent
+                    ));
+                }
+                let took = self.sent_to.since(self.sent_from);
+                match time {
+                    Some((time, tolerance))
+                        if took + *tolerance < *time || *time + *tolerance < took =>
+                    {
+                        failed(format!("the {bytes} bytes took {took}, expected is {time}"))
+                    }
+                    _ => Ok(()),
+                }
+            }
+            PlannedCheck::Received(bytes) => {
+                let received = self.rings[0].received.len() as u64;
+                if received == *bytes {
+                    return Ok(());
+                }
+                failed(format!(
+                    "{received} bytes were received, expected are {bytes}"
+                ))
+            }
+        }
+    }
+
+    fn check_memory(
+        &self,
+        ring: usize,
+        drives: std::ops::RangeInclusive<u8>,
+        address: u16,
+        bytes: &[Expected],
+        span: Span,
+    ) -> Result<(), Stop> {
+        for drive in drives {
+            for (cell, expected) in (address..=u16::MAX).zip(bytes) {
+                let Some(found) = self.link.peek(ring, drive, cell) else {
+                    continue;
+                };
+                if !matches(*expected, Received::good(found), &[]) {
+                    return Err(Stop::failed(
+                        span,
+                        format!(
+                            "cell {cell:04X} of drive {drive} holds {found:02X}, expected is {}",
+                            Shown(*expected)
+                        ),
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The address that the ring spells out, letting it go on where it has not come to it yet.
+    fn locate(&mut self, ring: usize) -> Option<Location> {
+        let size = self.link.drives(ring);
+        let record = &self.rings[ring];
+        let mut heard: Vec<_> = record.received[record.since_recovery..]
+            .iter()
+            .map(|(_, byte)| *byte)
+            .collect();
+        locate::locate(&heard, size).or_else(|| {
+            heard.extend(self.link.probe(ring, PROBE));
+            locate::locate(&heard, size)
+        })
+    }
+}
+
+fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
+    received.len() >= SEQUENCE.len()
+        && received[received.len() - SEQUENCE.len()..]
+            .iter()
+            .zip(SEQUENCE)
+            .all(|((_, byte), wanted)| byte.is(wanted))
+}
+
+fn matches(expected: Expected, received: Received, before: &[u8]) -> bool {
+    if received.error.is_some() {
+        return false;
+    }
+    match expected {
+        Expected::Byte(byte) => received.byte == byte,
+        Expected::Any => true,
+        Expected::MinusChecksum(over) => {
+            let from = before.len().saturating_sub(usize::from(over));
+            received.byte == Checksum::over(&before[from..]).minus()
+        }
+    }
+}
+
+/// A received byte as reports show it: `88`, or `12 (parity)`.
+#[must_use]
+pub fn show(received: Received) -> String {
+    let mut text = format!("{:02X}", received.byte);
+    if let Some(error) = received.error {
+        // Writing to a String cannot fail.
+        let _infallible = write!(text, " ({error})");
+    }
+    text
+}
+
+/// An expected byte as reports show it.
+#[derive(Clone, Copy)]
+pub struct Shown(pub Expected);
+
+impl std::fmt::Display for Shown {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.0 {
+            Expected::Byte(byte) => write!(f, "{byte:02X}"),
+            Expected::Any => f.write_str("xx"),
+            Expected::MinusChecksum(_) => f.write_str("-checksum"),
+        }
+    }
+}
+
+fn list(drives: &[u8]) -> String {
+    let names: Vec<_> = drives.iter().map(u8::to_string).collect();
+    let s = if drives.len() == 1 { "" } else { "s" };
+    format!("drive{s} {}", names.join(", "))
+}
+
+fn are(drives: &[u8]) -> &'static str {
+    if drives.len() == 1 { "is" } else { "are" }
+}
+
+/// What a plan needs that a rig may lack, in words.
+#[must_use]
+pub fn needs(plan: &Plan) -> Vec<&'static str> {
+    plan.needs
+        .iter()
+        .map(|need: &Capability| need.name())
+        .collect()
+}

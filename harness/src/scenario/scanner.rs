@@ -1,0 +1,159 @@
+//! Reads one line from left to right and remembers the place of everything.
+
+use super::problem::{Problem, Span, Spanned};
+
+/// A line without its comment.
+#[derive(Clone, Debug)]
+pub(super) struct Scanner<'a> {
+    text: &'a str,
+    /// Where the line starts in the file.
+    offset: usize,
+    at: usize,
+}
+
+impl<'a> Scanner<'a> {
+    /// A scanner for the line that starts at `offset`; a `#` at its start or behind white space begins
+    /// a comment.
+    pub(super) fn new(line: &'a str, offset: usize) -> Self {
+        let comment = line.char_indices().find(|&(i, c)| {
+            c == '#'
+                && line[..i]
+                    .chars()
+                    .next_back()
+                    .is_none_or(char::is_whitespace)
+        });
+        let text = comment.map_or(line, |(i, _)| &line[..i]).trim_end();
+        Self {
+            text,
+            offset,
+            at: 0,
+        }
+    }
+
+    pub(super) fn skip_space(&mut self) {
+        let rest = &self.text[self.at..];
+        self.at += rest.len() - rest.trim_start().len();
+    }
+
+    /// Whether nothing but white space is left.
+    pub(super) fn at_end(&mut self) -> bool {
+        self.skip_space();
+        self.at == self.text.len()
+    }
+
+    /// What is left, white space in front taken away.
+    pub(super) fn rest(&mut self) -> &'a str {
+        self.skip_space();
+        &self.text[self.at..]
+    }
+
+    pub(super) fn peek(&mut self) -> Option<char> {
+        self.rest().chars().next()
+    }
+
+    /// Where the scanner stands; one character wide, or none at the end.
+    pub(super) fn here(&mut self) -> Span {
+        let width = self.peek().map_or(0, char::len_utf8);
+        let start = self.offset + self.at;
+        Span {
+            start,
+            end: start + width,
+        }
+    }
+
+    /// From the place `from` to where the scanner stands.
+    pub(super) fn since(&self, from: Span) -> Span {
+        Span {
+            start: from.start,
+            end: self.offset + self.text[..self.at].trim_end().len(),
+        }
+    }
+
+    /// Takes `token` if it comes next.
+    pub(super) fn eat(&mut self, token: &str) -> bool {
+        if self.rest().starts_with(token) {
+            self.at += token.len();
+            true
+        } else {
+            false
+        }
+    }
+
+    /// Takes the word `word` if it comes next as a whole word.
+    pub(super) fn eat_word(&mut self, word: &str) -> bool {
+        let before = self.clone();
+        if self
+            .word()
+            .is_some_and(|found| found.value.eq_ignore_ascii_case(word))
+        {
+            return true;
+        }
+        *self = before;
+        false
+    }
+
+    /// Takes what comes next as long as `wanted` says so; `None` where that is nothing.
+    pub(super) fn take_while(&mut self, wanted: impl Fn(char) -> bool) -> Option<Spanned<&'a str>> {
+        let rest = self.rest();
+        let length = rest.find(|c| !wanted(c)).unwrap_or(rest.len());
+        if length == 0 {
+            return None;
+        }
+        let start = self.offset + self.at;
+        self.at += length;
+        Some(Spanned {
+            value: &rest[..length],
+            span: Span {
+                start,
+                end: start + length,
+            },
+        })
+    }
+
+    /// Takes a word: letters, with digits, `-` and `_` in it.
+    pub(super) fn word(&mut self) -> Option<Spanned<&'a str>> {
+        if !self.peek().is_some_and(|c| c.is_ascii_alphabetic()) {
+            return None;
+        }
+        self.take_while(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
+    }
+
+    /// Takes whatever stands there up to the next white space, for a message.
+    pub(super) fn chunk(&mut self) -> Spanned<&'a str> {
+        let here = self.here();
+        self.take_while(|c| !c.is_whitespace()).unwrap_or(Spanned {
+            value: "",
+            span: here,
+        })
+    }
+
+    /// A mistake right here: something else stands where `expected` should.
+    pub(super) fn unexpected(&mut self, expected: &str) -> Problem {
+        let mut ahead = self.clone();
+        let found = ahead.chunk();
+        let message = if found.value.is_empty() {
+            format!("the line ends where {expected} is expected")
+        } else {
+            format!("`{}` stands where {expected} is expected", found.value)
+        };
+        Problem::new(found.span, message, format!("{expected} expected here"))
+    }
+
+    /// Nothing more may follow.
+    pub(super) fn expect_end(&mut self) -> Result<(), Problem> {
+        if self.at_end() {
+            return Ok(());
+        }
+        let here = self.here();
+        let rest = self.rest();
+        let span = Span {
+            start: here.start,
+            end: here.start + rest.len(),
+        };
+        Err(Problem::new(
+            span,
+            format!("`{rest}` follows a line that is complete"),
+            "the end of the line expected here",
+        ))
+    }
+}

@@ -1,0 +1,106 @@
+//! A scenario's text, from a file or from the binary itself.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+/// The largest scenario, in bytes. The longest of ours has a fiftieth of it.
+pub const MAX_SIZE: u64 = 1 << 20;
+
+/// A text with the name under which people know it.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The path, or the name of a built-in scenario.
+    pub name: String,
+    /// The text.
+    pub text: Arc<str>,
+}
+
+/// Why a file is no scenario.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// It cannot be read.
+    #[error("failed to read {name}: {error}")]
+    Unreadable {
+        /// The file.
+        name: String,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// It is a device, a pipe or the like.
+    #[error("{name} is not a regular file; a scenario is a text file (*.scn)")]
+    NotAFile {
+        /// The file.
+        name: String,
+    },
+    /// It is too large.
+    #[error("{name} has more than {} KiB; a scenario is a short text", MAX_SIZE >> 10)]
+    TooLarge {
+        /// The file.
+        name: String,
+    },
+    /// It is no text.
+    #[error("{name} is not a text: byte {offset} is {byte:02X}; a scenario is UTF-8 text (*.scn)")]
+    NotText {
+        /// The file.
+        name: String,
+        /// Where.
+        offset: usize,
+        /// What stands there.
+        byte: u8,
+    },
+}
+
+impl Source {
+    /// Reads a scenario from a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is too large or is no text.
+    pub fn read(path: &Path) -> Result<Self, SourceError> {
+        let name = path.display().to_string();
+        let unreadable = |error| SourceError::Unreadable {
+            name: name.clone(),
+            error,
+        };
+        let metadata = std::fs::metadata(path).map_err(unreadable)?;
+        if !metadata.is_file() {
+            return Err(SourceError::NotAFile { name });
+        }
+        if metadata.len() > MAX_SIZE {
+            return Err(SourceError::TooLarge { name });
+        }
+        let mut bytes = Vec::new();
+        let file = File::open(path).map_err(unreadable)?;
+        file.take(MAX_SIZE + 1)
+            .read_to_end(&mut bytes)
+            .map_err(unreadable)?;
+        if bytes.len() as u64 > MAX_SIZE {
+            return Err(SourceError::TooLarge { name });
+        }
+        Self::from_bytes(name, bytes)
+    }
+
+    /// Takes the bytes of a file.
+    ///
+    /// # Errors
+    /// They are no text.
+    pub fn from_bytes(name: String, bytes: Vec<u8>) -> Result<Self, SourceError> {
+        let control = |b: &u8| *b < b' ' && !matches!(b, b'\n' | b'\r' | b'\t');
+        if let Some(offset) = bytes.iter().position(control) {
+            let byte = bytes[offset];
+            return Err(SourceError::NotText { name, offset, byte });
+        }
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok(Self {
+                name,
+                text: text.into(),
+            }),
+            Err(error) => {
+                let offset = error.utf8_error().valid_up_to();
+                let byte = error.as_bytes()[offset];
+                Err(SourceError::NotText { name, offset, byte })
+            }
+        }
+    }
+}

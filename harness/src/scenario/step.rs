@@ -1,0 +1,264 @@
+//! Steps: a time or none, then `>`, `<`, `!`, `?` or a job.
+
+use super::check;
+use super::expression::{self, Located};
+use super::job;
+use super::parse::{named, ring_prefix};
+use super::pattern;
+use super::problem::{Problem, nearest};
+use super::scanner::Scanner;
+use super::syntax::{Action, Fault, FaultKind, LinkEnds, LinkFaultKind, Step, When};
+use super::times;
+use harness_sim::fault::{DriveFault, Flips};
+
+/// Reads a step.
+pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+    let start = scanner.here();
+    let when = if scanner.eat("+") {
+        When::After(times::window(scanner)?)
+    } else if scanner.eat("@") {
+        When::At(times::window(scanner)?)
+    } else {
+        When::Now
+    };
+    let action = action(scanner)?;
+    scanner.expect_end()?;
+    let window = match when {
+        When::Now => None,
+        When::After(window) | When::At(window) => Some(window),
+    };
+    if let Some(window) = window.filter(|window| !window.is_exact())
+        && !matches!(action, Action::Receive { .. })
+    {
+        return Err(Problem::new(
+            window.from.span().to(window.to.span()),
+            "a window of time stands before a line that does not wait for a byte",
+            "one time expected here; a window can stand before `<`",
+        ));
+    }
+    Ok(Step {
+        when,
+        action,
+        span: scanner.since(start),
+    })
+}
+
+fn action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
+    let rest = scanner.rest();
+    let mut ring = 0;
+    if rest.starts_with("2>") || rest.starts_with("2<") {
+        scanner.eat("2");
+        ring = 1;
+    } else if rest.starts_with("1>") || rest.starts_with("1<") {
+        scanner.eat("1");
+    }
+    match scanner.peek() {
+        Some('>') => {
+            scanner.eat(">");
+            let bytes = pattern::pattern(scanner)?;
+            Ok(Action::Send { ring, bytes })
+        }
+        Some('<') => {
+            scanner.eat("<");
+            let bytes = pattern::pattern(scanner)?;
+            Ok(Action::Receive { ring, bytes })
+        }
+        Some('!') => {
+            scanner.eat("!");
+            Ok(Action::Fault(fault(scanner)?))
+        }
+        Some('?') => {
+            scanner.eat("?");
+            Ok(Action::Check(check::check(scanner)?))
+        }
+        _ => job_action(scanner),
+    }
+}
+
+fn job_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
+    let mut ahead = scanner.clone();
+    let expected = "a step (`>`, `<`, `!`, `?` or a job) or a header line";
+    let Some(name) = ahead.word() else {
+        return Err(scanner.unexpected(expected));
+    };
+    match job::job(name.value, &mut ahead) {
+        Some(job) => {
+            *scanner = ahead;
+            Ok(Action::Job(job?))
+        }
+        None => {
+            let mut known = job::names();
+            known.extend([
+                "title", "source", "bus", "ring", "drive", "needs", "line", "strict", "deadline",
+            ]);
+            let problem = scanner.unexpected(expected);
+            Err(match nearest(name.value, &known) {
+                Some(near) => problem.help(format!("did you mean `{near}`?")),
+                None => problem.help(format!("jobs are {}", job::names().join(", "))),
+            })
+        }
+    }
+}
+
+fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
+    if scanner.eat_word("drive") {
+        let ring = ring_prefix(scanner);
+        let drive = expression::sum(scanner)?;
+        let (byte, at) = place(scanner)?;
+        let kind = drive_fault(scanner)?;
+        return Ok(Fault {
+            ring,
+            what: FaultKind::Drive(drive, kind),
+            byte,
+            at,
+        });
+    }
+    let here = scanner.here();
+    let ring = ring_prefix(scanner);
+    let from = end(scanner)?;
+    if !scanner.eat("->") {
+        return Err(scanner.unexpected("`->`, as in 98->97"));
+    }
+    let to = end(scanner)?;
+    let span = scanner.since(here);
+    let (byte, at) = place(scanner)?;
+    let kind = link_fault(scanner)?;
+    let place = Located {
+        span,
+        ..Located::number(0)
+    };
+    Ok(Fault {
+        ring,
+        what: FaultKind::Link(place, LinkEnds { from, to }, kind),
+        byte,
+        at,
+    })
+}
+
+/// An end of a link: a drive, or `master` (`None`).
+fn end(scanner: &mut Scanner<'_>) -> Result<Option<Located>, Problem> {
+    let mut ahead = scanner.clone();
+    let letters = ahead.take_while(|c| c.is_ascii_alphabetic());
+    match letters.map(|word| word.value) {
+        Some("master") => {
+            *scanner = ahead;
+            Ok(None)
+        }
+        Some(other) if !matches!(other, "N" | "last") => Err(scanner
+            .unexpected("`master` or a drive's number")
+            .did_you_mean(other, &["master", "last"])),
+        _ => Ok(Some(expression::sum(scanner)?)),
+    }
+}
+
+/// `byte n`, `@20ms`, or nothing, and a colon.
+fn place(scanner: &mut Scanner<'_>) -> Result<(Option<Located>, Option<times::Duration>), Problem> {
+    let mut byte = None;
+    let mut at = None;
+    if scanner.eat_word("byte") {
+        byte = Some(expression::sum(scanner)?);
+    } else if scanner.eat("@") {
+        at = Some(times::duration(scanner)?);
+    }
+    scanner.eat(":");
+    Ok((byte, at))
+}
+
+fn drive_fault(scanner: &mut Scanner<'_>) -> Result<DriveFault, Problem> {
+    let names = [("off", 0), ("on", 1), ("stuck", 2), ("unstuck", 3)];
+    Ok(match named(scanner, &names, "a fault of a drive")? {
+        0 => DriveFault::Off,
+        1 => DriveFault::On,
+        2 => DriveFault::Stuck(byte(scanner)?),
+        _ => DriveFault::Unstuck,
+    })
+}
+
+fn link_fault(scanner: &mut Scanner<'_>) -> Result<LinkFaultKind, Problem> {
+    let names = [
+        ("flip", 0),
+        ("replace", 1),
+        ("drop", 2),
+        ("duplicate", 3),
+        ("insert", 4),
+        ("delay", 5),
+        ("break", 6),
+        ("overrun", 7),
+        ("cut", 8),
+        ("join", 9),
+    ];
+    Ok(match named(scanner, &names, "a fault of a link")? {
+        0 => LinkFaultKind::Flip(flips(scanner)?),
+        1 => LinkFaultKind::Replace(byte(scanner)?),
+        2 => LinkFaultKind::Drop,
+        3 => LinkFaultKind::Duplicate,
+        4 => LinkFaultKind::Insert(byte(scanner)?),
+        5 => LinkFaultKind::Delay(times::duration(scanner)?),
+        6 => LinkFaultKind::Break(times::duration(scanner)?),
+        7 => LinkFaultKind::Overrun,
+        8 => LinkFaultKind::Cut,
+        _ => LinkFaultKind::Join,
+    })
+}
+
+/// Bits 0 to 7, `p` and `s`.
+fn flips(scanner: &mut Scanner<'_>) -> Result<Flips, Problem> {
+    let expected = "a bit: 0 to 7, p (parity) or s (stop)";
+    let mut flips = Flips::default();
+    if scanner.at_end() {
+        return Err(scanner.unexpected(expected));
+    }
+    while !scanner.at_end() {
+        let bit = scanner.peek();
+        let known = match bit {
+            Some('p') => Flips {
+                parity: true,
+                ..Flips::default()
+            },
+            Some('s') => Flips {
+                stop: true,
+                ..Flips::default()
+            },
+            Some(digit @ '0'..='7') => Flips {
+                data: 1 << digit.to_digit(8).unwrap_or(0),
+                ..Flips::default()
+            },
+            _ => return Err(scanner.unexpected(expected)),
+        };
+        if flips.and(known) != merge(flips, known) {
+            let here = scanner.here();
+            return Err(Problem::new(
+                here,
+                "a bit that is flipped twice is not flipped",
+                "each bit once",
+            ));
+        }
+        flips = flips.and(known);
+        let mut ahead = scanner.clone();
+        if ahead.chunk().value.trim_end_matches(',').len() != 1 {
+            return Err(scanner.unexpected(expected));
+        }
+        *scanner = ahead;
+    }
+    Ok(flips)
+}
+
+fn merge(a: Flips, b: Flips) -> Flips {
+    Flips {
+        data: a.data | b.data,
+        parity: a.parity | b.parity,
+        stop: a.stop | b.stop,
+    }
+}
+
+fn byte(scanner: &mut Scanner<'_>) -> Result<u8, Problem> {
+    let before = scanner.clone();
+    let word = scanner.take_while(|c| c.is_ascii_alphanumeric());
+    match word.map(|word| (word.value.len(), u8::from_str_radix(word.value, 16))) {
+        Some((2, Ok(byte))) => Ok(byte),
+        _ => {
+            *scanner = before;
+            Err(scanner.unexpected("a byte of two hexadecimal digits"))
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! A scenario as written, for a ring of any size.
+
+use super::check::Check;
+use super::expression::Located;
+use super::job::Job;
+use super::pattern::Pattern;
+use super::problem::{Span, Spanned};
+use super::times::{Duration, Window};
+use crate::link::Capability;
+use harness_proto::line::Rate;
+use harness_sim::fault::{DriveFault, Flips};
+
+/// A scenario: what it is, the ring it needs, and its steps.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// What the conversation shows, in a line.
+    pub title: String,
+    /// The tables of which manuals it pins.
+    pub sources: Vec<Citation>,
+    /// Which bus.
+    pub bus: Bus,
+    /// The rings it can be played on; one or two.
+    pub rings: Vec<RingRange>,
+    /// The rate of the line.
+    pub rate: Rate,
+    /// What drives hold and how they behave before anything is sent.
+    pub setups: Vec<Setup>,
+    /// What it says that it needs of a rig.
+    pub needs: Vec<Capability>,
+    /// Whether bytes that no line asked for are a failure.
+    pub strict: bool,
+    /// How long a line without a time waits.
+    pub deadline: Option<Duration>,
+    /// The steps, in order.
+    pub steps: Vec<Step>,
+}
+
+/// A reference to a manual: `nd21 9.7`, `nd21 8.2 exchange-6`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Citation {
+    /// The whole reference, single spaces between its words.
+    pub text: String,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// The buses of the product.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bus {
+    /// The ND21's ring.
+    Novobus,
+    /// UNITEK DS/BAMOCAR on CAN; not built yet.
+    Unitek,
+    /// NORDAC vector on PROFIBUS DP; not built yet.
+    Nordac,
+}
+
+impl Bus {
+    /// The names in a scenario.
+    pub const NAMES: [(&'static str, Self); 3] = [
+        ("novobus", Self::Novobus),
+        ("unitek", Self::Unitek),
+        ("nordac", Self::Nordac),
+    ];
+}
+
+/// The sizes of ring that a scenario can be played on.
+#[derive(Clone, Debug)]
+pub struct RingRange {
+    /// The smallest.
+    pub smallest: u8,
+    /// The largest.
+    pub largest: u8,
+    /// The one to take where nothing else is asked for.
+    pub default: u8,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Drives: one, or all from one to another, in ring 1 or ring 2.
+#[derive(Clone, Debug)]
+pub struct Drives {
+    /// Which ring, counted from 0.
+    pub ring: usize,
+    /// From.
+    pub from: Located,
+    /// To; `None` for a single drive.
+    pub to: Option<Located>,
+}
+
+/// What drives hold or how they behave before anything is sent.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// Which drives.
+    pub drives: Drives,
+    /// What.
+    pub what: SetupKind,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// The kinds of a [`Setup`].
+#[derive(Clone, Debug)]
+pub enum SetupKind {
+    /// `memory ADDRESS = BYTES`
+    Memory(Spanned<u16>, Pattern),
+    /// `eeprom ADDRESS = BYTES`
+    Eeprom(Spanned<u8>, Pattern),
+    /// `property NAME = WORD`
+    Word(Spanned<String>, Spanned<String>),
+    /// `property NAME = TIME`
+    Time(Spanned<String>, Duration),
+}
+
+/// A step.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// The time in front.
+    pub when: When,
+    /// What happens.
+    pub action: Action,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A time in front of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum When {
+    /// None: as soon as the line before is done.
+    Now,
+    /// `+`: after the line before.
+    After(Window),
+    /// `@`: since the start.
+    At(Window),
+}
+
+/// What a step does.
+#[derive(Clone, Debug)]
+pub enum Action {
+    /// `>`: the master sends.
+    Send {
+        /// Which ring, counted from 0.
+        ring: usize,
+        /// What.
+        bytes: Pattern,
+    },
+    /// `<`: the master receives.
+    Receive {
+        /// Which ring, counted from 0.
+        ring: usize,
+        /// What.
+        bytes: Pattern,
+    },
+    /// `!`: a fault.
+    Fault(Fault),
+    /// `?`: a check.
+    Check(Check),
+    /// A job of the master.
+    Job(Job),
+}
+
+/// A fault as written.
+#[derive(Clone, Debug)]
+pub struct Fault {
+    /// Which ring, counted from 0.
+    pub ring: usize,
+    /// Where and what.
+    pub what: FaultKind,
+    /// At which byte, counted from 1.
+    pub byte: Option<Located>,
+    /// At which time since the start.
+    pub at: Option<Duration>,
+}
+
+/// Where a fault happens, and what.
+#[derive(Clone, Debug)]
+pub enum FaultKind {
+    /// On a link.
+    Link(Located, LinkEnds, LinkFaultKind),
+    /// In a drive.
+    Drive(Located, DriveFault),
+}
+
+/// The ends of a link.
+#[derive(Clone, Debug)]
+pub struct LinkEnds {
+    /// The transmitter; `None` for the master.
+    pub from: Option<Located>,
+    /// The receiver; `None` for the master.
+    pub to: Option<Located>,
+}
+
+/// What happens on a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinkFaultKind {
+    /// `flip b ...`
+    Flip(Flips),
+    /// `replace HH`
+    Replace(u8),
+    /// `drop`
+    Drop,
+    /// `duplicate`
+    Duplicate,
+    /// `insert HH`
+    Insert(u8),
+    /// `delay T`
+    Delay(Duration),
+    /// `break T`
+    Break(Duration),
+    /// `overrun`
+    Overrun,
+    /// `cut`
+    Cut,
+    /// `join`
+    Join,
+}

@@ -1,0 +1,38 @@
+//! Verdicts, in order of gravity.
+
+use std::fmt;
+
+/// What came of a scenario. A later one is graver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Verdict {
+    /// Not played: the rig lacks something.
+    Skipped,
+    /// Everything was as the scenario says.
+    Passed,
+    /// The transport could not have shown the opposite.
+    Inconclusive,
+    /// The drive behaved otherwise.
+    Failed,
+    /// It could not be played to its end.
+    Aborted,
+}
+
+impl Verdict {
+    /// The word in records and reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Skipped => "skipped",
+            Self::Passed => "passed",
+            Self::Inconclusive => "inconclusive",
+            Self::Failed => "failed",
+            Self::Aborted => "aborted",
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
