@@ -15,6 +15,6 @@ pub mod fault;
 pub mod link;
 pub mod node;
 pub mod plain;
-//REF pub mod reference;
+pub mod reference;
 pub mod ring;
 pub mod trace;

@@ -85,7 +85,7 @@ impl<D: Device> Node<D> {
         let deadline = match self.deadline() {
             None => Instant::NEVER,
             Some(Deadline::At(at)) => at,
-            Some(Deadline::LineFree) => outbound.line_free(),
+            Some(Deadline::LineFree(from)) => outbound.line_free().max(from),
         };
         inbound.next_arrival().min(deadline)
     }
@@ -101,9 +101,9 @@ impl<D: Device> Node<D> {
 
     /// Does everything that is due here up to and including `until`.
     ///
-    /// At one instant a time-out comes before a byte (a drive's own first zero goes out before it
-    /// answers the neighbour's, ND21 9.9), and a byte before a line that has become free (with something
-    /// to answer, no zero goes out unasked).
+    /// At one instant a time-out comes before a byte, and so does a drive's own first zero (it goes out
+    /// before the neighbour's is answered, ND21 9.9); a byte comes before any later zero (with something
+    /// to answer, none goes out unasked).
     pub(crate) fn run(&mut self, inbound: &mut Link, outbound: &mut Link, until: Instant) {
         loop {
             let arrival = inbound.next_arrival();
@@ -115,8 +115,11 @@ impl<D: Device> Node<D> {
                     self.act(at, outbound, inbound.arrived());
                     continue;
                 }
-                Some(Deadline::LineFree) if outbound.line_free() < arrival => {
-                    let at = outbound.line_free();
+                Some(Deadline::LineFree(from))
+                    if outbound.line_free() < arrival
+                        || from == arrival && outbound.line_free() == arrival =>
+                {
+                    let at = outbound.line_free().max(from);
                     if at > until {
                         return;
                     }

@@ -7,6 +7,8 @@ use std::fmt::Write as _;
 
 /// Rows of the table shown before and behind the one that differs.
 const AROUND: usize = 6;
+/// Columns of the table shown at most.
+const COLUMNS: usize = 20;
 /// Bytes of a line shown before and behind the one that differs.
 const BYTES_AROUND: usize = 8;
 
@@ -25,7 +27,8 @@ pub fn mismatch(finding: &Finding, traces: &[Trace], sources: &[String]) -> Stri
     let part = Part {
         rows: Some(row.saturating_sub(AROUND)..row + AROUND + 1),
         pointed: Some(row),
-        at_most: None,
+        columns_at_most: Some(COLUMNS),
+        ..Part::default()
     };
     // Writing to a String cannot fail.
     let _infallible = write!(out, "\n{}\n{LEGEND}", table(trace, &part));

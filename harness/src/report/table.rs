@@ -39,13 +39,19 @@ pub struct Part {
     pub pointed: Option<usize>,
     /// Rows shown at most; of a longer table the middle is left out.
     pub at_most: Option<usize>,
+    /// Columns shown at most; of a wider table the middle is left out.
+    pub columns_at_most: Option<usize>,
 }
 
 /// A trace as a table.
 #[must_use]
 pub fn table(trace: &Trace, part: &Part) -> String {
     let columns = columns(trace);
-    let shown = fold(&columns);
+    let mut shown = fold(&columns);
+    if let Some(most) = part.columns_at_most.filter(|most| *most < shown.len()) {
+        let half = most / 2;
+        shown.splice(half..shown.len() - half, [None]);
+    }
     let all = columns.iter().map(|c| c.cells.len()).max().unwrap_or(0);
     let rows = part.rows.clone().unwrap_or(0..all);
     let rows = rows.start.min(all)..rows.end.min(all);

@@ -10,7 +10,7 @@ use super::error::BusError;
 use super::error_mode::{ErrorMode, Marks};
 use super::memory::{Memory, PAGE};
 use super::parameter_channel::ParameterChannel;
-use super::properties::{EmptyShortTelegram, Properties, ShortAddress};
+use super::properties::{EmptyShortTelegram, Properties, ShortAddress, TimeOutAnswer};
 use super::sync::{Addressing, Header, SyncByte};
 use crate::line::Received;
 use crate::nd21;
@@ -39,8 +39,8 @@ impl Step {
 pub enum Deadline {
     /// At this time, unless a byte comes first.
     At(Instant),
-    /// As soon as the line is free and everything received has been answered.
-    LineFree,
+    /// From this time on, as soon as the line is free and everything received has been answered.
+    LineFree(Instant),
 }
 
 /// A drive's end of the bus.
@@ -68,11 +68,18 @@ enum State {
     /// A net byte of a telegram for this drive.
     Addressed { left: u8, next: Net },
     /// Any byte: the drive is in the error mode.
-    Error(ErrorMode),
-    /// The same, silent after a time-out until the given time (9.9).
-    Silent(ErrorMode, Instant),
-    /// The same, sending zeros unasked (9.9).
-    Sending(ErrorMode),
+    Error(ErrorMode, Silence),
+}
+
+/// How long the line has been silent, for a drive in the error mode (9.9).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Silence {
+    /// Not too long.
+    None,
+    /// Too long: a time-out. The drive waits until then before it sends unasked.
+    Waiting { until: Instant },
+    /// The wait is over: zeros go out unasked.
+    Sending { since: Instant },
 }
 
 /// Which net byte of a telegram for this drive comes next.
@@ -108,10 +115,7 @@ impl BusEnd {
     /// Whether the drive is in the error mode.
     #[must_use]
     pub const fn in_error(&self) -> bool {
-        matches!(
-            self.state,
-            State::Error(_) | State::Silent(..) | State::Sending(_)
-        )
+        matches!(self.state, State::Error(..))
     }
 
     /// The error for which it last went into the error mode, since power-up.
@@ -139,21 +143,24 @@ impl BusEnd {
 
     /// Takes a byte that this drive looks at.
     fn consider<M: Memory>(&mut self, received: Received, memory: &mut M) -> Step {
-        match &mut self.state {
-            State::Error(mode) | State::Sending(mode) => {
+        if let State::Error(mode, silence) = &mut self.state {
+            let waiting = matches!(silence, Silence::Waiting { .. });
+            let step = if waiting && self.properties.time_out_answer == TimeOutAnswer::Silent {
+                Step {
+                    byte: None,
+                    marks: mode.overhear(received),
+                }
+            } else {
                 let response = mode.receive(received, self.properties.broken_sequence);
-                self.leave_error_mode_if(response.marks);
-                return Step {
+                Step {
                     byte: Some(response.byte),
                     marks: response.marks,
-                };
+                }
+            };
+            if step.marks.contains(Marks::RECOVERED) {
+                self.leave_error_mode();
             }
-            State::Silent(mode, _) => {
-                let marks = mode.overhear(received);
-                self.leave_error_mode_if(marks);
-                return Step { byte: None, marks };
-            }
-            _ => {}
+            return step;
         }
         let result = match received.error {
             Some(error) => Err(error.into()),
@@ -165,43 +172,40 @@ impl BusEnd {
     /// When this bus end next wants [`Self::handle_deadline`] to be called.
     #[must_use]
     pub fn deadline<M: Memory>(&self, memory: &M) -> Option<Deadline> {
-        match &self.state {
-            State::Error(_) => None,
-            State::Silent(_, until) => Some(Deadline::At(*until)),
-            State::Sending(_) => Some(Deadline::LineFree),
-            _ => {
-                let last = self.last_received?;
-                memory
-                    .monitors_time_out()
-                    .then(|| Deadline::At(last + self.properties.time_out))
+        match self.state {
+            State::Error(_, Silence::Waiting { until }) => Some(Deadline::At(until)),
+            State::Error(_, Silence::Sending { since }) => Some(Deadline::LineFree(since)),
+            _ if memory.monitors_time_out() => {
+                Some(Deadline::At(self.last_received? + self.properties.time_out))
             }
+            _ => None,
         }
     }
 
     /// Does what is due at [`Self::deadline`] (ND21 9.9): first the time-out is detected; then, after
-    /// a further silence, zeros go out, one whenever the line is free.
+    /// a further wait, zeros go out, one whenever the line is free. A drive that is in the error mode
+    /// already watches the time as well: a cable that breaks is often heard as a damaged byte first.
     pub fn handle_deadline<M: Memory>(&mut self, now: Instant, memory: &mut M) -> Step {
+        let waiting = Silence::Waiting {
+            until: now + self.properties.time_out_wait,
+        };
         match &mut self.state {
-            State::Silent(mode, _) => {
-                let mut mode = mode.clone();
-                let marks = mode.send_zero();
-                self.state = State::Sending(mode);
-                Step {
-                    byte: Some(0),
-                    marks,
-                }
+            State::Error(mode, silence @ Silence::None) => {
+                mode.time_out();
+                *silence = waiting;
+                Step::default()
             }
-            State::Sending(mode) => Step {
+            State::Error(_, silence @ Silence::Waiting { .. }) => {
+                *silence = Silence::Sending { since: now };
+                Step::default()
+            }
+            State::Error(mode, Silence::Sending { .. }) => Step {
                 byte: Some(0),
                 marks: mode.send_zero(),
             },
-            State::Error(_) => Step::default(),
             _ => {
                 self.blame(BusError::TimeOut, memory);
-                self.state = State::Silent(
-                    ErrorMode::enter_after_time_out(),
-                    now + self.properties.time_out_wait,
-                );
+                self.state = State::Error(ErrorMode::enter_after_time_out(), waiting);
                 Step {
                     byte: None,
                     marks: Marks::DETECTED,
@@ -260,9 +264,7 @@ impl BusEnd {
                 }
                 Ok(step)
             }
-            State::Passing { .. } | State::Error(_) | State::Silent(..) | State::Sending(_) => {
-                Ok(Step::plain(byte))
-            }
+            State::Passing { .. } | State::Error(..) => Ok(Step::plain(byte)),
         }
     }
 
@@ -285,7 +287,7 @@ impl BusEnd {
         let valid =
             self.short_address_valid || self.properties.short_address == ShortAddress::KeptSum;
         let mut sum = memory.read(nd21::BUS_ADDR);
-        if valid && header.addressing() == Addressing::NextDrive {
+        if header.addressing() == Addressing::NextDrive {
             sum = passed_on(sum);
             memory.write(nd21::BUS_ADDR, sum);
         }
@@ -311,7 +313,7 @@ impl BusEnd {
 
     fn detect<M: Memory>(&mut self, error: BusError, offending: Received, memory: &mut M) -> Step {
         self.blame(error, memory);
-        self.state = State::Error(ErrorMode::enter(offending));
+        self.state = State::Error(ErrorMode::enter(offending), Silence::None);
         Step {
             byte: Some(0),
             marks: Marks::DETECTED,
@@ -325,12 +327,10 @@ impl BusEnd {
 
     /// After the 41 of a check sequence: normal mode, half-received commands forgotten, no short
     /// address valid.
-    fn leave_error_mode_if(&mut self, marks: Marks) {
-        if marks.contains(Marks::RECOVERED) {
-            self.state = State::Sync;
-            self.channel = ParameterChannel::default();
-            self.short_address_valid = false;
-        }
+    fn leave_error_mode(&mut self) {
+        self.state = State::Sync;
+        self.channel = ParameterChannel::default();
+        self.short_address_valid = false;
     }
 }
 

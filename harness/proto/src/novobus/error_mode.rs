@@ -109,6 +109,11 @@ impl ErrorMode {
         }
     }
 
+    /// The line has been silent for too long (ND21 9.9).
+    pub fn time_out(&mut self) {
+        self.after_time_out = true;
+    }
+
     /// Takes the next byte (rules 1 to 4).
     pub fn receive(&mut self, received: Received, broken_sequence: BrokenSequence) -> Response {
         let good = received.error.is_none();

@@ -22,6 +22,8 @@ pub struct Properties {
     pub time_out: Span,
     /// `time-out-wait`: how long it then waits before it sends zeros; 10 ms (ND21 9.9).
     pub time_out_wait: Span,
+    /// `time-out-answer`: what becomes of a byte received during that wait (ND21 9.7 against 9.9).
+    pub time_out_answer: TimeOutAnswer,
 }
 
 impl Default for Properties {
@@ -33,6 +35,7 @@ impl Default for Properties {
             broken_sequence: BrokenSequence::default(),
             time_out: Span::from_millis(10),
             time_out_wait: Span::from_millis(10),
+            time_out_answer: TimeOutAnswer::default(),
         }
     }
 }
@@ -78,6 +81,17 @@ pub enum BrokenSequence {
     Forwarded,
 }
 
+/// What a drive does about a byte that it receives between a time-out and its own zeros. By 9.7 a drive
+/// in the error mode answers every byte; by 9.9 it waits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimeOutAnswer {
+    /// `answered`: by the rules of the error mode, as at any other time.
+    #[default]
+    Answered,
+    /// `silent`: heard, but not answered.
+    Silent,
+}
+
 /// What a property can be set to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting<'a> {
@@ -102,7 +116,7 @@ pub struct Description {
 }
 
 /// Every property, with its values.
-pub const PROPERTIES: [Description; 6] = [
+pub const PROPERTIES: [Description; 7] = [
     Description {
         name: "empty-short-telegram",
         values: &["accepted", "error"],
@@ -191,6 +205,22 @@ pub const PROPERTIES: [Description; 6] = [
                 true
             }
             _ => false,
+        },
+    },
+    Description {
+        name: "time-out-answer",
+        values: &["answered", "silent"],
+        section: "9.9",
+        about: "a byte received between a time-out and the drive's own zeros",
+        set: |p, s| {
+            choose(
+                &mut p.time_out_answer,
+                s,
+                &[
+                    ("answered", TimeOutAnswer::Answered),
+                    ("silent", TimeOutAnswer::Silent),
+                ],
+            )
         },
     },
 ];
