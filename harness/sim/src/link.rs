@@ -233,13 +233,20 @@ impl Link {
 
     #[cold]
     fn transmit_damaged(&mut self, first: Option<LinkFault>, start: Instant, mut byte: LineByte) {
+        // Several faults at one byte act one after the other, in the order of their lines.
         let mut flips = Flips::default();
         let mut copies = 1;
         let mut next = first;
         while let Some(fault) = next {
             match fault {
-                LinkFault::Flip(more) => flips = flips.and(more),
-                LinkFault::Replace(data) => byte.received = Some(data),
+                LinkFault::Flip(more) => {
+                    flips = flips.and(more);
+                    byte.received = byte.received.map(|data| data ^ more.data);
+                }
+                LinkFault::Replace(data) => {
+                    flips = Flips::default();
+                    byte.received = byte.received.map(|_| data);
+                }
                 LinkFault::Drop => byte.received = None,
                 LinkFault::Duplicate => copies = 2,
                 LinkFault::Insert(data) => {
@@ -264,8 +271,9 @@ impl Link {
             }
             next = self.plan.take(self.transmitted);
         }
-        if byte.error != Some(LineError::Break) {
-            byte.received = byte.received.map(|data| data ^ flips.data);
+        if byte.error == Some(LineError::Break) {
+            byte.received = byte.received.map(|_| 0);
+        } else {
             byte.error = byte.error.or(flips.noticed());
             if start < self.held_until {
                 byte.received = None;

@@ -1,0 +1,6 @@
+//! Tests of the simulated ring: exhaustive where that is possible, random elsewhere.
+
+mod against_reference;
+mod common;
+mod recovery;
+mod single_faults;
