@@ -1,1 +1,340 @@
-//! To be written.
+//! The program as a stranger uses it: streams, exit codes, messages.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn drivebench(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(arguments)
+        .current_dir(std::env::temp_dir())
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts")
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("the program ended by itself")
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).expect("text")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).expect("text")
+}
+
+/// A file in a folder of this test's own.
+fn file(test: &str, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("a file");
+    path
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+const GOOD: &str = "title good\nring 2\n> 80\n< 80\n";
+
+#[test]
+fn without_arguments_all_built_in_scenarios_pass_from_any_folder() {
+    let output = drivebench(&[]);
+    assert_eq!(code(&output), 0, "{}{}", stdout(&output), stderr(&output));
+    let lines = stdout(&output);
+    assert!(
+        lines.lines().filter(|l| l.starts_with("passed ")).count() > 40,
+        "{lines}"
+    );
+    assert!(
+        lines
+            .lines()
+            .last()
+            .is_some_and(|l| l.contains(" passed, 0 failed"))
+    );
+    assert_eq!(
+        stderr(&output),
+        "",
+        "nothing to say, and no progress bar where there is no terminal"
+    );
+}
+
+#[test]
+fn a_path_wins_over_a_built_in_name() {
+    let path = file("path_wins", "9.7-parity-error", GOOD);
+    let output = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(["run", "9.7-parity-error"])
+        .current_dir(path.parent().expect("a folder"))
+        .output()
+        .expect("the program starts");
+    assert!(stdout(&output).contains("good"), "{}", stdout(&output));
+    let built_in = drivebench(&["run", "9.7-parity-error"]);
+    assert!(stdout(&built_in).contains("The 100-axis parity error"));
+}
+
+#[test]
+fn folders_are_searched_and_filtered() {
+    let path = file("folders", "a.scn", GOOD);
+    file("folders", "b.scn", GOOD.replace("good", "another"));
+    file("folders", "notes.txt", "no scenario");
+    let folder = text(path.parent().expect("a folder"));
+    let both = drivebench(&["run", folder]);
+    assert!(
+        stdout(&both).contains("2 passed, 0 failed"),
+        "{}",
+        stdout(&both)
+    );
+    let one = drivebench(&["run", folder, "--filter", "ANOTHER"]);
+    assert!(
+        stdout(&one).contains("1 passed, 0 failed"),
+        "{}",
+        stdout(&one)
+    );
+    assert_eq!(
+        code(&drivebench(&[
+            "run",
+            folder,
+            "--filter",
+            "nothing of the kind"
+        ])),
+        4
+    );
+}
+
+#[test]
+fn a_mismatch_is_shown_as_the_manuals_table() {
+    let path = file(
+        "mismatch",
+        "wrong.scn",
+        "title wrong\nsource nd21 9.7\nring 3\n> 88 FE C0 13 FE D1\n< 88 01 C0 13 77 A5\n",
+    );
+    let output = drivebench(&["run", text(&path)]);
+    assert_eq!(code(&output), 1);
+    assert!(stdout(&output).starts_with("failed wrong "));
+    let shown = stderr(&output);
+    for part in [
+        "wrong.scn:5:1: the master received 00 where 77 is expected",
+        "expected  88 01 C0 13 77 A5",
+        "received  88 01 C0 13 00 2D",
+        "^^ byte 5 at the master",
+        ">    5      FE  FE  >00  00",
+        "see nd21 9.7",
+    ] {
+        assert!(shown.contains(part), "{part}\n{shown}");
+    }
+}
+
+#[test]
+fn a_byte_that_never_comes_is_named() {
+    let path = file("missing", "a.scn", "title a\nring 1\n> 80\n< 80 80\n");
+    let output = drivebench(&["run", text(&path)]);
+    assert_eq!(code(&output), 1);
+    assert!(
+        stderr(&output).contains("nothing more was received up to"),
+        "{}",
+        stderr(&output)
+    );
+}
+
+#[test]
+fn wrong_files_are_exit_code_2_and_nothing_is_played() {
+    let good = file("wrong_files", "good.scn", GOOD);
+    let binary = file("wrong_files", "binary.scn", [0x7F, b'E', b'L', b'F', 0, 1]);
+    let large = file("wrong_files", "large.scn", vec![b'\n'; 10 << 20]);
+    let latin = file("wrong_files", "latin.scn", b"title caf\xE9\n");
+    let empty = file("wrong_files", "empty.scn", "");
+    for (path, message) in [
+        (text(&binary), "byte 4 is 00"),
+        (text(&large), "more than 1024 KiB"),
+        (text(&latin), "byte 9 is E9"),
+        (text(&empty), "has no title"),
+        ("/dev/zero", "is not a regular file"),
+        ("no-such-file.scn", "failed to find no-such-file.scn"),
+        ("9.7-parity-eror", "did you mean `9.7-parity-error`?"),
+    ] {
+        for command in ["run", "check", "trace"] {
+            let output = drivebench(&[command, path]);
+            assert_eq!(code(&output), 2, "{command} {path}: {}", stderr(&output));
+            assert!(
+                stderr(&output).contains(message),
+                "{path}: {}",
+                stderr(&output)
+            );
+            assert_eq!(stdout(&output), "", "{command} {path}");
+        }
+        let output = drivebench(&["run", text(&good), path]);
+        assert_eq!(code(&output), 2);
+        assert_eq!(
+            stdout(&output),
+            "",
+            "nothing is played when one file is wrong"
+        );
+    }
+}
+
+#[test]
+fn rings_that_cannot_be_are_refused_with_the_manuals_limit() {
+    for size in ["0", "251", "99999999999999999999"] {
+        let path = file("rings", "a.scn", format!("title a\nring {size}\n> 80\n"));
+        let output = drivebench(&["check", text(&path)]);
+        assert_eq!(code(&output), 2);
+        assert!(
+            stderr(&output).contains("1 to 250 (ND21 8.4)"),
+            "{}",
+            stderr(&output)
+        );
+        let output = drivebench(&["run", "--ring", size]);
+        assert_eq!(code(&output), 2, "--ring {size}");
+        assert!(stderr(&output).contains("250"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn wrong_options_are_exit_code_2() {
+    for arguments in [
+        &["rnu"][..],
+        &["run", "--no-such-option"],
+        &["trace"],
+        &["trace", "9.7-parity-error", "--format", "xml"],
+        &["trace", "9.7-parity-error", "--rows", "9..3"],
+        &["trace", "9.7-parity-error", "--rows", "0..3"],
+        &["trace", "9.7-parity-error", "--ring", "99"],
+        &["trace", "/tmp"],
+        &["check"],
+        &["completions", "tcl"],
+        &["man", "/no/such/folder"],
+    ] {
+        let output = drivebench(arguments);
+        assert_eq!(code(&output), 2, "{arguments:?}: {}", stderr(&output));
+        assert_ne!(stderr(&output), "");
+        assert_eq!(stdout(&output), "");
+    }
+}
+
+#[test]
+fn a_ring_of_another_size_is_taken_where_the_scenario_allows_it() {
+    let output = drivebench(&["run", "9.2-synco", "--ring", "250"]);
+    assert_eq!(code(&output), 0);
+    assert!(
+        stdout(&output).contains("250 drives"),
+        "{}",
+        stdout(&output)
+    );
+}
+
+#[test]
+fn a_bus_that_is_not_built_is_skipped() {
+    let path = file("skipped", "a.scn", "title a\nbus unitek\n");
+    let output = drivebench(&["run", text(&path)]);
+    assert_eq!(code(&output), 0);
+    assert!(
+        stdout(&output).starts_with("skipped "),
+        "{}",
+        stdout(&output)
+    );
+    assert_eq!(code(&drivebench(&["run", text(&path), "--require-all"])), 5);
+}
+
+#[test]
+fn the_trace_of_an_example_is_what_the_documentation_says() {
+    let output = drivebench(&["trace", "9.7-parity-error", "--format", "json"]);
+    assert_eq!(code(&output), 0);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(json["schema"], 1);
+    assert_eq!(json["ring"], 100);
+    assert_eq!(json["links"].as_array().map(Vec::len), Some(101));
+    assert_eq!(json["links"][0]["from"], "master");
+    assert_eq!(json["links"][0]["to"], "99");
+    assert_eq!(json["links"][100]["to"], "master");
+    let first = &json["links"][0]["bytes"][0];
+    assert_eq!(
+        first,
+        &serde_json::json!({"t_ns": 286_458, "sent": 136, "received": 136, "error": null})
+    );
+    let damaged = &json["links"][2]["bytes"][9];
+    assert_eq!(damaged["sent"], 0x13);
+    assert_eq!(damaged["received"], 0x12);
+    assert_eq!(damaged["error"], "parity");
+    let mark = &json["marks"][0];
+    assert_eq!(mark["drive"], 97);
+    assert_eq!(mark["byte"], 10);
+    assert_eq!(mark["kind"], "detected");
+    assert_eq!(mark["cause"], "parity");
+}
+
+#[test]
+fn two_rings_run_on_one_clock() {
+    let path = file(
+        "two_rings",
+        "a.scn",
+        "title a\nring 2, 3\nstrict\ndrive 2:1 memory FE13 = 77\n> 80\n2> 80 80\n< 80\n2< 80 80\n\
+         read-byte 2:1 FE13 = 77\n! 2:1->0 byte 20: drop\n? drives 2:0..last normal\n",
+    );
+    let output = drivebench(&["trace", text(&path), "--format", "json"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(json["ring"], 2);
+    assert_eq!(json["second"]["ring"], 3);
+    assert!(stderr(&output).contains("this fault never happened: 2:1->0 byte 20: drop"));
+}
+
+#[test]
+fn help_has_examples_and_exit_codes() {
+    let output = drivebench(&["--help"]);
+    assert_eq!(code(&output), 0);
+    for part in [
+        "Examples:",
+        "drivebench trace 9.7-parity-error",
+        "Exit codes:",
+        "wrong usage",
+    ] {
+        assert!(stdout(&output).contains(part), "{part}");
+    }
+    for command in [
+        "run",
+        "list",
+        "check",
+        "trace",
+        "manual",
+        "completions",
+        "man",
+    ] {
+        assert_eq!(code(&drivebench(&[command, "--help"])), 0, "{command}");
+    }
+    assert!(stdout(&drivebench(&["man"])).contains(".TH drivebench"));
+    assert!(stdout(&drivebench(&["completions", "bash"])).contains("drivebench"));
+}
+
+#[test]
+fn the_manual_shows_what_is_pinned_and_what_is_not() {
+    let output = drivebench(&["manual"]);
+    assert_eq!(code(&output), 0);
+    let shown = stdout(&output);
+    let line = |start: &str| {
+        let found = shown.lines().find(|line| line.starts_with(start));
+        found
+            .unwrap_or_else(|| panic!("no line {start}"))
+            .to_owned()
+    };
+    assert!(line("nd21 9.7 ").ends_with("9.7-parity-error"));
+    assert!(line("nd21 13.1.9").ends_with("not yet"));
+    assert!(shown.contains("prints \"286,46 ms\", meant is 286.46 us"));
+    assert!(
+        stdout(&drivebench(&["manual", "--missing"]))
+            .lines()
+            .all(|l| !l.starts_with("nd21 9.7 "))
+    );
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .arg("manual")
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+}

@@ -1,1 +1,217 @@
-//! To be written.
+//! What no compiler keeps: import directions, citations that resolve, a snapshot for each scenario and no
+//! orphan, no over-long file.
+
+use harness::library::Entry;
+use harness::manual::{NOT_YET, errata, tables};
+use harness::scenario::source::Source;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Lines of a file that ask whether it holds two things.
+const MAX_LINES: usize = 650;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn files(folder: &str, ending: &str) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    let mut folders = vec![root().join(folder)];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == ending) {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn scenarios() -> Vec<(PathBuf, Entry)> {
+    let all: Vec<_> = files("corpora/scenarios", "scn")
+        .into_iter()
+        .map(|path| {
+            let source = Source::read(&path).expect("a text");
+            let entry = Entry::new(source, None)
+                .unwrap_or_else(|p| panic!("{}: {:#?}", path.display(), p.all()));
+            (path, entry)
+        })
+        .collect();
+    assert!(!all.is_empty(), "corpora/scenarios is empty");
+    all
+}
+
+#[test]
+fn imports_go_one_way() {
+    let forbidden = [
+        (
+            "harness/proto/src",
+            ["harness_sim", "harness::", "std::time"].as_slice(),
+        ),
+        ("harness/sim/src", &["harness::", "std::time"]),
+        // The ring knows no drive, and the reference model shares nothing.
+        ("harness/sim/src/ring.rs", &["plain", "bus_end"]),
+        ("harness/sim/src/link.rs", &["plain", "bus_end", "device"]),
+        (
+            "harness/sim/src/reference.rs",
+            &["harness_proto", "crate::"],
+        ),
+        // A scenario sees a link; only `simulate` makes simulated ones.
+        (
+            "harness/src/scenario/run.rs",
+            &["harness_sim", "SimulatedLink"],
+        ),
+        ("harness/src/report", &["crate::link", "crate::cli"]),
+    ];
+    for (place, words) in forbidden {
+        let path = root().join(place);
+        let sources = if path.is_dir() {
+            files(place, "rs")
+        } else {
+            vec![path]
+        };
+        assert!(!sources.is_empty());
+        for source in sources.iter().filter(|s| !s.ends_with("tests.rs")) {
+            for (number, line) in read(source).lines().enumerate() {
+                let code = line.split("//").next().unwrap_or_default();
+                let found = words.iter().find(|word| code.contains(**word));
+                assert_eq!(found, None, "{}:{}", source.display(), number + 1);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
+    let name = |path: &Path, base: &str| {
+        let inner = path.strip_prefix(root().join(base)).expect("inside");
+        inner.with_extension("").display().to_string()
+    };
+    let inputs: BTreeSet<_> = files("corpora/scenarios", "scn")
+        .iter()
+        .map(|p| name(p, "corpora"))
+        .collect();
+    let outputs: BTreeSet<_> = files("snapshots", "snap")
+        .iter()
+        .map(|p| name(p, "snapshots"))
+        .collect();
+    assert_eq!(inputs, outputs);
+    assert_eq!(
+        files("snapshots", "new"),
+        Vec::<PathBuf>::new(),
+        "tables to be reviewed"
+    );
+}
+
+#[test]
+fn citations_resolve() {
+    let tables: BTreeMap<_, _> = tables()
+        .expect("the catalogue")
+        .into_iter()
+        .map(|t| (t.id.clone(), t))
+        .collect();
+    let mut pinned = BTreeSet::new();
+    for (path, entry) in scenarios() {
+        assert!(
+            !entry.scenario.sources.is_empty(),
+            "{}: no `source` line",
+            path.display()
+        );
+        for source in &entry.scenario.sources {
+            let place = path.display();
+            assert!(
+                tables.contains_key(&source.text),
+                "{place}: the catalogue has no `{}`",
+                source.text
+            );
+            pinned.insert(source.text.clone());
+        }
+    }
+    let errata = errata().expect("the ledger");
+    let ids: BTreeSet<_> = errata.iter().map(|e| e.id.as_str()).collect();
+    assert_eq!(ids.len(), errata.len(), "an id stands twice in the ledger");
+    for erratum in &errata {
+        let shown = erratum.shown_by == NOT_YET || pinned.contains(&erratum.shown_by);
+        assert!(
+            shown,
+            "{}: no scenario pins `{}`",
+            erratum.id, erratum.shown_by
+        );
+    }
+    // Chapters 8 to 10 are the bus: every table and example of them is pinned.
+    for table in tables
+        .values()
+        .filter(|t| ["8.", "9.", "10."].iter().any(|c| t.section.starts_with(c)))
+    {
+        assert!(
+            pinned.contains(&table.id),
+            "no scenario pins `{}` ({})",
+            table.id,
+            table.title
+        );
+    }
+}
+
+#[test]
+fn every_property_is_exercised_and_described() {
+    let page = read(&root().join("harness/src/scenario/LANGUAGE.md"));
+    let texts: String = files("corpora/scenarios", "scn")
+        .iter()
+        .map(|path| read(path))
+        .collect();
+    for property in &harness_proto::novobus::properties::PROPERTIES {
+        assert!(
+            page.contains(&format!("| `{}` |", property.name)),
+            "{}",
+            property.name
+        );
+        let set = format!("property {} =", property.name);
+        assert!(texts.contains(&set), "no scenario sets {}", property.name);
+    }
+}
+
+#[test]
+fn files_are_not_over_long_and_have_a_doc() {
+    for path in files("harness", "rs") {
+        let text = read(&path);
+        assert!(text.lines().count() <= MAX_LINES, "{}", path.display());
+        assert!(
+            text.starts_with("//!"),
+            "{}: says nothing of itself",
+            path.display()
+        );
+        assert!(
+            !text.contains(&["#[", "allow("].concat()),
+            "{}: use expect with a reason",
+            path.display()
+        );
+    }
+}
+
+#[test]
+fn scenarios_are_readable() {
+    for path in files("corpora/scenarios", "scn") {
+        for (number, line) in read(&path).lines().enumerate() {
+            assert!(
+                line.chars().count() <= 120,
+                "{}:{}",
+                path.display(),
+                number + 1
+            );
+            assert!(
+                !line.contains('\t') && line == line.trim_end(),
+                "{}:{}",
+                path.display(),
+                number + 1
+            );
+        }
+    }
+}

@@ -343,12 +343,23 @@ pub(super) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
     Ok(Drives { ring, from, to })
 }
 
-/// `2:` in front of a drive or a link of the second ring.
+/// `2:` in front of a drive or a link of the second ring. The colon of `drive 2: off` is another one:
+/// no number follows it.
 pub(super) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
-    if scanner.eat("2:") {
+    let rest = scanner.rest();
+    let behind = |prefix| rest.strip_prefix(prefix).unwrap_or_default();
+    let number = |text: &str| {
+        text.starts_with(|c: char| c.is_ascii_digit() || c == 'N' || c == '(')
+            || text.starts_with("last")
+            || text.starts_with("master")
+    };
+    if number(behind("2:")) {
+        scanner.eat("2:");
         return 1;
     }
-    scanner.eat("1:");
+    if number(behind("1:")) {
+        scanner.eat("1:");
+    }
     0
 }
 

@@ -1,11 +1,10 @@
-//! Plays a plan on a link, step by step, and says what came of it.
+//! Step by step.
 
-use super::pattern::Expected;
-use super::plan::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen, PlannedWindow};
-use super::problem::Span;
-use super::verdict::Verdict;
 use crate::link::{Capability, Link, Moment};
-use crate::locate::{self, Location};
+use crate::scenario::pattern::Expected;
+use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
+use crate::scenario::problem::Span;
+use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::checksum::Checksum;
@@ -14,10 +13,6 @@ use std::fmt::Write as _;
 
 /// How long bytes may be on their way round before the bench gives up waiting for them.
 const MAX_ROUND: time::Span = time::Span::from_millis(60_000);
-
-/// SYNCO sent to let a ring spell out an address: the bound of 25 zeros, and enough behind it to see
-/// that the address stays (ND21 9.7).
-const PROBE: usize = 64;
 
 /// What came of a scenario.
 #[derive(Clone, Debug)]
@@ -84,7 +79,12 @@ pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
         sent_to: link.now(),
         link,
     };
-    let result = runner.play(plan);
+    let mut result = runner.play(plan);
+    if let Err(stop) = &mut result {
+        // What is under way still tells something, and nothing more is sent.
+        runner.settle();
+        runner.complete(&mut stop.finding);
+    }
     let remarks = runner
         .link
         .unused_faults()
@@ -105,13 +105,13 @@ pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
 }
 
 /// Why playing stops.
-struct Stop {
+pub(super) struct Stop {
     verdict: Verdict,
     finding: Box<Finding>,
 }
 
 impl Stop {
-    fn failed(span: Span, message: impl Into<String>) -> Self {
+    pub(super) fn failed(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Failed,
             finding: Box::new(Finding {
@@ -137,24 +137,24 @@ impl Stop {
 
 /// What the master has received from one ring.
 #[derive(Default)]
-struct RingRecord {
-    received: Vec<(Instant, Received)>,
+pub(super) struct RingRecord {
+    pub(super) received: Vec<(Instant, Received)>,
     /// The first byte that no line has asked for yet.
     next: usize,
     /// The first byte behind the last check sequence.
-    since_recovery: usize,
+    pub(super) since_recovery: usize,
 }
 
-struct Runner<'a> {
-    link: &'a mut dyn Link,
-    rings: Vec<RingRecord>,
+pub(super) struct Runner<'a> {
+    pub(super) link: &'a mut dyn Link,
+    pub(super) rings: Vec<RingRecord>,
     /// When the line before was done.
     line_before: Instant,
     deadline: time::Span,
-    corrected: u64,
-    sent: u64,
-    sent_from: Instant,
-    sent_to: Instant,
+    pub(super) corrected: u64,
+    pub(super) sent: u64,
+    pub(super) sent_from: Instant,
+    pub(super) sent_to: Instant,
 }
 
 impl Runner<'_> {
@@ -383,6 +383,16 @@ impl Runner<'_> {
         ))
     }
 
+    /// Adds to a finding what has been received meanwhile.
+    fn complete(&self, finding: &mut Finding) {
+        if let Some(difference) = &mut finding.difference {
+            let first = difference.byte - 1 - difference.index;
+            let wanted = difference.expected.len().max(1);
+            let received = self.rings[difference.ring].received.iter();
+            difference.received = received.skip(first).take(wanted).map(|(_, b)| *b).collect();
+        }
+    }
+
     fn nothing_unasked(&self, span: Span) -> Result<(), Stop> {
         for (ring, record) in self.rings.iter().enumerate() {
             if let Some((at, byte)) = record.received.get(record.next) {
@@ -401,135 +411,6 @@ impl Runner<'_> {
         }
         Ok(())
     }
-
-    fn check(&mut self, check: &PlannedCheck, span: Span) -> Result<(), Stop> {
-        let failed = |message: String| Err(Stop::failed(span, message));
-        match check {
-            PlannedCheck::Located(ring, drive) => match self.locate(*ring) {
-                Some(location) if location.drive == *drive => Ok(()),
-                Some(location) => failed(format!(
-                    "the ring spells out drive {}, expected is drive {drive}",
-                    location.drive
-                )),
-                None => failed(format!(
-                    "the ring spells out no address, expected is drive {drive}"
-                )),
-            },
-            PlannedCheck::Within(zeros) => match self.locate(0) {
-                Some(location) if location.zeros.is_none_or(|found| found <= *zeros) => Ok(()),
-                Some(location) => failed(format!(
-                    "the address came after {} zeros, expected are at most {zeros}",
-                    location.zeros.unwrap_or_default()
-                )),
-                None => failed("the ring spells out no address".to_owned()),
-            },
-            PlannedCheck::InError(ring, drives, expected) => {
-                let wrong: Vec<_> = drives
-                    .clone()
-                    .filter(|k| {
-                        self.link
-                            .error_of(*ring, *k)
-                            .is_some_and(|error| error.is_some() != *expected)
-                    })
-                    .collect();
-                if wrong.is_empty() {
-                    return Ok(());
-                }
-                let not = if *expected { " not" } else { "" };
-                failed(format!(
-                    "{} {}{not} in the error mode",
-                    list(&wrong),
-                    are(&wrong)
-                ))
-            }
-            PlannedCheck::Error(ring, drive, error) => {
-                match self.link.error_of(*ring, *drive).flatten() {
-                    Some(found) if found == *error => Ok(()),
-                    Some(found) => failed(format!(
-                        "drive {drive} has error {found}, expected is {error}"
-                    )),
-                    None => failed(format!(
-                        "drive {drive} is not in the error mode, expected is error {error}"
-                    )),
-                }
-            }
-            PlannedCheck::Memory(ring, drives, address, bytes) => {
-                self.check_memory(*ring, drives.clone(), *address, bytes, span)
-            }
-            PlannedCheck::Corrected(times) if *times == self.corrected => Ok(()),
-            PlannedCheck::Corrected(times) => failed(format!(
-                "{} check sequences came back, expected are {times}",
-                self.corrected
-            )),
-            PlannedCheck::Sent(bytes, time) => {
-                if *bytes != self.sent {
-                    return failed(format!(
-                        "{} bytes were sent since the last check, expected are {bytes}",
-                        self.sent
-                    ));
-                }
-                let took = self.sent_to.since(self.sent_from);
-                match time {
-                    Some((time, tolerance))
-                        if took + *tolerance < *time || *time + *tolerance < took =>
-                    {
-                        failed(format!("the {bytes} bytes took {took}, expected is {time}"))
-                    }
-                    _ => Ok(()),
-                }
-            }
-            PlannedCheck::Received(bytes) => {
-                let received = self.rings[0].received.len() as u64;
-                if received == *bytes {
-                    return Ok(());
-                }
-                failed(format!(
-                    "{received} bytes were received, expected are {bytes}"
-                ))
-            }
-        }
-    }
-
-    fn check_memory(
-        &self,
-        ring: usize,
-        drives: std::ops::RangeInclusive<u8>,
-        address: u16,
-        bytes: &[Expected],
-        span: Span,
-    ) -> Result<(), Stop> {
-        for drive in drives {
-            for (cell, expected) in (address..=u16::MAX).zip(bytes) {
-                let Some(found) = self.link.peek(ring, drive, cell) else {
-                    continue;
-                };
-                if !matches(*expected, Received::good(found), &[]) {
-                    return Err(Stop::failed(
-                        span,
-                        format!(
-                            "cell {cell:04X} of drive {drive} holds {found:02X}, expected is {}",
-                            Shown(*expected)
-                        ),
-                    ));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// The address that the ring spells out, letting it go on where it has not come to it yet.
-    fn locate(&mut self, ring: usize) -> Option<Location> {
-        let size = self.link.drives(ring);
-        let record = &self.rings[ring];
-        let mut heard: Vec<_> = record.received[record.since_recovery..]
-            .iter()
-            .map(|(_, byte)| *byte)
-            .collect();
-        locate::locate(&heard, size).or_else(|| {
-            heard.extend(self.link.probe(ring, PROBE));
-            locate::locate(&heard, size)
-        })
-    }
 }
 
 fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
@@ -540,7 +421,7 @@ fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
             .all(|((_, byte), wanted)| byte.is(wanted))
 }
 
-fn matches(expected: Expected, received: Received, before: &[u8]) -> bool {
+pub(super) fn matches(expected: Expected, received: Received, before: &[u8]) -> bool {
     if received.error.is_some() {
         return false;
     }
@@ -577,16 +458,6 @@ impl std::fmt::Display for Shown {
             Expected::MinusChecksum(_) => f.write_str("-checksum"),
         }
     }
-}
-
-fn list(drives: &[u8]) -> String {
-    let names: Vec<_> = drives.iter().map(u8::to_string).collect();
-    let s = if drives.len() == 1 { "" } else { "s" };
-    format!("drive{s} {}", names.join(", "))
-}
-
-fn are(drives: &[u8]) -> &'static str {
-    if drives.len() == 1 { "is" } else { "are" }
 }
 
 /// What a plan needs that a rig may lack, in words.

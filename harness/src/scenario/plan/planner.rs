@@ -1,169 +1,28 @@
-//! A scenario settled for rings of given sizes: every number is known, everything that cannot be is
-//! refused, and nothing has been sent yet.
+//! Settles a scenario, line by line.
 
-use super::check::Check;
-use super::expression::Located;
-use super::job::{Job, JobKind};
-use super::pattern::{Expected, MAX_BYTES, Pattern};
-use super::problem::{Problem, Problems, Span, Spanned};
-use super::source::Source;
-use super::syntax::{
+use super::types::{
+    Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedSetupKind, PlannedStep, PlannedWhen,
+    PlannedWindow,
+};
+use crate::link::{Capability, Moment, PlacedFault};
+use crate::scenario::check::Check;
+use crate::scenario::expression::Located;
+use crate::scenario::pattern::MAX_BYTES;
+use crate::scenario::problem::{Problem, Problems, Span, Spanned};
+use crate::scenario::source::Source;
+use crate::scenario::syntax::{
     Action, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Scenario, Setup, SetupKind, When,
 };
-use super::times::Window;
-use crate::link::{Capability, Moment, PlacedFault};
-use harness_proto::line::Rate;
-use harness_proto::nd21;
+use crate::scenario::times::Window;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::command::{Command, Reply};
-use harness_proto::novobus::error::BusError;
-use harness_proto::novobus::memory::{self, OutputChange};
-use harness_proto::novobus::properties::{Properties, ReadLongAnswer, Setting};
-use harness_proto::novobus::telegram::{Address, Telegram};
+use harness_proto::novobus::memory;
+use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time::{self, Instant};
 use harness_sim::fault::LinkFault;
 use std::ops::RangeInclusive;
 
 /// How long a line without a time waits where the scenario does not say.
 const DEADLINE: time::Span = time::Span::from_millis(1000);
-
-/// A scenario for rings of given sizes.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// The rings; one or two.
-    pub rings: Vec<RingSize>,
-    /// The rate of the line.
-    pub rate: Rate,
-    /// Whether bytes that no line asked for are a failure.
-    pub strict: bool,
-    /// How long a line without a time waits.
-    pub deadline: time::Span,
-    /// What a rig must have.
-    pub needs: Vec<Capability>,
-    /// The steps, in order.
-    pub steps: Vec<PlannedStep>,
-    setups: Vec<PlannedSetup>,
-}
-
-#[derive(Clone, Debug)]
-struct PlannedSetup {
-    ring: usize,
-    drives: RangeInclusive<u8>,
-    what: PlannedSetupKind,
-}
-
-#[derive(Clone, Debug)]
-pub(super) enum PlannedSetupKind {
-    Memory(u16, Vec<u8>),
-    Eeprom(u8, Vec<u8>),
-    Word(String, String),
-    Time(String, time::Span),
-}
-
-impl PlannedSetupKind {
-    /// Sets what the setup says of a drive's properties, if it says anything of them.
-    pub(super) fn apply_to(&self, properties: &mut Properties) {
-        // Planning has refused what cannot be set.
-        let _known = match self {
-            Self::Word(name, word) => properties.set(name, Setting::Word(word)),
-            Self::Time(name, span) => properties.set(name, Setting::Time(*span)),
-            Self::Memory(..) | Self::Eeprom(..) => Ok(()),
-        };
-    }
-}
-
-/// A step, settled.
-#[derive(Clone, Debug)]
-pub struct PlannedStep {
-    /// The time in front.
-    pub when: PlannedWhen,
-    /// What happens.
-    pub action: PlannedAction,
-    /// Where it stands.
-    pub span: Span,
-}
-
-/// A time in front of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlannedWhen {
-    /// None.
-    Now,
-    /// After the line before.
-    After(PlannedWindow),
-    /// Since the start.
-    At(PlannedWindow),
-}
-
-/// A time from, to, and how exact they are meant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PlannedWindow {
-    /// From.
-    pub from: time::Span,
-    /// To.
-    pub to: time::Span,
-    /// Half a unit of the last digit written, for an exact time; zero for a window.
-    pub tolerance: time::Span,
-}
-
-/// What a step does.
-#[derive(Clone, Debug)]
-pub enum PlannedAction {
-    /// The master sends.
-    Send(usize, Vec<u8>),
-    /// The master receives.
-    Receive(usize, Vec<Expected>),
-    /// A fault.
-    Fault(usize, PlacedFault, Moment),
-    /// A check.
-    Check(PlannedCheck),
-    /// A telegram and its answer.
-    Telegram(usize, Vec<u8>, Vec<Expected>),
-    /// 17 zeros and the check sequence.
-    Recover(usize),
-}
-
-/// A check, settled.
-#[derive(Clone, Debug)]
-pub enum PlannedCheck {
-    /// The ring spells out this drive.
-    Located(usize, u8),
-    /// It does so after at most so many zeros.
-    Within(u64),
-    /// Drives are in the error mode, or are not.
-    InError(usize, RangeInclusive<u8>, bool),
-    /// A drive's error mode has this cause.
-    Error(usize, u8, BusError),
-    /// Drives' cells hold these bytes.
-    Memory(usize, RangeInclusive<u8>, u16, Vec<Expected>),
-    /// So many check sequences came back whole after an error.
-    Corrected(u64),
-    /// So many bytes were sent since the last check, in this time (and its tolerance).
-    Sent(u64, Option<(time::Span, time::Span)>),
-    /// So many bytes were received since the start.
-    Received(u64),
-}
-
-impl Plan {
-    /// What drive `drive` is set to hold and how to behave, in order of the lines.
-    pub(super) fn setups_of(
-        &self,
-        ring: usize,
-        drive: u8,
-    ) -> impl Iterator<Item = &PlannedSetupKind> + '_ {
-        setups_of(&self.setups, ring, drive)
-    }
-}
-
-fn setups_of(
-    setups: &[PlannedSetup],
-    ring: usize,
-    drive: u8,
-) -> impl Iterator<Item = &PlannedSetupKind> + '_ {
-    setups
-        .iter()
-        .filter(move |setup| setup.ring == ring && setup.drives.contains(&drive))
-        .map(|setup| &setup.what)
-}
 
 /// Settles a scenario, for a first ring of `size` drives where that is given.
 ///
@@ -262,14 +121,14 @@ impl PlannedAction {
     }
 }
 
-struct Planner {
+pub(super) struct Planner {
     byte_time: time::Span,
     rings: Vec<RingSize>,
-    setups: Vec<PlannedSetup>,
+    pub(super) setups: Vec<PlannedSetup>,
 }
 
 impl Planner {
-    fn ring(&self, index: usize, span: Span) -> Result<RingSize, Problem> {
+    pub(super) fn ring(&self, index: usize, span: Span) -> Result<RingSize, Problem> {
         self.rings.get(index).copied().ok_or_else(|| {
             Problem::new(
                 span,
@@ -280,7 +139,7 @@ impl Planner {
         })
     }
 
-    fn size(&self, ring: usize) -> i64 {
+    pub(super) fn size(&self, ring: usize) -> i64 {
         self.rings.get(ring).map_or(0, |r| i64::from(r.drives()))
     }
 
@@ -306,7 +165,7 @@ impl Planner {
         Ok(from.min(to)..=from.max(to))
     }
 
-    fn one(&self, drives: &Drives) -> Result<(usize, u8), Problem> {
+    pub(super) fn one(&self, drives: &Drives) -> Result<(usize, u8), Problem> {
         Ok((drives.ring, self.drive(drives.ring, &drives.from)?))
     }
 
@@ -517,206 +376,6 @@ impl Planner {
             Check::Received(bytes) => PlannedCheck::Received(count(bytes)?),
         })
     }
-
-    fn job(&self, job: &Job) -> Result<PlannedAction, Problem> {
-        match job {
-            Job::Recover(ring) => {
-                self.ring(*ring, Span::default())?;
-                Ok(PlannedAction::Recover(*ring))
-            }
-            Job::Exchange {
-                drive,
-                send,
-                receive,
-            } => {
-                let (ring, k) = self.one(drive)?;
-                let data = self.data(send, 2, ring)?;
-                let word = u16::from_be_bytes([known(data[0]), known(data[1])]);
-                let answer = match receive {
-                    Some(pattern) => self.data(pattern, 2, ring)?,
-                    None => vec![Expected::Any; 2],
-                };
-                self.telegram(ring, k, drive.from.span, Some(word), &[], answer)
-            }
-            Job::Command {
-                kind,
-                drive,
-                address,
-                data,
-            } => {
-                let (ring, k) = self.one(drive)?;
-                let command = self.command(*kind, ring, address.as_ref(), data.as_ref())?;
-                if let Some(address) = address
-                    && !memory::in_range(command.kind(), address.value)
-                {
-                    let layout = command.layout(ReadLongAnswer::default());
-                    return Err(Problem::new(
-                        address.span,
-                        format!(
-                            "{} does not reach {:04X}",
-                            layout.printed_name, address.value
-                        ),
-                        format!(
-                            "an address in the ranges of ND21 {} expected here",
-                            layout.section
-                        ),
-                    ));
-                }
-                let read = match data {
-                    Some(pattern) if command.kind().reads() => {
-                        self.data(pattern, usize::from(command.kind().width()), ring)?
-                    }
-                    _ => vec![Expected::Any; 4],
-                };
-                let answer = expected_answer(&command, &read, self.read_long(ring, k));
-                self.telegram(ring, k, drive.from.span, None, &command.encode(), answer)
-            }
-        }
-    }
-
-    fn command(
-        &self,
-        kind: JobKind,
-        ring: usize,
-        address: Option<&Spanned<u16>>,
-        data: Option<&Pattern>,
-    ) -> Result<Command, Problem> {
-        let address = address.map_or(memory::PAGE, |address| address.value);
-        let [_, address_low] = address.to_be_bytes();
-        let byte = || -> Result<u8, Problem> {
-            match data {
-                Some(pattern) => Ok(known(self.data(pattern, 1, ring)?[0])),
-                None => Ok(0),
-            }
-        };
-        let [_, status] = nd21::STATUS.to_be_bytes();
-        let status_and = |data| Command::And {
-            address_low: status,
-            data,
-        };
-        let status_or = |data| Command::Or {
-            address_low: status,
-            data,
-        };
-        Ok(match kind {
-            JobKind::ReadByte => Command::ReadByte { address },
-            JobKind::ReadWord => Command::ReadWord { address },
-            JobKind::ReadLong => Command::ReadLong { address },
-            JobKind::WriteByte => Command::WriteByte {
-                address,
-                data: byte()?,
-            },
-            JobKind::WriteWord => {
-                let word = match data {
-                    Some(pattern) => self.data(pattern, 2, ring)?,
-                    None => vec![Expected::Byte(0); 2],
-                };
-                Command::WriteWord {
-                    address,
-                    data: u16::from_be_bytes([known(word[0]), known(word[1])]),
-                }
-            }
-            JobKind::And => Command::And {
-                address_low,
-                data: byte()?,
-            },
-            JobKind::Or => Command::Or {
-                address_low,
-                data: byte()?,
-            },
-            JobKind::WriteIo => {
-                let code = byte()?;
-                let change = OutputChange::from_code(code).ok_or_else(|| {
-                    Problem::new(
-                        data.map_or(Span::default(), |pattern| pattern.span),
-                        format!("{code:02X} is no output code"),
-                        "00 to 03 expected here (ND21 10.4)",
-                    )
-                })?;
-                Command::WriteIo(change)
-            }
-            JobKind::Reset => Command::ResetH8,
-            JobKind::Go => status_and(!(nd21::STATUS_BLOCKED | nd21::STATUS_STOPPED)),
-            JobKind::Stop => status_or(nd21::STATUS_STOPPED),
-            JobKind::Block => status_or(nd21::STATUS_BLOCKED),
-            JobKind::DeleteError => Command::WriteByte {
-                address: nd21::ERROR_CODE,
-                data: nd21::CONFIRM_ERROR,
-            },
-        })
-    }
-
-    /// The form in which a drive is set to answer `ReadLong`.
-    fn read_long(&self, ring: usize, drive: u8) -> ReadLongAnswer {
-        let mut properties = Properties::default();
-        for setup in setups_of(&self.setups, ring, drive) {
-            setup.apply_to(&mut properties);
-        }
-        properties.read_long
-    }
-
-    /// Exactly `count` bytes.
-    fn data(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<Expected>, Problem> {
-        let bytes = pattern.expand(self.size(ring))?;
-        if bytes.len() == count {
-            return Ok(bytes);
-        }
-        Err(Problem::new(
-            pattern.span,
-            format!("{} bytes stand where {count} are expected", bytes.len()),
-            format!("{} hexadecimal digits expected here", 2 * count),
-        ))
-    }
-
-    /// A telegram with an address byte, and what the master receives for it.
-    fn telegram(
-        &self,
-        ring: usize,
-        drive: u8,
-        span: Span,
-        process_data: Option<u16>,
-        parameters: &[u8],
-        answer: Vec<Expected>,
-    ) -> Result<PlannedAction, Problem> {
-        let wrong = |message: String| Problem::new(span, message, "this drive");
-        let address = self
-            .ring(ring, span)?
-            .address_byte(drive)
-            .map_err(|error| wrong(error.to_string()))?;
-        let bytes = Telegram::new(Address::Byte(address), process_data, parameters)
-            .map_err(|error| wrong(error.to_string()))?
-            .encode();
-        let mut expected = vec![Expected::Byte(bytes[0]), Expected::Byte(drive)];
-        expected.extend(answer);
-        Ok(PlannedAction::Telegram(ring, bytes, expected))
-    }
-}
-
-fn known(byte: Expected) -> u8 {
-    match byte {
-        Expected::Byte(byte) => byte,
-        Expected::Any | Expected::MinusChecksum(_) => 0,
-    }
-}
-
-/// What comes back for a command where the data read are `read`, in memory order.
-fn expected_answer(
-    command: &Command,
-    read: &[Expected],
-    read_long: ReadLongAnswer,
-) -> Vec<Expected> {
-    let layout = command.layout(read_long);
-    let sent = command.encode();
-    let mut expected = vec![Expected::Byte(layout.code)];
-    for (i, reply) in layout.answer.iter().enumerate() {
-        let so_far = u8::try_from(expected.len()).unwrap_or(u8::MAX);
-        expected.push(match reply {
-            Reply::Echo => Expected::Byte(sent[1 + i]),
-            Reply::Data(n) => read.get(usize::from(*n)).copied().unwrap_or(Expected::Any),
-            Reply::Check => Expected::MinusChecksum(so_far),
-        });
-    }
-    expected
 }
 
 fn in_memory(address: &Spanned<u16>, length: usize) -> Result<(), Problem> {

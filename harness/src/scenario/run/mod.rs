@@ -1,0 +1,6 @@
+//! Plays a plan on a link and says what came of it.
+
+mod check;
+mod player;
+
+pub use player::{Difference, Finding, Outcome, Shown, needs, run, show};
