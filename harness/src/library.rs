@@ -174,8 +174,13 @@ fn built_in() -> Result<Vec<Source>, LibraryError> {
         .into_iter()
         .map(|(name, bytes)| Source::from_bytes(name, bytes.to_vec()))
         .collect::<Result<Vec<_>, _>>()?;
-    sources.sort_by(|a, b| natural(&a.name).cmp(&natural(&b.name)));
+    sources.sort_by(|a, b| natural(bare(&a.name)).cmp(&natural(bare(&b.name))));
     Ok(sources)
+}
+
+/// A name without the ending.
+fn bare(name: &str) -> &str {
+    name.strip_suffix(".scn").unwrap_or(name)
 }
 
 /// Numbers in a name sort as numbers: 9.7 before 10.1.
@@ -205,22 +210,17 @@ fn collect<'a>(dir: &'a Dir<'a>, files: &mut Vec<(String, &'a [u8])>) {
 
 fn built_in_named(name: &Path) -> Result<Source, LibraryError> {
     let wanted = name.display().to_string();
-    let bare = |name: &str| name.trim_end_matches(".scn").to_owned();
-    let last = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
+    let last = |name| -> &str { bare(name).rsplit('/').next().unwrap_or_default() };
     let sources = built_in()?;
-    let found = sources.iter().find(|source| {
-        bare(&source.name) == bare(&wanted) || bare(&last(&source.name)) == bare(&wanted)
-    });
+    let found = sources
+        .iter()
+        .find(|source| [bare(&source.name), last(&source.name)].contains(&bare(&wanted)));
     if let Some(source) = found {
         return Ok(source.clone());
     }
-    let names: Vec<_> = sources
-        .iter()
-        .map(|source| bare(&last(&source.name)))
-        .collect();
-    let known: Vec<_> = names.iter().map(String::as_str).collect();
+    let known: Vec<_> = sources.iter().map(|source| last(&source.name)).collect();
     Err(LibraryError::NotFound {
-        near: nearest(&bare(&last(&wanted)), &known).map(str::to_owned),
+        near: nearest(last(&wanted), &known).map(str::to_owned),
         name: wanted,
     })
 }

@@ -149,7 +149,7 @@ fn wrong_files_are_exit_code_2_and_nothing_is_played() {
         (text(&binary), "byte 4 is 00"),
         (text(&large), "more than 1024 KiB"),
         (text(&latin), "byte 9 is E9"),
-        (text(&empty), "has no title"),
+        (text(&empty), "how many drives"),
         ("/dev/zero", "is not a regular file"),
         ("no-such-file.scn", "failed to find no-such-file.scn"),
         ("9.7-parity-eror", "did you mean `9.7-parity-error`?"),
@@ -318,7 +318,7 @@ fn the_manual_shows_what_is_pinned_and_what_is_not() {
             .unwrap_or_else(|| panic!("no line {start}"))
             .to_owned()
     };
-    assert!(line("nd21 9.7 ").ends_with("9.7-parity-error"));
+    assert!(line("nd21 9.7 ").contains(" 9.7-parity-error"));
     assert!(line("nd21 13.1.9").ends_with("not yet"));
     assert!(shown.contains("prints \"286,46 ms\", meant is 286.46 us"));
     assert!(

@@ -159,7 +159,7 @@ fn what_cannot_be_is_refused_with_its_range() {
     refused(
         &steps("write-word 1 FF08 = 12"),
         "12",
-        "1 bytes stand where 2",
+        "1 byte where 2 bytes must stand",
         None,
     );
     refused(&steps("> xx"), "xx", "must be known", None);
@@ -229,7 +229,6 @@ fn what_cannot_be_is_refused_with_its_range() {
         None,
     );
     refused("title x\ntitle y\nring 3\n", "title", "stands twice", None);
-    refused("ring 3\n> 80\n", "", "no title", Some("add a line"));
     refused("title x\n> 80\n", "", "how many drives", Some("ring 4"));
     refused(&steps("2> 80"), "80", "one ring", Some("ring 4, 3"));
 }

@@ -66,7 +66,7 @@ fn imports_go_one_way() {
         ),
         // A scenario sees a link; only `simulate` makes simulated ones.
         (
-            "harness/src/scenario/run.rs",
+            "harness/src/scenario/run",
             &["harness_sim", "SimulatedLink"],
         ),
         ("harness/src/report", &["crate::link", "crate::cli"]),

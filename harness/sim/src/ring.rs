@@ -226,6 +226,12 @@ impl<D: Device> Ring<D> {
         }
     }
 
+    /// How many bytes all links together have carried.
+    #[must_use]
+    pub fn carried(&self) -> u64 {
+        self.links.iter().map(Link::arrived).sum()
+    }
+
     /// What has happened so far.
     #[must_use]
     pub fn trace(&self) -> Trace {

@@ -63,7 +63,7 @@ impl Output {
         for diagnostic in problems.diagnostics() {
             let mut text = String::new();
             if handler.render_report(&mut text, diagnostic).is_ok() {
-                self.say(&text);
+                self.say(&(text + "\n"));
             }
         }
         self.complain(&problems.to_string());

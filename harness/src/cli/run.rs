@@ -6,7 +6,7 @@ use super::output::Output;
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
 use crate::report::mismatch::mismatch;
-use crate::scenario::run::{Finding, Outcome, run as play};
+use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
 use crate::scenario::syntax::Bus;
 use crate::scenario::verdict::Verdict;
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     let mut took = Span::ZERO;
     for entry in &entries {
         bar.set_message(entry.short_name().to_owned());
-        let played = play_entry(entry);
+        let played = play_entry(entry, AtFinding::Stop);
         let outcome = &played.outcome;
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
@@ -94,7 +94,7 @@ pub(super) struct Played {
 }
 
 /// Plays a scenario on simulated rings.
-pub(super) fn play_entry(entry: &Entry) -> Played {
+pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
     let Some(plan) = &entry.plan else {
         let name = Bus::NAMES
             .iter()
@@ -111,7 +111,7 @@ pub(super) fn play_entry(entry: &Entry) -> Played {
         };
     };
     let mut link = simulated(plan);
-    let outcome = play(plan, &mut link);
+    let outcome = play(plan, &mut link, at_finding);
     Played {
         outcome,
         traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
@@ -157,6 +157,9 @@ fn explain(entry: &Entry, finding: &Finding, traces: &[Trace]) -> String {
     let line = entry.source.text.get(finding.span.start..finding.span.end);
     for line in line.unwrap_or_default().lines() {
         let _infallible = writeln!(text, "    {line}");
+    }
+    if !finding.in_error.is_empty() {
+        let _infallible = writeln!(text, "in the error mode: {}", finding.in_error);
     }
     let bytes = mismatch(finding, traces, &sources);
     if bytes.is_empty() {

@@ -7,6 +7,7 @@ use super::run::{details, play_entry};
 use crate::library::{Entry, sources};
 use crate::report::json;
 use crate::report::table::{LEGEND, Part, table, wires};
+use crate::scenario::run::AtFinding;
 use harness_sim::trace::Trace;
 
 /// Lines about damaged bytes shown below a table.
@@ -34,7 +35,7 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
             return Ok(Exit::Usage);
         }
     };
-    let played = play_entry(&entry);
+    let played = play_entry(&entry, AtFinding::GoOn);
     match arguments.format {
         Format::Json => {
             let text = json::to_string(&played.traces).map_err(std::io::Error::other)?;

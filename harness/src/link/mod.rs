@@ -32,11 +32,13 @@ pub enum Capability {
     Reset,
     /// Two rings.
     TwoRings,
+    /// Simulated drives: for what must not be tried on a machine.
+    Simulator,
 }
 
 impl Capability {
     /// The names in a scenario.
-    pub const NAMES: [(&'static str, Self); 8] = [
+    pub const NAMES: [(&'static str, Self); 9] = [
         ("interposer", Self::Interposer),
         ("tap", Self::Tap),
         ("memory", Self::Memory),
@@ -45,6 +47,7 @@ impl Capability {
         ("eeprom", Self::Eeprom),
         ("reset", Self::Reset),
         ("two-rings", Self::TwoRings),
+        ("simulator", Self::Simulator),
     ];
 
     /// The name in a scenario.
@@ -117,6 +120,9 @@ pub trait Link {
 
     /// Faults whose moment never came, in words.
     fn unused_faults(&self) -> Vec<String>;
+
+    /// How many bytes all links together have carried, as far as they are recorded.
+    fn carried(&self) -> u64;
 
     /// How many drives a ring has.
     fn drives(&self, ring: usize) -> u8;

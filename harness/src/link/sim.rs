@@ -21,7 +21,7 @@ pub struct SimulatedLink {
     scheduled: VecDeque<(Instant, usize, PlacedFault)>,
 }
 
-const CAPABILITIES: [Capability; 8] = [
+const CAPABILITIES: [Capability; 9] = [
     Capability::Interposer,
     Capability::Tap,
     Capability::Memory,
@@ -30,6 +30,7 @@ const CAPABILITIES: [Capability; 8] = [
     Capability::Eeprom,
     Capability::Reset,
     Capability::TwoRings,
+    Capability::Simulator,
 ];
 
 impl SimulatedLink {
@@ -173,6 +174,10 @@ impl Link for SimulatedLink {
             unused.push(format!("a fault at {at}"));
         }
         unused
+    }
+
+    fn carried(&self) -> u64 {
+        self.bench.rings().iter().map(Ring::carried).sum()
     }
 
     fn drives(&self, ring: usize) -> u8 {

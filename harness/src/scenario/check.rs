@@ -12,8 +12,13 @@ use harness_proto::novobus::error::BusError;
 /// What must hold at a point of a scenario.
 #[derive(Clone, Debug)]
 pub enum Check {
-    /// The ring spells out that this drive saw the fault (ND21 9.7).
-    Located(Drives),
+    /// The ring spells out that this drive saw the fault (ND21 9.7), after at most so many zeros.
+    Located {
+        /// Which drive.
+        drive: Drives,
+        /// The most zeros; any number where `None`.
+        within: Option<Located>,
+    },
     /// It does so after at most so many zeros (ND21 9.7: 25).
     Within(Located),
     /// These drives are in the error mode, or are not.
@@ -75,12 +80,17 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         ("received", Word::Received),
     ];
     match named(scanner, &words, "a check")? {
-        Word::Located => Ok(Check::Located(one_drive(scanner)?)),
-        Word::Within => {
-            let zeros = expression::sum(scanner)?;
-            required(scanner, &["zeros", "zero"])?;
-            Ok(Check::Within(zeros))
+        Word::Located => {
+            scanner.eat_word("drive");
+            let drive = one_drive(scanner)?;
+            let within = if scanner.eat_word("within") {
+                Some(zeros(scanner)?)
+            } else {
+                None
+            };
+            Ok(Check::Located { drive, within })
         }
+        Word::Within => Ok(Check::Within(zeros(scanner)?)),
         Word::Drive => drive_check(scanner),
         Word::Error => {
             let error = error_code(scanner)?;
@@ -150,6 +160,12 @@ fn drive_check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
     Ok(Check::InError { drives, expected })
 }
 
+fn zeros(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
+    let zeros = expression::sum(scanner)?;
+    required(scanner, &["zeros", "zero"])?;
+    Ok(zeros)
+}
+
 fn one_drive(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
     let drives = drives(scanner)?;
     match &drives.to {
@@ -177,7 +193,8 @@ fn error_code(scanner: &mut Scanner<'_>) -> Result<BusError, Problem> {
     let before = scanner.clone();
     let word = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '-');
     let known = word.and_then(|word| {
-        let by_code = u16::from_str_radix(word.value, 16).ok();
+        let four = Some(word.value).filter(|digits| digits.len() == 4);
+        let by_code = four.and_then(|digits| u16::from_str_radix(digits, 16).ok());
         by_code.and_then(BusError::from_code).or_else(|| {
             BusError::ALL.into_iter().find(|error| {
                 error.printed_name().eq_ignore_ascii_case(word.value) || error.name() == word.value

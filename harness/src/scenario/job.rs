@@ -5,6 +5,7 @@ use super::pattern::{self, Pattern};
 use super::problem::{Problem, Spanned};
 use super::scanner::Scanner;
 use super::syntax::Drives;
+use crate::link::Capability;
 
 /// A job as written.
 #[derive(Clone, Debug)]
@@ -62,6 +63,22 @@ pub enum JobKind {
     Block,
     /// `delete-error K` (14.10.1)
     DeleteError,
+}
+
+impl Job {
+    /// What the job needs of a rig beside the bus itself.
+    pub(super) fn needs(&self) -> Option<Capability> {
+        match self {
+            Self::Command {
+                kind: JobKind::Reset,
+                ..
+            } => Some(Capability::Reset),
+            Self::Command {
+                kind: JobKind::Go, ..
+            } => Some(Capability::Motion),
+            _ => None,
+        }
+    }
 }
 
 /// What stands behind a job's name.
@@ -125,30 +142,26 @@ pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, P
 }
 
 fn recover(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
-    let ring = if scanner.eat_word("ring") {
-        match scanner.take_while(|c| c.is_ascii_digit()).map(|d| d.value) {
-            Some("1") => 0,
-            Some("2") => 1,
-            _ => return Err(scanner.unexpected("1 or 2")),
-        }
-    } else {
-        0
+    let named = scanner.eat_word("ring");
+    let mut ahead = scanner.clone();
+    let ring = match ahead.take_while(|c| c.is_ascii_digit()).map(|d| d.value) {
+        None if !named => return Ok(Job::Recover(0)),
+        Some("1") => 0,
+        Some("2") => 1,
+        _ => return Err(scanner.unexpected("the ring, 1 or 2")),
     };
+    *scanner = ahead;
     Ok(Job::Recover(ring))
 }
 
 fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     let drive = one(scanner)?;
     let here = scanner.here();
-    let send = scanner.take_while(|c| c.is_ascii_hexdigit());
-    let Some(send) = send.filter(|send| send.value.len() == 4) else {
-        return Err(Problem::new(
-            here,
-            "process data are two bytes",
-            "four hexadecimal digits expected here, such as 1234",
-        ));
-    };
-    let send = pattern::pattern(&mut Scanner::new(send.value, send.span.start))?;
+    let text = scanner
+        .take_while(|c| c.is_ascii_hexdigit() || c == ' ')
+        .map_or("", |text| text.value);
+    let send = pattern::pattern(&mut Scanner::new(text, here.start))
+        .map_err(|_| scanner.unexpected("process data: four hexadecimal digits such as 1234"))?;
     let receive = if scanner.eat("=") {
         Some(pattern::pattern(scanner)?)
     } else {

@@ -145,26 +145,14 @@ impl Reader {
     }
 
     fn finish(mut self) -> Result<Scenario, Vec<Problem>> {
-        let start = Span::default();
-        let title = self.title.take();
         let rings = self.rings.take();
         let bus = self.bus.unwrap_or(Bus::Novobus);
-        if title.is_none() && self.problems.is_empty() {
-            self.problems.push(
-                Problem::new(
-                    start,
-                    "the scenario has no title",
-                    "a `title` line expected",
-                )
-                .help("add a line such as `title   Parity error between drives 98 and 97`"),
-            );
-        }
         let rings = match rings {
             Some(rings) => rings,
             None if bus == Bus::Novobus && self.problems.is_empty() => {
                 self.problems.push(
                     Problem::new(
-                        start,
+                        Span::default(),
                         "the scenario does not say how many drives its ring has",
                         "a `ring` line expected",
                     )
@@ -178,7 +166,7 @@ impl Reader {
             return Err(self.problems);
         }
         Ok(Scenario {
-            title: title.unwrap_or_default(),
+            title: self.title.unwrap_or_default(),
             sources: self.sources,
             bus,
             rings,
@@ -436,7 +424,7 @@ const CELLS: [(&str, u16); 7] = [
 pub(super) fn address(scanner: &mut Scanner<'_>) -> Result<Spanned<u16>, Problem> {
     let before = scanner.clone();
     let Some(word) = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '_') else {
-        return Err(scanner.unexpected("an address of four hexadecimal digits, such as FE13"));
+        return Err(scanner.unexpected("an address of four hexadecimal digits (such as FE13)"));
     };
     let span = word.span;
     if let Some((_, value)) = CELLS.iter().find(|(name, _)| *name == word.value) {
@@ -450,9 +438,10 @@ pub(super) fn address(scanner: &mut Scanner<'_>) -> Result<Spanned<u16>, Problem
         _ => {
             *scanner = before;
             let names: Vec<_> = CELLS.iter().map(|(name, _)| *name).collect();
-            Err(scanner
-                .unexpected("an address of four hexadecimal digits, such as FE13")
-                .did_you_mean(word.value, &names))
+            let problem = scanner
+                .unexpected("an address of four hexadecimal digits (such as FE13) or a name")
+                .help(format!("names are {}", names.join(", ")));
+            Err(problem.did_you_mean(word.value, &names))
         }
     }
 }

@@ -12,17 +12,9 @@ pub(super) struct Scanner<'a> {
 }
 
 impl<'a> Scanner<'a> {
-    /// A scanner for the line that starts at `offset`; a `#` at its start or behind white space begins
-    /// a comment.
+    /// A scanner for the line that starts at `offset`; a `#` begins a comment.
     pub(super) fn new(line: &'a str, offset: usize) -> Self {
-        let comment = line.char_indices().find(|&(i, c)| {
-            c == '#'
-                && line[..i]
-                    .chars()
-                    .next_back()
-                    .is_none_or(char::is_whitespace)
-        });
-        let text = comment.map_or(line, |(i, _)| &line[..i]).trim_end();
+        let text = line.split('#').next().unwrap_or_default().trim_end();
         Self {
             text,
             offset,

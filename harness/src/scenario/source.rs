@@ -94,7 +94,8 @@ impl Source {
         match String::from_utf8(bytes) {
             Ok(text) => Ok(Self {
                 name,
-                text: text.into(),
+                // Some editors put a byte order mark in front.
+                text: text.strip_prefix('\u{FEFF}').unwrap_or(&text).into(),
             }),
             Err(error) => {
                 let offset = error.utf8_error().valid_up_to();

@@ -151,13 +151,14 @@ fn end(scanner: &mut Scanner<'_>) -> Result<Option<Located>, Problem> {
     }
 }
 
-/// `byte n`, `@20ms`, or nothing, and a colon.
+/// `byte n`, `from byte n`, `@20ms`, `from 20ms`, or nothing, and a colon.
 fn place(scanner: &mut Scanner<'_>) -> Result<(Option<Located>, Option<times::Duration>), Problem> {
     let mut byte = None;
     let mut at = None;
+    let from = scanner.eat_word("from");
     if scanner.eat_word("byte") {
         byte = Some(expression::sum(scanner)?);
-    } else if scanner.eat("@") {
+    } else if scanner.eat("@") || from {
         at = Some(times::duration(scanner)?);
     }
     scanner.eat(":");

@@ -17,21 +17,27 @@ pub const PAGE: u16 = 0xFF00;
 /// The part of that page that the bit commands may touch (ND21 10.3).
 pub const PAGE_RAM: RangeInclusive<u16> = 0xFF00..=0xFF7F;
 
-/// The ND21's own rule (ND21 10.1-10.3): whether a command may touch all of the `kind.width()` bytes
-/// from `address` on.
+/// The ranges that a command may touch (ND21 10.1-10.3); none for one that touches no memory.
 #[must_use]
-pub fn in_range(kind: Kind, address: u16) -> bool {
-    let ranges: &[RangeInclusive<u16>] = match kind {
+pub const fn ranges(kind: Kind) -> &'static [RangeInclusive<u16>] {
+    match kind {
         Kind::ReadByte => &[ROM_BYTES, RAM_AND_REGISTERS],
         Kind::ReadWord => &[ROM_WORDS, RAM],
         Kind::ReadLong | Kind::WriteByte | Kind::WriteWord => &[RAM],
         Kind::And | Kind::Or => &[PAGE_RAM],
-        Kind::WriteIo | Kind::ResetH8 => return true,
-    };
-    let last = u32::from(address) + u32::from(kind.width()) - 1;
-    ranges
-        .iter()
-        .any(|range| range.contains(&address) && last <= u32::from(*range.end()))
+        Kind::WriteIo | Kind::ResetH8 => &[],
+    }
+}
+
+/// The ND21's own rule (ND21 10.1-10.3): whether a command may touch all of the `kind.width()` bytes
+/// from `address` on.
+#[must_use]
+pub fn in_range(kind: Kind, address: u16) -> bool {
+    let last = u32::from(address) + u32::from(kind.width()).max(1) - 1;
+    kind.width() == 0
+        || ranges(kind)
+            .iter()
+            .any(|range| range.contains(&address) && last <= u32::from(*range.end()))
 }
 
 /// One of the digital outputs that `WriteIO` reaches (ND21 10.4).

@@ -6,7 +6,7 @@ use crate::scenario::job::{Job, JobKind};
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::{Problem, Span, Spanned};
 use harness_proto::nd21;
-use harness_proto::novobus::command::{Command, Reply};
+use harness_proto::novobus::command::{Command, Kind, Reply};
 use harness_proto::novobus::memory::{self, OutputChange};
 use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::novobus::telegram::{Address, Telegram};
@@ -51,7 +51,9 @@ impl Planner {
                             layout.printed_name, address.value
                         ),
                         format!(
-                            "an address in the ranges of ND21 {} expected here",
+                            "all of {} in {} expected here (ND21 {})",
+                            bytes_in_words(usize::from(command.kind().width())),
+                            ranges(command.kind()),
                             layout.section
                         ),
                     ));
@@ -151,13 +153,17 @@ impl Planner {
 
     /// Exactly `count` bytes.
     fn data(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<Expected>, Problem> {
-        let bytes = pattern.expand(self.size(ring))?;
-        if bytes.len() == count {
-            return Ok(bytes);
+        let found = pattern.expand(self.size(ring))?;
+        if found.len() == count {
+            return Ok(found);
         }
         Err(Problem::new(
             pattern.span,
-            format!("{} bytes stand where {count} are expected", bytes.len()),
+            format!(
+                "{} where {} must stand",
+                bytes_in_words(found.len()),
+                bytes_in_words(count)
+            ),
             format!("{} hexadecimal digits expected here", 2 * count),
         ))
     }
@@ -211,4 +217,21 @@ fn expected_answer(
         });
     }
     expected
+}
+
+fn bytes_in_words(count: usize) -> String {
+    if count == 1 {
+        "1 byte".to_owned()
+    } else {
+        format!("{count} bytes")
+    }
+}
+
+/// The addresses that a command reaches, in words.
+fn ranges(kind: Kind) -> String {
+    let ranges: Vec<_> = memory::ranges(kind)
+        .iter()
+        .map(|range| format!("{:04X}-{:04X}", range.start(), range.end()))
+        .collect();
+    ranges.join(" or ")
 }

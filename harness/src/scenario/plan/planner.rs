@@ -76,6 +76,10 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
     }
     needs.extend(planner.setups.iter().map(|setup| match setup.what {
         PlannedSetupKind::Eeprom(..) => Capability::Eeprom,
+        // No command writes ROM or registers (ND21 10.2): only a simulated drive can be given them.
+        PlannedSetupKind::Memory(address, _) if !memory::RAM.contains(&address) => {
+            Capability::Simulator
+        }
         _ => Capability::Memory,
     }));
     needs.sort();
@@ -249,7 +253,10 @@ impl Planner {
             }
             Action::Fault(fault) => self.fault(fault, needs),
             Action::Check(check) => Ok(PlannedAction::Check(self.check(check, needs)?)),
-            Action::Job(job) => self.job(job),
+            Action::Job(job) => {
+                needs.extend(job.needs());
+                self.job(job)
+            }
         }
     }
 
@@ -344,9 +351,9 @@ impl Planner {
             })
         };
         Ok(match check {
-            Check::Located(drives) => {
-                let (ring, drive) = self.one(drives)?;
-                PlannedCheck::Located(ring, drive)
+            Check::Located { drive, within } => {
+                let (ring, drive) = self.one(drive)?;
+                PlannedCheck::Located(ring, drive, within.as_ref().map(count).transpose()?)
             }
             Check::Within(zeros) => PlannedCheck::Within(count(zeros)?),
             Check::InError { drives, expected } => {

@@ -108,8 +108,8 @@ pub enum PlannedAction {
 /// A check, settled.
 #[derive(Clone, Debug)]
 pub enum PlannedCheck {
-    /// The ring spells out this drive.
-    Located(usize, u8),
+    /// The ring spells out this drive, after at most so many zeros.
+    Located(usize, u8, Option<u64>),
     /// It does so after at most so many zeros.
     Within(u64),
     /// Drives are in the error mode, or are not.

@@ -15,8 +15,8 @@ impl Runner<'_> {
     pub(super) fn check(&mut self, check: &PlannedCheck, span: Span) -> Result<(), Stop> {
         let failed = |message: String| Err(Stop::failed(span, message));
         match check {
-            PlannedCheck::Located(ring, drive) => match self.locate(*ring) {
-                Some(location) if location.drive == *drive => Ok(()),
+            PlannedCheck::Located(ring, drive, within) => match self.locate(*ring) {
+                Some(location) if location.drive == *drive => enough(location, *within, span),
                 Some(location) => failed(format!(
                     "the ring spells out drive {}, expected is drive {drive}",
                     location.drive
@@ -26,11 +26,7 @@ impl Runner<'_> {
                 )),
             },
             PlannedCheck::Within(zeros) => match self.locate(0) {
-                Some(location) if location.zeros.is_none_or(|found| found <= *zeros) => Ok(()),
-                Some(location) => failed(format!(
-                    "the address came after {} zeros, expected are at most {zeros}",
-                    location.zeros.unwrap_or_default()
-                )),
+                Some(location) => enough(location, Some(*zeros), span),
                 None => failed("the ring spells out no address".to_owned()),
             },
             PlannedCheck::InError(ring, drives, expected) => {
@@ -113,7 +109,7 @@ impl Runner<'_> {
                 let Some(found) = self.link.peek(ring, drive, cell) else {
                     continue;
                 };
-                if !matches(*expected, Received::good(found), &[]) {
+                if !matches(*expected, Received::good(found)) {
                     return Err(Stop::failed(
                         span,
                         format!(
@@ -139,6 +135,17 @@ impl Runner<'_> {
             heard.extend(self.link.probe(ring, PROBE));
             locate::locate(&heard, size)
         })
+    }
+}
+
+/// Whether the zeros in front of an address were few enough.
+fn enough(location: Location, most: Option<u64>, span: Span) -> Result<(), Stop> {
+    match (location.zeros, most) {
+        (Some(zeros), Some(most)) if zeros > most => Err(Stop::failed(
+            span,
+            format!("the address came after {zeros} zeros, expected are at most {most}"),
+        )),
+        _ => Ok(()),
     }
 }
 

@@ -3,4 +3,4 @@
 mod check;
 mod player;
 
-pub use player::{Difference, Finding, Outcome, Shown, needs, run, show};
+pub use player::{AtFinding, Difference, Finding, Outcome, Shown, needs, play, run, show};

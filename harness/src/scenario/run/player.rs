@@ -14,6 +14,15 @@ use std::fmt::Write as _;
 /// How long bytes may be on their way round before the bench gives up waiting for them.
 const MAX_ROUND: time::Span = time::Span::from_millis(60_000);
 
+/// The most bytes that a run may leave on all links together: its record is held in memory.
+const MAX_CARRIED: u64 = 30_000_000;
+
+/// Bytes that no line asks for shown at most.
+const UNASKED: usize = 16;
+
+/// Drives in the error mode named at most.
+const NAMED: usize = 6;
+
 /// What came of a scenario.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -36,6 +45,9 @@ pub struct Finding {
     pub message: String,
     /// Where the bytes differ, if bytes are what differs.
     pub difference: Option<Difference>,
+    /// The drives that were in the error mode then, in words; empty where none was or where this cannot
+    /// be seen.
+    pub in_error: String,
 }
 
 /// Bytes that differ.
@@ -53,8 +65,22 @@ pub struct Difference {
     pub received: Vec<Received>,
 }
 
-/// Plays a plan on a link.
+/// What to do at a line that is not met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AtFinding {
+    /// Send nothing more.
+    Stop,
+    /// Go on with the lines behind it: for a trace of the whole conversation.
+    GoOn,
+}
+
+/// Plays a plan on a link up to its end or to the first line that is not met.
 pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
+    play(plan, link, AtFinding::Stop)
+}
+
+/// Plays a plan on a link. The outcome tells of the first line that was not met.
+pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome {
     let missing: Vec<_> = plan
         .needs
         .iter()
@@ -78,10 +104,14 @@ pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
         sent_from: link.now(),
         sent_to: link.now(),
         link,
+        at_finding,
+        strict: plan.strict,
+        full: false,
     };
     let mut result = runner.play(plan);
     if let Err(stop) = &mut result {
         // What is under way still tells something, and nothing more is sent.
+        stop.finding.in_error = runner.in_error();
         runner.settle();
         runner.complete(&mut stop.finding);
     }
@@ -118,6 +148,7 @@ impl Stop {
                 span,
                 message: message.into(),
                 difference: None,
+                in_error: String::new(),
             }),
         }
     }
@@ -147,6 +178,10 @@ pub(super) struct RingRecord {
 
 pub(super) struct Runner<'a> {
     pub(super) link: &'a mut dyn Link,
+    at_finding: AtFinding,
+    strict: bool,
+    /// The record is full.
+    full: bool,
     pub(super) rings: Vec<RingRecord>,
     /// When the line before was done.
     line_before: Instant,
@@ -168,38 +203,58 @@ impl Runner<'_> {
                 self.link.inject(ring, fault, moment);
             }
         }
-        let mut last = Span::default();
+        let mut first = Ok(());
         for step in &plan.steps {
-            last = step.span;
-            self.step(step)?;
+            let result = self.step(step);
+            if self.full {
+                let message =
+                    format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
+                return Err(Stop::aborted(step.span, message));
+            }
+            if result.is_err() && self.at_finding == AtFinding::Stop {
+                return result;
+            }
+            first = first.and(result);
         }
         self.settle();
-        if plan.strict {
-            self.nothing_unasked(last)?;
+        let last = plan.steps.last().map_or(Span::default(), |step| step.span);
+        if self.strict {
+            first = first.and_then(|()| self.nothing_unasked(last));
         }
-        Ok(())
+        first
     }
 
     fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
         if let PlannedAction::Receive(ring, expected) = &step.action {
             return self.receive(step, *ring, expected);
         }
-        let at = match step.when {
-            PlannedWhen::Now => None,
-            PlannedWhen::After(window) => Some(self.line_before + window.from),
-            PlannedWhen::At(window) => Some(Instant::START + window.from),
-        };
-        if let Some(at) = at {
-            if at < self.link.now() {
-                let now = self.link.now();
-                return Err(Stop::aborted(
-                    step.span,
-                    format!("this line is for {at}, but the lines before it took until {now}"),
-                ));
-            }
-            self.pass_until(at);
-            self.line_before = at;
+        let in_time = self.pass_until_due(step);
+        if in_time.is_err() && self.at_finding == AtFinding::Stop {
+            return in_time;
         }
+        in_time.and(self.act(step))
+    }
+
+    /// Lets time pass until a step with a time in front is due.
+    fn pass_until_due(&mut self, step: &PlannedStep) -> Result<(), Stop> {
+        let at = match step.when {
+            PlannedWhen::Now => return Ok(()),
+            PlannedWhen::After(window) => self.line_before + window.from,
+            PlannedWhen::At(window) => Instant::START + window.from,
+        };
+        let now = self.link.now();
+        if at < now {
+            return Err(Stop::aborted(
+                step.span,
+                format!("this line is for {at}, but the lines before it took until {now}"),
+            ));
+        }
+        self.pass_until(at);
+        self.line_before = at;
+        Ok(())
+    }
+
+    fn act(&mut self, step: &PlannedStep) -> Result<(), Stop> {
         match &step.action {
             PlannedAction::Send(ring, bytes) => {
                 self.send(*ring, bytes);
@@ -211,7 +266,7 @@ impl Runner<'_> {
             }
             PlannedAction::Fault(..) | PlannedAction::Receive(..) => Ok(()),
             PlannedAction::Check(check) => {
-                if at.is_none() {
+                if step.when == PlannedWhen::Now {
                     self.settle();
                 }
                 let result = self.check(check, step.span);
@@ -220,6 +275,9 @@ impl Runner<'_> {
             }
             PlannedAction::Telegram(ring, bytes, expected) => {
                 self.settle();
+                if self.strict {
+                    self.nothing_unasked(step.span)?;
+                }
                 self.forget(*ring);
                 self.send(*ring, bytes);
                 self.expect(step.span, *ring, expected, None)
@@ -239,19 +297,24 @@ impl Runner<'_> {
 
     /// Lets time pass up to `until`.
     fn pass_until(&mut self, until: Instant) {
-        while self.link.now() < until {
-            self.link.wait(until);
-            self.fetch();
+        while self.link.now() < until && !self.full {
+            self.wait(until);
         }
     }
 
     /// Lets time pass until everything that was sent has come round (or has been lost).
     fn settle(&mut self) {
         let end = self.link.now() + MAX_ROUND;
-        while self.link.busy() && self.link.now() < end && self.link.wait(end) {
-            self.fetch();
-        }
+        while self.link.busy() && self.link.now() < end && self.wait(end) {}
         self.fetch();
+    }
+
+    /// Lets time pass until something happens. False where nothing will, or where the record is full.
+    fn wait(&mut self, until: Instant) -> bool {
+        self.full |= self.link.carried() > MAX_CARRIED;
+        let more = !self.full && self.link.wait(until);
+        self.fetch();
+        more
     }
 
     fn fetch(&mut self) {
@@ -305,28 +368,29 @@ impl Runner<'_> {
                 ring,
                 byte: first + index + 1,
                 index,
-                expected: expected.to_vec(),
+                // A checking byte is shown as the byte that it must be, where that is known.
+                expected: (0..expected.len())
+                    .map(|i| match received.get(..i) {
+                        Some(before) => resolve(expected[i], before),
+                        None => expected[i],
+                    })
+                    .collect(),
                 received: received.iter().map(|(_, byte)| *byte).collect(),
             };
             let Some((at, byte)) = arrived else {
-                let waited = if until == Instant::NEVER {
-                    self.link.now()
-                } else {
-                    until
-                };
                 let message = format!(
                     "nothing more was received up to {}, where {} is expected",
-                    waited.min(self.link.now()),
+                    until.min(self.link.now()),
                     Shown(expected[index])
                 );
                 return Err(Stop::failed(span, message).differs(difference()));
             };
-            let before: Vec<_> = received[..index].iter().map(|(_, b)| b.byte).collect();
-            if !matches(expected[index], byte, &before) {
+            let wanted = resolve(expected[index], &received[..index]);
+            if !matches(wanted, byte) {
                 let message = format!(
                     "the master received {} where {} is expected",
                     show(byte),
-                    Shown(expected[index])
+                    Shown(wanted)
                 );
                 return Err(Stop::failed(span, message).differs(difference()));
             }
@@ -360,7 +424,7 @@ impl Runner<'_> {
             if let Some(byte) = self.rings[ring].received.get(index) {
                 return Some(*byte).filter(|(at, _)| *at <= until);
             }
-            if self.link.now() >= until || !self.link.wait(until) {
+            if self.link.now() >= until || !self.wait(until) {
                 return None;
             }
         }
@@ -383,6 +447,25 @@ impl Runner<'_> {
         ))
     }
 
+    /// The drives in the error mode, in ring order.
+    fn in_error(&self) -> String {
+        let mut named = Vec::new();
+        for ring in 0..self.rings.len() {
+            for drive in (0..self.link.drives(ring)).rev() {
+                if let Some(Some(error)) = self.link.error_of(ring, drive) {
+                    let prefix = if ring == 0 { "" } else { "2:" };
+                    named.push(format!("{prefix}{drive} ({error})"));
+                }
+            }
+        }
+        let more = named.len().saturating_sub(NAMED);
+        named.truncate(NAMED);
+        if more > 0 {
+            named.push(format!("and {more} more"));
+        }
+        named.join(", ")
+    }
+
     /// Adds to a finding what has been received meanwhile.
     fn complete(&self, finding: &mut Finding) {
         if let Some(difference) = &mut finding.difference {
@@ -393,11 +476,13 @@ impl Runner<'_> {
         }
     }
 
+    /// A strict scenario asks for every byte.
     fn nothing_unasked(&self, span: Span) -> Result<(), Stop> {
         for (ring, record) in self.rings.iter().enumerate() {
-            if let Some((at, byte)) = record.received.get(record.next) {
+            let unasked = &record.received[record.next..];
+            if let Some((at, byte)) = unasked.first() {
                 let message = format!(
-                    "{} was received at {at}, which no line asks for (the scenario is strict)",
+                    "{} was received at {at}, but no line asks for it (the scenario is strict)",
                     show(*byte)
                 );
                 return Err(Stop::failed(span, message).differs(Difference {
@@ -405,7 +490,7 @@ impl Runner<'_> {
                     byte: record.next + 1,
                     index: 0,
                     expected: Vec::new(),
-                    received: vec![*byte],
+                    received: unasked.iter().take(UNASKED).map(|(_, b)| *b).collect(),
                 }));
             }
         }
@@ -421,17 +506,26 @@ fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
             .all(|((_, byte), wanted)| byte.is(wanted))
 }
 
-pub(super) fn matches(expected: Expected, received: Received, before: &[u8]) -> bool {
-    if received.error.is_some() {
-        return false;
-    }
+pub(super) fn matches(expected: Expected, received: Received) -> bool {
     match expected {
-        Expected::Byte(byte) => received.byte == byte,
-        Expected::Any => true,
+        Expected::Byte(byte) => received.is(byte),
+        Expected::Any => received.error.is_none(),
+        // Resolved before it is compared.
+        Expected::MinusChecksum(_) => false,
+    }
+}
+
+/// A checking byte as the byte that it must be, by what was received before it.
+fn resolve(expected: Expected, before: &[(Instant, Received)]) -> Expected {
+    match expected {
         Expected::MinusChecksum(over) => {
             let from = before.len().saturating_sub(usize::from(over));
-            received.byte == Checksum::over(&before[from..]).minus()
+            let sum = before[from..]
+                .iter()
+                .fold(Checksum::EMPTY, |sum, (_, byte)| sum.with(byte.byte));
+            Expected::Byte(sum.minus())
         }
+        known => known,
     }
 }
 
