@@ -5,7 +5,8 @@ use harness_proto::line::Received;
 use harness_proto::nd21;
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
-use harness_proto::novobus::memory::{Memory, Output, OutputChange, RAM, ROM_WORDS};
+use harness_proto::novobus::memory::{Memory, RAM, ROM_WORDS};
+use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Instant;
 

@@ -5,9 +5,7 @@
 //! and refuses what cannot be, and [`run`] plays it on a [`Link`](crate::link::Link). The language is
 //! described in `LANGUAGE.md` beside this file.
 
-mod check;
 pub mod expression;
-mod job;
 pub mod parse;
 pub mod pattern;
 pub mod plan;
@@ -16,7 +14,6 @@ pub mod run;
 mod scanner;
 pub mod simulate;
 pub mod source;
-mod step;
 pub mod syntax;
 mod times;
 pub mod verdict;

@@ -6,9 +6,10 @@
 //! on a line that carries one byte at a time; keeping the order is the caller's part.
 
 use super::address::{ADDRESSED, passed_on};
+use super::command::PAGE;
 use super::error::BusError;
 use super::error_mode::{ErrorMode, Marks};
-use super::memory::{Memory, PAGE};
+use super::memory::Memory;
 use super::parameter_channel::ParameterChannel;
 use super::properties::{EmptyShortTelegram, Properties, ShortAddress, TimeOutAnswer};
 use super::sync::{Addressing, Header, SyncByte};

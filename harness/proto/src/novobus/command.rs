@@ -6,10 +6,13 @@
 
 use super::checksum::Checksum;
 use super::decode::Decoded;
-use super::memory::OutputChange;
+use super::output::OutputChange;
 use super::properties::ReadLongAnswer;
 use alloc::vec::Vec;
 use core::fmt;
+
+/// The page of RAM that the bit commands and process data reach (ND21 10.3, 14.10.3).
+pub const PAGE: u16 = 0xFF00;
 
 /// The most bytes of a command, checking byte included (ND21 9.5).
 pub const MAX_COMMAND: usize = 6;
@@ -353,7 +356,7 @@ impl Command {
             | Self::WriteByte { address, .. }
             | Self::WriteWord { address, .. } => Some(address),
             Self::And { address_low, .. } | Self::Or { address_low, .. } => {
-                Some(super::memory::PAGE | address_low as u16)
+                Some(PAGE | address_low as u16)
             }
             Self::WriteIo(_) | Self::ResetH8 => None,
         }
@@ -393,7 +396,7 @@ impl Command {
                 offset: 0,
             };
         };
-        let mut address = super::memory::PAGE.to_be_bytes();
+        let mut address = PAGE.to_be_bytes();
         let mut data = [0; 2];
         let mut change = None;
         for (i, &field) in layout.command.iter().enumerate() {

@@ -2,6 +2,7 @@
 
 use super::command::Kind;
 use super::error::BusError;
+use super::output::OutputChange;
 use core::ops::RangeInclusive;
 
 /// ROM that can be read byte by byte (ND21 10.1; 12.3 names another range).
@@ -12,8 +13,6 @@ pub const ROM_WORDS: RangeInclusive<u16> = 0x2F00..=0x2FDF;
 pub const RAM: RangeInclusive<u16> = 0xFD80..=0xFF7F;
 /// RAM and, above it, the on-chip register field (ND21 10.1).
 pub const RAM_AND_REGISTERS: RangeInclusive<u16> = 0xFD80..=0xFFFF;
-/// The page of RAM that the bit commands and process data reach (ND21 10.3, 14.10.3).
-pub const PAGE: u16 = 0xFF00;
 /// The part of that page that the bit commands may touch (ND21 10.3).
 pub const PAGE_RAM: RangeInclusive<u16> = 0xFF00..=0xFF7F;
 
@@ -38,50 +37,6 @@ pub fn in_range(kind: Kind, address: u16) -> bool {
         || ranges(kind)
             .iter()
             .any(|range| range.contains(&address) && last <= u32::from(*range.end()))
-}
-
-/// One of the digital outputs that `WriteIO` reaches (ND21 10.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Output {
-    /// GPO1, X3 pin 31.
-    Gpo1,
-    /// GPO2, X3 pin 23.
-    Gpo2,
-}
-
-/// What `WriteIO` asks for (ND21 10.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct OutputChange {
-    /// Which output.
-    pub output: Output,
-    /// Set (true) or cleared.
-    pub set: bool,
-}
-
-impl OutputChange {
-    /// The change that a code stands for: 00 clear GPO1, 01 set GPO1, 02 clear GPO2, 03 set GPO2.
-    #[must_use]
-    pub const fn from_code(code: u8) -> Option<Self> {
-        let output = match code {
-            0 | 1 => Output::Gpo1,
-            2 | 3 => Output::Gpo2,
-            _ => return None,
-        };
-        Some(Self {
-            output,
-            set: code & 1 == 1,
-        })
-    }
-
-    /// The code on the bus.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        let output = match self.output {
-            Output::Gpo1 => 0,
-            Output::Gpo2 => 2,
-        };
-        output | self.set as u8
-    }
 }
 
 /// A drive as its bus end sees it.

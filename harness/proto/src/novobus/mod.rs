@@ -15,7 +15,8 @@
 //! | 9.7, 9.9 | the error mode | [`error_mode`] |
 //! | 9.8 | the check sequence | [`check_sequence`] |
 //! | 9.1-9.9 | a drive's end of the bus | [`bus_end`] |
-//! | 10.1-10.4 | what of a drive the bus reaches | [`memory`] |
+//! | 10.1-10.3 | what of a drive the bus reaches | [`memory`] |
+//! | 10.4 | the digital outputs | [`output`] |
 //!
 //! What the manual leaves open is a named value of [`properties`].
 
@@ -28,6 +29,7 @@ pub mod decode;
 pub mod error;
 pub mod error_mode;
 pub mod memory;
+pub mod output;
 mod parameter_channel;
 pub mod properties;
 pub mod sync;

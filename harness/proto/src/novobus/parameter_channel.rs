@@ -2,10 +2,11 @@
 //! bytes out, in step. A command may be cut over several telegrams and several may share one.
 
 use super::checksum::Checksum;
-use super::command::{Field, Kind, Layout, Reply, layout};
+use super::command::{Field, Kind, Layout, PAGE, Reply, layout};
 use super::error::BusError;
 use super::error_mode::Marks;
-use super::memory::{Memory, OutputChange, PAGE};
+use super::memory::Memory;
+use super::output::OutputChange;
 use super::properties::ReadLongAnswer;
 
 /// What the channel holds between two bytes: nothing, or a command received in part.

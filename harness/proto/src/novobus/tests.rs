@@ -6,7 +6,7 @@ use super::checksum::Checksum;
 use super::command::{Command, CommandError, LAYOUTS};
 use super::decode::Decoded;
 use super::error::BusError;
-use super::memory::OutputChange;
+use super::output::OutputChange;
 use super::properties::{PROPERTIES, Properties, ReadLongAnswer, Setting};
 use super::sync::{Addressing, Header, SyncByte, SyncError};
 use super::telegram::{Address, Telegram, TelegramError};

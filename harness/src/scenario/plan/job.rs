@@ -2,12 +2,13 @@
 
 use super::planner::Planner;
 use super::types::{PlannedAction, setups_of};
-use crate::scenario::job::{Job, JobKind};
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::{Problem, Span, Spanned};
+use crate::scenario::syntax::{Job, JobKind};
 use harness_proto::nd21;
-use harness_proto::novobus::command::{Command, Kind, Reply};
-use harness_proto::novobus::memory::{self, OutputChange};
+use harness_proto::novobus::command::{Command, Kind, PAGE, Reply};
+use harness_proto::novobus::memory;
+use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::novobus::telegram::{Address, Telegram};
 
@@ -77,7 +78,7 @@ impl Planner {
         address: Option<&Spanned<u16>>,
         data: Option<&Pattern>,
     ) -> Result<Command, Problem> {
-        let address = address.map_or(memory::PAGE, |address| address.value);
+        let address = address.map_or(PAGE, |address| address.value);
         let [_, address_low] = address.to_be_bytes();
         let byte = || -> Result<u8, Problem> {
             match data {

@@ -5,13 +5,13 @@ use super::types::{
     PlannedWindow,
 };
 use crate::link::{Capability, Moment, PlacedFault};
-use crate::scenario::check::Check;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::MAX_BYTES;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{
-    Action, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Scenario, Setup, SetupKind, When,
+    Action, Check, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Scenario, Setup, SetupKind,
+    When,
 };
 use crate::scenario::times::Window;
 use harness_proto::novobus::address::RingSize;

@@ -1,12 +1,12 @@
-//! A scenario as written, for a ring of any size.
+//! The scenario, its header and its steps.
 
 use super::check::Check;
-use super::expression::Located;
 use super::job::Job;
-use super::pattern::Pattern;
-use super::problem::{Span, Spanned};
-use super::times::{Duration, Window};
 use crate::link::Capability;
+use crate::scenario::expression::Located;
+use crate::scenario::pattern::Pattern;
+use crate::scenario::problem::{Span, Spanned};
+use crate::scenario::times::{Duration, Window};
 use harness_proto::line::Rate;
 use harness_sim::fault::{DriveFault, Flips};
 

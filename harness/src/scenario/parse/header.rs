@@ -1,16 +1,15 @@
-//! From text to a [`Scenario`]: the header, then the steps, one line each.
+//! The header, and the lines one after another.
 
-use super::expression;
-use super::pattern;
-use super::problem::{Problem, Problems, Span, Spanned};
-use super::scanner::Scanner;
-use super::source::Source;
 use super::step;
-use super::syntax::{Bus, Citation, Drives, RingRange, Scenario, Setup, SetupKind};
-use super::times;
+use super::words::{address, drives, equals, named};
 use crate::link::Capability;
+use crate::scenario::pattern;
+use crate::scenario::problem::{Problem, Problems, Span, Spanned};
+use crate::scenario::scanner::Scanner;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::{Bus, Citation, RingRange, Scenario, Setup, SetupKind, Step};
+use crate::scenario::times;
 use harness_proto::line::Rate;
-use harness_proto::nd21;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
 use harness_proto::novobus::properties::PROPERTIES;
 
@@ -62,7 +61,7 @@ struct Reader {
     needs: Vec<Capability>,
     strict: bool,
     deadline: Option<times::Duration>,
-    steps: Vec<super::syntax::Step>,
+    steps: Vec<Step>,
     problems: Vec<Problem>,
 }
 
@@ -192,28 +191,6 @@ fn once<T>(place: &mut Option<T>, value: T, word: &Spanned<&str>) -> Result<(), 
     Ok(())
 }
 
-/// Reads one of a list of words.
-pub(super) fn named<T: Copy>(
-    scanner: &mut Scanner<'_>,
-    names: &[(&str, T)],
-    what: &str,
-) -> Result<T, Problem> {
-    let known: Vec<_> = names.iter().map(|(name, _)| *name).collect();
-    let before = scanner.clone();
-    let Some(word) = scanner.word() else {
-        return Err(scanner.unexpected(&format!("{what} ({})", known.join(", "))));
-    };
-    match names.iter().find(|(name, _)| *name == word.value) {
-        Some((_, value)) => Ok(*value),
-        None => {
-            *scanner = before;
-            Err(scanner
-                .unexpected(&format!("{what} ({})", known.join(", ")))
-                .did_you_mean(word.value, &known))
-        }
-    }
-}
-
 fn citation(scanner: &mut Scanner<'_>) -> Result<Citation, Problem> {
     let here = scanner.here();
     let text: Vec<_> = scanner.rest().split_whitespace().collect();
@@ -319,38 +296,6 @@ fn rate(scanner: &mut Scanner<'_>) -> Result<Rate, Problem> {
     Ok(rate)
 }
 
-/// `95..99`, `N-1`, `2:0..last`.
-pub(super) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
-    let ring = ring_prefix(scanner);
-    let from = expression::sum(scanner)?;
-    let to = if scanner.eat("..") {
-        Some(expression::sum(scanner)?)
-    } else {
-        None
-    };
-    Ok(Drives { ring, from, to })
-}
-
-/// `2:` in front of a drive or a link of the second ring. The colon of `drive 2: off` is another one:
-/// no number follows it.
-pub(super) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
-    let rest = scanner.rest();
-    let behind = |prefix| rest.strip_prefix(prefix).unwrap_or_default();
-    let number = |text: &str| {
-        text.starts_with(|c: char| c.is_ascii_digit() || c == 'N' || c == '(')
-            || text.starts_with("last")
-            || text.starts_with("master")
-    };
-    if number(behind("2:")) {
-        scanner.eat("2:");
-        return 1;
-    }
-    if number(behind("1:")) {
-        scanner.eat("1:");
-    }
-    0
-}
-
 fn setup(scanner: &mut Scanner<'_>, start: Span) -> Result<Setup, Problem> {
     let drives = drives(scanner)?;
     let what = named(
@@ -399,51 +344,6 @@ fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
         span: word.span,
     };
     Ok(SetupKind::Word(name, word))
-}
-
-pub(super) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
-    if scanner.eat("=") {
-        Ok(())
-    } else {
-        Err(scanner.unexpected("`=`"))
-    }
-}
-
-/// The cells that a scenario can call by their printed names (ND21 14.2.1).
-const CELLS: [(&str, u16); 7] = [
-    ("Status", nd21::STATUS),
-    ("DataIn", nd21::DATA_IN),
-    ("DataOut", nd21::DATA_OUT),
-    ("BusAddr", nd21::BUS_ADDR),
-    ("Flags2", nd21::FLAGS2),
-    ("errorcode", nd21::ERROR_CODE),
-    ("HwVersion", nd21::PARAMETERS),
-];
-
-/// A cell: four hexadecimal digits, or a name.
-pub(super) fn address(scanner: &mut Scanner<'_>) -> Result<Spanned<u16>, Problem> {
-    let before = scanner.clone();
-    let Some(word) = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '_') else {
-        return Err(scanner.unexpected("an address of four hexadecimal digits (such as FE13)"));
-    };
-    let span = word.span;
-    if let Some((_, value)) = CELLS.iter().find(|(name, _)| *name == word.value) {
-        return Ok(Spanned {
-            value: *value,
-            span,
-        });
-    }
-    match u16::from_str_radix(word.value, 16) {
-        Ok(value) if word.value.len() == 4 => Ok(Spanned { value, span }),
-        _ => {
-            *scanner = before;
-            let names: Vec<_> = CELLS.iter().map(|(name, _)| *name).collect();
-            let problem = scanner
-                .unexpected("an address of four hexadecimal digits (such as FE13) or a name")
-                .help(format!("names are {}", names.join(", ")));
-            Err(problem.did_you_mean(word.value, &names))
-        }
-    }
 }
 
 fn eeprom_address(scanner: &mut Scanner<'_>) -> Result<Spanned<u8>, Problem> {

@@ -1,14 +1,14 @@
 //! Steps: a time or none, then `>`, `<`, `!`, `?` or a job.
 
 use super::check;
-use super::expression::{self, Located};
 use super::job;
-use super::parse::{named, ring_prefix};
-use super::pattern;
-use super::problem::{Problem, nearest};
-use super::scanner::Scanner;
-use super::syntax::{Action, Fault, FaultKind, LinkEnds, LinkFaultKind, Step, When};
-use super::times;
+use super::words::{named, ring_prefix};
+use crate::scenario::expression::{self, Located};
+use crate::scenario::pattern;
+use crate::scenario::problem::{Problem, nearest};
+use crate::scenario::scanner::Scanner;
+use crate::scenario::syntax::{Action, Fault, FaultKind, LinkEnds, LinkFaultKind, Step, When};
+use crate::scenario::times;
 use harness_sim::fault::{DriveFault, Flips};
 
 /// Reads a step.

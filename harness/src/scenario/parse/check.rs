@@ -1,61 +1,13 @@
 //! Checks: `? located 97`, `? drive 3 memory FF08 = 1234`, `? error 0502 at 97`.
 
-use super::expression::{self, Located};
-use super::parse::{address, drives, equals, named};
-use super::pattern::{self, Pattern};
-use super::problem::{Problem, Spanned};
-use super::scanner::Scanner;
-use super::syntax::Drives;
-use super::times::{self, Duration};
+use super::words::{address, drives, equals, named};
+use crate::scenario::expression::{self, Located};
+use crate::scenario::pattern;
+use crate::scenario::problem::Problem;
+use crate::scenario::scanner::Scanner;
+use crate::scenario::syntax::{Check, Drives};
+use crate::scenario::times;
 use harness_proto::novobus::error::BusError;
-
-/// What must hold at a point of a scenario.
-#[derive(Clone, Debug)]
-pub enum Check {
-    /// The ring spells out that this drive saw the fault (ND21 9.7), after at most so many zeros.
-    Located {
-        /// Which drive.
-        drive: Drives,
-        /// The most zeros; any number where `None`.
-        within: Option<Located>,
-    },
-    /// It does so after at most so many zeros (ND21 9.7: 25).
-    Within(Located),
-    /// These drives are in the error mode, or are not.
-    InError {
-        /// Which drives.
-        drives: Drives,
-        /// Whether they are, or must not be.
-        expected: bool,
-    },
-    /// This drive's error mode has this cause.
-    Error {
-        /// The cause.
-        error: BusError,
-        /// Which drive.
-        drive: Drives,
-    },
-    /// A drive's cells hold these bytes.
-    Memory {
-        /// Which drives.
-        drives: Drives,
-        /// From which address on.
-        address: Spanned<u16>,
-        /// What.
-        bytes: Pattern,
-    },
-    /// So many check sequences came back whole after an error.
-    Corrected(Located),
-    /// So many bytes were sent since the last check, and took this long.
-    Sent {
-        /// How many.
-        bytes: Located,
-        /// How long, to the last digit written.
-        time: Option<Duration>,
-    },
-    /// So many bytes were received since the start.
-    Received(Located),
-}
 
 /// Reads what stands behind `?`.
 pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {

@@ -1,0 +1,9 @@
+//! From text to a [`Scenario`](super::syntax::Scenario): the header, then the steps, one line each.
+
+mod check;
+mod header;
+mod job;
+mod step;
+mod words;
+
+pub use header::parse;
