@@ -6,7 +6,7 @@
 //! *ND21 User Manual 1/96*).
 //!
 //! * [`time`]: virtual time, exact for every rate of every line;
-//! * [`line`]: an asynchronous serial line: its rate, and what a receiver reads from it;
+//! * [`line`](mod@line): an asynchronous serial line: its rate, and what a receiver reads from it;
 //! * [`novobus`]: the ring of the Novotron ND21;
 //! * [`nd21`]: the cells of that drive that its bus end itself needs.
 #![no_std]

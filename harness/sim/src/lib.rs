@@ -5,7 +5,7 @@
 //!
 //! The [`ring`] moves bytes and knows no drive; a [`device`] knows telegrams and no topology; faults
 //! happen on a [`link`](mod@link) or in a drive's [`node`], never inside the code under test.
-//! [`reference`] is a second, deliberately simple model of the same rules, written apart from the first
+//! [`reference`](mod@reference) is a second, deliberately simple model of the same rules, written apart from the first
 //! and sharing nothing with it: the two are held against each other in tests.
 #![forbid(unsafe_code)]
 
