@@ -23,12 +23,12 @@ const MAX_DEPTH: usize = 16;
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
     /// Neither a path nor the name of a built-in scenario.
-    #[error("failed to find {name}: neither a file or folder nor a built-in scenario{}", suggestion(.near.as_deref()))]
+    #[error("failed to find {name}: neither a file or folder nor a built-in scenario; {remedy}")]
     NotFound {
         /// What was asked for.
         name: String,
-        /// The nearest built-in name.
-        near: Option<String>,
+        /// What to do about it.
+        remedy: String,
     },
     /// A folder cannot be read.
     #[error("failed to read the folder {folder}: {error}")]
@@ -52,13 +52,6 @@ pub enum LibraryError {
     /// A scenario has mistakes.
     #[error(transparent)]
     Mistakes(#[from] Box<Problems>),
-}
-
-fn suggestion(near: Option<&str>) -> String {
-    match near {
-        Some(near) => format!("; did you mean `{near}`?"),
-        None => "; `drivebench list` shows the built-in ones".to_owned(),
-    }
 }
 
 /// A scenario, read and settled, and not yet played.
@@ -219,8 +212,15 @@ fn built_in_named(name: &Path) -> Result<Source, LibraryError> {
         return Ok(source.clone());
     }
     let known: Vec<_> = sources.iter().map(|source| last(&source.name)).collect();
+    let remedy = match nearest(last(&wanted), &known) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if known.iter().any(|name| name.contains(&wanted)) => {
+            format!("`--filter {wanted}` selects the built-in ones with this text")
+        }
+        None => "`drivebench list` shows the built-in ones".to_owned(),
+    };
     Err(LibraryError::NotFound {
-        near: nearest(last(&wanted), &known).map(str::to_owned),
         name: wanted,
+        remedy,
     })
 }

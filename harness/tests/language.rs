@@ -23,8 +23,9 @@ fn play(text: &str) -> (Outcome, String) {
     let plan = entry.plan.expect("novobus");
     let mut link = simulated(&plan);
     let outcome = run(&plan, &mut link);
-    let trace = json::to_string(&[link.trace(0)]).expect("JSON");
-    (outcome, trace)
+    let mut trace = Vec::new();
+    json::write(&[link.trace(0)], &mut trace).expect("JSON");
+    (outcome, String::from_utf8(trace).expect("text"))
 }
 
 /// A scenario for a ring of 3 with these steps.

@@ -9,6 +9,7 @@ use crate::report::json;
 use crate::report::table::{LEGEND, Part, table, wires};
 use crate::scenario::run::AtFinding;
 use harness_sim::trace::Trace;
+use std::io::BufWriter;
 
 /// Lines about damaged bytes shown below a table.
 const WIRES: usize = 20;
@@ -38,8 +39,7 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
     let played = play_entry(&entry, AtFinding::GoOn);
     match arguments.format {
         Format::Json => {
-            let text = json::to_string(&played.traces).map_err(std::io::Error::other)?;
-            output.result(&(text + "\n"))?;
+            json::write(&played.traces, BufWriter::new(std::io::stdout().lock()))?;
         }
         Format::Table => {
             for trace in &played.traces {

@@ -22,6 +22,7 @@ use harness_proto::novobus::error_mode::Marks;
 use harness_sim::link::LineByte;
 use harness_sim::trace::{LinkTrace, Mark, Trace};
 use serde::Serialize;
+use std::io::Write;
 
 /// The version of the form.
 pub const SCHEMA: u32 = 1;
@@ -61,16 +62,18 @@ struct MarkObject {
     cause: Option<&'static str>,
 }
 
-/// The traces of one or two rings as a line of JSON.
+/// Writes the traces of one or two rings as a line of JSON.
 ///
 /// # Errors
-/// Writing failed; it cannot for a trace.
-pub fn to_string(traces: &[Trace]) -> Result<String, serde_json::Error> {
+/// What the writer says.
+pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     let second = traces.get(1).map(|trace| Box::new(object(trace, None)));
     match traces.first() {
-        Some(first) => serde_json::to_string(&object(first, second)),
-        None => Ok("null".to_owned()),
+        Some(first) => serde_json::to_writer(&mut out, &object(first, second))?,
+        None => out.write_all(b"null")?,
     }
+    out.write_all(b"\n")?;
+    out.flush()
 }
 
 fn object<'a>(trace: &'a Trace, second: Option<Box<Object<'a>>>) -> Object<'a> {

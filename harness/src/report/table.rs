@@ -43,29 +43,25 @@ pub struct Part {
     pub columns_at_most: Option<usize>,
 }
 
+/// Rows shown of a table where nobody says how many.
+const ROWS: usize = 20_000;
+
 /// A trace as a table.
 #[must_use]
 pub fn table(trace: &Trace, part: &Part) -> String {
-    let columns = columns(trace);
+    let rows = rows(trace, part);
+    let columns = columns(trace, &rows);
     let mut shown = fold(&columns);
     if let Some(most) = part.columns_at_most.filter(|most| *most < shown.len()) {
         let half = most / 2;
         shown.splice(half..shown.len() - half, [None]);
     }
-    let all = columns.iter().map(|c| c.cells.len()).max().unwrap_or(0);
-    let rows = part.rows.clone().unwrap_or(0..all);
-    let rows = rows.start.min(all)..rows.end.min(all);
-    let width = |column: &Column| {
-        let cells = column.cells.get(rows.clone()).unwrap_or(&column.cells);
-        let widest = cells.iter().map(|cell| cell.text.len()).max();
-        widest.unwrap_or(0).max(column.head.len())
-    };
     let mut out = String::new();
-    let mut line = |number: &str, pointer: &str, cell: &dyn Fn(&Column) -> String| {
+    let mut line = |pointer: &str, number: &str, cell: &dyn Fn(&Column) -> &str| {
         let mut row = format!("{pointer:1}{number:>5}");
-        for shown in &shown {
-            let text = match shown {
-                Some(column) => format!("  {:>1$}", cell(column), width(column)),
+        for column in &shown {
+            let text = match column {
+                Some(column) => format!("  {:>1$}", cell(column), column.width),
                 None => "  ...".to_owned(),
             };
             row.push_str(&text);
@@ -73,30 +69,34 @@ pub fn table(trace: &Trace, part: &Part) -> String {
         out.push_str(row.trim_end());
         out.push('\n');
     };
-    line("byte", "", &|column| column.head.clone());
-    let half = part.at_most.map_or(usize::MAX, |most| most / 2);
-    let skipped = if rows.len() / 2 > half {
-        rows.start + half..rows.end - half
-    } else {
-        0..0
-    };
-    for row in rows.clone() {
-        if row == skipped.start && !skipped.is_empty() {
-            line("...", "", &|_| "...".to_owned());
+    line("", "byte", &|column| &column.head);
+    for (place, row) in rows.iter().enumerate() {
+        match row {
+            None => line("", "...", &|_| "..."),
+            Some(row) => {
+                let pointer = if part.pointed == Some(*row) { ">" } else { "" };
+                line(pointer, &(row + 1).to_string(), &|column| {
+                    &column.cells[place].text
+                });
+            }
         }
-        if skipped.contains(&row) {
-            continue;
-        }
-        let pointer = if part.pointed == Some(row) { ">" } else { "" };
-        line(&(row + 1).to_string(), pointer, &|column| {
-            column
-                .cells
-                .get(row)
-                .map(|cell| cell.text.clone())
-                .unwrap_or_default()
-        });
     }
     out
+}
+
+/// The rows to show; `None` stands for rows left out.
+fn rows(trace: &Trace, part: &Part) -> Vec<Option<usize>> {
+    let all = trace.links.iter().map(|l| l.bytes.len()).max().unwrap_or(0);
+    let wanted = part.rows.clone().unwrap_or(0..all);
+    let wanted = wanted.start.min(all)..wanted.end.min(all);
+    let most = part.at_most.unwrap_or(ROWS);
+    if wanted.len() <= most {
+        return wanted.map(Some).collect();
+    }
+    let half = most / 2;
+    let head = wanted.start..wanted.start + half;
+    let tail = wanted.end - half..wanted.end;
+    head.map(Some).chain([None]).chain(tail.map(Some)).collect()
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -108,30 +108,42 @@ struct Cell {
 
 struct Column {
     head: String,
+    /// One a row that is shown.
     cells: Vec<Cell>,
+    width: usize,
     /// A drive's column may be folded, the master's and a wire's may not.
     drive: bool,
 }
 
-fn columns(trace: &Trace) -> Vec<Column> {
-    let mut columns = Vec::new();
-    for link in &trace.links {
-        let head = link.from.map_or("Master".to_owned(), |k| k.to_string());
-        let mut cells: Vec<_> = link.bytes.iter().map(sent).collect();
-        if let Some(drive) = link.from {
-            sign(&mut cells, trace, drive, &link.bytes);
-        }
-        columns.push(Column {
+impl Column {
+    fn new(head: String, cells: Vec<Cell>, drive: bool) -> Self {
+        let widest = cells.iter().map(|cell| cell.text.len()).max();
+        Self {
+            width: widest.unwrap_or(0).max(head.len()),
             head,
             cells,
-            drive: link.from.is_some(),
-        });
+            drive,
+        }
+    }
+}
+
+fn columns(trace: &Trace, rows: &[Option<usize>]) -> Vec<Column> {
+    let mut columns = Vec::new();
+    for link in &trace.links {
+        let cells = |cell: fn(&LineByte) -> Cell| -> Vec<Cell> {
+            let byte = |row: &Option<usize>| row.and_then(|row| link.bytes.get(row));
+            rows.iter()
+                .map(|row| byte(row).map(cell).unwrap_or_default())
+                .collect()
+        };
+        let head = link.from.map_or("Master".to_owned(), |k| k.to_string());
+        let mut sent = cells(sent);
+        if let Some(drive) = link.from {
+            sign(&mut sent, rows, trace, drive, &link.bytes);
+        }
+        columns.push(Column::new(head, sent, link.from.is_some()));
         if link.bytes.iter().any(damaged) {
-            columns.push(Column {
-                head: "wire".to_owned(),
-                cells: link.bytes.iter().map(arrived).collect(),
-                drive: false,
-            });
+            columns.push(Column::new("wire".to_owned(), cells(arrived), false));
         }
     }
     columns
@@ -164,21 +176,25 @@ fn arrived(byte: &LineByte) -> Cell {
 
 /// Puts a drive's marks in front of the bytes that it sent at them. A mark at which nothing went out (a
 /// time-out) stands at the next byte.
-fn sign(cells: &mut [Cell], trace: &Trace, drive: u8, bytes: &[LineByte]) {
+fn sign(cells: &mut [Cell], rows: &[Option<usize>], trace: &Trace, drive: u8, bytes: &[LineByte]) {
     let sent: Vec<_> = (0..bytes.len())
         .filter(|i| bytes[*i].sent.is_some())
         .collect();
     for mark in trace.marks.iter().filter(|mark| mark.drive == drive) {
-        let place = match mark.answered_as {
+        let row = match mark.answered_as {
             Some(number) => usize::try_from(number - 1).ok().and_then(|i| sent.get(i)),
-            None => sent.iter().find(|i| bytes[**i].at > mark.at),
+            None => {
+                let next = sent.partition_point(|i| bytes[*i].at <= mark.at);
+                sent.get(next)
+            }
         };
-        let Some(cell) = place.and_then(|i| cells.get_mut(*i)) else {
+        let Some(row) = row else { continue };
+        let Some(place) = rows.iter().position(|shown| shown.as_ref() == Some(row)) else {
             continue;
         };
         for (marks, sign) in SIGNS {
-            if mark.marks.contains(marks) && !cell.signs.contains(sign) {
-                cell.signs.push(sign);
+            if mark.marks.contains(marks) && !cells[place].signs.contains(sign) {
+                cells[place].signs.push(sign);
             }
         }
     }
@@ -188,7 +204,7 @@ fn sign(cells: &mut [Cell], trace: &Trace, drive: u8, bytes: &[LineByte]) {
 }
 
 /// `None` stands for drives left out: all between two that are shown differ from their neighbours in
-/// the same way, byte for byte.
+/// the same way, byte for byte, in the rows that are shown.
 fn fold(columns: &[Column]) -> Vec<Option<&Column>> {
     let mut shown = Vec::new();
     let mut at = 0;
@@ -219,15 +235,13 @@ fn fold(columns: &[Column]) -> Vec<Option<&Column>> {
 /// By how much each byte of two neighbours differs: 0 or 1, as addresses do; `None` where they are not
 /// alike.
 fn difference(left: &Column, right: &Column) -> Option<Vec<u8>> {
-    if left.cells.len() != right.cells.len() {
-        return None;
-    }
     left.cells
         .iter()
         .zip(&right.cells)
         .map(|(l, r)| {
             let step = r.byte.unwrap_or(0).wrapping_sub(l.byte.unwrap_or(0));
-            (l.signs == r.signs && step <= 1).then_some(step)
+            let alike = l.signs == r.signs && l.byte.is_some() == r.byte.is_some();
+            (alike && step <= 1).then_some(step)
         })
         .collect()
 }

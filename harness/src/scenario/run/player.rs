@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 const MAX_ROUND: time::Span = time::Span::from_millis(60_000);
 
 /// The most bytes that a run may leave on all links together: its record is held in memory.
-const MAX_CARRIED: u64 = 30_000_000;
+const MAX_CARRIED: u64 = 20_000_000;
 
 /// Bytes that no line asks for shown at most.
 const UNASKED: usize = 16;
