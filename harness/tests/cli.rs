@@ -119,7 +119,7 @@ fn a_mismatch_is_shown_as_the_manuals_table() {
         "expected  88 01 C0 13 77 A5",
         "received  88 01 C0 13 00 2D",
         "^^ byte 5 at the master",
-        ">    5      FE  FE  >00  00",
+        ">    5      FE  FE  >00  [00]",
         "see nd21 9.7",
     ] {
         assert!(shown.contains(part), "{part}\n{shown}");

@@ -35,7 +35,7 @@ const FOLD: usize = 4;
 pub struct Part {
     /// The rows, counted from 0; all where `None`.
     pub rows: Option<Range<usize>>,
-    /// A row that is pointed at, counted from 0.
+    /// A row that is pointed at, counted from 0; what the master received there stands in brackets.
     pub pointed: Option<usize>,
     /// Rows shown at most; of a longer table the middle is left out.
     pub at_most: Option<usize>,
@@ -50,7 +50,13 @@ const ROWS: usize = 20_000;
 #[must_use]
 pub fn table(trace: &Trace, part: &Part) -> String {
     let rows = rows(trace, part);
-    let columns = columns(trace, &rows);
+    let mut columns = columns(trace, &rows);
+    if let Some(pointed) = rows
+        .iter()
+        .position(|row| row.is_some() && *row == part.pointed)
+    {
+        bracket(&mut columns, pointed);
+    }
     let mut shown = fold(&columns);
     if let Some(most) = part.columns_at_most.filter(|most| *most < shown.len()) {
         let half = most / 2;
@@ -147,6 +153,20 @@ fn columns(trace: &Trace, rows: &[Option<usize>]) -> Vec<Column> {
         }
     }
     columns
+}
+
+/// Marks what arrived at the master: in the last column, or in the one before where the wire behind it
+/// left the byte alone. Nothing is marked where nothing arrived.
+fn bracket(columns: &mut [Column], place: usize) {
+    let wire = columns.last().is_some_and(|column| !column.drive);
+    let ends = if wire { 2 } else { 1 };
+    let mut last = columns.iter_mut().rev().take(ends);
+    let arrived = last.find(|column| !column.cells[place].text.is_empty());
+    if let Some(column) = arrived {
+        let text = &mut column.cells[place].text;
+        *text = format!("[{text}]");
+        column.width = column.width.max(text.len());
+    }
 }
 
 fn sent(byte: &LineByte) -> Cell {
