@@ -329,6 +329,24 @@ fn the_manual_shows_what_is_pinned_and_what_is_not() {
 }
 
 #[test]
+fn cells_are_shown_under_their_printed_names() {
+    let all = stdout(&drivebench(&["cells"]));
+    assert_eq!(all.lines().count(), 113, "the rows of ND21 14.2.1");
+    let nsoll = all
+        .lines()
+        .find(|line| line.contains(" nsoll "))
+        .expect("nsoll");
+    assert!(nsoll.starts_with("FF08   2 write"), "{nsoll}");
+    assert!(
+        nsoll.contains(" rpm ") && nsoll.contains("14.5.3"),
+        "{nsoll}"
+    );
+    let eeprom = stdout(&drivebench(&["cells", "--eeprom", "ee_selftest"]));
+    assert!(eeprom.starts_with("47   1 write"), "{eeprom}");
+    assert_eq!(code(&drivebench(&["cells", "no such cell"])), 4);
+}
+
+#[test]
 fn a_closed_pipe_is_no_failure() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
         .arg("manual")

@@ -31,7 +31,8 @@ Examples:
   drivebench trace 9.7-parity-error          the 100-axis table of ND21 9.7
   drivebench trace my.scn --format json      every byte on every link, for tools
   drivebench check my.scn                    look for mistakes, play nothing
-  drivebench manual                          which tables of the manual are pinned";
+  drivebench manual                          which tables of the manual are pinned
+  drivebench cells ps_                       the cells of the positioning controller";
 
 fn after_long_help() -> String {
     format!("{EXAMPLES}\n\n{}", Exit::HELP)
@@ -50,6 +51,8 @@ pub enum Command {
     Trace(TraceArguments),
     /// Show which tables and examples of the manual are pinned, and the errata ledger.
     Manual(ManualArguments),
+    /// Show the drive's cells: address, size, access, unit, meaning and section of the manual.
+    Cells(CellsArguments),
     /// Print a completion script for a shell.
     Completions {
         /// For which shell.
@@ -123,6 +126,16 @@ pub struct ManualArguments {
     /// Only entries with this text in them.
     #[arg(long, value_name = "TEXT")]
     pub filter: Option<String>,
+}
+
+/// For `cells`.
+#[derive(Clone, Debug, Args)]
+pub struct CellsArguments {
+    /// Only cells with this text in their name, address or meaning.
+    pub filter: Option<String>,
+    /// The EEPROM in place of the RAM.
+    #[arg(long)]
+    pub eeprom: bool,
 }
 
 /// The forms of a trace.

@@ -1,6 +1,7 @@
 //! The command line of `drivebench`: standard output is for results, standard error for people.
 
 mod args;
+mod cells;
 mod check;
 mod exit;
 mod list;
@@ -56,6 +57,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Check(arguments) => check::check(&arguments, output),
         Command::Trace(arguments) => trace::trace(&arguments, output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
+        Command::Cells(arguments) => cells::cells(&arguments, output),
         Command::Completions { shell } => man::completions(shell, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),
     }

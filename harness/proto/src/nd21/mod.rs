@@ -1,7 +1,14 @@
-//! The Novotron ND21: the cells that its bus end itself reads and writes.
+//! The Novotron ND21: what its cells are, in which units, and its error codes.
 //!
-//! The high byte of a word stands at the lower address (the drive's H8 is big-endian). Names are those
-//! of the manual's RAM table (ND21 14.2.1).
+//! The high byte of a word stands at the lower address (the drive's H8 is big-endian). [`cells`] and
+//! [`eeprom`] are the manual's tables 14.2.1 and 14.2.2; the constants here are those cells that a
+//! drive's bus end itself reads and writes.
+
+pub mod cells;
+pub mod eeprom;
+pub mod errors;
+pub mod position;
+pub mod units;
 
 /// `errorcode`: two bytes, the code of the last error (ND21 14.10.1).
 pub const ERROR_CODE: u16 = 0xFD82;
@@ -40,3 +47,30 @@ pub const PARAMETERS: u16 = 0xFF60;
 pub const EE_PARAMETERS: u8 = 0x20;
 /// How many parameters there are.
 pub const PARAMETER_COUNT: u16 = 0x20;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The bus end's cells stand in the tables at the same addresses (ND21 14.2.1, 14.2.2).
+    #[test]
+    fn the_bus_ends_cells_are_in_the_tables() {
+        for (name, address) in [
+            ("errorcode", ERROR_CODE),
+            ("DataIn", DATA_IN),
+            ("DataOut", DATA_OUT),
+            ("BusAddr", BUS_ADDR),
+            ("Status", STATUS),
+            ("Flags2", FLAGS2),
+            ("HwVersion", PARAMETERS),
+        ] {
+            assert_eq!(
+                cells::cell(name).map(|cell| cell.address),
+                Some(address),
+                "{name}"
+            );
+        }
+        let selftest = eeprom::cell("EE_selftest").map(|cell| cell.address);
+        assert_eq!(selftest, Some(u16::from(EE_SELFTEST)));
+    }
+}

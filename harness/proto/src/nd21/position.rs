@@ -3,7 +3,7 @@
 //! Bits 30-16 are whole revolutions, bits 15-0 the angle, 65536 increments to a turn; the two's
 //! complement is that of all 31 bits together.
 
-use super::units::{INCREMENTS_PER_TURN, Ratio, Reason, UnitError};
+use super::units::{INCREMENTS_PER_TURN, Ratio, Reason, UnitError, turns_from_raw, turns_to_raw};
 
 /// How many positions the EEPROM holds (ND21 13.1.9).
 pub const POSITIONS: u8 = 40;
@@ -62,7 +62,18 @@ impl Position {
     /// # Errors
     /// Less than -16384 turns, or nearer to 16384 than to the greatest position.
     pub fn from_turns(mode: Mode, turns: Ratio) -> Result<Self, UnitError> {
-        super::units::turns_to_raw(turns).and_then(|increments| Self::new(mode, increments))
+        let increments = turns_to_raw(turns).ok();
+        let position = increments.and_then(|increments| Self::new(mode, increments).ok());
+        position.ok_or(UnitError {
+            quantity: "position in turns",
+            section: "13.1.9",
+            received: turns,
+            reason: if turns < Ratio::ZERO {
+                Reason::Below(turns_from_raw(Self::MIN))
+            } else {
+                Reason::Above(turns_from_raw(Self::MAX))
+            },
+        })
     }
 
     /// Whether it is absolute or relative.
@@ -80,7 +91,7 @@ impl Position {
     /// The turns: whole ones and the rest.
     #[must_use]
     pub const fn turns(self) -> Ratio {
-        super::units::turns_from_raw(self.increments)
+        turns_from_raw(self.increments)
     }
 
     /// Whole revolutions, -16384 to 16383, and the angle of one revolution: bits 30-16 and 15-0.
@@ -206,7 +217,10 @@ mod tests {
         assert_eq!(turns(-16_384).unwrap().parts(), (-16_384, 0));
         assert!(turns(16_384).is_err());
         assert!(turns(-16_385).is_err());
-        assert!(turns(40_000).is_err());
+        let error = turns(40_000).unwrap_err();
+        assert_eq!(error.reason, Reason::Above(turns_from_raw(Position::MAX)));
+        let error = turns(-40_000).unwrap_err();
+        assert_eq!(error.reason, Reason::Below(Ratio::whole(-16_384)));
         let most = Position::new(Relative, Position::MAX).unwrap();
         assert_eq!(most.encode(), 0xBFFF_FFFF);
         assert_eq!(most.parts(), (16_383, 0xFFFF));

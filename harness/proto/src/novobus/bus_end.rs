@@ -108,11 +108,6 @@ impl BusEnd {
         }
     }
 
-    /// How the drive behaves where the manual leaves it open.
-    pub fn properties_mut(&mut self) -> &mut Properties {
-        &mut self.properties
-    }
-
     /// Whether the drive is in the error mode.
     #[must_use]
     pub const fn in_error(&self) -> bool {

@@ -1,6 +1,7 @@
 //! What a drive can find wrong with its bus (ND21 9.7, 9.9; codes from 14.11.14).
 
 use crate::line::LineError;
+use crate::nd21::errors::ErrorCode;
 use core::fmt;
 
 /// The reason for which a drive goes into the error mode.
@@ -37,19 +38,25 @@ impl BusError {
         Self::TimeOut,
     ];
 
+    /// The row of the drive's error codes (ND21 14.11.14).
+    #[must_use]
+    pub const fn error_code(self) -> ErrorCode {
+        match self {
+            Self::Overrun => ErrorCode::SciOverrun,
+            Self::Parity => ErrorCode::SciParity,
+            Self::Framing => ErrorCode::SciFraming,
+            Self::Sync => ErrorCode::NbSync,
+            Self::Command => ErrorCode::NbCommand,
+            Self::Parameter => ErrorCode::NbParam,
+            Self::Checksum => ErrorCode::NbChecksum,
+            Self::TimeOut => ErrorCode::NbTimeout,
+        }
+    }
+
     /// The error code that the drive shows in its cell `errorcode` (ND21 14.11.14).
     #[must_use]
     pub const fn code(self) -> u16 {
-        match self {
-            Self::Overrun => 0x0501,
-            Self::Parity => 0x0502,
-            Self::Framing => 0x0503,
-            Self::Sync => 0x0504,
-            Self::Command => 0x0505,
-            Self::Parameter => 0x0506,
-            Self::Checksum => 0x0507,
-            Self::TimeOut => 0x0508,
-        }
+        self.error_code().code()
     }
 
     /// The error with this code.
@@ -61,16 +68,7 @@ impl BusError {
     /// The name that the manual prints (ND21 14.11.14).
     #[must_use]
     pub const fn printed_name(self) -> &'static str {
-        match self {
-            Self::Overrun => "SCIoverrun",
-            Self::Parity => "SCIparity",
-            Self::Framing => "SCIframing",
-            Self::Sync => "NBsync",
-            Self::Command => "NBcommand",
-            Self::Parameter => "NBparam",
-            Self::Checksum => "NBchecksum",
-            Self::TimeOut => "NBtimeout",
-        }
+        self.error_code().printed_name()
     }
 
     /// The word that records use for the cause.

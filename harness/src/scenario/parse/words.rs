@@ -4,7 +4,7 @@ use crate::scenario::expression;
 use crate::scenario::problem::{Problem, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Drives;
-use harness_proto::nd21;
+use harness_proto::nd21::cells;
 
 /// Reads one of a list of words.
 pub(super) fn named<T: Copy>(
@@ -68,27 +68,16 @@ pub(super) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
     }
 }
 
-/// The cells that a scenario can call by their printed names (ND21 14.2.1).
-const CELLS: [(&str, u16); 7] = [
-    ("Status", nd21::STATUS),
-    ("DataIn", nd21::DATA_IN),
-    ("DataOut", nd21::DATA_OUT),
-    ("BusAddr", nd21::BUS_ADDR),
-    ("Flags2", nd21::FLAGS2),
-    ("errorcode", nd21::ERROR_CODE),
-    ("HwVersion", nd21::PARAMETERS),
-];
-
-/// A cell: four hexadecimal digits, or a name.
+/// A cell: four hexadecimal digits, or its printed name (ND21 14.2.1).
 pub(super) fn address(scanner: &mut Scanner<'_>) -> Result<Spanned<u16>, Problem> {
     let before = scanner.clone();
     let Some(word) = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '_') else {
         return Err(scanner.unexpected("an address of four hexadecimal digits (such as FE13)"));
     };
     let span = word.span;
-    if let Some((_, value)) = CELLS.iter().find(|(name, _)| *name == word.value) {
+    if let Some(cell) = cells::cell(word.value) {
         return Ok(Spanned {
-            value: *value,
+            value: cell.address,
             span,
         });
     }
@@ -96,10 +85,10 @@ pub(super) fn address(scanner: &mut Scanner<'_>) -> Result<Spanned<u16>, Problem
         Ok(value) if word.value.len() == 4 => Ok(Spanned { value, span }),
         _ => {
             *scanner = before;
-            let names: Vec<_> = CELLS.iter().map(|(name, _)| *name).collect();
+            let names: Vec<_> = cells::RAM.iter().map(|cell| cell.printed).collect();
             let problem = scanner
-                .unexpected("an address of four hexadecimal digits (such as FE13) or a name")
-                .help(format!("names are {}", names.join(", ")));
+                .unexpected("an address of four hexadecimal digits (such as FE13) or a cell's name")
+                .help("`drivebench cells` shows the names of the cells (ND21 14.2.1)");
             Err(problem.did_you_mean(word.value, &names))
         }
     }

@@ -180,7 +180,10 @@ mod tests {
             // Rounded to 1 mA there, to 0.001 mA here.
             assert!(near(torque, limit, 0.0005 + 0.000_128), "{device:?}");
         }
-        assert_eq!(torque_from_raw(1_000, Device::Nd5620), Ratio::of(1_347, 1_000));
+        assert_eq!(
+            torque_from_raw(1_000, Device::Nd5620),
+            Ratio::of(1_347, 1_000)
+        );
     }
 
     /// ND21 14.6.2: emk0 = 0.38636 x V per 1000 rpm.

@@ -42,7 +42,7 @@ pub fn serial_number_to_bytes(number: u32) -> Result<[u8; 3], UnitError> {
     }
     let (mut rest, mut word) = (number, 0);
     for i in 0..6 {
-        word |= rest % 10 << (4 * i);
+        word |= (rest % 10) << (4 * i);
         rest /= 10;
     }
     let [_, a, b, c] = word.to_be_bytes();
@@ -97,8 +97,11 @@ impl Date {
         let [_, day] = (word & 0x1F).to_be_bytes();
         let [_, month] = (word >> 5 & 0xF).to_be_bytes();
         let received = Ratio::whole(i32::from(word));
-        Self::new(FIRST_YEAR + (word >> 9), month, day)
-            .ok_or(UnitError::new(DATE_WHAT, received, Reason::NoSuchDate))
+        Self::new(FIRST_YEAR + (word >> 9), month, day).ok_or(UnitError::new(
+            DATE_WHAT,
+            received,
+            Reason::NoSuchDate,
+        ))
     }
 
     /// The word of this day (ND21 14.8.3).
@@ -133,7 +136,7 @@ impl Date {
 /// Any other number.
 pub fn motor_poles(raw: u8) -> Result<u8, UnitError> {
     check(POLES_WHAT, i32::from(raw), 2, 12)?;
-    if raw % 2 != 0 {
+    if !raw.is_multiple_of(2) {
         let received = Ratio::whole(i32::from(raw));
         return Err(UnitError::new(POLES_WHAT, received, Reason::Odd));
     }

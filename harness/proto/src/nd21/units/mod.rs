@@ -224,3 +224,58 @@ fn encode<T: TryFrom<i128>>(
     }
     T::try_from(raw).map_err(|_| above)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::string::ToString;
+
+    #[test]
+    fn errors_say_what_was_expected() {
+        assert_eq!(
+            tacho_filter_from_raw(0x80).unwrap_err().to_string(),
+            "failed to convert 128 for the tacho filter in us: at most 127 expected (ND21 14.6.3)"
+        );
+        assert_eq!(
+            speed_to_raw(Ratio::whole(-8_001), SpeedRange::To8000)
+                .unwrap_err()
+                .to_string(),
+            "failed to convert -8001 for the spin speed in rpm: at least -8000 expected (ND21 14.5.3.1)"
+        );
+        assert_eq!(
+            Date::from_raw(0xFFFF).unwrap_err().to_string(),
+            "failed to convert 65535 for the date: a day of the calendar expected (ND21 14.8.3)"
+        );
+    }
+
+    /// Numbers at the ends of 64 bits are refused or converted, never a panic.
+    #[test]
+    fn ends_of_the_numbers() {
+        for numerator in [i64::MIN, -1, 0, 1, i64::MAX] {
+            for denominator in [1, 3, i64::MAX] {
+                let ratio = Ratio::new(numerator, denominator).unwrap();
+                for device in Device::ALL {
+                    let _ = momentary_current_to_raw(ratio, device);
+                    let _ = effective_current_to_raw(ratio, device);
+                    let _ = torque_limit_to_raw(ratio, device);
+                    let _ = torque_to_raw(ratio, device);
+                }
+                for range in [SpeedRange::To8000, SpeedRange::To12000] {
+                    let _ = speed_to_raw(ratio, range);
+                    let _ = max_speed_to_raw(ratio, range);
+                    let _ = ramp_to_raw(Switched::On(ratio), range);
+                }
+                let _ = turns_to_raw(ratio);
+                let _ = angle_to_raw(ratio);
+                let _ = slipping_error_to_raw(Switched::On(ratio));
+                let _ = tacho_filter_to_raw(ratio);
+                let _ = analogue_speed_to_raw(ratio);
+                let _ = impulses_to_raw(ratio);
+                let _ = emf_to_raw(ratio);
+                let _ = cooler_to_raw(ratio);
+                let _ = motor_sensor_to_raw(ratio);
+                let _ = (ratio.round(), ratio.to_f64());
+            }
+        }
+    }
+}

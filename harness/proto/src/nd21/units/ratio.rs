@@ -76,9 +76,9 @@ impl Ratio {
         while b != 0 {
             (a, b) = (b, a % b);
         }
-        // `a` divides a positive i64, so it is one.
+        // `a` is at least 1 and divides a positive i64, so it fits.
         #[expect(clippy::cast_possible_wrap, reason = "it fits, see above")]
-        let divisor = if a == 0 { 1 } else { a as i64 };
+        let divisor = a as i64;
         Self {
             numerator: numerator / divisor,
             denominator: denominator / divisor,

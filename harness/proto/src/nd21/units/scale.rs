@@ -216,7 +216,10 @@ mod tests {
         assert_eq!(value(Scale::Ramp, &[0x7F, 0xFF]), Value::Off);
         assert_eq!(value(Scale::SlippingError, &[0x80, 0x00]), Value::Off);
         assert_eq!(value(Scale::Hours, &[0x01, 0x00]), exact(1, 1));
-        assert_eq!(value(Scale::SerialNumber, &[0x01, 0x23, 0x45]), exact(12_345, 1));
+        assert_eq!(
+            value(Scale::SerialNumber, &[0x01, 0x23, 0x45]),
+            exact(12_345, 1)
+        );
         let date = Date::new(1996, 1, 31).unwrap();
         assert_eq!(value(Scale::Date, &[0x06, 0x3F]), Value::Date(date));
     }

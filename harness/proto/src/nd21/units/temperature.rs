@@ -12,10 +12,9 @@ const COOLER_RANGE: (i32, i32) = (-52, 415);
 /// `TempKK`: the resistance of the cooler's sensor as a part of that at 25 °C, `temp` of ND21
 /// 14.5.7.1.
 ///
-/// Read as 0,27 x tempKK / (256 - tempKK), a voltage divider. As far as the print can be read, the
-/// fraction is tempKK / (1 - tempKK / 256): 256 times as much, and then only the raw values 0 to 6
-/// would lie above 0 °C. The same converter reads the motor's sensor, and there the divider is
-/// printed in full.
+/// The signs of the formula are out of place in the print. Its parts make 0,27 x tempKK / (1 - tempKK /
+/// 256), with which no raw value lies above 61 °C. Read here as 0,27 x tempKK / (256 - tempKK), a
+/// voltage divider with the sensor on the low side, as the formula of the motor's sensor is one (14.5.7.2).
 ///
 /// # Errors
 /// Raw 0: no resistance, so no temperature.
@@ -83,10 +82,7 @@ pub fn motor_sensor_to_raw(ohm: Ratio) -> Result<u8, UnitError> {
         return Err(below);
     }
     let (n, d) = (i128::from(ohm.numerator()), i128::from(ohm.denominator()));
-    let raw = round_div(
-        652_800 * n + 14_361_600 * d,
-        2_597 * n + 2_454_134 * d,
-    );
+    let raw = round_div(652_800 * n + 14_361_600 * d, 2_597 * n + 2_454_134 * d);
     u8::try_from(raw).map_err(|_| below)
 }
 
@@ -97,7 +93,6 @@ fn ln(x: f64) -> f64 {
     // x = fraction x 2^exponent, with the fraction between the root of a half and the root of 2.
     let bits = x.to_bits();
     let mut fraction = f64::from_bits(bits & FRACTION | EXPONENT_OF_1 << 52);
-    #[expect(clippy::cast_possible_truncation, reason = "11 bits are left")]
     let mut exponent = f64::from((bits >> 52) as u32) - 1023.0;
     if fraction > core::f64::consts::SQRT_2 {
         fraction /= 2.0;
@@ -135,7 +130,7 @@ mod tests {
     #[test]
     fn cooler_of_14_5_7_1() {
         let at = |celsius| cooler_to_raw(Ratio::whole(celsius)).unwrap();
-        assert_eq!([at(25), at(45), at(65), at(85)], [202, 163, 121, 84]);
+        assert_eq!([at(25), at(45), at(65), at(85)], [202, 162, 120, 84]);
         for raw in 2..=u8::MAX {
             assert!(cooler_from_raw(raw).unwrap() < cooler_from_raw(raw - 1).unwrap());
         }
@@ -144,8 +139,8 @@ mod tests {
         assert!(cooler_to_raw(Ratio::whole(416)).is_err());
     }
 
-    /// ND21 14.5.7.1 cannot be meant as printed (not in the ledger yet): tempKK / (1 - tempKK / 256)
-    /// has one bit for all of 4.2.2's range above 65 °C, and none for 85 °C.
+    /// ND21 14.5.7.1 cannot be meant as printed (E114): tempKK / (1 - tempKK / 256) has
+    /// no raw value for the 65 °C to 85 °C of 4.2.2, and half of the raw values lie below -50 °C.
     #[test]
     fn cooler_as_printed_has_no_resolution() {
         let printed = |raw: f64| {
