@@ -12,7 +12,8 @@ pub struct LineByte {
     pub at: Instant,
     /// What the transmitter put on the wire; `None` for a byte that nobody sent.
     pub sent: Option<u8>,
-    /// What the receiver read; `None` where nothing arrived.
+    /// What arrived at the receiver; `None` where nothing did. A drive without power reads nothing, but
+    /// the byte arrives.
     pub received: Option<u8>,
     /// What the receiver noticed.
     pub error: Option<LineError>,
@@ -308,23 +309,12 @@ impl Link {
             .map_or(Instant::NEVER, |byte| byte.at)
     }
 
-    /// Takes the next byte from the wire, for a receiver that listens.
+    /// Takes the next byte from the wire.
     #[inline]
     pub(crate) fn take(&mut self) -> Option<LineByte> {
         let byte = self.under_way.pop_front()?.unpack();
         self.record(byte);
         Some(byte)
-    }
-
-    /// Takes the next byte from the wire where nobody listens.
-    pub(crate) fn take_unheard(&mut self) {
-        if let Some(byte) = self.under_way.pop_front() {
-            self.record(LineByte {
-                received: None,
-                error: None,
-                ..byte.unpack()
-            });
-        }
     }
 
     #[inline]

@@ -134,18 +134,14 @@ impl<D: Device> Node<D> {
             while let Some(fault) = self.plan.take(inbound.arrived() + 1) {
                 self.suffer(fault, arrival, outbound);
             }
-            if self.powered {
-                self.take_byte(arrival, inbound, outbound);
-            } else {
-                inbound.take_unheard();
-            }
+            self.take_byte(arrival, inbound, outbound);
         }
     }
 
     #[inline]
     fn take_byte(&mut self, now: Instant, inbound: &mut Link, outbound: &mut Link) {
         let Some(byte) = inbound.take() else { return };
-        let Some(received) = byte.arrival() else {
+        let Some(received) = byte.arrival().filter(|_| self.powered) else {
             return;
         };
         let step = self.device.receive(now, received);
