@@ -205,23 +205,26 @@ impl Runner<'_> {
         }
         let mut first = Ok(());
         for step in &plan.steps {
-            let result = self.step(step);
-            if self.full {
-                let message =
-                    format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
-                return Err(Stop::aborted(step.span, message));
-            }
-            if result.is_err() && self.at_finding == AtFinding::Stop {
-                return result;
+            let result = self.step(step).and(self.room(step.span));
+            if result.is_err() && self.at_finding == AtFinding::Stop || self.full {
+                return first.and(result);
             }
             first = first.and(result);
         }
         self.settle();
         let last = plan.steps.last().map_or(Span::default(), |step| step.span);
-        if self.strict {
-            first = first.and_then(|()| self.nothing_unasked(last));
-        }
         first
+            .and(self.room(last))
+            .and_then(|()| self.nothing_unasked(last))
+    }
+
+    /// Whether the record has room for more.
+    fn room(&self, span: Span) -> Result<(), Stop> {
+        if self.full {
+            let message = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
+            return Err(Stop::aborted(span, message));
+        }
+        Ok(())
     }
 
     fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
@@ -275,12 +278,13 @@ impl Runner<'_> {
             }
             PlannedAction::Telegram(ring, bytes, expected) => {
                 self.settle();
-                if self.strict {
-                    self.nothing_unasked(step.span)?;
+                let asked = self.nothing_unasked(step.span);
+                if asked.is_err() && self.at_finding == AtFinding::Stop {
+                    return asked;
                 }
                 self.forget(*ring);
                 self.send(*ring, bytes);
-                self.expect(step.span, *ring, expected, None)
+                asked.and(self.expect(step.span, *ring, expected, None))
             }
             PlannedAction::Recover(ring) => self.recover(*ring, step.span),
         }
@@ -478,7 +482,8 @@ impl Runner<'_> {
 
     /// A strict scenario asks for every byte.
     fn nothing_unasked(&self, span: Span) -> Result<(), Stop> {
-        for (ring, record) in self.rings.iter().enumerate() {
+        let rings = self.rings.iter().enumerate().filter(|_| self.strict);
+        for (ring, record) in rings {
             let unasked = &record.received[record.next..];
             if let Some((at, byte)) = unasked.first() {
                 let message = format!(
