@@ -16,6 +16,11 @@ pub trait Device {
     /// The deadline has come.
     fn handle_deadline(&mut self, now: Instant) -> Step;
 
+    /// Does all that the device does by itself, without the bus, up to and including `now`.
+    fn advance(&mut self, now: Instant) {
+        let _nothing_of_its_own = now;
+    }
+
     /// The power has come back after it had been off: everything but the EEPROM is lost.
     fn power_on(&mut self);
 

@@ -11,8 +11,10 @@
 
 pub mod bench;
 pub mod device;
+pub mod drive;
 pub mod fault;
 pub mod link;
+pub mod nd21;
 pub mod node;
 pub mod plain;
 pub mod reference;

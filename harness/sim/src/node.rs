@@ -66,6 +66,7 @@ impl<D: Device> Node<D> {
     pub(crate) fn suffer(&mut self, fault: DriveFault, now: Instant, outbound: &mut Link) {
         match fault {
             DriveFault::Off => {
+                self.device.advance(now);
                 self.powered = false;
                 outbound.silence(now);
             }
@@ -105,6 +106,13 @@ impl<D: Device> Node<D> {
     /// before the neighbour's is answered, ND21 9.9); a byte comes before any later zero (with something
     /// to answer, none goes out unasked).
     pub(crate) fn run(&mut self, inbound: &mut Link, outbound: &mut Link, until: Instant) {
+        self.run_bus(inbound, outbound, until);
+        if self.powered {
+            self.device.advance(until);
+        }
+    }
+
+    fn run_bus(&mut self, inbound: &mut Link, outbound: &mut Link, until: Instant) {
         loop {
             let arrival = inbound.next_arrival();
             match self.deadline() {
@@ -144,11 +152,13 @@ impl<D: Device> Node<D> {
         let Some(received) = byte.arrival().filter(|_| self.powered) else {
             return;
         };
+        self.device.advance(now);
         let step = self.device.receive(now, received);
         self.finish(step, now, byte.solicited, inbound.arrived(), outbound);
     }
 
     fn act(&mut self, now: Instant, outbound: &mut Link, received: u64) {
+        self.device.advance(now);
         let step = self.device.handle_deadline(now);
         self.finish(step, now, false, received, outbound);
     }

@@ -33,6 +33,14 @@ impl PlainMemory {
         }
     }
 
+    /// A memory with an EEPROM as given, and nothing in RAM.
+    pub(crate) fn with_eeprom(eeprom: [u8; 256]) -> Self {
+        Self {
+            eeprom,
+            ..Self::new()
+        }
+    }
+
     fn cell(&mut self, address: u16) -> Option<&mut u8> {
         if let Some(offset) = address.checked_sub(RAM_START) {
             return self.ram.get_mut(usize::from(offset));
@@ -76,7 +84,7 @@ impl PlainMemory {
 
     /// What the drive's program does at power-up and reset: RAM is lost, the parameters are loaded from
     /// the EEPROM (ND21 14.2), and `EE_selftest` bit 7 switches time-out monitoring on (14.10.2).
-    fn start(&mut self) {
+    pub(crate) fn start(&mut self) {
         self.ram.fill(0);
         for i in 0..nd21::PARAMETER_COUNT {
             let byte = self.eeprom[usize::from(u16::from(nd21::EE_PARAMETERS) + i)];
@@ -137,8 +145,7 @@ impl PlainDrive {
     /// A drive with an EEPROM as given, after power-up.
     #[must_use]
     pub fn new(properties: Properties, eeprom: [u8; 256]) -> Self {
-        let mut memory = PlainMemory::new();
-        memory.eeprom = eeprom;
+        let mut memory = PlainMemory::with_eeprom(eeprom);
         memory.start();
         Self {
             bus_end: BusEnd::new(properties),

@@ -192,8 +192,14 @@ impl<D: Device> Ring<D> {
 
     /// Lets everything happen up to and including `until`.
     pub fn run_until(&mut self, until: Instant) {
+        let mut walked = self.now;
         while let Some(next) = self.next_event().filter(|&next| next <= until) {
-            self.walk(until.min(next + self.byte_time() * BYTES_A_WALK));
+            walked = until.min(next + self.byte_time() * BYTES_A_WALK);
+            self.walk(walked);
+        }
+        if walked < until {
+            // Nothing on the bus; but devices have a life of their own.
+            self.walk(until);
         }
         self.now = self.now.max(until);
     }

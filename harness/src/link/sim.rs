@@ -7,15 +7,15 @@ use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::bench::Bench;
 use harness_sim::device::Device;
-use harness_sim::plain::PlainDrive;
+use harness_sim::drive::Drive;
 use harness_sim::ring::Ring;
 use harness_sim::trace::Trace;
 use std::collections::VecDeque;
 
-/// One or two simulated rings of plain drives.
+/// One or two simulated rings.
 #[derive(Clone, Debug)]
 pub struct SimulatedLink {
-    bench: Bench<PlainDrive>,
+    bench: Bench<Drive>,
     byte_time: Span,
     /// Faults that wait for their time, in order of it.
     scheduled: VecDeque<(Instant, usize, PlacedFault)>,
@@ -36,7 +36,7 @@ const CAPABILITIES: [Capability; 9] = [
 impl SimulatedLink {
     /// A link to the rings of a bench.
     #[must_use]
-    pub fn new(bench: Bench<PlainDrive>) -> Self {
+    pub fn new(bench: Bench<Drive>) -> Self {
         let byte_time = bench.rings().first().map_or(Span::ZERO, Ring::byte_time);
         Self {
             bench,
@@ -45,7 +45,7 @@ impl SimulatedLink {
         }
     }
 
-    fn ring(&self, ring: usize) -> Option<&Ring<PlainDrive>> {
+    fn ring(&self, ring: usize) -> Option<&Ring<Drive>> {
         self.bench.rings().get(ring)
     }
 
@@ -147,7 +147,7 @@ impl Link for SimulatedLink {
     }
 
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        Some(self.ring(ring)?.drive(drive)?.memory().peek(address))
+        Some(self.ring(ring)?.drive(drive)?.cells().peek(address))
     }
 
     fn unused_faults(&self) -> Vec<String> {

@@ -4,10 +4,12 @@ use super::plan::{Plan, PlannedSetupKind};
 use crate::link::SimulatedLink;
 use harness_proto::novobus::properties::Properties;
 use harness_sim::bench::Bench;
+use harness_sim::drive::{Drive, Model};
+use harness_sim::nd21::{Nd21Drive, Nd21Properties};
 use harness_sim::plain::PlainDrive;
 use harness_sim::ring::Ring;
 
-/// A link to simulated rings of plain drives, set up as the plan says.
+/// A link to simulated rings, their drives set up as the plan says.
 #[must_use]
 pub fn simulated(plan: &Plan) -> SimulatedLink {
     let mut rings = plan
@@ -24,23 +26,33 @@ pub fn simulated(plan: &Plan) -> SimulatedLink {
 }
 
 /// Drive `k`: the EEPROM first, since RAM is filled from it at power-up, then the cells.
-fn drive(plan: &Plan, ring: usize, k: u8) -> PlainDrive {
+fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
     let mut eeprom = [0; 256];
     let mut properties = Properties::default();
+    let mut own = Nd21Properties::default();
+    let mut model = Model::default();
     for setup in plan.setups_of(ring, k) {
         setup.apply_to(&mut properties);
-        if let PlannedSetupKind::Eeprom(address, bytes) = setup {
-            for (cell, byte) in eeprom.iter_mut().skip(usize::from(*address)).zip(bytes) {
-                *cell = *byte;
+        setup.apply_to_nd21(&mut own);
+        match setup {
+            PlannedSetupKind::Model(named) => model = *named,
+            PlannedSetupKind::Eeprom(address, bytes) => {
+                for (cell, byte) in eeprom.iter_mut().skip(usize::from(*address)).zip(bytes) {
+                    *cell = *byte;
+                }
             }
+            _ => {}
         }
     }
-    let mut drive = PlainDrive::new(properties, eeprom);
+    let mut drive = match model {
+        Model::Plain => Drive::Plain(PlainDrive::new(properties, eeprom)),
+        Model::Nd21 => Drive::Nd21(Nd21Drive::new(properties, own, eeprom)),
+    };
     for setup in plan.setups_of(ring, k) {
         if let PlannedSetupKind::Memory(address, bytes) = setup {
             for (address, byte) in (*address..=u16::MAX).zip(bytes) {
                 // Planning has refused addresses where there is no memory.
-                let _known = drive.memory_mut().poke(address, *byte);
+                let _known = drive.cells_mut().poke(address, *byte);
             }
         }
     }

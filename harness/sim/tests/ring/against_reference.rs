@@ -171,7 +171,7 @@ fn cell(random: &mut Random) -> u16 {
 }
 
 /// A telegram, mostly a legal one.
-fn telegram(random: &mut Random, drives: u8) -> Vec<u8> {
+pub(crate) fn telegram(random: &mut Random, drives: u8) -> Vec<u8> {
     if random.below(12) == 0 {
         return (0..1 + random.below(6))
             .map(|_| random.below(256) as u8)

@@ -2,5 +2,6 @@
 
 mod against_reference;
 mod common;
+mod nd21;
 mod recovery;
 mod single_faults;

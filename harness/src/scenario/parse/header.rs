@@ -12,6 +12,8 @@ use crate::scenario::times;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
 use harness_proto::novobus::properties::PROPERTIES;
+use harness_sim::drive::Model;
+use harness_sim::nd21;
 
 /// The most lines of a scenario.
 const MAX_LINES: usize = 20_000;
@@ -300,7 +302,7 @@ fn setup(scanner: &mut Scanner<'_>, start: Span) -> Result<Setup, Problem> {
     let drives = drives(scanner)?;
     let what = named(
         scanner,
-        &[("memory", 0), ("eeprom", 1), ("property", 2)],
+        &[("memory", 0), ("eeprom", 1), ("property", 2), ("model", 3)],
         "what to set",
     )?;
     let what = match what {
@@ -314,7 +316,8 @@ fn setup(scanner: &mut Scanner<'_>, start: Span) -> Result<Setup, Problem> {
             equals(scanner)?;
             SetupKind::Eeprom(address, pattern::pattern(scanner)?)
         }
-        _ => property(scanner)?,
+        2 => property(scanner)?,
+        _ => SetupKind::Model(named(scanner, &Model::NAMES, "a drive model")?),
     };
     scanner.expect_end()?;
     Ok(Setup {
@@ -325,7 +328,11 @@ fn setup(scanner: &mut Scanner<'_>, start: Span) -> Result<Setup, Problem> {
 }
 
 fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
-    let known: Vec<_> = PROPERTIES.iter().map(|p| (p.name, p.name)).collect();
+    let bus = PROPERTIES.iter().map(|p| p.name);
+    let known: Vec<_> = bus
+        .chain(nd21::PROPERTIES.iter().map(|p| p.name))
+        .map(|name| (name, name))
+        .collect();
     let here = scanner.here();
     let name = named(scanner, &known, "a property")?;
     let name = Spanned {

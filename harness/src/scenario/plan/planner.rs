@@ -19,6 +19,7 @@ use harness_proto::novobus::memory;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time::{self, Instant};
 use harness_sim::fault::LinkFault;
+use harness_sim::nd21;
 use std::ops::RangeInclusive;
 
 /// How long a line without a time waits where the scenario does not say.
@@ -74,14 +75,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
     if planner.rings.len() > 1 {
         needs.push(Capability::TwoRings);
     }
-    needs.extend(planner.setups.iter().map(|setup| match setup.what {
-        PlannedSetupKind::Eeprom(..) => Capability::Eeprom,
-        // No command writes ROM or registers (ND21 10.2): only a simulated drive can be given them.
-        PlannedSetupKind::Memory(address, _) if !memory::RAM.contains(&address) => {
-            Capability::Simulator
-        }
-        _ => Capability::Memory,
-    }));
+    needs.extend(planner.setups.iter().filter_map(|setup| setup.what.needs()));
     needs.sort();
     needs.dedup();
     Ok(Plan {
@@ -193,6 +187,7 @@ impl Planner {
                 }
                 PlannedSetupKind::Eeprom(address.value, bytes)
             }
+            SetupKind::Model(model) => PlannedSetupKind::Model(*model),
             SetupKind::Word(name, word) => {
                 set_property(&name.value, Setting::Word(&word.value), word.span)?;
                 PlannedSetupKind::Word(name.value.clone(), word.value.clone())
@@ -404,6 +399,16 @@ fn in_memory(address: &Spanned<u16>, length: usize) -> Result<(), Problem> {
 }
 
 fn set_property(name: &str, setting: Setting<'_>, span: Span) -> Result<(), Problem> {
+    if let Some(own) = nd21::PROPERTIES.iter().find(|own| own.name == name) {
+        return match setting {
+            Setting::Time(time) if time <= own.longest => Ok(()),
+            _ => Err(Problem::new(
+                span,
+                format!("`{name}` cannot be set to this"),
+                format!("a time of at most {} expected here", own.longest),
+            )),
+        };
+    }
     Properties::default().set(name, setting).map_err(|error| {
         Problem::new(
             span,

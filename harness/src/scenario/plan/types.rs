@@ -6,8 +6,11 @@ use crate::scenario::problem::Span;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::memory::RAM;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time;
+use harness_sim::drive::Model;
+use harness_sim::nd21::Nd21Properties;
 use std::ops::RangeInclusive;
 
 /// A scenario for rings of given sizes.
@@ -39,6 +42,7 @@ pub(super) struct PlannedSetup {
 pub(in crate::scenario) enum PlannedSetupKind {
     Memory(u16, Vec<u8>),
     Eeprom(u8, Vec<u8>),
+    Model(Model),
     Word(String, String),
     Time(String, time::Span),
 }
@@ -50,8 +54,28 @@ impl PlannedSetupKind {
         let _known = match self {
             Self::Word(name, word) => properties.set(name, Setting::Word(word)),
             Self::Time(name, span) => properties.set(name, Setting::Time(*span)),
-            Self::Memory(..) | Self::Eeprom(..) => Ok(()),
+            Self::Memory(..) | Self::Eeprom(..) | Self::Model(_) => Ok(()),
         };
+    }
+
+    /// What a rig must have for it.
+    pub(in crate::scenario) fn needs(&self) -> Option<Capability> {
+        match self {
+            // No command writes ROM or registers (ND21 10.2): only a simulated drive can be given them.
+            Self::Memory(address, _) if !RAM.contains(address) => Some(Capability::Simulator),
+            Self::Memory(..) => Some(Capability::Memory),
+            Self::Eeprom(..) => Some(Capability::Eeprom),
+            // A real drive is what it is.
+            Self::Word(..) | Self::Time(..) => Some(Capability::Simulator),
+            Self::Model(_) => None,
+        }
+    }
+
+    /// The same for what the manual does not say of the drive behind the bus.
+    pub(in crate::scenario) fn apply_to_nd21(&self, properties: &mut Nd21Properties) {
+        if let Self::Time(name, span) = self {
+            let _known = properties.set(name, *span);
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::{Span, Spanned};
 use crate::scenario::times::{Duration, Window};
 use harness_proto::line::Rate;
+use harness_sim::drive::Model;
 use harness_sim::fault::{DriveFault, Flips};
 
 /// A scenario: what it is, the ring it needs, and its steps.
@@ -106,6 +107,8 @@ pub enum SetupKind {
     Memory(Spanned<u16>, Pattern),
     /// `eeprom ADDRESS = BYTES`
     Eeprom(Spanned<u8>, Pattern),
+    /// `model NAME`
+    Model(Model),
     /// `property NAME = WORD`
     Word(Spanned<String>, Spanned<String>),
     /// `property NAME = TIME`

@@ -1,0 +1,92 @@
+//! The drive models that a simulated ring can hold, each drive its own.
+
+use crate::device::Device;
+use crate::nd21::Nd21Drive;
+use crate::plain::{PlainDrive, PlainMemory};
+use harness_proto::line::Received;
+use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::Instant;
+
+/// Which model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Model {
+    /// `plain`: memory and bus, and nothing behind them.
+    #[default]
+    Plain,
+    /// `nd21`: the ND21.
+    Nd21,
+}
+
+impl Model {
+    /// The names in a scenario.
+    pub const NAMES: [(&'static str, Self); 2] = [("plain", Self::Plain), ("nd21", Self::Nd21)];
+}
+
+/// A drive of any model.
+#[derive(Clone, Debug)]
+pub enum Drive {
+    /// A plain drive.
+    Plain(PlainDrive),
+    /// An ND21.
+    Nd21(Nd21Drive),
+}
+
+/// The same call for whichever model it is.
+macro_rules! each {
+    ($self:ident, $drive:ident => $call:expr) => {
+        match $self {
+            Drive::Plain($drive) => $call,
+            Drive::Nd21($drive) => $call,
+        }
+    };
+}
+
+impl Drive {
+    /// Its cells, past all rules of access.
+    #[must_use]
+    pub fn cells(&self) -> &PlainMemory {
+        match self {
+            Self::Plain(drive) => drive.memory(),
+            Self::Nd21(drive) => drive.memory().cells(),
+        }
+    }
+
+    /// Its cells, past all rules of access.
+    pub fn cells_mut(&mut self) -> &mut PlainMemory {
+        match self {
+            Self::Plain(drive) => drive.memory_mut(),
+            Self::Nd21(drive) => drive.memory_mut().cells_mut(),
+        }
+    }
+}
+
+impl Device for Drive {
+    fn receive(&mut self, now: Instant, received: Received) -> Step {
+        each!(self, drive => drive.receive(now, received))
+    }
+
+    fn deadline(&self) -> Option<Deadline> {
+        each!(self, drive => drive.deadline())
+    }
+
+    fn handle_deadline(&mut self, now: Instant) -> Step {
+        each!(self, drive => drive.handle_deadline(now))
+    }
+
+    fn advance(&mut self, now: Instant) {
+        each!(self, drive => drive.advance(now));
+    }
+
+    fn power_on(&mut self) {
+        each!(self, drive => drive.power_on());
+    }
+
+    fn in_error(&self) -> bool {
+        each!(self, drive => drive.in_error())
+    }
+
+    fn cause(&self) -> Option<BusError> {
+        each!(self, drive => drive.cause())
+    }
+}

@@ -1,0 +1,73 @@
+//! The drive: its end of the bus over its memory.
+
+use super::memory::Nd21Memory;
+use super::properties::Nd21Properties;
+use crate::device::Device;
+use crate::plain::PlainMemory;
+use harness_proto::line::Received;
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
+use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::properties::Properties;
+use harness_proto::time::Instant;
+
+/// An ND21.
+#[derive(Clone, Debug)]
+pub struct Nd21Drive {
+    bus_end: BusEnd,
+    memory: Nd21Memory,
+    properties: Properties,
+}
+
+impl Nd21Drive {
+    /// A drive with an EEPROM as given, after power-up.
+    #[must_use]
+    pub fn new(properties: Properties, own: Nd21Properties, eeprom: [u8; 256]) -> Self {
+        Self {
+            bus_end: BusEnd::new(properties),
+            memory: Nd21Memory::new(PlainMemory::with_eeprom(eeprom), own),
+            properties,
+        }
+    }
+
+    /// Its memory.
+    #[must_use]
+    pub fn memory(&self) -> &Nd21Memory {
+        &self.memory
+    }
+
+    /// Its memory.
+    pub fn memory_mut(&mut self) -> &mut Nd21Memory {
+        &mut self.memory
+    }
+}
+
+impl Device for Nd21Drive {
+    fn receive(&mut self, now: Instant, received: Received) -> Step {
+        self.bus_end.receive(now, received, &mut self.memory)
+    }
+
+    fn deadline(&self) -> Option<Deadline> {
+        self.bus_end.deadline(&self.memory)
+    }
+
+    fn handle_deadline(&mut self, now: Instant) -> Step {
+        self.bus_end.handle_deadline(now, &mut self.memory)
+    }
+
+    fn advance(&mut self, now: Instant) {
+        self.memory.advance(now);
+    }
+
+    fn power_on(&mut self) {
+        self.memory.power_on();
+        self.bus_end = BusEnd::new(self.properties);
+    }
+
+    fn in_error(&self) -> bool {
+        self.bus_end.in_error()
+    }
+
+    fn cause(&self) -> Option<BusError> {
+        self.bus_end.cause()
+    }
+}

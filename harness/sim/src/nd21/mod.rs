@@ -1,0 +1,11 @@
+//! The ND21 behind its bus. So far its memory with the manual's access rules, errors and their
+//! confirmation, and the EEPROM controller; nothing turns yet.
+
+mod drive;
+mod eeprom_controller;
+mod memory;
+mod properties;
+
+pub use drive::Nd21Drive;
+pub use memory::Nd21Memory;
+pub use properties::{Nd21Properties, PROPERTIES, TimeProperty};
