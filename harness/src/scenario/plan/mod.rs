@@ -5,6 +5,7 @@ mod job;
 mod planner;
 mod types;
 
+pub(super) use planner::MAX_CARRIED;
 pub use planner::plan;
 pub(super) use types::PlannedSetupKind;
 pub use types::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen, PlannedWindow};

@@ -2,7 +2,9 @@
 
 use crate::link::{Capability, Link, Moment};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
+use crate::scenario::plan::{
+    MAX_CARRIED, Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow,
+};
 use crate::scenario::problem::Span;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
@@ -13,9 +15,6 @@ use std::fmt::Write as _;
 
 /// How long bytes may be on their way round before the bench gives up waiting for them.
 const MAX_ROUND: time::Span = time::Span::from_millis(60_000);
-
-/// The most bytes that a run may leave on all links together: its record is held in memory.
-const MAX_CARRIED: u64 = 20_000_000;
 
 /// Bytes that no line asks for shown at most.
 const UNASKED: usize = 16;
