@@ -15,6 +15,7 @@ use crate::scenario::syntax::{
 };
 use crate::scenario::times::Window;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::memory;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time::{self, Instant};
@@ -49,7 +50,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
     }
     let mut steps = Vec::new();
     let mut needs = scenario.needs.clone();
-    let mut bytes = 0;
+    let mut sent = 0;
     let links: u64 = planner
         .rings
         .iter()
@@ -60,11 +61,11 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         let action = planner.action(&step.action, &mut needs);
         match action {
             Ok(action) => {
-                bytes += action.bytes();
-                if bytes > room {
+                sent += action.bytes_sent();
+                if sent > room {
                     found.push(Problem::new(
                         step.span,
-                        format!("more than {room} bytes in a scenario for this ring"),
+                        format!("more than {room} bytes sent in one scenario on this ring"),
                         "fewer bytes expected here",
                     ));
                     break;
@@ -119,11 +120,12 @@ fn sizes(scenario: &Scenario, size: Option<u8>) -> Result<Vec<RingSize>, Problem
 }
 
 impl PlannedAction {
-    fn bytes(&self) -> usize {
+    /// How many bytes the master sends.
+    fn bytes_sent(&self) -> usize {
         match self {
-            Self::Send(_, bytes) => bytes.len(),
-            Self::Receive(_, bytes) => bytes.len(),
-            _ => 0,
+            Self::Send(_, bytes) | Self::Telegram(_, bytes, _) => bytes.len(),
+            Self::Recover(_) => CHECK_SEQUENCE.len(),
+            Self::Receive(..) | Self::Fault(..) | Self::Check(_) => 0,
         }
     }
 }
