@@ -90,10 +90,7 @@ impl Entry {
     /// The name without folders and ending.
     #[must_use]
     pub fn short_name(&self) -> &str {
-        Path::new(&self.name)
-            .file_stem()
-            .and_then(|stem| stem.to_str())
-            .unwrap_or(&self.name)
+        bare(&self.name).rsplit('/').next().unwrap_or(&self.name)
     }
 
     /// Whether the text occurs in the name, the title or a source.

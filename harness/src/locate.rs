@@ -1,6 +1,7 @@
 //! Reads from what the master receives which drive saw a fault (ND21 9.7).
 
 use harness_proto::line::Received;
+use harness_proto::novobus::sync::SYNCO;
 
 /// Zeros in a row that no telegram holds: one more than the seven of ND21 9.7 would be sure, but the
 /// last drive of a broken ring sends just seven (the figure of 9.9).
@@ -40,14 +41,20 @@ pub fn locate(received: &[Received], drives: u8) -> Option<Location> {
     if last.byte >= drives {
         return None;
     }
-    let before = &received[..received.len() - repeats];
-    let end = before.iter().rposition(|byte| byte.is(0))? + 1;
-    let zeros = before[..end]
-        .iter()
-        .rev()
-        .take_while(|byte| byte.is(0))
-        .count();
-    (zeros >= ZEROS).then_some(Location {
+    // Behind a time-out the addresses climb for a byte or two: 00 00 01 02 02 (ND21 9.9).
+    let mut before = &received[..received.len() - repeats];
+    let mut lowest = last.byte;
+    while let [rest @ .., byte] = before
+        && byte.error.is_none()
+        && (1..lowest).contains(&byte.byte)
+    {
+        lowest = byte.byte;
+        before = rest;
+    }
+    let zeros = before.iter().rev().take_while(|byte| byte.is(0)).count();
+    // SYNCO behind the seven zeros of a telegram is no address, although some rings have a drive 128.
+    let fewest = if last.byte == SYNCO { ZEROS + 1 } else { ZEROS };
+    (zeros >= fewest).then_some(Location {
         drive: last.byte,
         zeros: Some(zeros as u64),
     })

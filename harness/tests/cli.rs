@@ -119,7 +119,7 @@ fn a_mismatch_is_shown_as_the_manuals_table() {
         "expected  88 01 C0 13 77 A5",
         "received  88 01 C0 13 00 2D",
         "^^ byte 5 at the master",
-        ">    5      FE  FE  >00  [00]",
+        "→    5      FE  FE  >00  [00]",
         "see nd21 9.7",
     ] {
         assert!(shown.contains(part), "{part}\n{shown}");
@@ -222,6 +222,11 @@ fn a_ring_of_another_size_is_taken_where_the_scenario_allows_it() {
         "{}",
         stdout(&output)
     );
+    // What is wrong in the default ring only is no mistake in this one.
+    let text_of_it = "ring 3..250\n> 80\n? drive 95 memory FE13 = 00\n";
+    let path = file("sizes", "a.scn", text_of_it);
+    assert_eq!(code(&drivebench(&["run", text(&path), "--ring", "100"])), 0);
+    assert_eq!(code(&drivebench(&["run", text(&path)])), 2);
 }
 
 #[test]
@@ -355,4 +360,14 @@ fn a_closed_pipe_is_no_failure() {
         .expect("the program starts");
     drop(child.stdout.take());
     assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    // But a failure stays one.
+    let path = file("closed_pipe", "a.scn", "ring 1\n> 80\n< A0\n");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(["run", text(&path), "9.7-parity-error"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    assert_eq!(child.wait().expect("it ends").code(), Some(1));
 }

@@ -54,7 +54,7 @@ pub enum LinkFault {
     Duplicate,
     /// A byte that nobody sent arrives before it.
     Insert(u8),
-    /// It and all that follows arrive later.
+    /// It arrives later; what follows does not overtake it.
     Delay(Span),
     /// The line is held at 0 from the byte's start on: a break is read, and what is sent meanwhile is lost.
     Break(Span),

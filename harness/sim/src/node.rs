@@ -53,7 +53,7 @@ impl<D: Device> Node<D> {
         self.recording = false;
     }
 
-    /// Arms a fault for the `byte`-th byte that reaches this drive, counted from 1.
+    /// Arms a fault for the `byte`-th byte on this drive's inbound link, lost ones included, counted from 1.
     pub(crate) fn arm(&mut self, byte: u64, fault: DriveFault) {
         self.plan.add(byte, fault);
     }

@@ -82,10 +82,12 @@ impl PlainMemory {
         &self.eeprom
     }
 
-    /// What the drive's program does at power-up and reset: RAM is lost, the parameters are loaded from
+    /// What the drive's program does at power-up and reset: RAM is lost (the registers above it show the
+    /// outside world, and keep what the scenario has set), the parameters are loaded from
     /// the EEPROM (ND21 14.2), and `EE_selftest` bit 7 switches time-out monitoring on (14.10.2).
     pub(crate) fn start(&mut self) {
-        self.ram.fill(0);
+        let ram = RAM.len();
+        self.ram[..ram].fill(0);
         for i in 0..nd21::PARAMETER_COUNT {
             let byte = self.eeprom[usize::from(u16::from(nd21::EE_PARAMETERS) + i)];
             self.write(nd21::PARAMETERS + i, byte);

@@ -251,7 +251,10 @@ impl Drive {
     fn poke_word(&mut self, address: [u8; 2], [high, low]: [u8; 2]) {
         let address = u16::from_be_bytes(address);
         self.poke(address, high);
-        self.poke(address.wrapping_add(1), low);
+        // Behind FFFF there is nothing.
+        if let Some(next) = address.checked_add(1) {
+            self.poke(next, low);
+        }
     }
 
     /// After a reset and a check sequence all but the memory is as after power-up.

@@ -30,6 +30,8 @@ pub struct Ring<D> {
     /// What the master has received and nobody has fetched.
     inbox: VecDeque<LineByte>,
     now: Instant,
+    /// When the master will have sent everything that it has to send.
+    sent_by: Instant,
 }
 
 impl<D: Device> Ring<D> {
@@ -44,6 +46,7 @@ impl<D: Device> Ring<D> {
             outbox: VecDeque::new(),
             inbox: VecDeque::new(),
             now: Instant::START,
+            sent_by: Instant::START,
         }
     }
 
@@ -99,16 +102,14 @@ impl<D: Device> Ring<D> {
     pub fn send(&mut self, not_before: Instant, bytes: &[u8]) {
         self.outbox
             .extend(bytes.iter().map(|&byte| (not_before, byte)));
+        let start = self.sent_by.max(not_before).max(self.now);
+        self.sent_by = start + self.byte_time() * bytes.len() as u64;
     }
 
     /// When the master will have sent everything that it has to send.
     #[must_use]
     pub fn sent_by(&self) -> Instant {
-        self.outbox
-            .iter()
-            .fold(self.links[0].line_free(), |free, (not_before, _)| {
-                free.max(*not_before).max(self.now) + self.byte_time()
-            })
+        self.sent_by
     }
 
     /// The next byte that has reached the master.
@@ -123,7 +124,7 @@ impl<D: Device> Ring<D> {
         }
     }
 
-    /// Arms a fault for the `byte`-th byte that reaches drive `k`.
+    /// Arms a fault for the `byte`-th byte on drive `k`'s inbound link, lost ones included.
     pub fn arm_drive(&mut self, k: u8, byte: u64, fault: DriveFault) {
         if let Some(place) = self.place(k) {
             self.nodes[place].arm(byte, fault);

@@ -27,7 +27,7 @@ impl Exit {
 Exit codes:
   0  everything passed
   1  a drive behaved otherwise than a scenario says
-  2  wrong usage, or a scenario with mistakes
+  2  wrong usage, or a scenario with mistakes or that could not be played to its end (aborted)
   3  the bench itself failed
   4  nothing was selected
   5  passed but incomplete (skipped scenarios under --require-all, or inconclusive ones)";

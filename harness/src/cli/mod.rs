@@ -41,8 +41,6 @@ pub fn main() -> ExitCode {
         .unwrap_or_else(|| Command::Run(RunArguments::default()));
     match dispatch(command, &mut output) {
         Ok(exit) => exit.into(),
-        // The reader of a pipe has seen enough: `drivebench list | head`.
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Exit::Passed.into(),
         Err(error) => {
             output.complain(&format!("failed to write: {error}"));
             Exit::RigError.into()

@@ -37,8 +37,7 @@ impl Output {
     /// Writes a result.
     pub(super) fn result(&mut self, text: &str) -> std::io::Result<()> {
         let mut out = std::io::stdout().lock();
-        out.write_all(text.as_bytes())?;
-        out.flush()
+        unless_closed(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
     }
 
     /// Writes a message for people.
@@ -86,6 +85,15 @@ impl Output {
             Verdict::Failed | Verdict::Aborted => "1;31",
         };
         paint(&format!("{verdict:12}"), colour, self.colour_out)
+    }
+}
+
+/// The reader of a pipe that has seen enough (`drivebench run | head`) is no failure, and does not change
+/// the exit code.
+pub(super) fn unless_closed(result: std::io::Result<()>) -> std::io::Result<()> {
+    match result {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
     }
 }
 

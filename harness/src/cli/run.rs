@@ -6,9 +6,10 @@ use super::output::Output;
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
 use crate::report::mismatch::mismatch;
+use crate::scenario::parse::parse;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
-use crate::scenario::syntax::Bus;
+use crate::scenario::syntax::{Bus, Scenario};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::trace::Trace;
@@ -27,21 +28,15 @@ pub(super) fn select(
     let mut entries = Vec::new();
     let mut errors: Vec<LibraryError> = Vec::new();
     for source in sources {
-        match Entry::new(source.clone(), None) {
-            Ok(entry) => {
-                let fits = |size: &u8| {
-                    let first = entry.scenario.rings.first();
-                    first.is_some_and(|range| (range.smallest..=range.largest).contains(size))
-                };
-                match ring.filter(fits) {
-                    None => entries.push(entry),
-                    size => match Entry::new(source, size) {
-                        Ok(entry) => entries.push(entry),
-                        Err(problems) => errors.push(problems.into()),
-                    },
-                }
-            }
-            Err(problems) => errors.push(problems.into()),
+        let size = |scenario: &Scenario| {
+            let range = scenario.rings.first();
+            ring.filter(|n| range.is_some_and(|r| (r.smallest..=r.largest).contains(n)))
+        };
+        let entry = parse(&source)
+            .and_then(|scenario| Entry::new(source, size(&scenario)).map_err(|problems| *problems));
+        match entry {
+            Ok(entry) => entries.push(entry),
+            Err(problems) => errors.push(Box::new(problems).into()),
         }
     }
     if !errors.is_empty() {

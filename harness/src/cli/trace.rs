@@ -2,7 +2,7 @@
 
 use super::args::{Format, TraceArguments};
 use super::exit::Exit;
-use super::output::Output;
+use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
 use crate::library::{Entry, sources};
 use crate::report::json;
@@ -39,7 +39,8 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
     let played = play_entry(&entry, AtFinding::GoOn);
     match arguments.format {
         Format::Json => {
-            json::write(&played.traces, BufWriter::new(std::io::stdout().lock()))?;
+            let out = BufWriter::new(std::io::stdout().lock());
+            unless_closed(json::write(&played.traces, out))?;
         }
         Format::Table => {
             for trace in &played.traces {

@@ -133,7 +133,10 @@ impl Link for SimulatedLink {
         while copy.receive(ring).is_some() {}
         copy.send(ring, &vec![SYNCO; count]);
         let mut bytes = Vec::new();
-        while copy.busy() && copy.wait(Instant::NEVER) {
+        // Once round the ring and the bytes themselves, and as much again for what is delayed.
+        let drives = u64::from(self.drives(ring));
+        let end = copy.now() + self.byte_time * (2 * (drives + count as u64));
+        while copy.busy() && copy.now() < end && copy.wait(end) {
             while let Some((_, byte)) = copy.receive(ring) {
                 bytes.push(byte);
             }

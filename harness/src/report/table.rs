@@ -80,7 +80,11 @@ pub fn table(trace: &Trace, part: &Part) -> String {
         match row {
             None => line("", "...", &|_| "..."),
             Some(row) => {
-                let pointer = if part.pointed == Some(*row) { ">" } else { "" };
+                let pointer = if part.pointed == Some(*row) {
+                    "→"
+                } else {
+                    ""
+                };
                 line(pointer, &(row + 1).to_string(), &|column| {
                     &column.cells[place].text
                 });

@@ -5,6 +5,8 @@ use super::scanner::Scanner;
 
 /// How deep parentheses may nest.
 const MAX_DEPTH: u32 = 32;
+/// How many terms a sum, or factors a product, may have.
+const MAX_TERMS: usize = 32;
 
 /// A number that may depend on N, the number of drives in the ring.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,7 +102,7 @@ pub(super) fn sum(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
 
 fn sum_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Problem> {
     let mut left = product_at(scanner, depth)?;
-    loop {
+    for _ in 0..MAX_TERMS {
         // `98->97` is a link, not a subtraction.
         let operator = if scanner.rest().starts_with("->") {
             return Ok(left);
@@ -114,11 +116,12 @@ fn sum_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Problem> 
         let right = product_at(scanner, depth)?;
         left = Expression::Operation(Box::new(left), operator, Box::new(right));
     }
+    Err(scanner.unexpected("a sum of fewer terms"))
 }
 
 fn product_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Problem> {
     let mut left = factor_at(scanner, depth)?;
-    loop {
+    for _ in 0..MAX_TERMS {
         let operator = if scanner.eat("*") {
             Operator::Multiply
         } else if scanner.eat("/") {
@@ -131,6 +134,7 @@ fn product_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Probl
         let right = factor_at(scanner, depth)?;
         left = Expression::Operation(Box::new(left), operator, Box::new(right));
     }
+    Err(scanner.unexpected("a product of fewer factors"))
 }
 
 fn factor_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Problem> {

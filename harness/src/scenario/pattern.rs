@@ -4,8 +4,11 @@ use super::expression::{self, Located};
 use super::problem::{Problem, Span};
 use super::scanner::Scanner;
 
-/// The most bytes that one scenario may speak of.
+/// The most bytes that the lines of one scenario may send, and that they may expect.
 pub const MAX_BYTES: usize = 1_000_000;
+
+/// The most cells that one line may speak of: more than a drive has.
+pub const MAX_CELLS: usize = 1024;
 
 /// How deep brackets may nest.
 const MAX_DEPTH: u32 = 8;
@@ -45,13 +48,13 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The bytes in a ring of `size` drives.
+    /// The bytes in a ring of `size` drives; `most` of them at most.
     ///
     /// # Errors
     /// A number is no byte, or the bytes are too many.
-    pub fn expand(&self, size: i64) -> Result<Vec<Expected>, Problem> {
+    pub fn expand(&self, size: i64, most: usize) -> Result<Vec<Expected>, Problem> {
         let mut bytes = Vec::new();
-        expand(&self.items, size, &mut bytes)?;
+        expand(&self.items, size, most, &mut bytes)?;
         Ok(bytes)
     }
 
@@ -59,8 +62,8 @@ impl Pattern {
     ///
     /// # Errors
     /// As [`Self::expand`], and for `xx`.
-    pub fn expand_known(&self, size: i64) -> Result<Vec<u8>, Problem> {
-        self.expand(size)?
+    pub fn expand_known(&self, size: i64, most: usize) -> Result<Vec<u8>, Problem> {
+        self.expand(size, most)?
             .into_iter()
             .map(|byte| match byte {
                 Expected::Byte(byte) => Ok(byte),
@@ -74,7 +77,12 @@ impl Pattern {
     }
 }
 
-fn expand(items: &[Item], size: i64, bytes: &mut Vec<Expected>) -> Result<(), Problem> {
+fn expand(
+    items: &[Item],
+    size: i64,
+    most: usize,
+    bytes: &mut Vec<Expected>,
+) -> Result<(), Problem> {
     for item in items {
         let times = match &item.times {
             None => 1,
@@ -89,24 +97,25 @@ fn expand(items: &[Item], size: i64, bytes: &mut Vec<Expected>) -> Result<(), Pr
                 })?
             }
         };
+        if times == 0 {
+            continue;
+        }
         let before = bytes.len();
         match &item.what {
             What::Bytes(known) => bytes.extend(known),
             What::Number(number) => bytes.push(Expected::Byte(low_byte(number, size)?)),
-            What::Group(items) => expand(items, size, bytes)?,
+            What::Group(items) => expand(items, size, most, bytes)?,
         }
         let one = bytes.len() - before;
-        if one.saturating_mul(times).saturating_add(before) > MAX_BYTES {
+        if one.saturating_mul(times).saturating_add(before) > most {
             return Err(Problem::new(
                 item.span,
-                format!("more than {MAX_BYTES} bytes in one scenario"),
+                format!("more than {most} bytes in one line"),
                 "fewer bytes expected here",
             ));
         }
-        if times == 0 {
-            bytes.truncate(before);
-        }
-        for _ in 1..times {
+        let more = if one == 0 { 0 } else { times - 1 };
+        for _ in 0..more {
             bytes.extend_from_within(before..before + one);
         }
     }

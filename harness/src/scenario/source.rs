@@ -8,6 +8,9 @@ use std::sync::Arc;
 /// The largest scenario, in bytes. The longest of ours has a fiftieth of it.
 pub const MAX_SIZE: u64 = 1 << 20;
 
+/// The longest line, in bytes: mistakes are shown with the line they stand in.
+pub const MAX_LINE: usize = 10_000;
+
 /// A text with the name under which people know it.
 #[derive(Clone, Debug)]
 pub struct Source {
@@ -39,6 +42,16 @@ pub enum SourceError {
     TooLarge {
         /// The file.
         name: String,
+    },
+    /// A line is too long to be shown.
+    #[error(
+        "{name}:{line}: the line has more than {MAX_LINE} characters; bytes may go on in another `>` or `<` line"
+    )]
+    LongLine {
+        /// The file.
+        name: String,
+        /// Which line, counted from 1.
+        line: usize,
     },
     /// It is no text.
     #[error("{name} is not a text: byte {offset} is {byte:02X}; a scenario is UTF-8 text (*.scn)")]
@@ -90,6 +103,13 @@ impl Source {
         if let Some(offset) = bytes.iter().position(control) {
             let byte = bytes[offset];
             return Err(SourceError::NotText { name, offset, byte });
+        }
+        if let Some(line) = bytes
+            .split(|b| *b == b'\n')
+            .position(|line| line.len() > MAX_LINE)
+        {
+            let line = line + 1;
+            return Err(SourceError::LongLine { name, line });
         }
         match String::from_utf8(bytes) {
             Ok(text) => Ok(Self {

@@ -4,8 +4,8 @@ use super::problem::{Problem, Span, Spanned};
 use super::scanner::Scanner;
 use harness_proto::time;
 
-/// The longest time that a scenario can speak of: an hour.
-const MAX: time::Span = time::Span::from_millis(3_600_000);
+/// The longest time that a scenario can speak of: ten minutes.
+const MAX: time::Span = time::Span::from_millis(600_000);
 
 /// Digits after the point that are taken.
 const MAX_DECIMALS: usize = 9;
@@ -179,7 +179,7 @@ fn finish(
     if duration.on(time::Span::from_micros(1146)) > MAX {
         return Err(Problem::new(
             span,
-            "the time is longer than an hour",
+            "the time is longer than ten minutes",
             "a shorter time expected here",
         ));
     }

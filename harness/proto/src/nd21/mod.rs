@@ -1,8 +1,8 @@
 //! The Novotron ND21: what its cells are, in which units, and its error codes.
 //!
 //! The high byte of a word stands at the lower address (the drive's H8 is big-endian). [`cells`] and
-//! [`eeprom`] are the manual's tables 14.2.1 and 14.2.2; the constants here are those cells that a
-//! drive's bus end itself reads and writes.
+//! [`eeprom`] are the manual's tables 14.2.1 and 14.2.2; the constants here are the cells and bits that
+//! other code names.
 
 pub mod cells;
 pub mod eeprom;

@@ -38,7 +38,7 @@ impl Step {
 /// When a bus end wants to be called without a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deadline {
-    /// At this time, unless a byte comes first.
+    /// At this time. A byte that comes first may move it: ask again after each.
     At(Instant),
     /// From this time on, as soon as the line is free and everything received has been answered.
     LineFree(Instant),
@@ -114,7 +114,7 @@ impl BusEnd {
         matches!(self.state, State::Error(..))
     }
 
-    /// The error for which it last went into the error mode, since power-up.
+    /// The error for which it last went into the error mode, since power-up or reset.
     #[must_use]
     pub const fn cause(&self) -> Option<BusError> {
         self.cause

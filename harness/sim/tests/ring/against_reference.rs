@@ -118,7 +118,7 @@ fn compare(random: &mut Random, case: u64) -> Option<bool> {
             other.in_error(),
             "case {case}, drive {k}"
         );
-        for address in (0xFD80..=0xFF7F).filter(|a| ![0xFD82, 0xFD83].contains(a)) {
+        for address in (0xFD80..=0xFFFF).filter(|a| ![0xFD82, 0xFD83].contains(a)) {
             assert_eq!(
                 drive.memory().peek(address),
                 other.peek(address),

@@ -2,7 +2,7 @@
 
 use super::planner::Planner;
 use super::types::{PlannedAction, setups_of};
-use crate::scenario::pattern::{Expected, Pattern};
+use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::problem::{Problem, Span, Spanned};
 use crate::scenario::syntax::{Job, JobKind};
 use harness_proto::nd21;
@@ -25,8 +25,8 @@ impl Planner {
                 receive,
             } => {
                 let (ring, k) = self.one(drive)?;
-                let data = self.data(send, 2, ring)?;
-                let word = u16::from_be_bytes([known(data[0]), known(data[1])]);
+                let data = self.written(send, 2, ring)?;
+                let word = u16::from_be_bytes([data[0], data[1]]);
                 let answer = match receive {
                     Some(pattern) => self.data(pattern, 2, ring)?,
                     None => vec![Expected::Any; 2],
@@ -82,7 +82,7 @@ impl Planner {
         let [_, address_low] = address.to_be_bytes();
         let byte = || -> Result<u8, Problem> {
             match data {
-                Some(pattern) => Ok(known(self.data(pattern, 1, ring)?[0])),
+                Some(pattern) => Ok(self.written(pattern, 1, ring)?[0]),
                 None => Ok(0),
             }
         };
@@ -105,12 +105,12 @@ impl Planner {
             },
             JobKind::WriteWord => {
                 let word = match data {
-                    Some(pattern) => self.data(pattern, 2, ring)?,
-                    None => vec![Expected::Byte(0); 2],
+                    Some(pattern) => self.written(pattern, 2, ring)?,
+                    None => vec![0; 2],
                 };
                 Command::WriteWord {
                     address,
-                    data: u16::from_be_bytes([known(word[0]), known(word[1])]),
+                    data: u16::from_be_bytes([word[0], word[1]]),
                 }
             }
             JobKind::And => Command::And {
@@ -152,9 +152,15 @@ impl Planner {
         properties.read_long
     }
 
+    /// Exactly `count` bytes that are written, so that each must be known.
+    fn written(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<u8>, Problem> {
+        self.data(pattern, count, ring)?;
+        pattern.expand_known(self.size(ring), MAX_CELLS)
+    }
+
     /// Exactly `count` bytes.
     fn data(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<Expected>, Problem> {
-        let found = pattern.expand(self.size(ring))?;
+        let found = pattern.expand(self.size(ring), MAX_CELLS)?;
         if found.len() == count {
             return Ok(found);
         }
@@ -190,13 +196,6 @@ impl Planner {
         let mut expected = vec![Expected::Byte(bytes[0]), Expected::Byte(drive)];
         expected.extend(answer);
         Ok(PlannedAction::Telegram(ring, bytes, expected))
-    }
-}
-
-fn known(byte: Expected) -> u8 {
-    match byte {
-        Expected::Byte(byte) => byte,
-        Expected::Any | Expected::MinusChecksum(_) => 0,
     }
 }
 

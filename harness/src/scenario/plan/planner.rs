@@ -6,7 +6,7 @@ use super::types::{
 };
 use crate::link::{Capability, Moment, PlacedFault};
 use crate::scenario::expression::Located;
-use crate::scenario::pattern::MAX_BYTES;
+use crate::scenario::pattern::{MAX_BYTES, MAX_CELLS};
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{
@@ -25,6 +25,9 @@ use std::ops::RangeInclusive;
 
 /// The most bytes that a run may leave on all links together: its record is held in memory.
 pub(in crate::scenario) const MAX_CARRIED: u64 = 20_000_000;
+
+/// The longest delay or break.
+const MAX_FAULT: time::Span = time::Span::from_millis(10_000);
 
 /// How long a line without a time waits where the scenario does not say.
 const DEADLINE: time::Span = time::Span::from_millis(1000);
@@ -50,7 +53,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
     }
     let mut steps = Vec::new();
     let mut needs = scenario.needs.clone();
-    let mut sent = 0;
+    let (mut sent, mut expected) = (0, 0);
     let links: u64 = planner
         .rings
         .iter()
@@ -62,6 +65,15 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         match action {
             Ok(action) => {
                 sent += action.bytes_sent();
+                expected += action.bytes_expected();
+                if expected > MAX_BYTES {
+                    found.push(Problem::new(
+                        step.span,
+                        format!("more than {MAX_BYTES} bytes expected in one scenario"),
+                        "fewer bytes expected here",
+                    ));
+                    break;
+                }
                 if sent > room {
                     found.push(Problem::new(
                         step.span,
@@ -128,6 +140,14 @@ impl PlannedAction {
             Self::Receive(..) | Self::Fault(..) | Self::Check(_) => 0,
         }
     }
+
+    /// How many bytes the master must receive.
+    fn bytes_expected(&self) -> usize {
+        match self {
+            Self::Receive(_, bytes) | Self::Telegram(_, _, bytes) => bytes.len(),
+            _ => 0,
+        }
+    }
 }
 
 pub(super) struct Planner {
@@ -183,12 +203,12 @@ impl Planner {
         let size = self.size(setup.drives.ring);
         let what = match &setup.what {
             SetupKind::Memory(address, pattern) => {
-                let bytes = pattern.expand_known(size)?;
+                let bytes = pattern.expand_known(size, MAX_CELLS)?;
                 in_memory(address, bytes.len())?;
                 PlannedSetupKind::Memory(address.value, bytes)
             }
             SetupKind::Eeprom(address, pattern) => {
-                let bytes = pattern.expand_known(size)?;
+                let bytes = pattern.expand_known(size, MAX_CELLS)?;
                 if usize::from(address.value) + bytes.len() > 256 {
                     return Err(Problem::new(
                         address.span,
@@ -247,14 +267,14 @@ impl Planner {
                 self.ring(*ring, bytes.span)?;
                 Ok(PlannedAction::Send(
                     *ring,
-                    bytes.expand_known(self.size(*ring))?,
+                    bytes.expand_known(self.size(*ring), MAX_BYTES)?,
                 ))
             }
             Action::Receive { ring, bytes } => {
                 self.ring(*ring, bytes.span)?;
                 Ok(PlannedAction::Receive(
                     *ring,
-                    bytes.expand(self.size(*ring))?,
+                    bytes.expand(self.size(*ring), MAX_BYTES)?,
                 ))
             }
             Action::Fault(fault) => self.fault(fault, needs),
@@ -272,7 +292,7 @@ impl Planner {
             FaultKind::Link(place, ends, kind) => {
                 let link = self.link(fault.ring, place.span, ends)?;
                 needs.push(Capability::Interposer);
-                PlacedFault::Link(link, self.link_fault(*kind))
+                PlacedFault::Link(link, self.link_fault(*kind)?)
             }
             FaultKind::Drive(drive, kind) => {
                 needs.push(Capability::Power);
@@ -330,8 +350,17 @@ impl Planner {
         )))
     }
 
-    fn link_fault(&self, kind: LinkFaultKind) -> LinkFault {
-        match kind {
+    fn link_fault(&self, kind: LinkFaultKind) -> Result<LinkFault, Problem> {
+        if let LinkFaultKind::Delay(span) | LinkFaultKind::Break(span) = kind
+            && span.on(self.byte_time) > MAX_FAULT
+        {
+            return Err(Problem::new(
+                span.span(),
+                "the fault lasts too long",
+                format!("at most {MAX_FAULT} expected here"),
+            ));
+        }
+        Ok(match kind {
             LinkFaultKind::Flip(flips) => LinkFault::Flip(flips),
             LinkFaultKind::Replace(byte) => LinkFault::Replace(byte),
             LinkFaultKind::Drop => LinkFault::Drop,
@@ -342,7 +371,7 @@ impl Planner {
             LinkFaultKind::Overrun => LinkFault::Overrun,
             LinkFaultKind::Cut => LinkFault::Cut,
             LinkFaultKind::Join => LinkFault::Join,
-        }
+        })
     }
 
     fn check(&self, check: &Check, needs: &mut Vec<Capability>) -> Result<PlannedCheck, Problem> {
@@ -377,7 +406,7 @@ impl Planner {
                 bytes,
             } => {
                 let range = self.drives(drives)?;
-                let bytes = bytes.expand(self.size(drives.ring))?;
+                let bytes = bytes.expand(self.size(drives.ring), MAX_CELLS)?;
                 in_memory(address, bytes.len())?;
                 PlannedCheck::Memory(drives.ring, range, address.value, bytes)
             }

@@ -142,7 +142,7 @@ pub enum PlannedCheck {
     Error(usize, u8, BusError),
     /// Drives' cells hold these bytes.
     Memory(usize, RangeInclusive<u8>, u16, Vec<Expected>),
-    /// So many check sequences came back whole after an error.
+    /// So many check sequences came back whole.
     Corrected(u64),
     /// So many bytes were sent since the last check, in this time (and its tolerance).
     Sent(u64, Option<(time::Span, time::Span)>),

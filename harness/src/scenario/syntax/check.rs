@@ -42,7 +42,7 @@ pub enum Check {
         /// What.
         bytes: Pattern,
     },
-    /// So many check sequences came back whole after an error.
+    /// So many check sequences came back whole.
     Corrected(Located),
     /// So many bytes were sent since the last check, and took this long.
     Sent {
