@@ -5,9 +5,6 @@ use crate::device::Device;
 use crate::ring::Ring;
 use harness_proto::time::Instant;
 
-/// The most rings of a bench (ND21 11.4).
-pub const MAX_RINGS: usize = 2;
-
 /// One or two rings.
 #[derive(Clone, Debug)]
 pub struct Bench<D> {

@@ -40,11 +40,6 @@ impl<D: Device> Node<D> {
         &mut self.device
     }
 
-    /// Whether it has power.
-    pub(crate) fn powered(&self) -> bool {
-        self.powered
-    }
-
     pub(crate) fn marks(&self) -> &[Mark] {
         &self.marks
     }

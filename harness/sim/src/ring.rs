@@ -86,13 +86,6 @@ impl<D: Device> Ring<D> {
         Some(self.nodes.get_mut(place)?.device_mut())
     }
 
-    /// Whether drive `k` has power.
-    #[must_use]
-    pub fn powered(&self, k: u8) -> bool {
-        self.place(k)
-            .is_some_and(|place| self.nodes[place].powered())
-    }
-
     fn place(&self, k: u8) -> Option<usize> {
         self.size.first().checked_sub(k).map(usize::from)
     }

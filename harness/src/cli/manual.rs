@@ -1,4 +1,4 @@
-//! `drivebench manual`: which tables are pinned, and the errata ledger.
+//! `drivebench manual`: which tables are pinned, the errata ledger, and what the manual leaves open.
 
 use super::args::{ManualArguments, Selection};
 use super::exit::Exit;
@@ -6,6 +6,7 @@ use super::output::Output;
 use super::run::select;
 use crate::library::Entry;
 use crate::manual::{Erratum, ManualTable, NOT_YET, errata, pinned_by, tables};
+use harness_proto::novobus::properties::PROPERTIES;
 use std::fmt::Write as _;
 
 /// Shows the coverage of the manual and the ledger.
@@ -33,8 +34,30 @@ pub(super) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::i
     let mut text = coverage(&tables, &entries, arguments.missing, &wanted);
     text.push('\n');
     text.push_str(&ledger(&errata, &entries, arguments.missing, &wanted));
+    text.push('\n');
+    text.push_str(&open_points(&wanted));
     output.result(&text)?;
     Ok(Exit::Passed)
+}
+
+/// What the manual leaves open, and the properties that settle it.
+fn open_points(wanted: &dyn Fn(&str) -> bool) -> String {
+    let mut text = String::from(
+        "Open: what only hardware can settle, as properties of a drive, the default first\n",
+    );
+    for property in &PROPERTIES {
+        let line = format!(
+            "nd21 {:6} {:22} {:26} {}\n",
+            property.section,
+            property.name,
+            property.values.join(" | "),
+            property.about
+        );
+        if wanted(&line) {
+            text.push_str(&line);
+        }
+    }
+    text
 }
 
 fn coverage(

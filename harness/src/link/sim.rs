@@ -49,6 +49,20 @@ impl SimulatedLink {
         self.bench.rings().get(ring)
     }
 
+    /// Where a fault happens, as a scenario writes it: `98->97`, `drive 2:3`.
+    fn place(&self, ring: usize, fault: PlacedFault) -> String {
+        let prefix = if ring == 0 { "" } else { "2:" };
+        let size = usize::from(self.drives(ring));
+        let end = |place: usize| match size.checked_sub(place) {
+            Some(drive) if place > 0 => drive.to_string(),
+            _ => "master".to_owned(),
+        };
+        match fault {
+            PlacedFault::Link(link, _) => format!("{prefix}{}->{}", end(link), end(link + 1)),
+            PlacedFault::Drive(drive, _) => format!("drive {prefix}{drive}"),
+        }
+    }
+
     fn suffer(&mut self, ring: usize, fault: PlacedFault) {
         let Some(ring) = self.bench.ring_mut(ring) else {
             return;
@@ -156,25 +170,21 @@ impl Link for SimulatedLink {
     fn unused_faults(&self) -> Vec<String> {
         let mut unused = Vec::new();
         for (index, ring) in self.bench.rings().iter().enumerate() {
-            let prefix = if index == 0 { "" } else { "2:" };
             for (link, byte, fault) in ring.unused_link_faults() {
-                let size = usize::from(ring.size().drives());
-                let end = |place: usize| {
-                    if place == 0 || place > size {
-                        "master".to_owned()
-                    } else {
-                        (size - place).to_string()
-                    }
-                };
-                let (from, to) = (end(link), end(link + 1));
-                unused.push(format!("{prefix}{from}->{to} byte {byte}: {fault}"));
+                let place = self.place(index, PlacedFault::Link(link, fault));
+                unused.push(format!("{place} byte {byte}: {fault}"));
             }
             for (drive, byte, fault) in ring.unused_drive_faults() {
-                unused.push(format!("drive {prefix}{drive} byte {byte}: {fault}"));
+                let place = self.place(index, PlacedFault::Drive(drive, fault));
+                unused.push(format!("{place} byte {byte}: {fault}"));
             }
         }
-        for (at, _, _) in &self.scheduled {
-            unused.push(format!("a fault at {at}"));
+        for (at, ring, fault) in &self.scheduled {
+            let place = self.place(*ring, *fault);
+            unused.push(match fault {
+                PlacedFault::Link(_, fault) => format!("{place} at {at}: {fault}"),
+                PlacedFault::Drive(_, fault) => format!("{place} at {at}: {fault}"),
+            });
         }
         unused
     }

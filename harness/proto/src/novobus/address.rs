@@ -20,7 +20,7 @@ impl RingSize {
     /// [`AddressError::RingSize`] for 0 and for more than 250.
     pub fn new(drives: u64) -> Result<Self, AddressError> {
         match u8::try_from(drives) {
-            Ok(size @ 1..=250) => Ok(Self(size)),
+            Ok(size) if (1..=u64::from(MAX_DRIVES)).contains(&drives) => Ok(Self(size)),
             _ => Err(AddressError::RingSize { drives }),
         }
     }

@@ -14,9 +14,6 @@ use core::fmt;
 /// The page of RAM that the bit commands and process data reach (ND21 10.3, 14.10.3).
 pub const PAGE: u16 = 0xFF00;
 
-/// The most bytes of a command, checking byte included (ND21 9.5).
-pub const MAX_COMMAND: usize = 6;
-
 /// Which command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {

@@ -284,7 +284,7 @@ fn rate(scanner: &mut Scanner<'_>) -> Result<Rate, Problem> {
     let Some(rate) = rate else {
         return Err(scanner.unexpected("38400, 19200 or 9600 (ND21 8.3)"));
     };
-    ahead.eat_word("bit/s");
+    ahead.eat("bit/s");
     let mut format = ahead.clone();
     if !format.at_end() {
         let chunk = format.chunk();
