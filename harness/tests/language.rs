@@ -194,19 +194,19 @@ fn what_cannot_be_is_refused_with_its_range() {
         Some("above"),
     );
     refused(
-        "title x\nring 3\ndrive 0 memory 1000 = 00\n",
+        "title x\nring 3\ndrive 0 memory 1000 = 00\n> 80\n",
         "1000",
         "no memory at 1000",
         None,
     );
     refused(
-        "title x\nring 3\ndrive 0 memory FFFF = 0000\n",
+        "title x\nring 3\ndrive 0 memory FFFF = 0000\n> 80\n",
         "FFFF",
         "no memory at 10000",
         None,
     );
     refused(
-        "title x\nring 3\ndrive 0 property time-out = 21ms\n",
+        "title x\nring 3\ndrive 0 property time-out = 21ms\n> 80\n",
         "21ms",
         "cannot be set",
         None,
@@ -423,6 +423,14 @@ fn located_leaves_no_trace() {
 /// What a stranger found.
 #[test]
 fn regressions() {
+    // What shows nothing is refused.
+    refused("title x\nring 3\n", "", "no step", Some("SYNCO"));
+    refused(
+        "title x\nring 3\ndrive 0..1 model nd21\ndrive 0..2 property eeprom-read-time = 2ms\n> 80\n",
+        "eeprom-read-time",
+        "drive 2 has no",
+        Some("drive 2 model nd21"),
+    );
     // `xx` cannot be written.
     refused(
         &steps("write-byte 0 FE13 = xx"),

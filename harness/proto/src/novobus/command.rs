@@ -328,19 +328,23 @@ impl Command {
     /// Writes need none. Missing data read as 00.
     #[must_use]
     pub fn answer(&self, data: &[u8], read_long: ReadLongAnswer) -> Vec<u8> {
-        let command = self.encode();
-        let layout = self.layout(read_long);
-        let mut bytes = Vec::with_capacity(layout.length());
-        bytes.push(layout.code);
-        for (i, &reply) in layout.answer.iter().enumerate() {
-            let byte = match reply {
-                Reply::Echo => command[1 + i],
+        let mut bytes = Vec::with_capacity(self.layout(read_long).length());
+        for (reply, echo) in self.answer_form(read_long) {
+            bytes.push(match reply {
+                Reply::Echo => echo,
                 Reply::Data(n) => data.get(usize::from(n)).copied().unwrap_or(0),
                 Reply::Check => Checksum::over(&bytes).minus(),
-            };
-            bytes.push(byte);
+            });
         }
         bytes
+    }
+
+    /// The answer byte for byte: what each byte is, and the byte of the command in step with it.
+    #[must_use]
+    pub fn answer_form(&self, read_long: ReadLongAnswer) -> Vec<(Reply, u8)> {
+        let layout = self.layout(read_long);
+        let replies = core::iter::once(&Reply::Echo).chain(layout.answer);
+        replies.copied().zip(self.encode()).collect()
     }
 
     /// The address that the command touches, if it touches memory.

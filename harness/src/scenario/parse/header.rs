@@ -163,6 +163,12 @@ impl Reader {
             }
             None => Vec::new(),
         };
+        if bus == Bus::Novobus && self.steps.is_empty() && self.problems.is_empty() {
+            let place = Span::default();
+            let problem = Problem::new(place, "the scenario has no step", "a step expected");
+            let help = "add a line such as `> 80`: the master sends SYNCO";
+            self.problems.push(problem.help(help));
+        }
         if !self.problems.is_empty() {
             return Err(self.problems);
         }

@@ -205,14 +205,12 @@ fn expected_answer(
     read: &[Expected],
     read_long: ReadLongAnswer,
 ) -> Vec<Expected> {
-    let layout = command.layout(read_long);
-    let sent = command.encode();
-    let mut expected = vec![Expected::Byte(layout.code)];
-    for (i, reply) in layout.answer.iter().enumerate() {
+    let mut expected = Vec::new();
+    for (reply, echo) in command.answer_form(read_long) {
         let so_far = u8::try_from(expected.len()).unwrap_or(u8::MAX);
         expected.push(match reply {
-            Reply::Echo => Expected::Byte(sent[1 + i]),
-            Reply::Data(n) => read.get(usize::from(*n)).copied().unwrap_or(Expected::Any),
+            Reply::Echo => Expected::Byte(echo),
+            Reply::Data(n) => read.get(usize::from(n)).copied().unwrap_or(Expected::Any),
             Reply::Check => Expected::MinusChecksum(so_far),
         });
     }

@@ -2,7 +2,7 @@
 
 use super::types::{
     Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedSetupKind, PlannedStep, PlannedWhen,
-    PlannedWindow,
+    PlannedWindow, setups_of,
 };
 use crate::link::{Capability, Moment, PlacedFault};
 use crate::scenario::expression::Located;
@@ -19,6 +19,7 @@ use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::memory;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time::{self, Instant};
+use harness_sim::drive::Model;
 use harness_sim::fault::LinkFault;
 use harness_sim::nd21;
 use std::ops::RangeInclusive;
@@ -51,6 +52,12 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
             Err(problem) => found.push(problem),
         }
     }
+    found.extend(
+        scenario
+            .setups
+            .iter()
+            .filter_map(|setup| planner.idle_property(setup)),
+    );
     let mut steps = Vec::new();
     let mut needs = scenario.needs.clone();
     let (mut sent, mut expected) = (0, 0);
@@ -234,6 +241,27 @@ impl Planner {
             drives,
             what,
         })
+    }
+
+    /// A property of the nd21 model for a drive of another model would do nothing.
+    fn idle_property(&self, setup: &Setup) -> Option<Problem> {
+        let SetupKind::Time(name, _) = &setup.what else {
+            return None;
+        };
+        nd21::PROPERTIES.iter().find(|own| own.name == name.value)?;
+        let models = |drive| {
+            setups_of(&self.setups, setup.drives.ring, drive)
+                .filter_map(|what| match what {
+                    PlannedSetupKind::Model(model) => Some(*model),
+                    _ => None,
+                })
+                .last()
+        };
+        let mut drives = self.drives(&setup.drives).ok()?;
+        let other = drives.find(|drive| models(*drive) != Some(Model::Nd21))?;
+        let message = format!("drive {other} has no `{}`", name.value);
+        let problem = Problem::new(name.span, message, "a property of the model nd21");
+        Some(problem.help(format!("add `drive {other} model nd21`")))
     }
 
     fn when(&self, when: When) -> PlannedWhen {
