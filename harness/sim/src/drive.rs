@@ -1,8 +1,9 @@
 //! The drive models that a simulated ring can hold, each drive its own.
 
+use crate::cells::Cells;
 use crate::device::Device;
-use crate::nd21::Nd21Drive;
-use crate::plain::{PlainDrive, PlainMemory};
+use crate::nd21::{Nd21Drive, Shown, Stimulus};
+use crate::plain::PlainDrive;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{Deadline, Step};
 use harness_proto::novobus::error::BusError;
@@ -45,7 +46,7 @@ macro_rules! each {
 impl Drive {
     /// Its cells, past all rules of access.
     #[must_use]
-    pub fn cells(&self) -> &PlainMemory {
+    pub fn cells(&self) -> &Cells {
         match self {
             Self::Plain(drive) => drive.memory(),
             Self::Nd21(drive) => drive.memory().cells(),
@@ -53,10 +54,32 @@ impl Drive {
     }
 
     /// Its cells, past all rules of access.
-    pub fn cells_mut(&mut self) -> &mut PlainMemory {
+    pub fn cells_mut(&mut self) -> &mut Cells {
         match self {
             Self::Plain(drive) => drive.memory_mut(),
             Self::Nd21(drive) => drive.memory_mut().cells_mut(),
+        }
+    }
+}
+
+impl Drive {
+    /// Lets something happen to it from outside the bus; false where the model has no outside.
+    pub fn stimulate(&mut self, stimulus: Stimulus) -> bool {
+        match self {
+            Self::Plain(_) => false,
+            Self::Nd21(drive) => {
+                drive.stimulate(stimulus);
+                true
+            }
+        }
+    }
+
+    /// What it shows outside the bus; `None` where the model has no outside.
+    #[must_use]
+    pub fn shown(&self) -> Option<Shown> {
+        match self {
+            Self::Plain(_) => None,
+            Self::Nd21(drive) => Some(drive.shown()),
         }
     }
 }

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bench;
+pub mod cells;
 pub mod device;
 pub mod drive;
 pub mod fault;

@@ -57,12 +57,15 @@ impl Cell {
 pub(super) const SIGNED: bool = true;
 pub(super) const PLAIN: bool = false;
 
-/// One row a cell: address, bytes, `SIGNED` or not, access and the bits marked R, scale, section, name,
-/// meaning.
+/// One row a cell: address, bytes, `SIGNED` or not, access and the bits marked R, scale, section, name as
+/// printed and as a constant (none where the cell is reserved), meaning. Makes the table and a module with
+/// the addresses under these names.
 macro_rules! cells {
-    ($($address:literal $size:literal $signed:ident $access:ident $(R $mask:literal)?
-        [$($scale:ident)?] $section:literal $printed:literal $english:literal;)+) => {
-        &[$(Cell {
+    ($(#[$table_meta:meta])* table $table:ident; $(#[$module_meta:meta])* addresses $module:ident: $type:ty;
+        $($address:literal $size:literal $signed:ident $access:ident $(R $mask:literal)?
+        [$($scale:ident)?] $section:literal $printed:literal $($name:ident)? $english:literal;)+) => {
+        $(#[$table_meta])*
+        pub const $table: &[Cell] = &[$(Cell {
             printed: $printed,
             english: $english,
             address: $address,
@@ -72,13 +75,23 @@ macro_rules! cells {
             read_only_bits: 0 $(| $mask)?,
             scale: cells!(@scale $($scale)?),
             section: $section,
-        },)+]
+        },)+];
+
+        $(#[$module_meta])*
+        pub mod $module {
+            $($(
+                #[doc = concat!("`", $printed, "`: ", $english, " (ND21 ", $section, ").")]
+                pub const $name: $type = $address;
+            )?)+
+        }
     };
     (@scale) => { None };
     (@scale $scale:ident) => { Some(Scale::$scale) };
 }
 pub(super) use cells;
 
+#[rustfmt::skip]
+cells! {
 /// Every row of the table, FD80 to FF7F without a gap, in order of addresses (ND21 14.2.1).
 ///
 /// Where the print is in doubt:
@@ -94,129 +107,130 @@ pub(super) use cells;
 ///   of `MaxTempMot`.
 /// * `lageist` and `umdrist`: 14.5.5 does not call them read only, and 13.2.1.2 writes to `umdrist`.
 /// * `Status`: bits 7 and 0 can be written (14.10), so the six R are bits 6-1 (E91, open).
-/// * `Flags2`: two bits are marked R, probably those of "NOVOBUS OK!" and "NOVOBUS timeout"; which they
-///   are is lost (E92, open), so none is marked here.
+/// * `Flags2`: two bits are marked R, probably those of "NOVOBUS OK!" and "NOVOBUS timeout"; here they are
+///   bits 1 and 0 (E92, open).
 /// * `RefV1`, `RefV2`, `Vtippen` and the `ps_v` cells are speeds for which no scale of their own is
 ///   printed; that of 14.5.3 is taken, because `ps_v0` is loaded with `nMax` (13.1.4).
 /// * `uP`, the utilisation, has no scale in the manual.
-#[rustfmt::skip]
-pub const RAM: &[Cell] = cells! {
-    0xFD80 2 PLAIN Write [] "14.2.1" "PoleJump" "jump address for the motor polarity";
-    0xFD82 2 PLAIN Write [] "14.10.1" "errorcode" "error code";
-    0xFD84 4 PLAIN Write [] "14.2.1" "i2" "";
-    0xFD88 2 PLAIN Write [] "14.10.5" "EEPROMbuffer" "EEPROM controller: address and byte";
+table RAM;
+/// The addresses of the RAM cells (ND21 14.2.1).
+addresses ram: u16;
+    0xFD80 2 PLAIN Write [] "14.2.1" "PoleJump" POLE_JUMP "jump address for the motor polarity";
+    0xFD82 2 PLAIN Write [] "14.10.1" "errorcode" ERRORCODE "error code";
+    0xFD84 4 PLAIN Write [] "14.2.1" "i2" I2 "";
+    0xFD88 2 PLAIN Write [] "14.10.5" "EEPROMbuffer" EEPROM_BUFFER "EEPROM controller: address and byte";
     // Printed in two lines, "EEPROM control"; 14.10.5.1 has one word.
-    0xFD8A 1 PLAIN Write [] "14.10.5" "EEPROMcontrol" "EEPROM controller: command and state";
+    0xFD8A 1 PLAIN Write [] "14.10.5" "EEPROMcontrol" EEPROM_CONTROL "EEPROM controller: command and state";
     0xFD8B 1 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFD8C 2 SIGNED Write [Speed] "13.1.4" "RefV1" "first speed of the referencing run";
-    0xFD8E 2 SIGNED Write [Speed] "13.1.4" "RefV2" "second speed of the referencing run";
-    0xFD90 2 SIGNED Write [Turns] "13.1.4" "RefUmdr0" "rotation counter after a referencing run";
-    0xFD92 2 PLAIN Write [Angle] "13.1.4" "RefLage0" "rotor position after a referencing run";
-    0xFD94 2 PLAIN Write [Speed] "13.1.4" "Vtippen" "speed of stepping";
-    0xFD96 2 PLAIN Write [] "14.2.1" "iOffset" "measurement of the current, internal";
-    0xFD98 2 PLAIN Write [Angle] "14.6.6" "dRESOLVER" "resolver adjustment";
-    0xFD9A 1 PLAIN Write [] "13.1.9.1" "PZ" "position marker of the cycle control";
-    0xFD9B 1 PLAIN Write [] "14.2.1" "BZ" "bit marker of the cycle control";
-    0xFD9C 1 PLAIN Write [] "14.2.1" "AS_Command" "command of the cycle control";
+    0xFD8C 2 SIGNED Write [Speed] "13.1.4" "RefV1" REF_V1 "first speed of the referencing run";
+    0xFD8E 2 SIGNED Write [Speed] "13.1.4" "RefV2" REF_V2 "second speed of the referencing run";
+    0xFD90 2 SIGNED Write [Turns] "13.1.4" "RefUmdr0" REF_UMDR0 "rotation counter after a referencing run";
+    0xFD92 2 PLAIN Write [Angle] "13.1.4" "RefLage0" REF_LAGE0 "rotor position after a referencing run";
+    0xFD94 2 PLAIN Write [Speed] "13.1.4" "Vtippen" VTIPPEN "speed of stepping";
+    0xFD96 2 PLAIN Write [] "14.2.1" "iOffset" I_OFFSET "measurement of the current, internal";
+    0xFD98 2 PLAIN Write [Angle] "14.6.6" "dRESOLVER" D_RESOLVER "resolver adjustment";
+    0xFD9A 1 PLAIN Write [] "13.1.9.1" "PZ" PZ "position marker of the cycle control";
+    0xFD9B 1 PLAIN Write [] "14.2.1" "BZ" BZ "bit marker of the cycle control";
+    0xFD9C 1 PLAIN Write [] "14.2.1" "AS_Command" AS_COMMAND "command of the cycle control";
     0xFD9D 1 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFD9E 2 PLAIN Write [Angle] "13.1.4" "RefLage" "displacement of the zero point, referencing run";
-    0xFDA0 256 PLAIN Write [] "14.10.6.6" "scope_puffer" "oscilloscope: recording";
-    0xFEA0 96 PLAIN Write [] "14.2.1" "stack" "stack of the drive's program";
-    0xFF00 1 PLAIN Write R 0x7E [] "14.4.1" "Status" "status byte";
-    0xFF01 1 SIGNED Read [TorqueLimit] "14.5.2" "mmax" "maximum torque";
-    0xFF02 2 SIGNED Read [Torque] "14.5.2" "msoll" "torque, nominal value";
-    0xFF04 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "iasoll" "current of phase A, nominal value";
-    0xFF05 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "ibsoll" "current of phase B, nominal value";
-    0xFF06 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "iaist" "current of phase A, actual value";
-    0xFF07 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "ibist" "current of phase B, actual value";
-    0xFF08 2 SIGNED Write [Speed] "14.5.3.1" "nsoll" "spin speed, nominal value";
-    0xFF0A 2 SIGNED Read [Speed] "14.5.3.1" "nsollrampe" "spin speed, nominal value after the ramp";
-    0xFF0C 2 SIGNED Read [Speed] "14.5.3.1" "nist" "spin speed, actual value";
-    0xFF0E 2 PLAIN Write [] "14.2.1" "nIntegrator" "integrator of the speed regulator";
-    0xFF10 1 PLAIN Write [] "14.2.1" "emk" "back EMF of the motor";
-    0xFF11 1 PLAIN Write [] "14.2.1" "lagesollL" "";
-    0xFF12 2 SIGNED Write [Turns] "14.5.5" "umdrsoll" "rotation, nominal value";
-    0xFF14 2 PLAIN Write [Angle] "14.5.5" "lagesoll" "rotor position, nominal value";
-    0xFF16 2 SIGNED Write [Turns] "14.5.5" "umdrist" "rotation, actual value";
-    0xFF18 2 PLAIN Write [Angle] "14.5.5" "lageist" "rotor position, actual value";
-    0xFF1A 2 PLAIN Write [Angle] "14.2.1" "lage0" "rotor position, old actual value";
-    0xFF1C 2 PLAIN Reserved [] "14.2.1" "nsollAnalog" "";
-    0xFF1E 2 PLAIN Write [] "14.2.1" "icra" "input capture register A";
-    0xFF20 2 PLAIN Write [] "14.2.1" "icra0" "input capture register A, old";
-    0xFF22 2 PLAIN Write [] "14.7.2" "VCOoffset" "offset of the analogue input";
-    0xFF24 1 PLAIN Write [] "14.2.1" "adcsr" "control and status of the A/D converter";
+    0xFD9E 2 PLAIN Write [Angle] "13.1.4" "RefLage" REF_LAGE "displacement of the zero point, referencing run";
+    0xFDA0 256 PLAIN Write [] "14.10.6.6" "scope_puffer" SCOPE_PUFFER "oscilloscope: recording";
+    0xFEA0 96 PLAIN Write [] "14.2.1" "stack" STACK "stack of the drive's program";
+    0xFF00 1 PLAIN Write R 0x7E [] "14.4.1" "Status" STATUS "status byte";
+    0xFF01 1 SIGNED Read [TorqueLimit] "14.5.2" "mmax" MMAX "maximum torque";
+    0xFF02 2 SIGNED Read [Torque] "14.5.2" "msoll" MSOLL "torque, nominal value";
+    0xFF04 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "iasoll" IASOLL "current of phase A, nominal value";
+    0xFF05 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "ibsoll" IBSOLL "current of phase B, nominal value";
+    0xFF06 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "iaist" IAIST "current of phase A, actual value";
+    0xFF07 1 SIGNED Read [MomentaryCurrent] "14.5.1.1" "ibist" IBIST "current of phase B, actual value";
+    0xFF08 2 SIGNED Write [Speed] "14.5.3.1" "nsoll" NSOLL "spin speed, nominal value";
+    0xFF0A 2 SIGNED Read [Speed] "14.5.3.1" "nsollrampe" NSOLLRAMPE "spin speed, nominal value after the ramp";
+    0xFF0C 2 SIGNED Read [Speed] "14.5.3.1" "nist" NIST "spin speed, actual value";
+    0xFF0E 2 PLAIN Write [] "14.2.1" "nIntegrator" N_INTEGRATOR "integrator of the speed regulator";
+    0xFF10 1 PLAIN Write [] "14.2.1" "emk" EMK "back EMF of the motor";
+    0xFF11 1 PLAIN Write [] "14.2.1" "lagesollL" LAGESOLL_L "";
+    0xFF12 2 SIGNED Write [Turns] "14.5.5" "umdrsoll" UMDRSOLL "rotation, nominal value";
+    0xFF14 2 PLAIN Write [Angle] "14.5.5" "lagesoll" LAGESOLL "rotor position, nominal value";
+    0xFF16 2 SIGNED Write [Turns] "14.5.5" "umdrist" UMDRIST "rotation, actual value";
+    0xFF18 2 PLAIN Write [Angle] "14.5.5" "lageist" LAGEIST "rotor position, actual value";
+    0xFF1A 2 PLAIN Write [Angle] "14.2.1" "lage0" LAGE0 "rotor position, old actual value";
+    0xFF1C 2 PLAIN Reserved [] "14.2.1" "nsollAnalog" NSOLL_ANALOG "";
+    0xFF1E 2 PLAIN Write [] "14.2.1" "icra" ICRA "input capture register A";
+    0xFF20 2 PLAIN Write [] "14.2.1" "icra0" ICRA0 "input capture register A, old";
+    0xFF22 2 PLAIN Write [] "14.7.2" "VCOoffset" VCO_OFFSET "offset of the analogue input";
+    0xFF24 1 PLAIN Write [] "14.2.1" "adcsr" ADCSR "control and status of the A/D converter";
     0xFF25 1 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFF26 1 PLAIN Read [CoolerTemperature] "14.5.7.1" "TempKK" "temperature of the cooler";
-    0xFF27 1 PLAIN Read [MotorSensor] "14.5.7.2" "TempMot" "temperature of the motor";
-    0xFF28 2 PLAIN Reserved [] "14.2.1" "nsollDigital" "";
-    0xFF2A 1 PLAIN Write [] "14.2.1" "Novobus" "communication bytes";
-    0xFF2B 1 PLAIN Write [] "14.2.1" "Command" "";
-    0xFF2C 4 PLAIN Write [] "14.2.1" "ParamBuffer" "";
-    0xFF30 1 PLAIN Write [] "14.2.1" "ChecksumIn" "";
-    0xFF31 1 PLAIN Write [] "14.2.1" "ChecksumOut" "";
-    0xFF32 1 PLAIN Write [] "14.10.3" "DataIn" "address of incoming process data";
-    0xFF33 1 PLAIN Write [] "14.2.1" "DataInBuffer" "incoming process data";
-    0xFF34 1 PLAIN Write [] "14.10.3" "DataOut" "address of outgoing process data";
-    0xFF35 1 PLAIN Write [] "14.2.1" "DataOutBuffer" "outgoing process data";
-    0xFF36 1 PLAIN Write [] "14.2.1" "BusAddr" "";
+    0xFF26 1 PLAIN Read [CoolerTemperature] "14.5.7.1" "TempKK" TEMP_KK "temperature of the cooler";
+    0xFF27 1 PLAIN Read [MotorSensor] "14.5.7.2" "TempMot" TEMP_MOT "temperature of the motor";
+    0xFF28 2 PLAIN Reserved [] "14.2.1" "nsollDigital" NSOLL_DIGITAL "";
+    0xFF2A 1 PLAIN Write [] "14.2.1" "Novobus" NOVOBUS "communication bytes";
+    0xFF2B 1 PLAIN Write [] "14.2.1" "Command" COMMAND "";
+    0xFF2C 4 PLAIN Write [] "14.2.1" "ParamBuffer" PARAM_BUFFER "";
+    0xFF30 1 PLAIN Write [] "14.2.1" "ChecksumIn" CHECKSUM_IN "";
+    0xFF31 1 PLAIN Write [] "14.2.1" "ChecksumOut" CHECKSUM_OUT "";
+    0xFF32 1 PLAIN Write [] "14.10.3" "DataIn" DATA_IN "address of incoming process data";
+    0xFF33 1 PLAIN Write [] "14.2.1" "DataInBuffer" DATA_IN_BUFFER "incoming process data";
+    0xFF34 1 PLAIN Write [] "14.10.3" "DataOut" DATA_OUT "address of outgoing process data";
+    0xFF35 1 PLAIN Write [] "14.2.1" "DataOutBuffer" DATA_OUT_BUFFER "outgoing process data";
+    0xFF36 1 PLAIN Write [] "14.2.1" "BusAddr" BUS_ADDR "";
     0xFF37 1 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFF38 1 PLAIN Write [] "14.10.6.5" "scope_status" "oscilloscope: status";
-    0xFF39 1 PLAIN Write [ScopePeriod] "14.10.6.2" "scope_timer0" "oscilloscope: time base";
-    0xFF3A 2 PLAIN Write [] "14.10.6.4" "scope_counter" "oscilloscope: trigger delay";
-    0xFF3C 1 PLAIN Write [] "14.10.6.4" "scope_delay" "oscilloscope: delay pointer";
-    0xFF3D 1 PLAIN Write [] "14.10.6.6" "scope_pointer" "oscilloscope: newest byte, internal";
-    0xFF3E 1 PLAIN Write [] "14.10.6.1" "scope_trigger" "oscilloscope: address of the trigger signal";
-    0xFF3F 1 PLAIN Write [] "14.10.6.3" "scope_level" "oscilloscope: trigger threshold";
-    0xFF40 1 PLAIN Write [] "14.10.6.1" "scope_signal1" "oscilloscope: address of signal 1";
-    0xFF41 1 PLAIN Write [] "14.10.6.1" "scope_signal2" "oscilloscope: address of signal 2";
+    0xFF38 1 PLAIN Write [] "14.10.6.5" "scope_status" SCOPE_STATUS "oscilloscope: status";
+    0xFF39 1 PLAIN Write [ScopePeriod] "14.10.6.2" "scope_timer0" SCOPE_TIMER0 "oscilloscope: time base";
+    0xFF3A 2 PLAIN Write [] "14.10.6.4" "scope_counter" SCOPE_COUNTER "oscilloscope: trigger delay";
+    0xFF3C 1 PLAIN Write [] "14.10.6.4" "scope_delay" SCOPE_DELAY "oscilloscope: delay pointer";
+    0xFF3D 1 PLAIN Write [] "14.10.6.6" "scope_pointer" SCOPE_POINTER "oscilloscope: newest byte, internal";
+    0xFF3E 1 PLAIN Write [] "14.10.6.1" "scope_trigger" SCOPE_TRIGGER "oscilloscope: address of the trigger signal";
+    0xFF3F 1 PLAIN Write [] "14.10.6.3" "scope_level" SCOPE_LEVEL "oscilloscope: trigger threshold";
+    0xFF40 1 PLAIN Write [] "14.10.6.1" "scope_signal1" SCOPE_SIGNAL1 "oscilloscope: address of signal 1";
+    0xFF41 1 PLAIN Write [] "14.10.6.1" "scope_signal2" SCOPE_SIGNAL2 "oscilloscope: address of signal 2";
     0xFF42 1 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFF43 1 PLAIN Write [] "13.3.1" "ps_status" "positioning control: status";
-    0xFF44 2 SIGNED Write [Turns] "13.3.2.1" "ps_positionH" "positioning control: rotation of the target";
-    0xFF46 2 PLAIN Write [Angle] "13.3.2.1" "ps_positionL" "positioning control: rotor position of the target";
-    0xFF48 2 PLAIN Write [] "13.3.2.2" "ps_umdrehung" "positioning control: rotation counter";
-    0xFF4A 2 PLAIN Write [] "13.3.2.2" "ps_impuls" "positioning control: impulse counter";
-    0xFF4C 2 PLAIN Write [Speed] "13.1.4" "ps_v0" "positioning control: first speed";
-    0xFF4E 2 PLAIN Write [] "13.3.2.2" "ps_k0" "positioning control: duration of the first speed";
-    0xFF50 2 PLAIN Write [Speed] "13.3.2.2" "ps_v1" "positioning control: second speed";
-    0xFF52 2 PLAIN Write [] "13.3.2.2" "ps_k1" "positioning control: duration of the second speed";
+    0xFF43 1 PLAIN Write [] "13.3.1" "ps_status" PS_STATUS "positioning control: status";
+    0xFF44 2 SIGNED Write [Turns] "13.3.2.1" "ps_positionH" PS_POSITIONH "positioning control: rotation of the target";
+    0xFF46 2 PLAIN Write [Angle] "13.3.2.1" "ps_positionL" PS_POSITIONL "positioning control: rotor position of the target";
+    0xFF48 2 PLAIN Write [] "13.3.2.2" "ps_umdrehung" PS_UMDREHUNG "positioning control: rotation counter";
+    0xFF4A 2 PLAIN Write [] "13.3.2.2" "ps_impuls" PS_IMPULS "positioning control: impulse counter";
+    0xFF4C 2 PLAIN Write [Speed] "13.1.4" "ps_v0" PS_V0 "positioning control: first speed";
+    0xFF4E 2 PLAIN Write [] "13.3.2.2" "ps_k0" PS_K0 "positioning control: duration of the first speed";
+    0xFF50 2 PLAIN Write [Speed] "13.3.2.2" "ps_v1" PS_V1 "positioning control: second speed";
+    0xFF52 2 PLAIN Write [] "13.3.2.2" "ps_k1" PS_K1 "positioning control: duration of the second speed";
     // Printed at FF53 and FF54 (E79).
-    0xFF54 1 PLAIN Write [] "13.3.2.2" "ps_delta" "positioning control: remaining path";
+    0xFF54 1 PLAIN Write [] "13.3.2.2" "ps_delta" PS_DELTA "positioning control: remaining path";
     0xFF55 1 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFF56 1 PLAIN Read R 0xFF [] "14.4.2" "Flags" "status byte";
-    0xFF57 1 PLAIN Write [] "14.4.3" "Flags2" "status byte";
-    0xFF58 1 PLAIN Write [] "14.2.1" "Cnt2" "internal counter";
+    0xFF56 1 PLAIN Read R 0xFF [] "14.4.2" "Flags" FLAGS "status byte";
+    0xFF57 1 PLAIN Write R 0x03 [] "14.4.3" "Flags2" FLAGS2 "status byte";
+    0xFF58 1 PLAIN Write [] "14.2.1" "Cnt2" CNT2 "internal counter";
     0xFF59 1 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFF5A 2 PLAIN Write [] "14.2.1" "uP" "utilisation of the micro controller";
-    0xFF5C 2 PLAIN Write [] "14.2.1" "RealTimeClock" "time counter";
-    0xFF5E 1 PLAIN Write [] "14.2.1" "CntBlink" "cycle counter of the display";
-    0xFF5F 1 PLAIN Write [] "14.2.1" "CntRevers" "cycle counter of the reversing mode";
-    0xFF60 1 PLAIN Write [] "14.3.3" "HwVersion" "configuration byte";
-    0xFF61 1 PLAIN Write [] "14.3.4" "HwVersion2" "configuration byte";
-    0xFF62 1 PLAIN Write [] "14.3.1" "SwVersion" "configuration byte";
-    0xFF63 1 PLAIN Write [] "14.3.2" "SwVersion2" "configuration byte";
-    0xFF64 1 PLAIN Read [CoolerTemperature] "14.5.7.1" "MaxTempKK" "limit of the cooler's temperature";
-    0xFF65 1 PLAIN Write [MotorSensor] "14.5.7.2" "MaxTempMot" "limit of the motor's temperature";
-    0xFF66 1 PLAIN Write [EffectiveCurrent] "14.5.1.2" "imax" "peak current";
-    0xFF67 1 PLAIN Write [EffectiveCurrent] "14.5.1.2" "i0" "rated current of the motor";
-    0xFF68 2 PLAIN Write [MaxSpeed] "14.5.3.2" "nMax" "maximum speed";
+    0xFF5A 2 PLAIN Write [] "14.2.1" "uP" UP "utilisation of the micro controller";
+    0xFF5C 2 PLAIN Write [] "14.2.1" "RealTimeClock" REAL_TIME_CLOCK "time counter";
+    0xFF5E 1 PLAIN Write [] "14.2.1" "CntBlink" CNT_BLINK "cycle counter of the display";
+    0xFF5F 1 PLAIN Write [] "14.2.1" "CntRevers" CNT_REVERS "cycle counter of the reversing mode";
+    0xFF60 1 PLAIN Write [] "14.3.3" "HwVersion" HW_VERSION "configuration byte";
+    0xFF61 1 PLAIN Write [] "14.3.4" "HwVersion2" HW_VERSION2 "configuration byte";
+    0xFF62 1 PLAIN Write [] "14.3.1" "SwVersion" SW_VERSION "configuration byte";
+    0xFF63 1 PLAIN Write [] "14.3.2" "SwVersion2" SW_VERSION2 "configuration byte";
+    0xFF64 1 PLAIN Read [CoolerTemperature] "14.5.7.1" "MaxTempKK" MAX_TEMP_KK "limit of the cooler's temperature";
+    0xFF65 1 PLAIN Write [MotorSensor] "14.5.7.2" "MaxTempMot" MAX_TEMP_MOT "limit of the motor's temperature";
+    0xFF66 1 PLAIN Write [EffectiveCurrent] "14.5.1.2" "imax" IMAX "peak current";
+    0xFF67 1 PLAIN Write [EffectiveCurrent] "14.5.1.2" "i0" I0 "rated current of the motor";
+    0xFF68 2 PLAIN Write [MaxSpeed] "14.5.3.2" "nMax" N_MAX "maximum speed";
     0xFF6A 2 PLAIN Reserved [] "14.2.1" "reserviert" "";
-    0xFF6C 2 PLAIN Write [Ramp] "14.5.4" "nRampe+" "acceleration ramp";
-    0xFF6E 2 PLAIN Write [Ramp] "14.5.4" "nRampe-" "braking ramp";
-    0xFF70 1 PLAIN Write [] "14.6.4" "nKp" "P-part of the speed regulator";
-    0xFF71 1 PLAIN Write [] "14.6.4" "nKi" "I-part of the speed regulator";
-    0xFF72 1 PLAIN Write [] "14.6.5" "LKp" "P-part of the position regulator";
-    0xFF73 1 PLAIN Write [] "14.6.5" "LKd" "D-part of the position regulator";
-    0xFF74 2 PLAIN Write [Angle] "13.2.1.2" "dLage" "displacement of the rotor position";
-    0xFF76 2 PLAIN Write [SlippingError] "14.5.6" "Slipping error" "limit of the slip, with the position regulator";
-    0xFF78 1 PLAIN Write [AnalogueSpeed] "14.7.2" "VCOlin" "scale of the analogue and the frequency input";
-    0xFF79 1 PLAIN Write [TachoFilter] "14.6.3" "nFilter" "tacho filter";
-    0xFF7A 1 PLAIN Write [Emf] "14.6.2" "emk0" "compensation of the back EMF";
-    0xFF7B 1 PLAIN Write [] "13.1.4" "Window" "window for in-position or speed 0";
-    0xFF7C 1 PLAIN Write [] "14.7.4" "AnOut" "address of the signal for the analogue output";
-    0xFF7D 1 PLAIN Write [] "14.7.4" "AnOutOffset" "offset of the analogue output";
-    0xFF7E 1 PLAIN Write [] "14.2.1" "ReversTakt" "cycle of the test mode";
-    0xFF7F 1 PLAIN Write [] "14.7.3" "VCOlinL" "fine scale of the frequency input";
-};
+    0xFF6C 2 PLAIN Write [Ramp] "14.5.4" "nRampe+" N_RAMPE_PLUS "acceleration ramp";
+    0xFF6E 2 PLAIN Write [Ramp] "14.5.4" "nRampe-" N_RAMPE_MINUS "braking ramp";
+    0xFF70 1 PLAIN Write [] "14.6.4" "nKp" NKP "P-part of the speed regulator";
+    0xFF71 1 PLAIN Write [] "14.6.4" "nKi" NKI "I-part of the speed regulator";
+    0xFF72 1 PLAIN Write [] "14.6.5" "LKp" LKP "P-part of the position regulator";
+    0xFF73 1 PLAIN Write [] "14.6.5" "LKd" LKD "D-part of the position regulator";
+    0xFF74 2 PLAIN Write [Angle] "13.2.1.2" "dLage" D_LAGE "displacement of the rotor position";
+    0xFF76 2 PLAIN Write [SlippingError] "14.5.6" "Slipping error" SLIPPING_ERROR "limit of the slip, with the position regulator";
+    0xFF78 1 PLAIN Write [AnalogueSpeed] "14.7.2" "VCOlin" VCO_LIN "scale of the analogue and the frequency input";
+    0xFF79 1 PLAIN Write [TachoFilter] "14.6.3" "nFilter" N_FILTER "tacho filter";
+    0xFF7A 1 PLAIN Write [Emf] "14.6.2" "emk0" EMK0 "compensation of the back EMF";
+    0xFF7B 1 PLAIN Write [] "13.1.4" "Window" WINDOW "window for in-position or speed 0";
+    0xFF7C 1 PLAIN Write [] "14.7.4" "AnOut" AN_OUT "address of the signal for the analogue output";
+    0xFF7D 1 PLAIN Write [] "14.7.4" "AnOutOffset" AN_OUT_OFFSET "offset of the analogue output";
+    0xFF7E 1 PLAIN Write [] "14.2.1" "ReversTakt" REVERS_TAKT "cycle of the test mode";
+    0xFF7F 1 PLAIN Write [] "14.7.3" "VCOlinL" VCO_LIN_L "fine scale of the frequency input";
+}
 
 /// The RAM cell of this name, exactly as printed. Reserved cells share a name and are not found.
 #[must_use]
@@ -305,18 +319,18 @@ mod tests {
     #[test]
     fn cells_of_the_bus_end() {
         for (name, address) in [
-            ("errorcode", nd21::ERROR_CODE),
-            ("DataIn", nd21::DATA_IN),
-            ("DataOut", nd21::DATA_OUT),
-            ("BusAddr", nd21::BUS_ADDR),
-            ("Status", nd21::STATUS),
-            ("Flags2", nd21::FLAGS2),
+            ("errorcode", nd21::ram::ERRORCODE),
+            ("DataIn", nd21::ram::DATA_IN),
+            ("DataOut", nd21::ram::DATA_OUT),
+            ("BusAddr", nd21::ram::BUS_ADDR),
+            ("Status", nd21::ram::STATUS),
+            ("Flags2", nd21::ram::FLAGS2),
             ("HwVersion", nd21::PARAMETERS),
         ] {
             assert_eq!(cell(name).unwrap().address, address, "{name}");
         }
         let status = cell("Status").unwrap();
-        let writable = nd21::STATUS_BLOCKED | nd21::STATUS_STOPPED;
+        let writable = nd21::bits::status::BLOCK | nd21::bits::status::STOP;
         assert_eq!(status.read_only_bits, !writable);
         let last = nd21::PARAMETERS + nd21::PARAMETER_COUNT - 1;
         assert_eq!(cell_at(last), cell("VCOlinL"));

@@ -3,6 +3,8 @@
 use super::cells::{Access, Cell, PLAIN, SIGNED, at, cells, named};
 use super::units::Scale;
 
+#[rustfmt::skip]
+cells! {
 /// Every row of the table, 00 to FF without a gap, in order of addresses (ND21 14.2.2).
 ///
 /// Where the print is in doubt:
@@ -16,41 +18,42 @@ use super::units::Scale;
 ///
 /// `EE_Seriennummer`, the hours and `EE_InitDatum` "can be read out" (14.8) and are [`Access::Read`];
 /// `EE_ProgDatum` is to be written by whoever changes the EEPROM (14.8.4).
-#[rustfmt::skip]
-pub const EEPROM: &[Cell] = cells! {
-    0x00 1 PLAIN Reserved [] "14.2.2" "EE_LA" "";
-    0x01 3 PLAIN Read [SerialNumber] "14.8.1" "EE_Seriennummer" "serial number";
+table EEPROM;
+/// The addresses of the EEPROM cells (ND21 14.2.2).
+addresses ee: u8;
+    0x00 1 PLAIN Reserved [] "14.2.2" "EE_LA" LA "";
+    0x01 3 PLAIN Read [SerialNumber] "14.8.1" "EE_Seriennummer" SERIENNUMMER "serial number";
     0x04 1 PLAIN Reserved [] "14.2.2" "" "";
-    0x05 2 PLAIN Read [Hours] "14.8.2" "EE_BetriebStd" "operating hours";
+    0x05 2 PLAIN Read [Hours] "14.8.2" "EE_BetriebStd" BETRIEB_STD "operating hours";
     0x07 1 PLAIN Reserved [] "14.2.2" "reserviert" "";
-    0x08 2 PLAIN Read [Hours] "14.8.2" "EE_SperreStd" "hours blocked";
-    0x0A 2 PLAIN Read [Date] "14.8.3" "EE_InitDatum" "date of the first start";
-    0x0C 1 PLAIN Read [] "14.3.5" "EE_Version" "configuration byte";
+    0x08 2 PLAIN Read [Hours] "14.8.2" "EE_SperreStd" SPERRE_STD "hours blocked";
+    0x0A 2 PLAIN Read [Date] "14.8.3" "EE_InitDatum" INIT_DATUM "date of the first start";
+    0x0C 1 PLAIN Read [] "14.3.5" "EE_Version" VERSION "configuration byte";
     0x0D 3 PLAIN Reserved [] "14.2.2" "reserviert" "00";
     0x10 15 PLAIN Reserved [] "14.2.2" "reserviert" "for a history of errors";
-    0x1F 1 PLAIN Write [] "14.2.2" "EE_parity" "test byte of the EEPROM";
-    0x20 32 PLAIN Write [] "14.2.2" "EE_RAM" "mirror of RAM FF60-FF7F, the parameters";
-    0x40 1 PLAIN Write [] "14.2.2" "EE_a_param3" "ASIC setting";
-    0x41 1 PLAIN Write [] "14.6.1" "EE_a_mpr1" "ASIC setting";
-    0x42 1 PLAIN Write [] "14.6.1" "EE_a_mpr2" "ASIC setting";
-    0x43 1 PLAIN Write [] "14.6.1" "EE_a_mpr98" "ASIC adjustment";
-    0x44 2 PLAIN Write [EncoderImpulses] "14.7.1.1" "EE_impulszahl" "encoder emulation";
-    0x46 1 PLAIN Write [MotorPoles] "14.6.7" "EE_pole" "number of motor poles";
-    0x47 1 PLAIN Write [] "14.3.6" "EE_selftest" "configuration byte";
-    0x48 2 SIGNED Write [Speed] "13.1.4" "EE_RefV1" "first speed of the referencing run";
-    0x4A 2 SIGNED Write [Speed] "13.1.4" "EE_RefV2" "second speed of the referencing run";
-    0x4C 2 SIGNED Write [Turns] "13.1.4" "EE_RefUmdr0" "reference point: rotation counter";
-    0x4E 2 PLAIN Write [Angle] "13.1.4" "EE_RefLage0" "reference point: rotor position";
-    0x50 2 PLAIN Write [Speed] "13.1.4" "EE_Vtippen" "speed of stepping";
-    0x52 2 PLAIN Write [Angle] "14.6.6" "EE_dRESOLVER" "resolver adjustment";
-    0x54 2 PLAIN Write [Angle] "13.1.4" "EE_RefLage" "displacement of the zero point, referencing run";
-    0x56 1 PLAIN Write [] "14.2.2" "EE_nd2204" "ASIC setting";
+    0x1F 1 PLAIN Write [] "14.2.2" "EE_parity" PARITY "test byte of the EEPROM";
+    0x20 32 PLAIN Write [] "14.2.2" "EE_RAM" RAM "mirror of RAM FF60-FF7F, the parameters";
+    0x40 1 PLAIN Write [] "14.2.2" "EE_a_param3" A_PARAM3 "ASIC setting";
+    0x41 1 PLAIN Write [] "14.6.1" "EE_a_mpr1" A_MPR1 "ASIC setting";
+    0x42 1 PLAIN Write [] "14.6.1" "EE_a_mpr2" A_MPR2 "ASIC setting";
+    0x43 1 PLAIN Write [] "14.6.1" "EE_a_mpr98" A_MPR98 "ASIC adjustment";
+    0x44 2 PLAIN Write [EncoderImpulses] "14.7.1.1" "EE_impulszahl" IMPULSZAHL "encoder emulation";
+    0x46 1 PLAIN Write [MotorPoles] "14.6.7" "EE_pole" POLE "number of motor poles";
+    0x47 1 PLAIN Write [] "14.3.6" "EE_selftest" SELFTEST "configuration byte";
+    0x48 2 SIGNED Write [Speed] "13.1.4" "EE_RefV1" REF_V1 "first speed of the referencing run";
+    0x4A 2 SIGNED Write [Speed] "13.1.4" "EE_RefV2" REF_V2 "second speed of the referencing run";
+    0x4C 2 SIGNED Write [Turns] "13.1.4" "EE_RefUmdr0" REF_UMDR0 "reference point: rotation counter";
+    0x4E 2 PLAIN Write [Angle] "13.1.4" "EE_RefLage0" REF_LAGE0 "reference point: rotor position";
+    0x50 2 PLAIN Write [Speed] "13.1.4" "EE_Vtippen" VTIPPEN "speed of stepping";
+    0x52 2 PLAIN Write [Angle] "14.6.6" "EE_dRESOLVER" D_RESOLVER "resolver adjustment";
+    0x54 2 PLAIN Write [Angle] "13.1.4" "EE_RefLage" REF_LAGE "displacement of the zero point, referencing run";
+    0x56 1 PLAIN Write [] "14.2.2" "EE_nd2204" ND2204 "ASIC setting";
     0x57 1 PLAIN Reserved [] "14.2.2" "reserviert" "";
-    0x58 2 PLAIN Write [Date] "14.8.4" "EE_ProgDatum" "date of the last change of parameters";
-    0x5A 2 PLAIN Write [] "14.2.2" "EE_ProgName" "";
-    0x5C 4 PLAIN Reserved [] "14.2.2" "EE_Kunde" "for the customer";
-    0x60 160 PLAIN Write [] "13.1.9" "EE_Ablauf" "cycle control: positions 0 to 39";
-};
+    0x58 2 PLAIN Write [Date] "14.8.4" "EE_ProgDatum" PROG_DATUM "date of the last change of parameters";
+    0x5A 2 PLAIN Write [] "14.2.2" "EE_ProgName" PROG_NAME "";
+    0x5C 4 PLAIN Reserved [] "14.2.2" "EE_Kunde" KUNDE "for the customer";
+    0x60 160 PLAIN Write [] "13.1.9" "EE_Ablauf" ABLAUF "cycle control: positions 0 to 39";
+}
 
 /// A run of EEPROM bytes and the RAM cells that are loaded with them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -231,7 +234,7 @@ mod tests {
     fn addresses_of_the_bus_end() {
         assert_eq!(
             cell("EE_selftest").unwrap().address,
-            u16::from(nd21::EE_SELFTEST)
+            u16::from(nd21::ee::SELFTEST)
         );
         let parameters = cell("EE_RAM").unwrap();
         assert_eq!(parameters.address, u16::from(nd21::EE_PARAMETERS));

@@ -217,7 +217,7 @@ impl BusEnd {
             State::Address(header) => {
                 let header = *header;
                 let sum = passed_on(byte);
-                memory.write(nd21::BUS_ADDR, sum);
+                memory.write(nd21::ram::BUS_ADDR, sum);
                 self.short_address_valid = true;
                 self.begin_net_bytes(header, sum == ADDRESSED);
                 Ok(Step::plain(sum))
@@ -282,10 +282,10 @@ impl BusEnd {
         }
         let valid =
             self.short_address_valid || self.properties.short_address == ShortAddress::KeptSum;
-        let mut sum = memory.read(nd21::BUS_ADDR);
+        let mut sum = memory.read(nd21::ram::BUS_ADDR);
         if header.addressing() == Addressing::NextDrive {
             sum = passed_on(sum);
-            memory.write(nd21::BUS_ADDR, sum);
+            memory.write(nd21::ram::BUS_ADDR, sum);
         }
         self.begin_net_bytes(header, valid && sum == ADDRESSED);
         Ok(Step::plain(byte))
@@ -332,13 +332,13 @@ impl BusEnd {
 
 /// Latches the process data that go out: the word at FF00|DataOut, high byte first (ND21 9.4, 14.10.3).
 fn process_data_out<M: Memory>(memory: &mut M) -> [u8; 2] {
-    let address = PAGE | u16::from(memory.read(nd21::DATA_OUT));
+    let address = PAGE | u16::from(memory.read(nd21::ram::DATA_OUT));
     [memory.read(address), memory.read(address.wrapping_add(1))]
 }
 
 /// Writes the process data that came in to FF00|DataIn, high byte first (ND21 9.4, 14.10.3).
 fn process_data_in<M: Memory>(memory: &mut M, data: [u8; 2]) {
-    let address = PAGE | u16::from(memory.read(nd21::DATA_IN));
+    let address = PAGE | u16::from(memory.read(nd21::ram::DATA_IN));
     memory.write(address, data[0]);
     memory.write(address.wrapping_add(1), data[1]);
 }

@@ -2,8 +2,9 @@
 
 use super::memory::Nd21Memory;
 use super::properties::Nd21Properties;
+use super::world::{Shown, Stimulus};
+use crate::cells::Cells;
 use crate::device::Device;
-use crate::plain::PlainMemory;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
@@ -24,7 +25,7 @@ impl Nd21Drive {
     pub fn new(properties: Properties, own: Nd21Properties, eeprom: [u8; 256]) -> Self {
         Self {
             bus_end: BusEnd::new(properties),
-            memory: Nd21Memory::new(PlainMemory::with_eeprom(eeprom), own),
+            memory: Nd21Memory::new(Cells::with_eeprom(eeprom), own),
             properties,
         }
     }
@@ -33,6 +34,17 @@ impl Nd21Drive {
     #[must_use]
     pub fn memory(&self) -> &Nd21Memory {
         &self.memory
+    }
+
+    /// Lets something happen to it from outside the bus.
+    pub fn stimulate(&mut self, stimulus: Stimulus) {
+        self.memory.stimulate(stimulus);
+    }
+
+    /// What it shows outside the bus.
+    #[must_use]
+    pub fn shown(&self) -> Shown {
+        self.memory.shown()
     }
 
     /// Its memory.

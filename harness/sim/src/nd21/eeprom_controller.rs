@@ -1,7 +1,7 @@
 //! The EEPROM controller (ND21 14.10.5): commands in the cell `EEPROMcontrol`, done when a bit of it is 1.
 
 use super::properties::Nd21Properties;
-use crate::plain::PlainMemory;
+use crate::cells::Cells;
 use harness_proto::nd21::{self, cells};
 use harness_proto::time::Instant;
 
@@ -44,7 +44,7 @@ pub(super) struct EepromController {
 
 impl EepromController {
     /// As after power-up.
-    pub(super) fn start(&mut self, memory: &mut PlainMemory) {
+    pub(super) fn start(&mut self, memory: &mut Cells) {
         self.busy = None;
         put(memory, CONTROL, READY);
     }
@@ -55,7 +55,7 @@ impl EepromController {
         now: Instant,
         code: u8,
         properties: Nd21Properties,
-        memory: &mut PlainMemory,
+        memory: &mut Cells,
     ) {
         if self.busy.is_some() {
             return;
@@ -74,7 +74,7 @@ impl EepromController {
     }
 
     /// Finishes what is due.
-    pub(super) fn advance(&mut self, now: Instant, memory: &mut PlainMemory) {
+    pub(super) fn advance(&mut self, now: Instant, memory: &mut Cells) {
         let Some((command, _)) = self.busy.filter(|(_, until)| *until <= now) else {
             return;
         };
@@ -101,7 +101,7 @@ impl EepromController {
     }
 
     /// The power fails: bytes that are being written are lost (they read FF). True where there are some.
-    pub(super) fn damage(&self, memory: &mut PlainMemory) -> bool {
+    pub(super) fn damage(&self, memory: &mut Cells) -> bool {
         let written = match self.busy {
             Some((Command::WriteByte, _)) => {
                 let address = usize::from(memory.peek(BUFFER));
@@ -118,7 +118,7 @@ impl EepromController {
     }
 }
 
-fn put(memory: &mut PlainMemory, address: u16, byte: u8) {
+fn put(memory: &mut Cells, address: u16, byte: u8) {
     let known = memory.poke(address, byte);
     debug_assert!(known && cells::cell_at(address).is_some());
 }

@@ -3,7 +3,8 @@
 
 use super::eeprom_controller::{CONTROL, EepromController};
 use super::properties::Nd21Properties;
-use crate::plain::PlainMemory;
+use super::world::{Mode, Shown, Stimulus, World};
+use crate::cells::Cells;
 use harness_proto::nd21;
 use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::nd21::eeprom::LINKS;
@@ -19,19 +20,21 @@ const STATUS_ERROR: u8 = 1 << 5;
 /// The memory of an ND21.
 #[derive(Clone, Debug)]
 pub struct Nd21Memory {
-    cells: PlainMemory,
+    cells: Cells,
     eeprom_controller: EepromController,
     properties: Nd21Properties,
     now: Instant,
+    world: World,
 }
 
 impl Nd21Memory {
-    pub(super) fn new(cells: PlainMemory, properties: Nd21Properties) -> Self {
+    pub(super) fn new(cells: Cells, properties: Nd21Properties) -> Self {
         let mut memory = Self {
             cells,
             eeprom_controller: EepromController::default(),
             properties,
             now: Instant::START,
+            world: World::default(),
         };
         memory.start();
         memory
@@ -39,13 +42,32 @@ impl Nd21Memory {
 
     /// The cells, past all rules of access.
     #[must_use]
-    pub fn cells(&self) -> &PlainMemory {
+    pub fn cells(&self) -> &Cells {
         &self.cells
     }
 
     /// The cells, past all rules of access.
-    pub fn cells_mut(&mut self) -> &mut PlainMemory {
+    pub fn cells_mut(&mut self) -> &mut Cells {
         &mut self.cells
+    }
+
+    pub(super) fn stimulate(&mut self, stimulus: Stimulus) {
+        if let Some(error) = self.world.change(stimulus) {
+            self.error(error);
+        }
+    }
+
+    pub(super) fn shown(&self) -> Shown {
+        let outputs = self.cells.peek(nd21::io::OUTPUTS);
+        Shown {
+            gpo1: outputs & nd21::io::GPO1 != 0,
+            gpo2: outputs & nd21::io::GPO2 != 0,
+            ready: false,
+            analogue: 0,
+            encoder: 0,
+            display: None,
+            mode: Mode::Reset,
+        }
     }
 
     /// Does what the drive does by itself up to `now`.
@@ -80,16 +102,22 @@ impl Nd21Memory {
     /// The drive goes into error mode (ND21 14.10.1).
     fn error(&mut self, error: ErrorCode) {
         let [high, low] = error.code().to_be_bytes();
-        self.put(nd21::ERROR_CODE, high);
-        self.put(nd21::ERROR_CODE + 1, low);
-        self.put(nd21::STATUS, self.cells.peek(nd21::STATUS) | STATUS_ERROR);
+        self.put(nd21::ram::ERRORCODE, high);
+        self.put(nd21::ram::ERRORCODE + 1, low);
+        self.put(
+            nd21::ram::STATUS,
+            self.cells.peek(nd21::ram::STATUS) | STATUS_ERROR,
+        );
     }
 
     /// "Write H'AF in RAM cell error code" (ND21 14.10.1).
     fn confirm_error(&mut self) {
-        self.put(nd21::ERROR_CODE, 0);
-        self.put(nd21::ERROR_CODE + 1, 0);
-        self.put(nd21::STATUS, self.cells.peek(nd21::STATUS) & !STATUS_ERROR);
+        self.put(nd21::ram::ERRORCODE, 0);
+        self.put(nd21::ram::ERRORCODE + 1, 0);
+        self.put(
+            nd21::ram::STATUS,
+            self.cells.peek(nd21::ram::STATUS) & !STATUS_ERROR,
+        );
     }
 
     fn put(&mut self, address: u16, byte: u8) {
@@ -105,7 +133,7 @@ impl Memory for Nd21Memory {
 
     /// Read-only cells and bits stay as they are (ND21 14.2.1).
     fn write(&mut self, address: u16, data: u8) {
-        if address == nd21::BUS_ADDR || !RAM.contains(&address) {
+        if address == nd21::ram::BUS_ADDR || !RAM.contains(&address) {
             self.cells.write(address, data);
             return;
         }
@@ -115,7 +143,7 @@ impl Memory for Nd21Memory {
                     .control(self.now, code, self.properties, &mut self.cells);
                 return;
             }
-            (nd21::ERROR_CODE, nd21::CONFIRM_ERROR) => {
+            (nd21::ram::ERRORCODE, nd21::CONFIRM_ERROR) => {
                 self.confirm_error();
                 return;
             }

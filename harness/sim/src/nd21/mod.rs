@@ -5,7 +5,9 @@ mod drive;
 mod eeprom_controller;
 mod memory;
 mod properties;
+mod world;
 
 pub use drive::Nd21Drive;
 pub use memory::Nd21Memory;
 pub use properties::{Nd21Properties, PROPERTIES, TimeProperty};
+pub use world::{Mode, Shown, Stimulus};

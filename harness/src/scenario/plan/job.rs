@@ -86,7 +86,7 @@ impl Planner {
                 None => Ok(0),
             }
         };
-        let [_, status] = nd21::STATUS.to_be_bytes();
+        let [_, status] = nd21::ram::STATUS.to_be_bytes();
         let status_and = |data| Command::And {
             address_low: status,
             data,
@@ -133,11 +133,11 @@ impl Planner {
                 Command::WriteIo(change)
             }
             JobKind::Reset => Command::ResetH8,
-            JobKind::Go => status_and(!(nd21::STATUS_BLOCKED | nd21::STATUS_STOPPED)),
-            JobKind::Stop => status_or(nd21::STATUS_STOPPED),
-            JobKind::Block => status_or(nd21::STATUS_BLOCKED),
+            JobKind::Go => status_and(!(nd21::bits::status::BLOCK | nd21::bits::status::STOP)),
+            JobKind::Stop => status_or(nd21::bits::status::STOP),
+            JobKind::Block => status_or(nd21::bits::status::BLOCK),
             JobKind::DeleteError => Command::WriteByte {
-                address: nd21::ERROR_CODE,
+                address: nd21::ram::ERRORCODE,
                 data: nd21::CONFIRM_ERROR,
             },
         })
