@@ -2,7 +2,7 @@
 
 use crate::cells::Cells;
 use crate::device::Device;
-use crate::nd21::{Nd21Drive, Shown, Stimulus};
+use crate::nd21::{Nd21Drive, Shown, Stimulus, factory};
 use crate::plain::PlainDrive;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{Deadline, Step};
@@ -22,6 +22,15 @@ pub enum Model {
 impl Model {
     /// The names in a scenario.
     pub const NAMES: [(&'static str, Self); 2] = [("plain", Self::Plain), ("nd21", Self::Nd21)];
+
+    /// The EEPROM of a drive that nobody has set up: empty, or as delivered.
+    #[must_use]
+    pub fn eeprom(self) -> [u8; 256] {
+        match self {
+            Self::Plain => [0; 256],
+            Self::Nd21 => factory::eeprom(),
+        }
+    }
 }
 
 /// A drive of any model.
@@ -49,7 +58,7 @@ impl Drive {
     pub fn cells(&self) -> &Cells {
         match self {
             Self::Plain(drive) => drive.memory(),
-            Self::Nd21(drive) => drive.memory().cells(),
+            Self::Nd21(drive) => drive.program().cells(),
         }
     }
 
@@ -57,7 +66,7 @@ impl Drive {
     pub fn cells_mut(&mut self) -> &mut Cells {
         match self {
             Self::Plain(drive) => drive.memory_mut(),
-            Self::Nd21(drive) => drive.memory_mut().cells_mut(),
+            Self::Nd21(drive) => drive.program_mut().cells_mut(),
         }
     }
 }

@@ -27,21 +27,22 @@ pub fn simulated(plan: &Plan) -> SimulatedLink {
 
 /// Drive `k`: the EEPROM first, since RAM is filled from it at power-up, then the cells.
 fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
-    let mut eeprom = [0; 256];
     let mut properties = Properties::default();
     let mut own = Nd21Properties::default();
     let mut model = Model::default();
     for setup in plan.setups_of(ring, k) {
         setup.apply_to(&mut properties);
         setup.apply_to_nd21(&mut own);
-        match setup {
-            PlannedSetupKind::Model(named) => model = *named,
-            PlannedSetupKind::Eeprom(address, bytes) => {
-                for (cell, byte) in eeprom.iter_mut().skip(usize::from(*address)).zip(bytes) {
-                    *cell = *byte;
-                }
+        if let PlannedSetupKind::Model(named) = setup {
+            model = *named;
+        }
+    }
+    let mut eeprom = model.eeprom();
+    for setup in plan.setups_of(ring, k) {
+        if let PlannedSetupKind::Eeprom(address, bytes) = setup {
+            for (cell, byte) in eeprom.iter_mut().skip(usize::from(*address)).zip(bytes) {
+                *cell = *byte;
             }
-            _ => {}
         }
     }
     let mut drive = match model {

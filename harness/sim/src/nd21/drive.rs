@@ -1,6 +1,6 @@
 //! The drive: its end of the bus over its memory.
 
-use super::memory::Nd21Memory;
+use super::program::Program;
 use super::properties::Nd21Properties;
 use super::world::{Shown, Stimulus};
 use crate::cells::Cells;
@@ -15,7 +15,7 @@ use harness_proto::time::Instant;
 #[derive(Clone, Debug)]
 pub struct Nd21Drive {
     bus_end: BusEnd,
-    memory: Nd21Memory,
+    program: Program,
     properties: Properties,
 }
 
@@ -25,53 +25,57 @@ impl Nd21Drive {
     pub fn new(properties: Properties, own: Nd21Properties, eeprom: [u8; 256]) -> Self {
         Self {
             bus_end: BusEnd::new(properties),
-            memory: Nd21Memory::new(Cells::with_eeprom(eeprom), own),
+            program: Program::new(Cells::with_eeprom(eeprom), own),
             properties,
         }
     }
 
-    /// Its memory.
+    /// Its program.
     #[must_use]
-    pub fn memory(&self) -> &Nd21Memory {
-        &self.memory
+    pub fn program(&self) -> &Program {
+        &self.program
     }
 
     /// Lets something happen to it from outside the bus.
     pub fn stimulate(&mut self, stimulus: Stimulus) {
-        self.memory.stimulate(stimulus);
+        self.program.stimulate(stimulus);
     }
 
     /// What it shows outside the bus.
     #[must_use]
     pub fn shown(&self) -> Shown {
-        self.memory.shown()
+        self.program.shown()
     }
 
-    /// Its memory.
-    pub fn memory_mut(&mut self) -> &mut Nd21Memory {
-        &mut self.memory
+    /// Its program.
+    pub fn program_mut(&mut self) -> &mut Program {
+        &mut self.program
     }
 }
 
 impl Device for Nd21Drive {
     fn receive(&mut self, now: Instant, received: Received) -> Step {
-        self.bus_end.receive(now, received, &mut self.memory)
+        let step = self.bus_end.receive(now, received, &mut self.program);
+        if !self.bus_end.in_error() {
+            self.program.bus_works();
+        }
+        step
     }
 
     fn deadline(&self) -> Option<Deadline> {
-        self.bus_end.deadline(&self.memory)
+        self.bus_end.deadline(&self.program)
     }
 
     fn handle_deadline(&mut self, now: Instant) -> Step {
-        self.bus_end.handle_deadline(now, &mut self.memory)
+        self.bus_end.handle_deadline(now, &mut self.program)
     }
 
     fn advance(&mut self, now: Instant) {
-        self.memory.advance(now);
+        self.program.advance(now);
     }
 
     fn power_on(&mut self) {
-        self.memory.power_on();
+        self.program.power_on();
         self.bus_end = BusEnd::new(self.properties);
     }
 

@@ -1,13 +1,30 @@
-//! The ND21 behind its bus. So far its memory with the manual's access rules, errors and their
-//! confirmation, and the EEPROM controller; nothing turns yet.
+//! The ND21 behind its bus.
+//!
+//! [`Program`] is the drive's program; every 432 us it does one cycle, room by room: `world` and `monitor`
+//! (what comes from outside and what of it is an error), `referencing`, `positioning` and `source` (what is
+//! demanded), `motion` and `plant` (what becomes of it), `outputs` and `clock` (what is shown of it). The rooms
+//! speak through the drive's own cells, as the firmware's parts do, so that a bus master sees every step.
 
+mod clock;
 mod drive;
 mod eeprom_controller;
-mod memory;
+mod error_state;
+pub mod factory;
+mod memory_rules;
+mod monitor;
+mod motion;
+mod outputs;
+mod plant;
+mod positioning;
+mod program;
 mod properties;
+mod referencing;
+mod source;
+mod wave;
 mod world;
 
 pub use drive::Nd21Drive;
-pub use memory::Nd21Memory;
-pub use properties::{Nd21Properties, PROPERTIES, TimeProperty};
+pub use plant::PlantParameters;
+pub use program::Program;
+pub use properties::{BusErrors, Nd21Properties, PROPERTIES, Property, PsPosition};
 pub use world::{Mode, Shown, Stimulus};

@@ -1,62 +1,182 @@
 //! What the manual does not say of the drive behind the bus, as named properties with a default each.
 
+use super::plant::PlantParameters;
+use harness_proto::nd21::units::Device;
+use harness_proto::novobus::properties::Setting;
 use harness_proto::time::Span;
 
 /// How an ND21 behaves where the manual does not say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nd21Properties {
+    /// The type of the device, on which currents depend (4.2.2).
+    pub device: Device,
+    /// The motor and what it turns.
+    pub plant: PlantParameters,
     /// `eeprom-read-time`: how long the EEPROM controller reads a byte.
     pub eeprom_read_time: Span,
     /// `eeprom-write-time`: how long it writes one; `ProgParam` writes 32.
     pub eeprom_write_time: Span,
+    /// `self-test-time`: how long the reset mode lasts.
+    pub self_test_time: Span,
+    /// `ps-calculation-time`: how long the positioning controller calculates.
+    pub ps_calculation_time: Span,
+    /// `i2t-time`: how long the motor may have its peak current.
+    pub i2t_time: Span,
+    /// `ps-position`: the format of `ps_positionH` and `ps_positionL`.
+    pub ps_position: PsPosition,
+    /// `bus-errors`: which errors of the bus block the regulator.
+    pub bus_errors: BusErrors,
 }
 
 impl Default for Nd21Properties {
     fn default() -> Self {
         Self {
+            device: Device::Nd5610,
+            plant: PlantParameters::default(),
             eeprom_read_time: Span::from_millis(1),
             eeprom_write_time: Span::from_millis(10),
+            self_test_time: Span::from_millis(100),
+            ps_calculation_time: Span::from_millis(10),
+            i2t_time: Span::from_millis(2_000),
+            ps_position: PsPosition::default(),
+            bus_errors: BusErrors::default(),
         }
     }
 }
 
-/// A property that is a time.
+/// The format of a target that is written to `ps_positionH` and `ps_positionL`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PsPosition {
+    /// `mode-bit`: 1 mode bit and 31 bits of position, as stored positions are (13.1.9).
+    #[default]
+    ModeBit,
+    /// `32-bit`: an absolute position of 32 bits (13.3.2.1).
+    WholeWords,
+}
+
+/// Which errors of the bus put the drive itself into the error mode, which blocks the regulator.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BusErrors {
+    /// `block`: all of them; 14.11.14 lists them among the error codes.
+    #[default]
+    Block,
+    /// `time-out-only`: only 0508; the others stay in `errorcode` until the next one and let the motor run,
+    /// since the driver corrects them (11.5).
+    TimeOutOnly,
+}
+
+/// A property.
 #[derive(Clone, Copy, Debug)]
-pub struct TimeProperty {
+pub struct Property {
     /// Its name in scenarios.
     pub name: &'static str,
     /// The section that leaves it open.
     pub section: &'static str,
-    /// The longest time that it can be set to.
-    pub longest: Span,
+    values: Values,
+}
+
+/// What a property can be set to.
+#[derive(Clone, Copy, Debug)]
+enum Values {
+    Time(Span, fn(&mut Nd21Properties, Span)),
+    Words(&'static [(&'static str, fn(&mut Nd21Properties))]),
+}
+
+const fn time(
+    name: &'static str,
+    section: &'static str,
+    longest_ms: u64,
     set: fn(&mut Nd21Properties, Span),
+) -> Property {
+    Property {
+        name,
+        section,
+        values: Values::Time(Span::from_millis(longest_ms), set),
+    }
+}
+
+const fn words(
+    name: &'static str,
+    section: &'static str,
+    words: &'static [(&'static str, fn(&mut Nd21Properties))],
+) -> Property {
+    Property {
+        name,
+        section,
+        values: Values::Words(words),
+    }
 }
 
 /// Every property.
-pub const PROPERTIES: [TimeProperty; 2] = [
-    TimeProperty {
-        name: "eeprom-read-time",
-        section: "14.10.5.2",
-        longest: Span::from_millis(1000),
-        set: |properties, time| properties.eeprom_read_time = time,
-    },
-    TimeProperty {
-        name: "eeprom-write-time",
-        section: "14.10.5.3",
-        longest: Span::from_millis(1000),
-        set: |properties, time| properties.eeprom_write_time = time,
-    },
+pub const PROPERTIES: [Property; 7] = [
+    time("eeprom-read-time", "14.10.5.2", 1_000, |p, t| {
+        p.eeprom_read_time = t
+    }),
+    time("eeprom-write-time", "14.10.5.3", 1_000, |p, t| {
+        p.eeprom_write_time = t
+    }),
+    time("self-test-time", "11.8", 60_000, |p, t| {
+        p.self_test_time = t
+    }),
+    time("ps-calculation-time", "13.3.2.2", 1_000, |p, t| {
+        p.ps_calculation_time = t
+    }),
+    time("i2t-time", "14.4.2", 60_000, |p, t| p.i2t_time = t),
+    words(
+        "ps-position",
+        "13.3.2.1",
+        &[
+            ("mode-bit", |p| p.ps_position = PsPosition::ModeBit),
+            ("32-bit", |p| p.ps_position = PsPosition::WholeWords),
+        ],
+    ),
+    words(
+        "bus-errors",
+        "11.8",
+        &[
+            ("block", |p| p.bus_errors = BusErrors::Block),
+            ("time-out-only", |p| p.bus_errors = BusErrors::TimeOutOnly),
+        ],
+    ),
 ];
 
-impl Nd21Properties {
-    /// Sets the property `name`; false where there is none of this name or the time is too long.
-    pub fn set(&mut self, name: &str, time: Span) -> bool {
-        match PROPERTIES.iter().find(|property| property.name == name) {
-            Some(property) if time <= property.longest => {
-                (property.set)(self, time);
-                true
+impl Property {
+    /// What it can be set to, in words.
+    #[must_use]
+    pub fn values(&self) -> String {
+        match self.values {
+            Values::Time(longest, _) => format!("0ms to {longest}"),
+            Values::Words(words) => {
+                let words: Vec<_> = words.iter().map(|(word, _)| *word).collect();
+                words.join(" or ")
             }
-            _ => false,
         }
+    }
+
+    /// Sets it; false where it has no such value.
+    pub fn set(&self, properties: &mut Nd21Properties, setting: Setting<'_>) -> bool {
+        match (self.values, setting) {
+            (Values::Time(longest, set), Setting::Time(time)) if time <= longest => {
+                set(properties, time);
+            }
+            (Values::Words(words), Setting::Word(word)) => {
+                let Some((_, set)) = words.iter().find(|(known, _)| *known == word) else {
+                    return false;
+                };
+                set(properties);
+            }
+            _ => return false,
+        }
+        true
+    }
+}
+
+impl Nd21Properties {
+    /// Sets the property `name`; false where there is none of this name or it has no such value.
+    pub fn set(&mut self, name: &str, setting: Setting<'_>) -> bool {
+        PROPERTIES
+            .iter()
+            .find(|property| property.name == name)
+            .is_some_and(|property| property.set(self, setting))
     }
 }

@@ -9,6 +9,9 @@ use harness_proto::nd21::io::{Input, Inputs};
 pub enum Stimulus {
     /// A digital input is at 5 to 24 V (`true`) or at 0 V (5.3.3, 5.3.4).
     Input(Input, bool),
+    /// A cam on the shaft holds a digital input high from one position of the rotor up to another, in
+    /// increments since power-up, and low elsewhere (the reference switch of 13.1.1, end switches).
+    Cam(Input, i64, i64),
     /// The voltage at the analogue input in mV, -10 000 to 10 000 (5.3.1).
     Analogue(i32),
     /// Impulses a second at the frequency input (5.3.4).
@@ -83,6 +86,8 @@ impl Mode {
 pub(super) struct World {
     /// The digital inputs.
     pub(super) inputs: Inputs,
+    /// The cams, in order of the inputs.
+    cams: [Option<(i64, i64)>; Input::ALL.len()],
     /// The analogue input in mV.
     pub(super) analogue: i32,
     /// Impulses a second.
@@ -108,6 +113,7 @@ impl Default for World {
     fn default() -> Self {
         Self {
             inputs: Inputs::default(),
+            cams: [None; Input::ALL.len()],
             analogue: 0,
             frequency: 0,
             cooler: 250,
@@ -122,10 +128,24 @@ impl Default for World {
 }
 
 impl World {
+    /// The rotor is here: cams switch their inputs.
+    #[inline]
+    pub(super) fn turn_to(&mut self, position: i64) {
+        for (input, cam) in Input::ALL.into_iter().zip(self.cams) {
+            if let Some((from, to)) = cam {
+                self.inputs = self.inputs.with(input, (from..to).contains(&position));
+            }
+        }
+    }
+
     /// Lets `stimulus` happen; the error is returned if it is one.
     pub(super) fn change(&mut self, stimulus: Stimulus) -> Option<ErrorCode> {
         match stimulus {
-            Stimulus::Input(input, high) => self.inputs = self.inputs.with(input, high),
+            Stimulus::Input(input, high) => {
+                self.cams[input as usize] = None;
+                self.inputs = self.inputs.with(input, high);
+            }
+            Stimulus::Cam(input, from, to) => self.cams[input as usize] = Some((from, to)),
             Stimulus::Analogue(mv) => self.analogue = mv.clamp(-10_000, 10_000),
             Stimulus::Frequency(hz) => self.frequency = hz,
             Stimulus::Cooler(tenths) => self.cooler = tenths,

@@ -50,7 +50,11 @@ fn read_only_cells_keep_their_values() {
             ring.run_until(now + Span::from_millis(1 + random.below(30)));
         }
         for k in 0..drives {
-            let cells = ring.drive(k).expect("a drive of the ring").memory().cells();
+            let cells = ring
+                .drive(k)
+                .expect("a drive of the ring")
+                .program()
+                .cells();
             for cell in RAM.iter().filter(|cell| cell.access == Access::Read) {
                 for address in cell.addresses() {
                     // Loaded from the EEPROM or 00 since power-up, and never written by the bus.

@@ -21,7 +21,7 @@ use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time::{self, Instant};
 use harness_sim::drive::Model;
 use harness_sim::fault::LinkFault;
-use harness_sim::nd21;
+use harness_sim::nd21::{self, Nd21Properties};
 use std::ops::RangeInclusive;
 
 /// The most bytes that a run may leave on all links together: its record is held in memory.
@@ -245,7 +245,7 @@ impl Planner {
 
     /// A property of the nd21 model for a drive of another model would do nothing.
     fn idle_property(&self, setup: &Setup) -> Option<Problem> {
-        let SetupKind::Time(name, _) = &setup.what else {
+        let (SetupKind::Time(name, _) | SetupKind::Word(name, _)) = &setup.what else {
             return None;
         };
         nd21::PROPERTIES.iter().find(|own| own.name == name.value)?;
@@ -468,14 +468,12 @@ fn in_memory(address: &Spanned<u16>, length: usize) -> Result<(), Problem> {
 
 fn set_property(name: &str, setting: Setting<'_>, span: Span) -> Result<(), Problem> {
     if let Some(own) = nd21::PROPERTIES.iter().find(|own| own.name == name) {
-        return match setting {
-            Setting::Time(time) if time <= own.longest => Ok(()),
-            _ => Err(Problem::new(
-                span,
-                format!("`{name}` cannot be set to this"),
-                format!("a time of at most {} expected here", own.longest),
-            )),
-        };
+        if own.set(&mut Nd21Properties::default(), setting) {
+            return Ok(());
+        }
+        let message = format!("`{name}` cannot be set to this");
+        let expected = format!("{} expected here", own.values());
+        return Err(Problem::new(span, message, expected));
     }
     Properties::default().set(name, setting).map_err(|error| {
         Problem::new(

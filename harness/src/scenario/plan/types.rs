@@ -73,9 +73,11 @@ impl PlannedSetupKind {
 
     /// The same for what the manual does not say of the drive behind the bus.
     pub(in crate::scenario) fn apply_to_nd21(&self, properties: &mut Nd21Properties) {
-        if let Self::Time(name, span) = self {
-            let _known = properties.set(name, *span);
-        }
+        let _known = match self {
+            Self::Word(name, word) => properties.set(name, Setting::Word(word)),
+            Self::Time(name, span) => properties.set(name, Setting::Time(*span)),
+            _ => false,
+        };
     }
 }
 

@@ -1,0 +1,358 @@
+//! Motion at the 432 us cycle: ramp, position regulator, speed regulator, limit of the torque, actual
+//! values (ND21 4.1, 14.5, 14.6).
+//!
+//! The cells are the truth: what the bus writes to `umdrsoll`, `lagesoll`, `nIntegrator` or `dLage` counts
+//! from the next cycle on. The manual gives no units for the regulators' gains; here, in raw units of the
+//! cells, named choices:
+//!
+//! * position regulator: speed += `LKp` / 32 x slip + `LKd` / 16 x change of the slip (in increments);
+//! * speed regulator: torque = 4 x `nKp` x deviation + integral of `nKi` / 4 x deviation, both in units of
+//!   `msoll`; the integral stands still while the torque is limited (anti-wind-up switch, 4.1);
+//! * deviations of half an increment and less are none, for that is the resolver's resolution;
+//! * i2t: above `i0` the square of the current is summed up in `i2`; the time that `imax` may last is the
+//!   property `i2t-time`. Then `i0` is the limit until half the sum is gone.
+
+use super::plant::Plant;
+use super::wave;
+use crate::cells::Cells;
+use harness_proto::nd21::bits::{flags, status, sw_version, sw_version2};
+use harness_proto::nd21::ram;
+use harness_proto::nd21::units::{RAMP_OFF, SLIPPING_OFF};
+
+/// What the motor is to do in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Demand {
+    /// Nothing: the regulator is blocked.
+    Free,
+    /// To reach this speed on the ramps.
+    Speed(i16),
+    /// To have this speed now: a profile has worked it out.
+    Exact(i16),
+}
+
+/// What `imax` adds in one cycle to the sum at which i2t limits.
+fn i2t_step(imax: u8, i0: u8) -> i64 {
+    i64::from(imax).pow(2) - i64::from(i0).pow(2)
+}
+
+/// The regulators' inner values.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Motion {
+    /// The part of `nIntegrator` below one unit.
+    integral: f64,
+    /// `nist` before it is rounded.
+    filtered: f64,
+    /// The slip of the cycle before.
+    slip: f64,
+    /// The rotor angle as the drive counts it, `SwVersion` bit 3 regarded, in increments.
+    seen: f64,
+    /// `lageist` of the cycle before.
+    old: u16,
+    limited: bool,
+}
+
+/// What the caller has to know of a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Moved {
+    /// The slip is more than `Slipping error` allows (14.5.6).
+    pub(super) slipped: bool,
+    /// Nothing turned and nothing changed.
+    pub(super) at_rest: bool,
+}
+
+/// What stands between the drive and its motor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outside {
+    /// Aeff for one unit of `msoll` (14.5.2).
+    pub(super) amperes: f64,
+    /// The load in Aeff.
+    pub(super) load: f64,
+    /// The rotor is held.
+    pub(super) jammed: bool,
+    /// Half the number of poles, and where phase A is (14.6.6, 14.6.7).
+    pub(super) pole_pairs: u16,
+    /// How many cycles `imax` may last.
+    pub(super) i2t_cycles: i64,
+    /// The torque limit that the analogue input sets while stepping, of 256 (13.1.4).
+    pub(super) torque_share: u16,
+}
+
+impl Motion {
+    /// As after power-up or reset: the position is that of the resolver, less than a turn (13.1.1).
+    pub(super) fn start(&mut self, plant: &Plant, cells: &mut Cells) {
+        #[expect(clippy::cast_possible_truncation, reason = "less than a turn")]
+        let turn = plant.position.rem_euclid(65_536.0);
+        *self = Self {
+            seen: turn,
+            filtered: plant.speed,
+            ..Self::default()
+        };
+        self.old = self.angle().wrapping_add(cells.word(ram::D_LAGE));
+        cells.put_word(ram::UMDRIST, 0);
+        cells.put_word(ram::LAGEIST, self.old);
+        cells.put_word(ram::LAGE0, self.old);
+        self.follow(cells);
+    }
+
+    /// The whole increments that the resolver shows.
+    fn shown(&self) -> f64 {
+        (self.seen + 0.5).floor()
+    }
+
+    /// The rotor angle.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an angle is what is left of the turns"
+    )]
+    pub(super) fn angle(&self) -> u16 {
+        self.shown() as i64 as u16
+    }
+
+    /// The nominal position becomes the actual one.
+    fn follow(&self, cells: &mut Cells) {
+        cells.put_long(ram::UMDRSOLL, cells.long(ram::UMDRIST));
+        cells.put(ram::LAGESOLL_L, 0);
+    }
+
+    /// One cycle.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "floats are clamped before they become cells"
+    )]
+    pub(super) fn cycle(
+        &mut self,
+        demand: Demand,
+        outside: Outside,
+        plant: &mut Plant,
+        cells: &mut Cells,
+    ) -> Moved {
+        let eighths = if cells.byte(ram::SW_VERSION2) & sw_version2::TO_8000 == 0 {
+            2
+        } else {
+            1
+        };
+        let before = (cells.word(ram::MSOLL), cells.word(ram::NSOLLRAMPE));
+        let nominal = Self::ramp(demand, cells);
+        let limit = self.limit(outside, cells);
+        let mut slipped = false;
+        let torque = if demand == Demand::Free {
+            self.integral = 0.0;
+            self.slip = 0.0;
+            self.limited = false;
+            cells.put_word(ram::N_INTEGRATOR, 0);
+            0
+        } else {
+            let mut speed = f64::from(i32::from(nominal) * eighths);
+            if cells.byte(ram::SW_VERSION) & sw_version::POSITION_REGULATOR != 0 {
+                // Both positions are those of the end of the last cycle.
+                let slip = self.slip(cells);
+                self.advance_nominal(nominal, eighths, cells);
+                slipped = Self::too_far(slip, cells);
+                let slip = if slip.abs() <= 0.5 { 0.0 } else { slip };
+                speed += f64::from(cells.byte(ram::LKP)) / 32.0 * slip;
+                speed += f64::from(cells.byte(ram::LKD)) / 16.0 * (slip - self.slip);
+                self.slip = slip;
+            }
+            self.regulate(speed - self.filtered, limit, cells)
+        };
+        let at_rest = plant.speed == 0.0;
+        self.turn(torque, outside, plant, cells);
+        if demand == Demand::Free
+            || cells.byte(ram::SW_VERSION) & sw_version::POSITION_REGULATOR == 0
+        {
+            self.follow(cells);
+        }
+        self.show(torque, eighths, outside, cells);
+        Moved {
+            slipped,
+            at_rest: at_rest
+                && plant.speed == 0.0
+                && self.filtered == 0.0
+                && nominal == 0
+                && before == (torque.cast_unsigned(), 0)
+                && cells.long(ram::I2) == 0,
+        }
+    }
+
+    /// The nominal speed after the ramp generator (14.5.4).
+    fn ramp(demand: Demand, cells: &mut Cells) -> i16 {
+        let now = i32::from(cells.signed(ram::NSOLLRAMPE));
+        let next = match demand {
+            Demand::Free => 0,
+            Demand::Exact(speed) => speed,
+            Demand::Speed(target) => {
+                let target = i32::from(target);
+                let away = now == 0 || (target > now) == (now > 0);
+                let ramp = cells.word(if away {
+                    ram::N_RAMPE_PLUS
+                } else {
+                    ram::N_RAMPE_MINUS
+                });
+                let step = if ramp == RAMP_OFF {
+                    i32::from(u16::MAX)
+                } else {
+                    i32::from(ramp)
+                };
+                // Braking ends at 0; what lies beyond is accelerated to.
+                let goal = if !away && now.signum() * target.signum() < 0 {
+                    0
+                } else {
+                    target
+                };
+                let next = now + (goal - now).clamp(-step, step);
+                next.clamp(-0x7FFF, 0x7FFF) as i16
+            }
+        };
+        cells.put_word(ram::NSOLLRAMPE, next.cast_unsigned());
+        next
+    }
+
+    /// The nominal position goes on by the nominal speed.
+    fn advance_nominal(&self, nominal: i16, eighths: i32, cells: &mut Cells) {
+        // In 256ths of an increment: an eighth is 32 of them.
+        let parts = i64::from(i32::from(nominal) * eighths) * 32;
+        let position = i64::from(cells.long(ram::UMDRSOLL)) << 8;
+        let [low, rest @ ..] =
+            (position + i64::from(cells.byte(ram::LAGESOLL_L)) + parts).to_le_bytes();
+        let [a, b, c, d, ..] = rest;
+        cells.put_long(ram::UMDRSOLL, u32::from_le_bytes([a, b, c, d]));
+        cells.put(ram::LAGESOLL_L, low);
+    }
+
+    /// How far the actual position is behind the nominal one, in increments.
+    fn slip(&self, cells: &Cells) -> f64 {
+        let whole = cells
+            .long(ram::UMDRSOLL)
+            .wrapping_sub(cells.long(ram::UMDRIST));
+        f64::from(whole.cast_signed()) + f64::from(cells.byte(ram::LAGESOLL_L)) / 256.0
+            - (self.seen - self.shown())
+    }
+
+    fn too_far(slip: f64, cells: &Cells) -> bool {
+        let allowed = cells.word(ram::SLIPPING_ERROR);
+        allowed != SLIPPING_OFF && slip.abs() > f64::from(u32::from(allowed) * 256)
+    }
+
+    /// The torque limit: `imax`, or `i0` when that lasted too long.
+    fn limit(&mut self, outside: Outside, cells: &mut Cells) -> u8 {
+        let (imax, i0) = (cells.byte(ram::IMAX), cells.byte(ram::I0));
+        let current = i64::from(cells.signed(ram::MSOLL)).abs() / 256;
+        let sum = i64::from(cells.long(ram::I2)) + current * current - i64::from(i0).pow(2);
+        let full = i2t_step(imax, i0) * outside.i2t_cycles;
+        let sum = sum.clamp(0, full.clamp(0, i64::from(u32::MAX)));
+        cells.put_long(ram::I2, u32::try_from(sum).unwrap_or(u32::MAX));
+        let was = cells.byte(ram::FLAGS) & flags::I2T != 0;
+        let limited = full > 0 && (sum >= full || was && sum > full / 2);
+        cells.set_bits(ram::FLAGS, flags::I2T, limited);
+        let limit = if limited { i0.min(imax) } else { imax }.min(0x7F);
+        let share = u16::from(limit) * outside.torque_share / 256;
+        let limit = u8::try_from(share).unwrap_or(limit);
+        cells.put(ram::MMAX, limit);
+        limit
+    }
+
+    /// The speed regulator (14.6.4).
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "clamped to the limit, at most 7F00"
+    )]
+    fn regulate(&mut self, deviation: f64, limit: u8, cells: &mut Cells) -> i16 {
+        let most = f64::from(u32::from(limit) * 256);
+        let proportional = f64::from(cells.byte(ram::NKP)) * 4.0 * deviation;
+        let integral = f64::from(cells.signed(ram::N_INTEGRATOR)) + self.integral;
+        let step = f64::from(cells.byte(ram::NKI)) / 4.0 * deviation;
+        let torque = proportional + integral + step;
+        self.limited = torque.abs() >= most && (torque != 0.0 || most == 0.0);
+        let integral = if self.limited && step * torque > 0.0 {
+            integral
+        } else {
+            (integral + step).clamp(-most, most)
+        };
+        let whole = integral.floor();
+        self.integral = integral - whole;
+        cells.put_word(ram::N_INTEGRATOR, (whole as i16).cast_unsigned());
+        torque.clamp(-most, most).round() as i16
+    }
+
+    /// The motor turns, and the resolver sees it.
+    fn turn(&mut self, torque: i16, outside: Outside, plant: &mut Plant, cells: &mut Cells) {
+        let sign = if cells.byte(ram::SW_VERSION) & sw_version::REVERSED == 0 {
+            1.0
+        } else {
+            -1.0
+        };
+        let before = plant.position;
+        let current = f64::from(torque) * outside.amperes;
+        plant.step(current * sign, outside.load * sign, outside.jammed);
+        self.seen += (plant.position - before) * sign;
+        let measured = plant.speed * sign;
+        // ND21 14.6.3: the time constant is 432 us / (1 - nFilter / 128).
+        let filter = cells.byte(ram::N_FILTER).min(0x7F);
+        if filter == 0 {
+            self.filtered = measured;
+        } else {
+            self.filtered += (measured - self.filtered) * f64::from(128 - filter) / 128.0;
+            if measured == 0.0 && self.filtered.abs() < 0.01 {
+                self.filtered = 0.0;
+            }
+        }
+        let angle = self.angle().wrapping_add(cells.word(ram::D_LAGE));
+        let change = angle.wrapping_sub(self.old).cast_signed();
+        let turns = cells.word(ram::UMDRIST);
+        let position =
+            (u32::from(turns) << 16 | u32::from(self.old)).wrapping_add_signed(i32::from(change));
+        cells.put_word(ram::LAGE0, self.old);
+        cells.put_long(ram::UMDRIST, position);
+        self.old = angle;
+    }
+
+    /// The actual values in the cells.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "clamped to a word, or a quotient of one byte"
+    )]
+    fn show(&self, torque: i16, eighths: i32, outside: Outside, cells: &mut Cells) {
+        let speed = (self.filtered / f64::from(eighths)).round();
+        let speed = speed.clamp(-32_767.0, 32_767.0) as i16;
+        cells.put_word(ram::NIST, speed.cast_unsigned());
+        cells.put_word(ram::MSOLL, torque.cast_unsigned());
+        cells.set_bits(ram::STATUS, status::CURRENT_LIMIT, self.limited);
+        // 700 rpm: from there on the resolver has less than 16 bit (4.1).
+        let fast = self.filtered.abs() > 0.7 * 3_774.873_6;
+        cells.set_bits(ram::FLAGS, flags::RESOLVER, fast);
+        let emf = i32::from(speed) * i32::from(cells.byte(ram::EMK0)) >> 15;
+        cells.put(ram::EMK, emf as i8 as u8);
+        if torque == 0 {
+            for current in [ram::IASOLL, ram::IBSOLL, ram::IAIST, ram::IBIST] {
+                cells.put(current, 0);
+            }
+            return;
+        }
+        let angle = self.angle().wrapping_sub(cells.word(ram::D_RESOLVER));
+        let electrical = angle.wrapping_mul(outside.pole_pairs);
+        let third = 0x1_0000_u32 / 3;
+        let phases = [electrical, electrical.wrapping_sub(third as u16)];
+        for (angle, nominal, actual) in [
+            (phases[0], ram::IASOLL, ram::IAIST),
+            (phases[1], ram::IBSOLL, ram::IBIST),
+        ] {
+            let current = (i32::from(torque) * wave::sine(angle)) >> 22;
+            let byte = current.clamp(-128, 127) as i8 as u8;
+            cells.put(nominal, byte);
+            cells.put(actual, byte);
+        }
+    }
+
+    /// Shifts the count of the position so that the rotor's present place is `position`, and the nominal
+    /// one with it (13.1.1 step 7, 13.2.1.2).
+    pub(super) fn set_actual(&mut self, position: u32, cells: &mut Cells) {
+        let shift = position.wrapping_sub(cells.long(ram::UMDRIST));
+        let nominal = cells.long(ram::UMDRSOLL).wrapping_add(shift);
+        let [_, _, high, low] = position.to_be_bytes();
+        self.old = u16::from_be_bytes([high, low]);
+        cells.put_word(ram::D_LAGE, self.old.wrapping_sub(self.angle()));
+        cells.put_long(ram::UMDRIST, position);
+        cells.put_long(ram::UMDRSOLL, nominal);
+    }
+}

@@ -1,0 +1,437 @@
+//! The drive's program: its memory, and what it does with it every 432 us (ND21 4.1, 11.8).
+//!
+//! A cycle that changes nothing but the clocks will change nothing again until something comes from
+//! outside: then the program is quiet, and cycles are only counted.
+
+use super::eeprom_controller::EepromController;
+use super::error_state;
+use super::monitor::{self, EndSwitches};
+use super::motion::{Demand, Motion, Outside};
+use super::outputs;
+use super::plant::Plant;
+use super::positioning::{Positioning, Situation};
+use super::properties::{BusErrors, Nd21Properties, PsPosition};
+use super::referencing::{Referencing, Run};
+use super::source::Source;
+use super::world::{Mode, Shown, Stimulus, World};
+use super::{clock::Clock, memory_rules};
+use crate::cells::Cells;
+use harness_proto::nd21;
+use harness_proto::nd21::bits::{flags, flags2, hw_version, hw_version2, status, sw_version};
+use harness_proto::nd21::eeprom::LINKS;
+use harness_proto::nd21::errors::ErrorCode;
+use harness_proto::nd21::io::{GPO1, GPO2, Input, OUTPUTS};
+use harness_proto::nd21::units::{CYCLE_US, SpeedRange, torque_from_raw};
+use harness_proto::nd21::{ee, ram};
+use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::memory::Memory;
+use harness_proto::novobus::output::OutputChange;
+use harness_proto::time::{Instant, Span};
+
+/// The cycle of the regulators (4.1).
+const CYCLE: Span = Span::from_micros(CYCLE_US as u64);
+
+/// The program of an ND21 and everything that it commands.
+#[derive(Clone, Debug)]
+pub struct Program {
+    cells: Cells,
+    properties: Nd21Properties,
+    world: World,
+    plant: Plant,
+    motion: Motion,
+    source: Source,
+    positioning: Positioning,
+    referencing: Referencing,
+    eeprom_controller: EepromController,
+    clock: Clock,
+    /// Of the power-up: from there the encoder emulation counts.
+    encoder_zero: i64,
+    /// Of the last reset: the impulses of the encoder emulation and half the motor's poles (14.6.7, 14.7.1.1).
+    impulses: u16,
+    pole_pairs: u16,
+    /// Aeff of one unit of `msoll`.
+    amperes: f64,
+    now: Instant,
+    next_cycle: Instant,
+    self_test_until: Instant,
+    mode: Mode,
+    quiet: bool,
+}
+
+impl Program {
+    pub(super) fn new(cells: Cells, properties: Nd21Properties) -> Self {
+        let plant = Plant::new(properties.plant);
+        let mut program = Self {
+            cells,
+            properties,
+            world: World::default(),
+            plant,
+            motion: Motion::default(),
+            source: Source::default(),
+            positioning: Positioning::default(),
+            referencing: Referencing::default(),
+            eeprom_controller: EepromController::default(),
+            clock: Clock::default(),
+            encoder_zero: 0,
+            impulses: 0,
+            pole_pairs: 0,
+            amperes: torque_from_raw(1_000, properties.device).to_f64() / 1_000.0,
+            now: Instant::START,
+            next_cycle: Instant::START + CYCLE,
+            self_test_until: Instant::START,
+            mode: Mode::Reset,
+            quiet: false,
+        };
+        program.start();
+        // At the beginning the drives have been switched on long before.
+        program.end_self_test();
+        program.mode = program.work_out_mode();
+        program.show_flags(EndSwitches::new(&program.world, &program.cells));
+        program
+    }
+
+    /// The cells, past all rules of access.
+    #[must_use]
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// The cells, past all rules of access.
+    pub fn cells_mut(&mut self) -> &mut Cells {
+        self.quiet = false;
+        &mut self.cells
+    }
+
+    /// Lets something happen from outside the bus.
+    pub(super) fn stimulate(&mut self, stimulus: Stimulus) {
+        self.quiet = false;
+        if let Some(error) = self.world.change(stimulus) {
+            error_state::raise(error.code(), &mut self.cells);
+        }
+        monitor::show_temperatures(&self.world, &mut self.cells);
+        self.show_inputs();
+    }
+
+    /// What can be seen from outside the bus.
+    pub(super) fn shown(&self) -> Shown {
+        let high = self.cells.byte(OUTPUTS);
+        Shown {
+            gpo1: high & GPO1 != 0,
+            gpo2: high & GPO2 != 0,
+            ready: outputs::ready(self.mode),
+            analogue: outputs::analogue(&self.cells),
+            encoder: outputs::encoder(self.plant.increments() - self.encoder_zero, self.impulses),
+            display: error_state::display(&self.cells),
+            mode: self.mode,
+        }
+    }
+
+    /// Does what the drive does by itself up to `now`.
+    #[inline]
+    pub(super) fn advance(&mut self, now: Instant) {
+        self.now = now;
+        self.eeprom_controller.advance(now, &mut self.cells);
+        while self.next_cycle <= now {
+            if self.quiet {
+                let cycles = 1 + now.since(self.next_cycle).units() / CYCLE.units();
+                self.clock.pass(cycles, self.released(), &mut self.cells);
+                self.next_cycle = self.next_cycle + CYCLE * cycles;
+                return;
+            }
+            self.cycle(self.next_cycle);
+            self.next_cycle = self.next_cycle + CYCLE;
+        }
+    }
+
+    fn released(&self) -> bool {
+        matches!(self.mode, Mode::Stop | Mode::Go)
+    }
+
+    /// What the drive's program does at power-up and reset: RAM is lost; the cells with a place in the
+    /// EEPROM are loaded from there (14.2.2, 13.1.4); the self-test begins.
+    fn start(&mut self) {
+        let cells = &mut self.cells;
+        cells.start();
+        for link in LINKS {
+            for i in 0..link.size {
+                let byte = cells.eeprom()[usize::from(link.eeprom + i)];
+                cells.put(link.ram + u16::from(i), byte);
+            }
+        }
+        let word = |cells: &Cells, address: u8| {
+            let first = usize::from(address);
+            u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]])
+        };
+        self.impulses = word(cells, ee::IMPULSZAHL);
+        self.pole_pairs = u16::from(cells.eeprom()[usize::from(ee::POLE)] / 2);
+        let hardware = cells.byte(ram::HW_VERSION);
+        self.source = Source::new(hardware & hw_version::ANALOGUE != 0);
+        // 13.1.4: this speed is initialised with the maximum speed.
+        cells.put_word(ram::PS_V0, cells.word(ram::N_MAX));
+        let blocked = cells.byte(ram::SW_VERSION) & sw_version::BLOCK_AFTER_RESET != 0;
+        cells.set_bits(ram::STATUS, status::BLOCK, blocked);
+        cells.set_bits(ram::STATUS, status::RESET, true);
+        cells.put(OUTPUTS, 0);
+        self.motion.start(&self.plant, cells);
+        self.referencing.start();
+        self.eeprom_controller.start(cells);
+        self.positioning = Positioning::default();
+        monitor::show_temperatures(&self.world, cells);
+        self.self_test_until = self.now + self.properties.self_test_time;
+        self.mode = Mode::Reset;
+        self.quiet = false;
+        self.show_inputs();
+        self.show_flags(EndSwitches::new(&self.world, &self.cells));
+    }
+
+    /// The power has come back. What was being written to the EEPROM when it failed is damaged, which the
+    /// self-test finds (14.11.2).
+    pub(super) fn power_on(&mut self) {
+        let damaged = self.eeprom_controller.damage(&mut self.cells);
+        self.encoder_zero = self.plant.increments();
+        self.start();
+        if damaged {
+            error_state::raise(ErrorCode::EepromParity.code(), &mut self.cells);
+        }
+    }
+
+    /// One cycle, at `now`.
+    fn cycle(&mut self, now: Instant) {
+        self.world.turn_to(self.plant.increments());
+        self.show_inputs();
+        let switches = EndSwitches::new(&self.world, &self.cells);
+        if self.mode == Mode::Reset && now >= self.self_test_until {
+            self.end_self_test();
+        }
+        if !error_state::is_set(&self.cells)
+            && self.mode != Mode::Reset
+            && let Some(error) = monitor::error(&self.world, switches, &self.cells)
+        {
+            error_state::raise(error.code(), &mut self.cells);
+        }
+        self.mode = self.work_out_mode();
+        let demand = self.demand(switches);
+        let moved = self.motion.cycle(
+            demand,
+            Outside {
+                amperes: self.amperes,
+                load: f64::from(self.world.load) / 1_000.0,
+                jammed: self.world.jammed,
+                pole_pairs: self.pole_pairs,
+                i2t_cycles: self.cycles(self.properties.i2t_time),
+                torque_share: 256,
+            },
+            &mut self.plant,
+            &mut self.cells,
+        );
+        if moved.slipped {
+            error_state::raise(ErrorCode::Schleppfehler.code(), &mut self.cells);
+            self.mode = self.work_out_mode();
+        }
+        self.show_flags(switches);
+        outputs::show_gpo2(&self.positioning, &mut self.cells);
+        self.clock.pass(1, self.released(), &mut self.cells);
+        self.quiet = moved.at_rest
+            && !moved.slipped
+            && self.mode != Mode::Reset
+            && self.positioning.at_rest(&self.cells)
+            && self.referencing.at_rest(&self.cells)
+            && self.still_demands_nothing();
+    }
+
+    /// How many cycles a time is, at most what a word of them holds.
+    #[expect(
+        clippy::unused_self,
+        reason = "reads as the program's own measure of time"
+    )]
+    fn cycles(&self, time: Span) -> i64 {
+        i64::try_from(time.units() / CYCLE.units()).unwrap_or(i64::MAX)
+    }
+
+    /// The nominal value is 0 and stays so.
+    fn still_demands_nothing(&self) -> bool {
+        let software = self.cells.byte(ram::SW_VERSION);
+        let idle = self.mode != Mode::Go || self.cells.word(ram::NSOLL) == 0;
+        let impulses = software & sw_version::SOURCE == sw_version::SOURCE_FREQUENCY
+            && self.world.frequency > 0;
+        idle && !impulses && software & sw_version::REVERSING == 0
+    }
+
+    /// The self-test is over (11.8); the positioning controller is activated if so programmed (13.2.1).
+    fn end_self_test(&mut self) {
+        self.cells.set_bits(ram::STATUS, status::RESET, false);
+        self.mode = Mode::Block;
+        let automatic = self.cells.byte(ram::HW_VERSION2) & hw_version2::NO_AUTOMATIC_PS == 0;
+        self.positioning.start(automatic, &mut self.cells);
+    }
+
+    /// The mode: hardware and software must both release and both start (11.8).
+    fn work_out_mode(&self) -> Mode {
+        let status = self.cells.byte(ram::STATUS);
+        if self.mode == Mode::Reset && status & status::RESET != 0 {
+            Mode::Reset
+        } else if status & status::ERROR != 0 {
+            Mode::Error
+        } else if status & status::BLOCK != 0 || !self.world.inputs.is_high(Input::Gpin5) {
+            Mode::Block
+        } else if status & status::STOP != 0 || !self.world.inputs.is_high(Input::Gpin3) {
+            Mode::Stop
+        } else {
+            Mode::Go
+        }
+    }
+
+    /// What the motor is to do in this cycle.
+    fn demand(&mut self, switches: EndSwitches) -> Demand {
+        let cells = &mut self.cells;
+        let standing = cells.word(ram::NSOLLRAMPE) == 0 && cells.signed(ram::NIST).abs() < 8;
+        let range = SpeedRange::from_sw_version2(cells.byte(ram::SW_VERSION2));
+        let situation = Situation {
+            mode: self.mode,
+            standing,
+            calculation: u32::try_from(self.properties.ps_calculation_time.units() / CYCLE.units())
+                .unwrap_or(u32::MAX),
+            whole_words: self.properties.ps_position == PsPosition::WholeWords,
+            referencing: self.referencing.on(),
+            per_increment: match range {
+                SpeedRange::To8000 => 8,
+                SpeedRange::To12000 => 4,
+            },
+        };
+        let was_on = self.referencing.on();
+        let run = self.referencing.cycle(
+            situation,
+            self.world.inputs.is_high(Input::Gpin4),
+            self.motion.angle(),
+            &self.positioning,
+            cells,
+        );
+        if self.referencing.finished(was_on, cells) {
+            // 13.1.1 step 7.
+            let point = cells.long(ram::REF_UMDR0);
+            self.motion.set_actual(point, cells);
+            self.positioning.set_target(point);
+        }
+        let situation = Situation {
+            referencing: self.referencing.on(),
+            ..situation
+        };
+        let profile = match self.positioning.cycle(situation, cells) {
+            Ok(profile) => profile,
+            Err(error) => {
+                error_state::raise(error.code(), cells);
+                self.mode = Mode::Error;
+                None
+            }
+        };
+        match self.mode {
+            Mode::Reset | Mode::Error | Mode::Block => Demand::Free,
+            Mode::Stop => Demand::Speed(0),
+            Mode::Go => {
+                if let Some(speed) = profile {
+                    if switches.restrain(speed) == speed {
+                        return Demand::Exact(speed);
+                    }
+                    // An end switch stops the drive in mid-run (14.3.3).
+                    self.positioning.cancel(cells);
+                }
+                let speed = match run {
+                    Run::Speed(speed) => speed,
+                    Run::Positioning => 0,
+                    Run::Off => self.source.cycle(&self.world, false, cells),
+                };
+                Demand::Speed(switches.restrain(speed))
+            }
+        }
+    }
+
+    /// The inputs in their ports (14.7.1).
+    fn show_inputs(&mut self) {
+        let error = error_state::is_set(&self.cells)
+            .then(|| ErrorCode::from_code(self.cells.word(ram::ERRORCODE)))
+            .flatten();
+        for (address, byte, mask) in self.world.inputs.ports(error) {
+            self.cells.put_bits(address, mask, byte);
+        }
+    }
+
+    /// `Flags` (14.4.2).
+    fn show_flags(&mut self, switches: EndSwitches) {
+        let cells = &mut self.cells;
+        let hardware_stop = !self.world.inputs.is_high(Input::Gpin3);
+        let stops = cells.byte(ram::HW_VERSION) & hw_version::END_SWITCH_BLOCKS == 0;
+        let stop = hardware_stop
+            || cells.byte(ram::STATUS) & status::STOP != 0
+            || stops && (switches.positive || switches.negative);
+        let block = matches!(self.mode, Mode::Reset | Mode::Error | Mode::Block);
+        cells.set_bits(ram::FLAGS, flags::STOP, stop);
+        cells.set_bits(ram::FLAGS, flags::HARDWARE_STOP, hardware_stop);
+        cells.set_bits(ram::FLAGS, flags::BLOCK, block);
+    }
+
+    /// The bus works, again or for the first time (14.4.3).
+    #[inline]
+    pub(super) fn bus_works(&mut self) {
+        let both = flags2::OK | flags2::TIMEOUT;
+        if self.cells.byte(ram::FLAGS2) & both != flags2::OK {
+            self.cells.put_bits(ram::FLAGS2, both, flags2::OK);
+        }
+    }
+}
+
+impl Memory for Program {
+    fn read(&mut self, address: u16) -> u8 {
+        self.cells.peek(address)
+    }
+
+    /// Read-only cells and bits stay as they are (14.2.1).
+    fn write(&mut self, address: u16, data: u8) {
+        match (address, data) {
+            (ram::BUS_ADDR, _) => self.cells.put(address, data),
+            (ram::EEPROM_CONTROL, code) => {
+                self.eeprom_controller
+                    .control(self.now, code, self.properties, &mut self.cells);
+            }
+            (ram::ERRORCODE, nd21::CONFIRM_ERROR) => {
+                error_state::confirm(&mut self.cells);
+                self.quiet = false;
+            }
+            _ => {
+                let Some(byte) = memory_rules::written(address, data, &self.cells) else {
+                    return;
+                };
+                if byte != self.cells.byte(address) {
+                    self.cells.put(address, byte);
+                    self.quiet = false;
+                }
+            }
+        }
+    }
+
+    fn write_output(&mut self, change: OutputChange) {
+        self.cells.write_output(change);
+        self.quiet = false;
+    }
+
+    fn reset(&mut self) {
+        self.start();
+    }
+
+    fn bus_error(&mut self, error: BusError) {
+        let cells = &mut self.cells;
+        let time_out = error == BusError::TimeOut;
+        cells.set_bits(ram::FLAGS2, flags2::OK, false);
+        cells.set_bits(ram::FLAGS2, flags2::TIMEOUT, time_out);
+        let code = error.error_code().code();
+        if time_out || self.properties.bus_errors == BusErrors::Block {
+            error_state::raise(code, cells);
+        } else {
+            error_state::note(code, cells);
+        }
+        self.quiet = false;
+    }
+
+    fn monitors_time_out(&self) -> bool {
+        self.cells.monitors_time_out()
+    }
+}

@@ -1,0 +1,4 @@
+//! The ND21 behind its bus: what it does of its own, held against calculation by hand.
+
+mod common;
+mod motion;
