@@ -344,15 +344,15 @@ impl Motion {
         }
     }
 
-    /// Shifts the count of the position so that the rotor's present place is `position`, and the nominal
-    /// one with it (13.1.1 step 7, 13.2.1.2).
-    pub(super) fn set_actual(&mut self, position: u32, cells: &mut Cells) {
-        let shift = position.wrapping_sub(cells.long(ram::UMDRIST));
-        let nominal = cells.long(ram::UMDRSOLL).wrapping_add(shift);
-        let [_, _, high, low] = position.to_be_bytes();
-        self.old = u16::from_be_bytes([high, low]);
-        cells.put_word(ram::D_LAGE, self.old.wrapping_sub(self.angle()));
-        cells.put_long(ram::UMDRIST, position);
-        cells.put_long(ram::UMDRSOLL, nominal);
+    /// Shifts the count of the position so that the present nominal position is `position`, and the actual
+    /// one with it (13.1.1 step 7).
+    pub(super) fn set_position(&mut self, position: u32, cells: &mut Cells) {
+        let shift = position.wrapping_sub(cells.long(ram::UMDRSOLL));
+        let [_, _, high, low] = shift.to_be_bytes();
+        let turn = u16::from_be_bytes([high, low]);
+        self.old = self.old.wrapping_add(turn);
+        cells.put_word(ram::D_LAGE, cells.word(ram::D_LAGE).wrapping_add(turn));
+        cells.put_long(ram::UMDRIST, cells.long(ram::UMDRIST).wrapping_add(shift));
+        cells.put_long(ram::UMDRSOLL, position);
     }
 }

@@ -302,14 +302,13 @@ impl Program {
         let run = self.referencing.cycle(
             situation,
             self.world.inputs.is_high(Input::Gpin4),
-            self.motion.angle(),
             &self.positioning,
             cells,
         );
         if self.referencing.finished(was_on, cells) {
             // 13.1.1 step 7.
             let point = cells.long(ram::REF_UMDR0);
-            self.motion.set_actual(point, cells);
+            self.motion.set_position(point, cells);
             self.positioning.set_target(point);
         }
         let situation = Situation {

@@ -71,13 +71,11 @@ impl Referencing {
         self.step.is_none() && cells.byte(ram::FLAGS2) & flags2::REFERENCING == 0
     }
 
-    /// One cycle, before that of the positioning controller. `angle` is the rotor angle, `switch` the
-    /// reference switch at GPIN4.
+    /// One cycle, before that of the positioning controller. `switch` is the reference switch at GPIN4.
     pub(super) fn cycle(
         &mut self,
         situation: Situation,
         switch: bool,
-        angle: u16,
         positioning: &Positioning,
         cells: &mut Cells,
     ) -> Run {
@@ -106,7 +104,7 @@ impl Referencing {
             Some(Step::BrakeOff) if situation.standing => self.go_to(Step::Return, cells),
             Some(Step::Return) if switch => self.go_to(Step::BrakeLast, cells),
             Some(Step::BrakeLast) if situation.standing => {
-                Self::order(first < 0, back, angle, cells);
+                Self::order(first < 0, back, cells);
                 self.go_to(Step::Position, cells);
                 return Run::Positioning;
             }
@@ -153,7 +151,11 @@ impl Referencing {
     }
 
     /// Step 6: the way to the next place where the rotor angle is H'8000, shifted by `RefLage`.
-    fn order(negative: bool, speed: i16, angle: u16, cells: &mut Cells) {
+    fn order(negative: bool, speed: i16, cells: &mut Cells) {
+        // Where the rotor angle is to be, which is what the position shows less its shift.
+        let angle = cells
+            .word(ram::LAGESOLL)
+            .wrapping_sub(cells.word(ram::D_LAGE));
         let goal = 0x8000_u16.wrapping_add(cells.word(ram::REF_LAGE));
         let way = if negative {
             angle.wrapping_sub(goal)
