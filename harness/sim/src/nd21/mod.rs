@@ -5,6 +5,14 @@ mod drive;
 mod eeprom_controller;
 mod memory;
 mod properties;
+#[cfg_attr(
+    not(test),
+    expect(
+        dead_code,
+        reason = "the drive's cycle, which scans it, comes with the motor"
+    )
+)]
+mod scope;
 mod world;
 
 pub use drive::Nd21Drive;
