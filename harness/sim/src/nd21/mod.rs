@@ -9,6 +9,14 @@ mod properties;
     not(test),
     expect(
         dead_code,
+        reason = "the drive's cycle, which runs it, comes with the motor"
+    )
+)]
+mod s_ramp;
+#[cfg_attr(
+    not(test),
+    expect(
+        dead_code,
         reason = "the drive's cycle, which scans it, comes with the motor"
     )
 )]
