@@ -6,6 +6,7 @@ use super::world::{Shown, Stimulus};
 use crate::cells::Cells;
 use crate::device::Device;
 use harness_proto::line::Received;
+use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::properties::Properties;
@@ -39,6 +40,23 @@ impl Nd21Drive {
     /// Lets something happen to it from outside the bus.
     pub fn stimulate(&mut self, stimulus: Stimulus) {
         self.program.stimulate(stimulus);
+    }
+
+    /// Gives it the points of support of an S-ramp beside the bus, whose form for them the manual does not
+    /// give (13.5.4); false, and nothing taken, during a run.
+    pub fn load_s_ramp(&mut self, ramp: &SRamp) -> bool {
+        self.program.load_s_ramp(ramp)
+    }
+
+    /// Starts the run along the S-ramp.
+    pub fn start_s_ramp(&mut self, direction: Direction) {
+        self.program.start_s_ramp(direction);
+    }
+
+    /// The status of the run.
+    #[must_use]
+    pub fn s_ramp_status(&self) -> Status {
+        self.program.s_ramp_status()
     }
 
     /// What it shows outside the bus.

@@ -1,8 +1,9 @@
 //! The ND21 behind its bus.
 //!
 //! [`Program`] is the drive's program; every 432 us it does one cycle, room by room: `world` and `monitor`
-//! (what comes from outside and what of it is an error), `referencing`, `positioning` and `source` (what is
-//! demanded), `motion` and `plant` (what becomes of it), `outputs` and `clock` (what is shown of it). The rooms
+//! (what comes from outside and what of it is an error), `referencing`, `positioning`, `s_ramp`
+//! and `source` (what is demanded), `motion` and `plant` (what becomes of it), `outputs` and `clock` (what is shown
+//! of it); `scope` looks on every 108 us. The rooms
 //! speak through the drive's own cells, as the firmware's parts do, so that a bus master sees every step.
 
 mod clock;
@@ -19,6 +20,8 @@ mod positioning;
 mod program;
 mod properties;
 mod referencing;
+mod s_ramp;
+mod scope;
 mod source;
 mod wave;
 mod world;
@@ -27,4 +30,5 @@ pub use drive::Nd21Drive;
 pub use plant::PlantParameters;
 pub use program::Program;
 pub use properties::{BusErrors, Nd21Properties, PROPERTIES, Property, PsPosition};
+pub use s_ramp::SRampWire;
 pub use world::{Mode, Shown, Stimulus};

@@ -12,15 +12,20 @@ use super::plant::Plant;
 use super::positioning::{Positioning, Situation};
 use super::properties::{BusErrors, Nd21Properties, PsPosition};
 use super::referencing::{Referencing, Run};
+use super::s_ramp::{SRampRun, SRampWire};
+use super::scope::Scope;
 use super::source::Source;
 use super::world::{Mode, Shown, Stimulus, World};
 use super::{clock::Clock, memory_rules};
 use crate::cells::Cells;
 use harness_proto::nd21;
-use harness_proto::nd21::bits::{flags, flags2, hw_version, hw_version2, status, sw_version};
+use harness_proto::nd21::bits::{
+    flags, flags2, hw_version, hw_version2, status, sw_version, sw_version2,
+};
 use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::{GPO1, GPO2, Input, OUTPUTS};
+use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
 use harness_proto::nd21::units::{CYCLE_US, SpeedRange, torque_from_raw};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::error::BusError;
@@ -30,6 +35,8 @@ use harness_proto::time::{Instant, Span};
 
 /// The cycle of the regulators (4.1).
 const CYCLE: Span = Span::from_micros(CYCLE_US as u64);
+/// The clock of the oscilloscope (14.10.6.2): four scans to a cycle.
+const SCAN: Span = Span::from_micros(CYCLE_US as u64 / 4);
 
 /// The program of an ND21 and everything that it commands.
 #[derive(Clone, Debug)]
@@ -42,6 +49,8 @@ pub struct Program {
     source: Source,
     positioning: Positioning,
     referencing: Referencing,
+    s_ramp: SRampRun,
+    scope: Scope,
     eeprom_controller: EepromController,
     clock: Clock,
     /// Of the power-up: from there the encoder emulation counts.
@@ -53,6 +62,7 @@ pub struct Program {
     amperes: f64,
     now: Instant,
     next_cycle: Instant,
+    next_scan: Instant,
     self_test_until: Instant,
     mode: Mode,
     quiet: bool,
@@ -70,6 +80,8 @@ impl Program {
             source: Source::default(),
             positioning: Positioning::default(),
             referencing: Referencing::default(),
+            s_ramp: SRampRun::default(),
+            scope: Scope::default(),
             eeprom_controller: EepromController::default(),
             clock: Clock::default(),
             encoder_zero: 0,
@@ -78,6 +90,7 @@ impl Program {
             amperes: torque_from_raw(1_000, properties.device).to_f64() / 1_000.0,
             now: Instant::START,
             next_cycle: Instant::START + CYCLE,
+            next_scan: Instant::START,
             self_test_until: Instant::START,
             mode: Mode::Reset,
             quiet: false,
@@ -112,6 +125,22 @@ impl Program {
         self.show_inputs();
     }
 
+    /// `SK_WritePS` beside the bus, whose form for it the manual does not give (13.5.4); false during a run.
+    pub(super) fn load_s_ramp(&mut self, ramp: &SRamp) -> bool {
+        self.s_ramp.load(ramp.points().to_vec())
+    }
+
+    /// `SK_StartPS` beside the bus (13.5.4).
+    pub(super) fn start_s_ramp(&mut self, direction: Direction) {
+        self.s_ramp.start(direction, self.mode);
+        self.quiet = false;
+    }
+
+    /// `SK_StatusPS` beside the bus (13.5.4).
+    pub(super) fn s_ramp_status(&self) -> Status {
+        self.s_ramp.status()
+    }
+
     /// What can be seen from outside the bus.
     pub(super) fn shown(&self) -> Shown {
         let high = self.cells.byte(OUTPUTS);
@@ -131,16 +160,41 @@ impl Program {
     pub(super) fn advance(&mut self, now: Instant) {
         self.now = now;
         self.eeprom_controller.advance(now, &mut self.cells);
-        while self.next_cycle <= now {
-            if self.quiet {
-                let cycles = 1 + now.since(self.next_cycle).units() / CYCLE.units();
-                self.clock.pass(cycles, self.released(), &mut self.cells);
-                self.next_cycle = self.next_cycle + CYCLE * cycles;
+        loop {
+            let scanning = self.scope.running(&self.cells);
+            if scanning && self.next_scan < self.next_cycle {
+                if self.next_scan > now {
+                    return;
+                }
+                self.scope.scan(&mut self.cells);
+                self.next_scan = self.next_scan + SCAN;
+                continue;
+            }
+            if self.next_cycle > now {
                 return;
             }
-            self.cycle(self.next_cycle);
-            self.next_cycle = self.next_cycle + CYCLE;
+            let mut cycles = 1;
+            if self.quiet {
+                if !scanning {
+                    cycles += now.since(self.next_cycle).units() / CYCLE.units();
+                }
+                self.clock.pass(cycles, self.released(), &mut self.cells);
+            } else {
+                self.cycle(self.next_cycle);
+            }
+            self.next_scan = self.next_cycle;
+            self.next_cycle = self.next_cycle + CYCLE * cycles;
         }
+    }
+
+    /// The oscilloscope is started or stopped: its next scan is at the next quarter of a cycle.
+    fn align_scan(&mut self) {
+        let quarters = self.next_cycle.since(self.now).units() / SCAN.units();
+        self.next_scan = Instant::START
+            + self
+                .next_cycle
+                .since_start()
+                .saturating_sub(SCAN * quarters);
     }
 
     fn released(&self) -> bool {
@@ -174,6 +228,8 @@ impl Program {
         cells.put(OUTPUTS, 0);
         self.motion.start(&self.plant, cells);
         self.referencing.start();
+        self.s_ramp = SRampRun::default();
+        self.scope.start(cells);
         self.eeprom_controller.start(cells);
         self.positioning = Positioning::default();
         monitor::show_temperatures(&self.world, cells);
@@ -236,6 +292,7 @@ impl Program {
             && self.mode != Mode::Reset
             && self.positioning.at_rest(&self.cells)
             && self.referencing.at_rest(&self.cells)
+            && self.s_ramp.status() != Status::Doing
             && self.still_demands_nothing();
     }
 
@@ -315,14 +372,26 @@ impl Program {
             referencing: self.referencing.on(),
             ..situation
         };
-        let profile = match self.positioning.cycle(situation, cells) {
-            Ok(profile) => profile,
-            Err(error) => {
-                error_state::raise(error.code(), cells);
-                self.mode = Mode::Error;
-                None
+        let s_ramp = cells.byte(ram::SW_VERSION2) & sw_version2::NO_S_RAMP == 0;
+        let wired = s_ramp && self.properties.s_ramp_wire == SRampWire::Puffer;
+        if wired {
+            self.s_ramp.serve(self.mode, cells);
+        }
+        let mut profile = if wired {
+            None
+        } else {
+            match self.positioning.cycle(situation, cells) {
+                Ok(profile) => profile,
+                Err(error) => {
+                    error_state::raise(error.code(), cells);
+                    self.mode = Mode::Error;
+                    None
+                }
             }
         };
+        if let Some(speed) = self.s_ramp.cycle(self.mode) {
+            profile = i16::try_from(speed).ok();
+        }
         match self.mode {
             Mode::Reset | Mode::Error | Mode::Block => Demand::Free,
             Mode::Stop => Demand::Speed(0),
@@ -332,7 +401,9 @@ impl Program {
                         return Demand::Exact(speed);
                     }
                     // An end switch stops the drive in mid-run (14.3.3).
-                    self.positioning.cancel(cells);
+                    if self.s_ramp.cycle(Mode::Stop).is_none() && !wired {
+                        self.positioning.cancel(cells);
+                    }
                 }
                 let speed = match run {
                     Run::Speed(speed) => speed,
@@ -402,6 +473,9 @@ impl Memory for Program {
                 if byte != self.cells.byte(address) {
                     self.cells.put(address, byte);
                     self.quiet = false;
+                }
+                if address == ram::SCOPE_STATUS {
+                    self.align_scan();
                 }
             }
         }

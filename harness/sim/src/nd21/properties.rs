@@ -1,6 +1,7 @@
 //! What the manual does not say of the drive behind the bus, as named properties with a default each.
 
 use super::plant::PlantParameters;
+use super::s_ramp::SRampWire;
 use harness_proto::nd21::units::Device;
 use harness_proto::novobus::properties::Setting;
 use harness_proto::time::Span;
@@ -26,6 +27,8 @@ pub struct Nd21Properties {
     pub ps_position: PsPosition,
     /// `bus-errors`: which errors of the bus block the regulator.
     pub bus_errors: BusErrors,
+    /// `s-ramp-wire`: how the points of support come to the drive.
+    pub s_ramp_wire: SRampWire,
 }
 
 impl Default for Nd21Properties {
@@ -40,6 +43,7 @@ impl Default for Nd21Properties {
             i2t_time: Span::from_millis(2_000),
             ps_position: PsPosition::default(),
             bus_errors: BusErrors::default(),
+            s_ramp_wire: SRampWire::default(),
         }
     }
 }
@@ -50,7 +54,7 @@ pub enum PsPosition {
     /// `mode-bit`: 1 mode bit and 31 bits of position, as stored positions are (13.1.9).
     #[default]
     ModeBit,
-    /// `32-bit`: an absolute position of 32 bits (13.3.2.1).
+    /// `whole-word`: an absolute position of 32 bits (13.3.2.1).
     WholeWords,
 }
 
@@ -108,7 +112,7 @@ const fn words(
 }
 
 /// Every property.
-pub const PROPERTIES: [Property; 7] = [
+pub const PROPERTIES: [Property; 8] = [
     time("eeprom-read-time", "14.10.5.2", 1_000, |p, t| {
         p.eeprom_read_time = t
     }),
@@ -127,7 +131,7 @@ pub const PROPERTIES: [Property; 7] = [
         "13.3.2.1",
         &[
             ("mode-bit", |p| p.ps_position = PsPosition::ModeBit),
-            ("32-bit", |p| p.ps_position = PsPosition::WholeWords),
+            ("whole-word", |p| p.ps_position = PsPosition::WholeWords),
         ],
     ),
     words(
@@ -136,6 +140,14 @@ pub const PROPERTIES: [Property; 7] = [
         &[
             ("block", |p| p.bus_errors = BusErrors::Block),
             ("time-out-only", |p| p.bus_errors = BusErrors::TimeOutOnly),
+        ],
+    ),
+    words(
+        "s-ramp-wire",
+        "13.5.3",
+        &[
+            ("none", |p| p.s_ramp_wire = SRampWire::None),
+            ("puffer", |p| p.s_ramp_wire = SRampWire::Puffer),
         ],
     ),
 ];

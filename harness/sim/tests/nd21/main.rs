@@ -3,3 +3,5 @@
 mod common;
 mod motion;
 mod positioning;
+mod recording;
+mod s_ramp;

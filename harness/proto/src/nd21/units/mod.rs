@@ -106,6 +106,15 @@ impl SpeedRange {
         }
     }
 
+    /// How many raw units of speed are one increment a cycle (ND21 14.5.3.1).
+    #[must_use]
+    pub const fn parts(self) -> u8 {
+        match self {
+            Self::To8000 => 8,
+            Self::To12000 => 4,
+        }
+    }
+
     /// The greatest speed of the range in rpm (ND21 14.3.2).
     #[must_use]
     pub const fn limit(self) -> i32 {

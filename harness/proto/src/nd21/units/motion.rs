@@ -40,13 +40,9 @@ pub enum Switched {
 
 /// rpm per bit: an eighth of an increment a cycle, or a quarter.
 const fn speed_scale(range: SpeedRange) -> Ratio {
-    let parts = match range {
-        SpeedRange::To8000 => 8,
-        SpeedRange::To12000 => 4,
-    };
     Ratio::of(
         INCREMENT_RPM.numerator(),
-        INCREMENT_RPM.denominator() * parts,
+        INCREMENT_RPM.denominator() * range.parts() as i64,
     )
 }
 

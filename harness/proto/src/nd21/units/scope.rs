@@ -3,7 +3,7 @@
 use super::ratio::round_div;
 use super::{Ratio, Reason, UnitError};
 
-/// How many measurements a recording has (ND21 14.10.6.2).
+/// How many measurements a recording has, one byte each (ND21 14.10.6.2, E130).
 pub const SCOPE_MEASUREMENTS: u32 = 256;
 
 /// The shortest scan period in microseconds (ND21 14.10.6.2).
@@ -69,7 +69,7 @@ pub struct TriggerDelay {
 }
 
 /// The cells for a recording that begins so many us after the trigger, or before it if negative (ND21
-/// 14.10.6.4). The formula of `scope_counter` holds for both signs, as the example there shows.
+/// 14.10.6.4). The formula of `scope_counter` holds for both signs, as the example there shows (E131).
 ///
 /// # Errors
 /// Less than -255 scan periods, or more than 65279.
