@@ -34,6 +34,10 @@ impl Model {
 }
 
 /// A drive of any model.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "most drives of a scenario are plain and small, and none is moved after it is built"
+)]
 #[derive(Clone, Debug)]
 pub enum Drive {
     /// A plain drive.

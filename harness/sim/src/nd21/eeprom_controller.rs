@@ -73,6 +73,11 @@ impl EepromController {
         });
     }
 
+    /// When the command that is being done is done.
+    pub(super) fn busy_until(&self) -> Option<Instant> {
+        self.busy.map(|(_, until)| until)
+    }
+
     /// Finishes what is due.
     pub(super) fn advance(&mut self, now: Instant, memory: &mut Cells) {
         let Some((command, _)) = self.busy.filter(|(_, until)| *until <= now) else {

@@ -11,6 +11,7 @@ mod drive;
 mod eeprom_controller;
 mod error_state;
 pub mod factory;
+mod invariants;
 mod memory_rules;
 mod monitor;
 mod motion;

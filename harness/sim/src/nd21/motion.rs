@@ -12,7 +12,7 @@
 //! * i2t: above `i0` the square of the current is summed up in `i2`; the time that `imax` may last is the
 //!   property `i2t-time`. Then `i0` is the limit until half the sum is gone.
 
-use super::plant::Plant;
+use super::plant::{Plant, THOUSAND_RPM};
 use super::wave;
 use crate::cells::Cells;
 use harness_proto::nd21::bits::{flags, status, sw_version, sw_version2};
@@ -35,6 +35,23 @@ fn i2t_step(imax: u8, i0: u8) -> i64 {
     i64::from(imax).pow(2) - i64::from(i0).pow(2)
 }
 
+/// The nearest whole number, as a float and its low 32 bits. Adding 1.5 x 2^52 leaves no room behind the
+/// point: two additions where `f64::round` is a call on many processors. For |x| < 2^51.
+#[inline]
+fn round(x: f64) -> (f64, i32) {
+    const BIG: f64 = 6_755_399_441_055_744.0;
+    let sum = x + BIG;
+    let [a, b, c, d, ..] = sum.to_bits().to_le_bytes();
+    (sum - BIG, i32::from_le_bytes([a, b, c, d]))
+}
+
+/// The nearest whole number, for |x| < 2^15.
+#[inline]
+#[expect(clippy::cast_possible_truncation, reason = "clamped by every caller")]
+fn word(x: f64) -> i16 {
+    round(x).1 as i16
+}
+
 /// The regulators' inner values.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Motion {
@@ -49,6 +66,7 @@ pub(super) struct Motion {
     /// `lageist` of the cycle before.
     old: u16,
     limited: bool,
+    i2t: bool,
 }
 
 /// What the caller has to know of a cycle.
@@ -58,6 +76,8 @@ pub(super) struct Moved {
     pub(super) slipped: bool,
     /// Nothing turned and nothing changed.
     pub(super) at_rest: bool,
+    /// The bits of `Flags` that belong to the motion.
+    pub(super) flags: u8,
 }
 
 /// What stands between the drive and its motor.
@@ -72,7 +92,7 @@ pub(super) struct Outside {
     /// Half the number of poles, and where phase A is (14.6.6, 14.6.7).
     pub(super) pole_pairs: u16,
     /// How many cycles `imax` may last.
-    pub(super) i2t_cycles: i64,
+    pub(super) i2t_cycles: u32,
     /// The torque limit that the analogue input sets while stepping, of 256 (13.1.4).
     pub(super) torque_share: u16,
 }
@@ -80,33 +100,25 @@ pub(super) struct Outside {
 impl Motion {
     /// As after power-up or reset: the position is that of the resolver, less than a turn (13.1.1).
     pub(super) fn start(&mut self, plant: &Plant, cells: &mut Cells) {
-        #[expect(clippy::cast_possible_truncation, reason = "less than a turn")]
         let turn = plant.position.rem_euclid(65_536.0);
         *self = Self {
             seen: turn,
             filtered: plant.speed,
             ..Self::default()
         };
-        self.old = self.angle().wrapping_add(cells.word(ram::D_LAGE));
+        self.old = self.angle().0.wrapping_add(cells.word(ram::D_LAGE));
         cells.put_word(ram::UMDRIST, 0);
         cells.put_word(ram::LAGEIST, self.old);
         cells.put_word(ram::LAGE0, self.old);
         self.follow(cells);
     }
 
-    /// The whole increments that the resolver shows.
-    fn shown(&self) -> f64 {
-        (self.seen + 0.5).floor()
-    }
-
-    /// The rotor angle.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "an angle is what is left of the turns"
-    )]
-    pub(super) fn angle(&self) -> u16 {
-        self.shown() as i64 as u16
+    /// The rotor angle, and how far the rotor is behind it, in increments: the resolver shows whole ones.
+    #[inline]
+    fn angle(&self) -> (u16, f64) {
+        let (whole, bits) = round(self.seen);
+        let [low, high, ..] = bits.to_le_bytes();
+        (u16::from_le_bytes([low, high]), self.seen - whole)
     }
 
     /// The nominal position becomes the actual one.
@@ -116,10 +128,6 @@ impl Motion {
     }
 
     /// One cycle.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "floats are clamped before they become cells"
-    )]
     pub(super) fn cycle(
         &mut self,
         demand: Demand,
@@ -133,9 +141,17 @@ impl Motion {
             1
         };
         let before = (cells.word(ram::MSOLL), cells.word(ram::NSOLLRAMPE));
+        let regulated = cells.byte(ram::SW_VERSION) & sw_version::POSITION_REGULATOR != 0;
+        // Both positions are those of the end of the last cycle.
+        let slip = if regulated && demand != Demand::Free {
+            self.slip(cells)
+        } else {
+            0.0
+        };
+        let slipped = Self::too_far(slip, cells);
+        let demand = if slipped { Demand::Free } else { demand };
         let nominal = Self::ramp(demand, cells);
         let limit = self.limit(outside, cells);
-        let mut slipped = false;
         let torque = if demand == Demand::Free {
             self.integral = 0.0;
             self.slip = 0.0;
@@ -144,11 +160,8 @@ impl Motion {
             0
         } else {
             let mut speed = f64::from(i32::from(nominal) * eighths);
-            if cells.byte(ram::SW_VERSION) & sw_version::POSITION_REGULATOR != 0 {
-                // Both positions are those of the end of the last cycle.
-                let slip = self.slip(cells);
+            if regulated {
                 self.advance_nominal(nominal, eighths, cells);
-                slipped = Self::too_far(slip, cells);
                 let slip = if slip.abs() <= 0.5 { 0.0 } else { slip };
                 speed += f64::from(cells.byte(ram::LKP)) / 32.0 * slip;
                 speed += f64::from(cells.byte(ram::LKD)) / 16.0 * (slip - self.slip);
@@ -158,9 +171,7 @@ impl Motion {
         };
         let at_rest = plant.speed == 0.0;
         self.turn(torque, outside, plant, cells);
-        if demand == Demand::Free
-            || cells.byte(ram::SW_VERSION) & sw_version::POSITION_REGULATOR == 0
-        {
+        if demand == Demand::Free || !regulated {
             self.follow(cells);
         }
         self.show(torque, eighths, outside, cells);
@@ -172,6 +183,7 @@ impl Motion {
                 && nominal == 0
                 && before == (torque.cast_unsigned(), 0)
                 && cells.long(ram::I2) == 0,
+            flags: self.flags(),
         }
     }
 
@@ -226,7 +238,7 @@ impl Motion {
             .long(ram::UMDRSOLL)
             .wrapping_sub(cells.long(ram::UMDRIST));
         f64::from(whole.cast_signed()) + f64::from(cells.byte(ram::LAGESOLL_L)) / 256.0
-            - (self.seen - self.shown())
+            - self.angle().1
     }
 
     fn too_far(slip: f64, cells: &Cells) -> bool {
@@ -239,13 +251,11 @@ impl Motion {
         let (imax, i0) = (cells.byte(ram::IMAX), cells.byte(ram::I0));
         let current = i64::from(cells.signed(ram::MSOLL)).abs() / 256;
         let sum = i64::from(cells.long(ram::I2)) + current * current - i64::from(i0).pow(2);
-        let full = i2t_step(imax, i0) * outside.i2t_cycles;
+        let full = i2t_step(imax, i0) * i64::from(outside.i2t_cycles);
         let sum = sum.clamp(0, full.clamp(0, i64::from(u32::MAX)));
         cells.put_long(ram::I2, u32::try_from(sum).unwrap_or(u32::MAX));
-        let was = cells.byte(ram::FLAGS) & flags::I2T != 0;
-        let limited = full > 0 && (sum >= full || was && sum > full / 2);
-        cells.set_bits(ram::FLAGS, flags::I2T, limited);
-        let limit = if limited { i0.min(imax) } else { imax }.min(0x7F);
+        self.i2t = full > 0 && (sum >= full || self.i2t && sum > full / 2);
+        let limit = if self.i2t { i0.min(imax) } else { imax }.min(0x7F);
         let share = u16::from(limit) * outside.torque_share / 256;
         let limit = u8::try_from(share).unwrap_or(limit);
         cells.put(ram::MMAX, limit);
@@ -253,10 +263,6 @@ impl Motion {
     }
 
     /// The speed regulator (14.6.4).
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "clamped to the limit, at most 7F00"
-    )]
     fn regulate(&mut self, deviation: f64, limit: u8, cells: &mut Cells) -> i16 {
         let most = f64::from(u32::from(limit) * 256);
         let proportional = f64::from(cells.byte(ram::NKP)) * 4.0 * deviation;
@@ -269,10 +275,10 @@ impl Motion {
         } else {
             (integral + step).clamp(-most, most)
         };
-        let whole = integral.floor();
-        self.integral = integral - whole;
-        cells.put_word(ram::N_INTEGRATOR, (whole as i16).cast_unsigned());
-        torque.clamp(-most, most).round() as i16
+        let whole = word(integral);
+        self.integral = integral - f64::from(whole);
+        cells.put_word(ram::N_INTEGRATOR, whole.cast_unsigned());
+        word(torque.clamp(-most, most))
     }
 
     /// The motor turns, and the resolver sees it.
@@ -297,7 +303,7 @@ impl Motion {
                 self.filtered = 0.0;
             }
         }
-        let angle = self.angle().wrapping_add(cells.word(ram::D_LAGE));
+        let angle = self.angle().0.wrapping_add(cells.word(ram::D_LAGE));
         let change = angle.wrapping_sub(self.old).cast_signed();
         let turns = cells.word(ram::UMDRIST);
         let position =
@@ -307,21 +313,28 @@ impl Motion {
         self.old = angle;
     }
 
+    fn flags(&self) -> u8 {
+        // 700 rpm: from there on the resolver has less than 16 bit (4.1).
+        let fast = self.filtered.abs() > 0.7 * THOUSAND_RPM;
+        (if fast { flags::RESOLVER } else { 0 }) | if self.i2t { flags::I2T } else { 0 }
+    }
+
     /// The actual values in the cells.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "clamped to a word, or a quotient of one byte"
     )]
     fn show(&self, torque: i16, eighths: i32, outside: Outside, cells: &mut Cells) {
-        let speed = (self.filtered / f64::from(eighths)).round();
-        let speed = speed.clamp(-32_767.0, 32_767.0) as i16;
+        let speed = if eighths == 1 {
+            self.filtered
+        } else {
+            self.filtered / 2.0
+        };
+        let speed = word(speed.clamp(-32_767.0, 32_767.0));
         cells.put_word(ram::NIST, speed.cast_unsigned());
         cells.put_word(ram::MSOLL, torque.cast_unsigned());
         cells.set_bits(ram::STATUS, status::CURRENT_LIMIT, self.limited);
-        // 700 rpm: from there on the resolver has less than 16 bit (4.1).
-        let fast = self.filtered.abs() > 0.7 * 3_774.873_6;
-        cells.set_bits(ram::FLAGS, flags::RESOLVER, fast);
-        let emf = i32::from(speed) * i32::from(cells.byte(ram::EMK0)) >> 15;
+        let emf = (i32::from(speed) * i32::from(cells.byte(ram::EMK0))) >> 15;
         cells.put(ram::EMK, emf as i8 as u8);
         if torque == 0 {
             for current in [ram::IASOLL, ram::IBSOLL, ram::IAIST, ram::IBIST] {
@@ -329,7 +342,7 @@ impl Motion {
             }
             return;
         }
-        let angle = self.angle().wrapping_sub(cells.word(ram::D_RESOLVER));
+        let angle = self.angle().0.wrapping_sub(cells.word(ram::D_RESOLVER));
         let electrical = angle.wrapping_mul(outside.pole_pairs);
         let third = 0x1_0000_u32 / 3;
         let phases = [electrical, electrical.wrapping_sub(third as u16)];

@@ -32,7 +32,7 @@ impl Default for PlantParameters {
 /// rad/s2 for one raw unit of speed a cycle: 2 pi / 65536 / 8 / (432 us)^2 (ND21 14.5.4, E96).
 const RADIANS: f64 = 64.215_9;
 /// Raw units of speed at 1000 rpm (ND21 14.5.3.1).
-const THOUSAND_RPM: f64 = 3_774.873_6;
+pub(super) const THOUSAND_RPM: f64 = 3_774.873_6;
 /// No motor turns faster: 17,000 rpm.
 const FASTEST: f64 = 65_000.0;
 
@@ -82,7 +82,8 @@ impl Plant {
             if drive.abs() <= self.friction {
                 return;
             }
-            self.speed = (drive - self.friction.copysign(drive)) * self.gain;
+            let after = (drive - self.friction.copysign(drive)) * self.gain;
+            self.speed = after.clamp(-FASTEST, FASTEST);
         } else {
             let resistance = self.friction.copysign(before) + self.damping * before;
             let after = before + (drive - resistance) * self.gain;

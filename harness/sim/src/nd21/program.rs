@@ -5,6 +5,7 @@
 
 use super::eeprom_controller::EepromController;
 use super::error_state;
+use super::invariants::{self, State};
 use super::monitor::{self, EndSwitches};
 use super::motion::{Demand, Motion, Outside};
 use super::outputs;
@@ -24,7 +25,7 @@ use harness_proto::nd21::bits::{
 };
 use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::errors::ErrorCode;
-use harness_proto::nd21::io::{GPO1, GPO2, Input, OUTPUTS};
+use harness_proto::nd21::io::{GPO1, GPO2, Input, Inputs, OUTPUTS};
 use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
 use harness_proto::nd21::units::{CYCLE_US, SpeedRange, torque_from_raw};
 use harness_proto::nd21::{ee, ram};
@@ -37,6 +38,11 @@ use harness_proto::time::{Instant, Span};
 const CYCLE: Span = Span::from_micros(CYCLE_US as u64);
 /// The clock of the oscilloscope (14.10.6.2): four scans to a cycle.
 const SCAN: Span = Span::from_micros(CYCLE_US as u64 / 4);
+
+/// How many whole cycles a time is.
+fn cycles(time: Span) -> u32 {
+    u32::try_from(time.units() / CYCLE.units()).unwrap_or(u32::MAX)
+}
 
 /// The program of an ND21 and everything that it commands.
 #[derive(Clone, Debug)]
@@ -60,12 +66,19 @@ pub struct Program {
     pole_pairs: u16,
     /// Aeff of one unit of `msoll`.
     amperes: f64,
+    /// Times of the properties in cycles.
+    i2t_cycles: u32,
+    calculation_cycles: u32,
     now: Instant,
+    /// Before this nothing is to be done.
+    due: Instant,
     next_cycle: Instant,
     next_scan: Instant,
     self_test_until: Instant,
     mode: Mode,
     quiet: bool,
+    /// What the ports of the inputs were last made to show.
+    shown_inputs: Option<(Inputs, Option<ErrorCode>)>,
 }
 
 impl Program {
@@ -88,18 +101,22 @@ impl Program {
             impulses: 0,
             pole_pairs: 0,
             amperes: torque_from_raw(1_000, properties.device).to_f64() / 1_000.0,
+            i2t_cycles: cycles(properties.i2t_time),
+            calculation_cycles: cycles(properties.ps_calculation_time),
             now: Instant::START,
+            due: Instant::START,
             next_cycle: Instant::START + CYCLE,
             next_scan: Instant::START,
             self_test_until: Instant::START,
             mode: Mode::Reset,
             quiet: false,
+            shown_inputs: None,
         };
         program.start();
         // At the beginning the drives have been switched on long before.
         program.end_self_test();
         program.mode = program.work_out_mode();
-        program.show_flags(EndSwitches::new(&program.world, &program.cells));
+        program.show_flags(EndSwitches::new(&program.world, &program.cells), 0);
         program
     }
 
@@ -112,6 +129,7 @@ impl Program {
     /// The cells, past all rules of access.
     pub fn cells_mut(&mut self) -> &mut Cells {
         self.quiet = false;
+        self.shown_inputs = None;
         &mut self.cells
     }
 
@@ -159,19 +177,28 @@ impl Program {
     #[inline]
     pub(super) fn advance(&mut self, now: Instant) {
         self.now = now;
+        if self.due <= now {
+            self.catch_up(now);
+        }
+    }
+
+    fn catch_up(&mut self, now: Instant) {
         self.eeprom_controller.advance(now, &mut self.cells);
         loop {
             let scanning = self.scope.running(&self.cells);
-            if scanning && self.next_scan < self.next_cycle {
-                if self.next_scan > now {
-                    return;
-                }
-                self.scope.scan(&mut self.cells);
-                self.next_scan = self.next_scan + SCAN;
-                continue;
+            let scan_first = scanning && self.next_scan < self.next_cycle;
+            self.due = if scan_first {
+                self.next_scan
+            } else {
+                self.next_cycle
+            };
+            if self.due > now {
+                break;
             }
-            if self.next_cycle > now {
-                return;
+            if scan_first {
+                self.scope.scan(&mut self.cells);
+                self.next_scan += SCAN;
+                continue;
             }
             let mut cycles = 1;
             if self.quiet {
@@ -183,13 +210,17 @@ impl Program {
                 self.cycle(self.next_cycle);
             }
             self.next_scan = self.next_cycle;
-            self.next_cycle = self.next_cycle + CYCLE * cycles;
+            self.next_cycle += CYCLE * cycles;
+        }
+        if let Some(until) = self.eeprom_controller.busy_until() {
+            self.due = self.due.min(until);
         }
     }
 
     /// The oscilloscope is started or stopped: its next scan is at the next quarter of a cycle.
     fn align_scan(&mut self) {
         let quarters = self.next_cycle.since(self.now).units() / SCAN.units();
+        self.due = Instant::START;
         self.next_scan = Instant::START
             + self
                 .next_cycle
@@ -212,11 +243,8 @@ impl Program {
                 cells.put(link.ram + u16::from(i), byte);
             }
         }
-        let word = |cells: &Cells, address: u8| {
-            let first = usize::from(address);
-            u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]])
-        };
-        self.impulses = word(cells, ee::IMPULSZAHL);
+        let first = usize::from(ee::IMPULSZAHL);
+        self.impulses = u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]]);
         self.pole_pairs = u16::from(cells.eeprom()[usize::from(ee::POLE)] / 2);
         let hardware = cells.byte(ram::HW_VERSION);
         self.source = Source::new(hardware & hw_version::ANALOGUE != 0);
@@ -236,8 +264,9 @@ impl Program {
         self.self_test_until = self.now + self.properties.self_test_time;
         self.mode = Mode::Reset;
         self.quiet = false;
+        self.shown_inputs = None;
         self.show_inputs();
-        self.show_flags(EndSwitches::new(&self.world, &self.cells));
+        self.show_flags(EndSwitches::new(&self.world, &self.cells), 0);
     }
 
     /// The power has come back. What was being written to the EEPROM when it failed is damaged, which the
@@ -253,7 +282,9 @@ impl Program {
 
     /// One cycle, at `now`.
     fn cycle(&mut self, now: Instant) {
-        self.world.turn_to(self.plant.increments());
+        if self.world.has_cams() {
+            self.world.turn_to(self.plant.increments());
+        }
         self.show_inputs();
         let switches = EndSwitches::new(&self.world, &self.cells);
         if self.mode == Mode::Reset && now >= self.self_test_until {
@@ -274,7 +305,7 @@ impl Program {
                 load: f64::from(self.world.load) / 1_000.0,
                 jammed: self.world.jammed,
                 pole_pairs: self.pole_pairs,
-                i2t_cycles: self.cycles(self.properties.i2t_time),
+                i2t_cycles: self.i2t_cycles,
                 torque_share: 256,
             },
             &mut self.plant,
@@ -284,7 +315,7 @@ impl Program {
             error_state::raise(ErrorCode::Schleppfehler.code(), &mut self.cells);
             self.mode = self.work_out_mode();
         }
-        self.show_flags(switches);
+        self.show_flags(switches, moved.flags);
         outputs::show_gpo2(&self.positioning, &mut self.cells);
         self.clock.pass(1, self.released(), &mut self.cells);
         self.quiet = moved.at_rest
@@ -294,15 +325,18 @@ impl Program {
             && self.referencing.at_rest(&self.cells)
             && self.s_ramp.status() != Status::Doing
             && self.still_demands_nothing();
+        debug_assert_eq!(self.broken_invariant(), None);
     }
 
-    /// How many cycles a time is, at most what a word of them holds.
-    #[expect(
-        clippy::unused_self,
-        reason = "reads as the program's own measure of time"
-    )]
-    fn cycles(&self, time: Span) -> i64 {
-        i64::try_from(time.units() / CYCLE.units()).unwrap_or(i64::MAX)
+    /// The first of the [`invariants`] that does not hold.
+    fn broken_invariant(&self) -> Option<&'static str> {
+        invariants::broken(&State {
+            cells: &self.cells,
+            mode: self.mode,
+            positioning: &self.positioning,
+            speed: self.plant.speed,
+            position: self.plant.position,
+        })
     }
 
     /// The nominal value is 0 and stays so.
@@ -346,8 +380,7 @@ impl Program {
         let situation = Situation {
             mode: self.mode,
             standing,
-            calculation: u32::try_from(self.properties.ps_calculation_time.units() / CYCLE.units())
-                .unwrap_or(u32::MAX),
+            calculation: self.calculation_cycles,
             whole_words: self.properties.ps_position == PsPosition::WholeWords,
             referencing: self.referencing.on(),
             per_increment: match range {
@@ -375,6 +408,9 @@ impl Program {
         let s_ramp = cells.byte(ram::SW_VERSION2) & sw_version2::NO_S_RAMP == 0;
         let wired = s_ramp && self.properties.s_ramp_wire == SRampWire::Puffer;
         if wired {
+            if self.positioning.running() {
+                self.positioning.cancel(cells);
+            }
             self.s_ramp.serve(self.mode, cells);
         }
         let mut profile = if wired {
@@ -417,16 +453,22 @@ impl Program {
 
     /// The inputs in their ports (14.7.1).
     fn show_inputs(&mut self) {
-        let error = error_state::is_set(&self.cells)
-            .then(|| ErrorCode::from_code(self.cells.word(ram::ERRORCODE)))
-            .flatten();
+        let error = if error_state::is_set(&self.cells) {
+            ErrorCode::from_code(self.cells.word(ram::ERRORCODE))
+        } else {
+            None
+        };
+        if self.shown_inputs == Some((self.world.inputs, error)) {
+            return;
+        }
+        self.shown_inputs = Some((self.world.inputs, error));
         for (address, byte, mask) in self.world.inputs.ports(error) {
             self.cells.put_bits(address, mask, byte);
         }
     }
 
     /// `Flags` (14.4.2).
-    fn show_flags(&mut self, switches: EndSwitches) {
+    fn show_flags(&mut self, switches: EndSwitches, motion: u8) {
         let cells = &mut self.cells;
         let hardware_stop = !self.world.inputs.is_high(Input::Gpin3);
         let stops = cells.byte(ram::HW_VERSION) & hw_version::END_SWITCH_BLOCKS == 0;
@@ -434,9 +476,12 @@ impl Program {
             || cells.byte(ram::STATUS) & status::STOP != 0
             || stops && (switches.positive || switches.negative);
         let block = matches!(self.mode, Mode::Reset | Mode::Error | Mode::Block);
-        cells.set_bits(ram::FLAGS, flags::STOP, stop);
-        cells.set_bits(ram::FLAGS, flags::HARDWARE_STOP, hardware_stop);
-        cells.set_bits(ram::FLAGS, flags::BLOCK, block);
+        let bit = |set: bool, bit: u8| if set { bit } else { 0 };
+        let byte = motion
+            | bit(stop, flags::STOP)
+            | bit(hardware_stop, flags::HARDWARE_STOP)
+            | bit(block, flags::BLOCK);
+        cells.put_bits(ram::FLAGS, !flags::TIMING, byte);
     }
 
     /// The bus works, again or for the first time (14.4.3).
@@ -459,6 +504,7 @@ impl Memory for Program {
         match (address, data) {
             (ram::BUS_ADDR, _) => self.cells.put(address, data),
             (ram::EEPROM_CONTROL, code) => {
+                self.due = Instant::START;
                 self.eeprom_controller
                     .control(self.now, code, self.properties, &mut self.cells);
             }

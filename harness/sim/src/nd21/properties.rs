@@ -79,11 +79,14 @@ pub struct Property {
     values: Values,
 }
 
+/// A word and what it sets.
+type Word = (&'static str, fn(&mut Nd21Properties));
+
 /// What a property can be set to.
 #[derive(Clone, Copy, Debug)]
 enum Values {
     Time(Span, fn(&mut Nd21Properties, Span)),
-    Words(&'static [(&'static str, fn(&mut Nd21Properties))]),
+    Words(&'static [Word]),
 }
 
 const fn time(
@@ -99,11 +102,7 @@ const fn time(
     }
 }
 
-const fn words(
-    name: &'static str,
-    section: &'static str,
-    words: &'static [(&'static str, fn(&mut Nd21Properties))],
-) -> Property {
+const fn words(name: &'static str, section: &'static str, words: &'static [Word]) -> Property {
     Property {
         name,
         section,

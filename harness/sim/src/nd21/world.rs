@@ -88,6 +88,7 @@ pub(super) struct World {
     pub(super) inputs: Inputs,
     /// The cams, in order of the inputs.
     cams: [Option<(i64, i64)>; Input::ALL.len()],
+    has_cams: bool,
     /// The analogue input in mV.
     pub(super) analogue: i32,
     /// Impulses a second.
@@ -114,6 +115,7 @@ impl Default for World {
         Self {
             inputs: Inputs::default(),
             cams: [None; Input::ALL.len()],
+            has_cams: false,
             analogue: 0,
             frequency: 0,
             cooler: 250,
@@ -128,8 +130,13 @@ impl Default for World {
 }
 
 impl World {
-    /// The rotor is here: cams switch their inputs.
+    /// Some inputs depend on where the rotor is.
     #[inline]
+    pub(super) fn has_cams(&self) -> bool {
+        self.has_cams
+    }
+
+    /// The rotor is here: cams switch their inputs.
     pub(super) fn turn_to(&mut self, position: i64) {
         for (input, cam) in Input::ALL.into_iter().zip(self.cams) {
             if let Some((from, to)) = cam {
@@ -145,7 +152,10 @@ impl World {
                 self.cams[input as usize] = None;
                 self.inputs = self.inputs.with(input, high);
             }
-            Stimulus::Cam(input, from, to) => self.cams[input as usize] = Some((from, to)),
+            Stimulus::Cam(input, from, to) => {
+                self.cams[input as usize] = Some((from, to));
+                self.has_cams = true;
+            }
             Stimulus::Analogue(mv) => self.analogue = mv.clamp(-10_000, 10_000),
             Stimulus::Frequency(hz) => self.frequency = hz,
             Stimulus::Cooler(tenths) => self.cooler = tenths,

@@ -1,5 +1,6 @@
 //! The ND21 behind its bus: what it does of its own, held against calculation by hand.
 
+mod any_operations;
 mod common;
 mod motion;
 mod positioning;

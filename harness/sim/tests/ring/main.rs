@@ -2,6 +2,5 @@
 
 mod against_reference;
 mod common;
-mod nd21;
 mod recovery;
 mod single_faults;
