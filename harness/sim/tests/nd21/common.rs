@@ -38,7 +38,7 @@ impl Rig {
     }
 
     pub(crate) fn run(&mut self, span: Span) {
-        self.now = self.now + span;
+        self.now += span;
         self.drive.advance(self.now);
     }
 
