@@ -1,10 +1,13 @@
 //! What the manual does not say of the drive behind the bus, as named properties with a default each.
 
+use harness_proto::nd21::units::Device;
 use harness_proto::time::Span;
 
 /// How an ND21 behaves where the manual does not say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Nd21Properties {
+    /// The type of the device, on which the scales of the currents depend (4.2.2).
+    pub device: Device,
     /// `eeprom-read-time`: how long the EEPROM controller reads a byte.
     pub eeprom_read_time: Span,
     /// `eeprom-write-time`: how long it writes one; `ProgParam` writes 32.
@@ -14,6 +17,7 @@ pub struct Nd21Properties {
 impl Default for Nd21Properties {
     fn default() -> Self {
         Self {
+            device: Device::Nd5610,
             eeprom_read_time: Span::from_millis(1),
             eeprom_write_time: Span::from_millis(10),
         }
