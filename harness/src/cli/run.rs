@@ -96,12 +96,7 @@ pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
             .find(|(_, bus)| *bus == entry.scenario.bus);
         let bus = name.map_or("", |(name, _)| name);
         return Played {
-            outcome: Outcome {
-                verdict: Verdict::Skipped,
-                finding: None,
-                remarks: vec![format!("the bench has no bus `{bus}` yet")],
-                took: Span::ZERO,
-            },
+            outcome: Outcome::skipped(format!("the bench has no bus `{bus}` yet")),
             traces: Vec::new(),
         };
     };

@@ -1,17 +1,22 @@
 //! Step by step.
 
-use crate::link::{Capability, Link, Moment};
+use super::look::{Miss, judge};
+use super::record::{Record, Recorder};
+use crate::link::{Capability, DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{
-    MAX_CARRIED, Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow,
+    LOOK, MAX_CARRIED, Plan, PlannedAction, PlannedDriveCheck, PlannedStep, PlannedWhen,
+    PlannedWindow, Reading,
 };
 use crate::scenario::problem::Span;
+use crate::scenario::syntax::Influence;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::time::{self, Instant};
 use std::fmt::Write as _;
+use std::ops::RangeInclusive;
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
@@ -34,6 +39,22 @@ pub struct Outcome {
     pub remarks: Vec<String>,
     /// How long it took, on the line's clock.
     pub took: time::Span,
+    /// The cells that it recorded.
+    pub records: Vec<Record>,
+}
+
+impl Outcome {
+    /// A scenario that is not played, and why.
+    #[must_use]
+    pub fn skipped(remark: String) -> Self {
+        Self {
+            verdict: Verdict::Skipped,
+            finding: None,
+            remarks: vec![remark],
+            took: time::Span::ZERO,
+            records: Vec::new(),
+        }
+    }
 }
 
 /// Something that was otherwise than a step says.
@@ -88,12 +109,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         .map(|need| need.name())
         .collect();
     if !missing.is_empty() {
-        return Outcome {
-            verdict: Verdict::Skipped,
-            finding: None,
-            remarks: vec![format!("the rig has no {}", missing.join(", no "))],
-            took: time::Span::ZERO,
-        };
+        return Outcome::skipped(format!("the rig has no {}", missing.join(", no ")));
     }
     let mut runner = Runner {
         rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
@@ -104,11 +120,17 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         sent_from: link.now(),
         sent_to: link.now(),
         link,
+        plan,
         at_finding,
         strict: plan.strict,
-        full: false,
+        full: None,
+        unseen: None,
+        recorder: Recorder::default(),
     };
-    let mut result = runner.play(plan);
+    let mut result = runner.play();
+    if let (Ok(()), Some(unseen)) = (&result, runner.unseen.take()) {
+        result = Err(unseen);
+    }
     if let Err(stop) = &mut result {
         // What is under way still tells something, and nothing more is sent.
         stop.finding.in_error = runner.in_error();
@@ -131,6 +153,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         finding,
         remarks,
         took,
+        records: runner.recorder.records,
     }
 }
 
@@ -150,6 +173,13 @@ impl Stop {
                 difference: None,
                 in_error: String::new(),
             }),
+        }
+    }
+
+    fn inconclusive(span: Span, message: impl Into<String>) -> Self {
+        Self {
+            verdict: Verdict::Inconclusive,
+            ..Self::failed(span, message)
         }
     }
 
@@ -178,10 +208,14 @@ pub(super) struct RingRecord {
 
 pub(super) struct Runner<'a> {
     pub(super) link: &'a mut dyn Link,
+    pub(super) plan: &'a Plan,
     at_finding: AtFinding,
     strict: bool,
-    /// The record is full.
-    full: bool,
+    /// Why there is no room for more in what is recorded.
+    full: Option<String>,
+    /// The first check on something that the link does not show.
+    unseen: Option<Stop>,
+    pub(super) recorder: Recorder,
     pub(super) rings: Vec<RingRecord>,
     /// When the line before was done.
     line_before: Instant,
@@ -193,7 +227,11 @@ pub(super) struct Runner<'a> {
 }
 
 impl Runner<'_> {
-    fn play(&mut self, plan: &Plan) -> Result<(), Stop> {
+    fn play(&mut self) -> Result<(), Stop> {
+        let plan = self.plan;
+        for (ring, drives, influence) in plan.influences() {
+            self.influence(ring, drives, influence);
+        }
         // A fault at a byte is armed from the start, wherever its line stands: its byte is counted
         // from the start too.
         for step in &plan.steps {
@@ -207,7 +245,7 @@ impl Runner<'_> {
         for step in &plan.steps {
             let result = self.step(step);
             let result = self.room(step.span).and(result);
-            if result.is_err() && self.at_finding == AtFinding::Stop || self.full {
+            if result.is_err() && self.at_finding == AtFinding::Stop || self.full.is_some() {
                 return first.and(result);
             }
             first = first.and(result);
@@ -221,11 +259,10 @@ impl Runner<'_> {
 
     /// Whether the record has room for more.
     fn room(&self, span: Span) -> Result<(), Stop> {
-        if self.full {
-            let message = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
-            return Err(Stop::aborted(span, message));
+        match &self.full {
+            Some(why) => Err(Stop::aborted(span, why.clone())),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
@@ -269,6 +306,20 @@ impl Runner<'_> {
                 Ok(())
             }
             PlannedAction::Fault(..) | PlannedAction::Receive(..) => Ok(()),
+            PlannedAction::Influence(ring, drives, influence) => {
+                self.influence(*ring, drives.clone(), influence);
+                Ok(())
+            }
+            PlannedAction::Record(record) => {
+                self.record(record);
+                Ok(())
+            }
+            PlannedAction::Wait(time) => {
+                self.line_before = self.line_before.max(self.link.now()) + *time;
+                self.pass_until(self.line_before);
+                Ok(())
+            }
+            PlannedAction::Until(check, within) => self.until(check, *within, step.span),
             PlannedAction::Check(check) => {
                 if step.when == PlannedWhen::Now {
                     self.settle();
@@ -278,7 +329,7 @@ impl Runner<'_> {
                 self.sent = 0;
                 result
             }
-            PlannedAction::Telegram(ring, bytes, expected) => {
+            PlannedAction::Telegram(ring, bytes, expected, reading) => {
                 self.settle();
                 let asked = self.nothing_unasked(step.span);
                 if asked.is_err() && self.at_finding == AtFinding::Stop {
@@ -286,10 +337,93 @@ impl Runner<'_> {
                 }
                 self.forget(*ring);
                 self.send(*ring, bytes);
-                asked.and(self.expect(step.span, *ring, expected, None))
+                asked
+                    .and(self.expect(step.span, *ring, expected, None))
+                    .and_then(|()| self.read(*ring, expected.len(), reading.as_ref(), step.span))
             }
             PlannedAction::Recover(ring) => self.recover(*ring, step.span),
         }
+    }
+
+    fn influence(&mut self, ring: usize, drives: RangeInclusive<u8>, influence: &Influence) {
+        for drive in drives {
+            match influence {
+                Influence::Stimuli(stimuli) => {
+                    for stimulus in stimuli {
+                        self.link.stimulate(ring, drive, *stimulus);
+                    }
+                }
+                Influence::Power(on) => {
+                    let fault = if *on { DriveFault::On } else { DriveFault::Off };
+                    let fault = PlacedFault::Drive(drive, fault);
+                    self.link.inject(ring, fault, Moment::Now);
+                }
+            }
+        }
+    }
+
+    /// Lets time pass until a check holds. What was sent before goes on its way meanwhile.
+    fn until(
+        &mut self,
+        check: &PlannedDriveCheck,
+        within: time::Span,
+        span: Span,
+    ) -> Result<(), Stop> {
+        let end = self.link.now() + within;
+        loop {
+            let miss = self.look(check);
+            let now = self.link.now();
+            self.line_before = now;
+            match miss {
+                Err(Miss::Otherwise(message)) if now >= end => {
+                    let message = format!("not within {within}: {message}");
+                    return Err(Stop::failed(span, message));
+                }
+                Err(Miss::Otherwise(_)) => {
+                    self.recorder.count_look();
+                    self.pass_until(end.min(now + LOOK));
+                    // Why there is no room is said by whoever plays the step.
+                    if self.full.is_some() {
+                        return Ok(());
+                    }
+                }
+                seen => return self.judged(seen, span),
+            }
+        }
+    }
+
+    /// What a look at drives is for the verdict. What the link does not show does not end the scenario.
+    pub(super) fn judged(&mut self, seen: Result<(), Miss>, span: Span) -> Result<(), Stop> {
+        match seen {
+            Ok(()) => Ok(()),
+            Err(Miss::Otherwise(message)) => Err(Stop::failed(span, message)),
+            Err(Miss::Unseen(message)) => {
+                let first = self.unseen.take();
+                self.unseen = first.or_else(|| Some(Stop::inconclusive(span, message)));
+                Ok(())
+            }
+        }
+    }
+
+    /// The number in an answer that has just come whole.
+    fn read(
+        &self,
+        ring: usize,
+        answer: usize,
+        reading: Option<&Reading>,
+        span: Span,
+    ) -> Result<(), Stop> {
+        let Some(reading) = reading else {
+            return Ok(());
+        };
+        let record = &self.rings[ring];
+        let answer = &record.received[record.next - answer..record.next];
+        let bytes: Vec<_> = reading.bytes.iter().map(|i| answer[*i].1.byte).collect();
+        let units = self.plan.units(ring, reading.drive);
+        judge(&reading.cell, &bytes, units).map_err(|message| {
+            let prefix = if ring == 0 { "" } else { "2:" };
+            Stop::failed(span, format!("drive {prefix}{}: {message}", reading.drive))
+        })
     }
 
     fn send(&mut self, ring: usize, bytes: &[u8]) {
@@ -303,7 +437,7 @@ impl Runner<'_> {
 
     /// Lets time pass up to `until`.
     fn pass_until(&mut self, until: Instant) {
-        while self.link.now() < until && !self.full {
+        while self.link.now() < until && self.full.is_none() {
             self.wait(until);
         }
     }
@@ -317,10 +451,24 @@ impl Runner<'_> {
 
     /// Lets time pass until something happens. False where nothing will, or where the record is full.
     fn wait(&mut self, until: Instant) -> bool {
-        self.full |= self.link.carried() > MAX_CARRIED;
-        let more = !self.full && self.link.wait(until);
-        self.fetch();
-        more
+        loop {
+            if self.link.carried() > MAX_CARRIED {
+                let why = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
+                self.full = Some(why);
+            }
+            self.full = self.full.take().or_else(|| self.recorder.too_much());
+            if self.full.is_some() {
+                self.fetch();
+                return false;
+            }
+            // Time stops on its way where a cell is to be looked at.
+            let more = self.link.wait(until.min(self.recorder.next()));
+            self.note();
+            self.fetch();
+            if more || self.link.now() >= until {
+                return more;
+            }
+        }
     }
 
     fn fetch(&mut self) {
