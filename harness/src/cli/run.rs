@@ -6,6 +6,7 @@ use super::output::Output;
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
 use crate::report::mismatch::mismatch;
+use crate::report::plot::plot;
 use crate::scenario::parse::parse;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
@@ -71,7 +72,8 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         let outcome = &played.outcome;
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
-        let line = line(entry, outcome, output);
+        let mut line = line(entry, outcome, output);
+        line.push_str(&records(outcome));
         bar.suspend(|| output.result(&line))?;
         let details = details(entry, &played);
         bar.suspend(|| output.say(&details));
@@ -106,6 +108,12 @@ pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
         outcome,
         traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
     }
+}
+
+/// What a scenario recorded, indented below its line.
+fn records(outcome: &Outcome) -> String {
+    let lines = outcome.records.iter().map(plot).collect::<String>();
+    lines.lines().map(|line| format!("  {line}\n")).collect()
 }
 
 fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {

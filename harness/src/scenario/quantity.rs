@@ -257,11 +257,12 @@ pub(super) fn ahead(scanner: &Scanner<'_>) -> bool {
     let hexadecimal = letters.value.chars().all(|c| c.is_ascii_hexdigit());
     let even = (digits.value.len() + letters.value.len()) % 2 == 0;
     if apart || hexadecimal {
-        // No byte has one digit: `5 A` and `95C` are numbers, `5A` and `5AB0` are bytes.
-        return known && ends && (apart || !even);
+        // No byte has one digit: `5 A` and `95C` are numbers, `5A` and `5AB0` are bytes. Nobody writes the
+        // bytes AE FF as `Aeff`.
+        return known && ends && (apart || !even || letters.value.len() > 1);
     }
-    // `0x88` is a mistake of another kind.
-    ends || letters.value.contains('/')
+    // `xx` is any byte, and `0x88` a mistake of another kind.
+    !letters.value.starts_with(['x', 'X']) && (ends || letters.value.contains('/'))
 }
 
 /// A value such as `5A`, that a person can mean as a number with a unit and the program must read as

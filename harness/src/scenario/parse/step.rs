@@ -85,24 +85,18 @@ fn word_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
     let here = scanner.here();
     let mut ahead = scanner.clone();
     let word = ahead.word().map_or("", |word| word.value);
-    let step: Option<fn(&mut Scanner<'_>) -> Result<Action, Problem>> = match word {
-        "until" => Some(until),
-        "wait" => Some(|scanner| Ok(Action::Wait(times::duration(scanner)?))),
-        "record" => Some(|scanner| Ok(Action::Record(record(scanner)?))),
-        _ => None,
-    };
-    if drive::WORDS.contains(&word) {
-        let (drives, line) = drive::line(&mut ahead)?;
-        *scanner = ahead;
-        return drive_action(drives, line, scanner.since(here));
-    }
-    match step {
-        Some(step) => {
-            *scanner = ahead;
-            step(scanner)
+    let action = match word {
+        "until" => until(&mut ahead)?,
+        "wait" => Action::Wait(times::duration(&mut ahead)?),
+        "record" => Action::Record(record(&mut ahead)?),
+        word if drive::WORDS.contains(&word) => {
+            let (drives, line) = drive::line(&mut ahead)?;
+            drive_action(drives, line, ahead.since(here))?
         }
-        None => job_action(scanner),
-    }
+        _ => return job_action(scanner),
+    };
+    *scanner = ahead;
+    Ok(action)
 }
 
 /// A line that begins with `drive`, as a step.

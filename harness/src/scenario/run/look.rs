@@ -1,6 +1,7 @@
 //! What can be seen of drives, beside what must hold.
 
-use super::player::{Runner, Shown as Byte, matches};
+use super::bytes::{Shown as Byte, matches};
+use super::player::Runner;
 use crate::link::{Mode, Shown};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{CellTest, PlannedCell, PlannedCondition, PlannedDriveCheck, number};

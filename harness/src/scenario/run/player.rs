@@ -1,22 +1,17 @@
 //! Step by step.
 
-use super::look::{Miss, judge};
+use super::bytes::{Shown, matches, resolve, show};
 use super::record::{Record, Recorder};
-use crate::link::{Capability, DriveFault, Link, Moment, PlacedFault};
+use crate::link::{Capability, Link, Moment};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{
-    LOOK, MAX_CARRIED, Plan, PlannedAction, PlannedDriveCheck, PlannedStep, PlannedWhen,
-    PlannedWindow, Reading,
+    MAX_CARRIED, Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow,
 };
 use crate::scenario::problem::Span;
-use crate::scenario::syntax::Influence;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
-use harness_proto::novobus::checksum::Checksum;
 use harness_proto::time::{self, Instant};
-use std::fmt::Write as _;
-use std::ops::RangeInclusive;
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
@@ -176,7 +171,7 @@ impl Stop {
         }
     }
 
-    fn inconclusive(span: Span, message: impl Into<String>) -> Self {
+    pub(super) fn inconclusive(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Inconclusive,
             ..Self::failed(span, message)
@@ -201,7 +196,7 @@ impl Stop {
 pub(super) struct RingRecord {
     pub(super) received: Vec<(Instant, Received)>,
     /// The first byte that no line has asked for yet.
-    next: usize,
+    pub(super) next: usize,
     /// The first byte behind the last check sequence.
     pub(super) since_recovery: usize,
 }
@@ -212,13 +207,13 @@ pub(super) struct Runner<'a> {
     at_finding: AtFinding,
     strict: bool,
     /// Why there is no room for more in what is recorded.
-    full: Option<String>,
+    pub(super) full: Option<String>,
     /// The first check on something that the link does not show.
-    unseen: Option<Stop>,
+    pub(super) unseen: Option<Stop>,
     pub(super) recorder: Recorder,
     pub(super) rings: Vec<RingRecord>,
     /// When the line before was done.
-    line_before: Instant,
+    pub(super) line_before: Instant,
     deadline: time::Span,
     pub(super) corrected: u64,
     pub(super) sent: u64,
@@ -345,87 +340,6 @@ impl Runner<'_> {
         }
     }
 
-    fn influence(&mut self, ring: usize, drives: RangeInclusive<u8>, influence: &Influence) {
-        for drive in drives {
-            match influence {
-                Influence::Stimuli(stimuli) => {
-                    for stimulus in stimuli {
-                        self.link.stimulate(ring, drive, *stimulus);
-                    }
-                }
-                Influence::Power(on) => {
-                    let fault = if *on { DriveFault::On } else { DriveFault::Off };
-                    let fault = PlacedFault::Drive(drive, fault);
-                    self.link.inject(ring, fault, Moment::Now);
-                }
-            }
-        }
-    }
-
-    /// Lets time pass until a check holds. What was sent before goes on its way meanwhile.
-    fn until(
-        &mut self,
-        check: &PlannedDriveCheck,
-        within: time::Span,
-        span: Span,
-    ) -> Result<(), Stop> {
-        let end = self.link.now() + within;
-        loop {
-            let miss = self.look(check);
-            let now = self.link.now();
-            self.line_before = now;
-            match miss {
-                Err(Miss::Otherwise(message)) if now >= end => {
-                    let message = format!("not within {within}: {message}");
-                    return Err(Stop::failed(span, message));
-                }
-                Err(Miss::Otherwise(_)) => {
-                    self.recorder.count_look();
-                    self.pass_until(end.min(now + LOOK));
-                    // Why there is no room is said by whoever plays the step.
-                    if self.full.is_some() {
-                        return Ok(());
-                    }
-                }
-                seen => return self.judged(seen, span),
-            }
-        }
-    }
-
-    /// What a look at drives is for the verdict. What the link does not show does not end the scenario.
-    pub(super) fn judged(&mut self, seen: Result<(), Miss>, span: Span) -> Result<(), Stop> {
-        match seen {
-            Ok(()) => Ok(()),
-            Err(Miss::Otherwise(message)) => Err(Stop::failed(span, message)),
-            Err(Miss::Unseen(message)) => {
-                let first = self.unseen.take();
-                self.unseen = first.or_else(|| Some(Stop::inconclusive(span, message)));
-                Ok(())
-            }
-        }
-    }
-
-    /// The number in an answer that has just come whole.
-    fn read(
-        &self,
-        ring: usize,
-        answer: usize,
-        reading: Option<&Reading>,
-        span: Span,
-    ) -> Result<(), Stop> {
-        let Some(reading) = reading else {
-            return Ok(());
-        };
-        let record = &self.rings[ring];
-        let answer = &record.received[record.next - answer..record.next];
-        let bytes: Vec<_> = reading.bytes.iter().map(|i| answer[*i].1.byte).collect();
-        let units = self.plan.units(ring, reading.drive);
-        judge(&reading.cell, &bytes, units).map_err(|message| {
-            let prefix = if ring == 0 { "" } else { "2:" };
-            Stop::failed(span, format!("drive {prefix}{}: {message}", reading.drive))
-        })
-    }
-
     fn send(&mut self, ring: usize, bytes: &[u8]) {
         if self.sent == 0 {
             self.sent_from = self.link.now().max(self.sent_to);
@@ -436,7 +350,7 @@ impl Runner<'_> {
     }
 
     /// Lets time pass up to `until`.
-    fn pass_until(&mut self, until: Instant) {
+    pub(super) fn pass_until(&mut self, until: Instant) {
         while self.link.now() < until && self.full.is_none() {
             self.wait(until);
         }
@@ -667,54 +581,6 @@ fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
             .iter()
             .zip(SEQUENCE)
             .all(|((_, byte), wanted)| byte.is(wanted))
-}
-
-pub(super) fn matches(expected: Expected, received: Received) -> bool {
-    match expected {
-        Expected::Byte(byte) => received.is(byte),
-        Expected::Any => received.error.is_none(),
-        // Resolved before it is compared.
-        Expected::MinusChecksum(_) => false,
-    }
-}
-
-/// A checking byte as the byte that it must be, by what was received before it.
-fn resolve(expected: Expected, before: &[(Instant, Received)]) -> Expected {
-    match expected {
-        Expected::MinusChecksum(over) => {
-            let from = before.len().saturating_sub(usize::from(over));
-            let sum = before[from..]
-                .iter()
-                .fold(Checksum::EMPTY, |sum, (_, byte)| sum.with(byte.byte));
-            Expected::Byte(sum.minus())
-        }
-        known => known,
-    }
-}
-
-/// A received byte as reports show it: `88`, or `12 (parity)`.
-#[must_use]
-pub fn show(received: Received) -> String {
-    let mut text = format!("{:02X}", received.byte);
-    if let Some(error) = received.error {
-        // Writing to a String cannot fail.
-        let _infallible = write!(text, " ({error})");
-    }
-    text
-}
-
-/// An expected byte as reports show it.
-#[derive(Clone, Copy)]
-pub struct Shown(pub Expected);
-
-impl std::fmt::Display for Shown {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.0 {
-            Expected::Byte(byte) => write!(f, "{byte:02X}"),
-            Expected::Any => f.write_str("xx"),
-            Expected::MinusChecksum(_) => f.write_str("-checksum"),
-        }
-    }
 }
 
 /// What a plan needs that a rig may lack, in words.

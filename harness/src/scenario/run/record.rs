@@ -42,7 +42,9 @@ pub struct Sample {
 }
 
 impl Sample {
-    fn new(at: Instant, found: &[u8]) -> Self {
+    /// The first four of these bytes at a time; no record has more.
+    #[must_use]
+    pub fn new(at: Instant, found: &[u8]) -> Self {
         let mut bytes = [0; 4];
         for (byte, found) in bytes.iter_mut().zip(found) {
             *byte = *found;
