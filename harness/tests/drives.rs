@@ -84,7 +84,7 @@ fn stimuli_that_cannot_be_are_refused() {
         "`A` does not fit",
         None,
     );
-    refused(&lines("drive 0 analogue 5"), "", "a unit such as rpm", None);
+    refused(&lines("drive 0 analogue 5"), "", "a unit (V or mV)", None);
     refused(
         &lines("drive 0 frequency 2MHz"),
         "2MHz",

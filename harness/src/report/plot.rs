@@ -10,7 +10,7 @@
 //!              0.000 ms    110.000 ms
 //! ```
 
-use crate::scenario::quantity::trimmed;
+use crate::scenario::quantity::figures;
 use crate::scenario::run::{Record, Sample};
 use harness_proto::nd21::bits;
 use std::fmt::Write as _;
@@ -23,9 +23,6 @@ const ROWS: usize = 17;
 
 /// Changes shown at most; of a longer table the middle is left out.
 const CHANGES: usize = 60;
-
-/// Digits behind the point of a label at most; one increment is 0.000015 turns.
-const DECIMALS: usize = 5;
 
 /// What was recorded, as text; nothing where nothing was seen.
 #[must_use]
@@ -65,7 +62,7 @@ fn curve(record: &Record) -> String {
     }
     let flat = least >= most;
     let rows = if flat { 1 } else { ROWS };
-    let label = |value: f64| format!("{} {}", trimmed(value, DECIMALS), record.unit());
+    let label = |value: f64| format!("{} {}", figures(value, record.unit()), record.unit());
     let labels = [label(most), label(least)].map(|label| label.trim_end().to_owned());
     let wide = labels.iter().map(|label| label.chars().count()).max();
     let margin = wide.unwrap_or(0) + 2;
@@ -131,7 +128,7 @@ fn table(record: &Record) -> String {
         let mut line = format!("{:>16}  {:>8}", sample.at.to_string(), Record::raw(sample));
         if record.scale.is_some() {
             let value = record.value(sample);
-            let value = value.map_or("-".to_owned(), |value| trimmed(value, DECIMALS));
+            let value = value.map_or("-".to_owned(), |value| figures(value, record.unit()));
             let _infallible = write!(line, "  {value} {}", record.unit());
         }
         if let [byte] = sample.bytes() {

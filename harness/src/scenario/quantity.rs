@@ -107,12 +107,12 @@ impl Dimension {
         })
     }
 
-    /// The names of its units, for a message: "rpm/s or rad/s2".
-    #[must_use]
-    pub fn names(self) -> String {
+    /// The names of its units, for a message: "rpm/s or rad/s2". Other spellings are not named.
+    fn names(self) -> String {
+        let spelling = |unit: &Unit| unit.name == "turn" || !unit.name.is_ascii();
         let names: Vec<_> = UNITS
             .iter()
-            .filter(|unit| unit.dimension == self)
+            .filter(|unit| unit.dimension == self && !spelling(unit))
             .map(|unit| unit.name)
             .collect();
         names.join(" or ")
@@ -125,20 +125,23 @@ impl Unit {
     pub fn show(&self, value: f64) -> String {
         #[expect(clippy::cast_precision_loss, reason = "a table of small numbers")]
         let own = value * self.factor.1 as f64 / self.factor.0 as f64;
-        let turns = self.dimension == Dimension::Angle && self.factor == (1, 1);
-        let decimals = if turns {
-            TURN_DECIMALS
-        } else {
-            let before = |limit: f64| usize::from(own.abs() >= limit);
-            DIGITS - 1 - [1e1, 1e2, 1e3, 1e4].map(before).iter().sum::<usize>()
-        };
-        format!("{} {}", trimmed(own, decimals), self.name)
+        format!("{} {}", figures(own, self.name), self.name)
     }
 }
 
-/// A number with at most so many decimals, and no zeros behind the last that says something.
+/// A number in this unit with as many digits as say something.
 #[must_use]
-pub fn trimmed(value: f64, decimals: usize) -> String {
+pub fn figures(value: f64, unit: &str) -> String {
+    let before = |limit: f64| usize::from(value.abs() >= limit);
+    let decimals = match unit {
+        "turn" | "turns" => TURN_DECIMALS,
+        _ => DIGITS - 1 - [1e1, 1e2, 1e3, 1e4].map(before).iter().sum::<usize>(),
+    };
+    trimmed(value, decimals)
+}
+
+/// A number with at most so many decimals, and no zeros behind the last that says something.
+fn trimmed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let short = if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.')
@@ -167,10 +170,7 @@ impl fmt::Display for Quantity {
 
 impl Quantity {
     /// The same, if it measures this.
-    ///
-    /// # Errors
-    /// Its unit is of another kind.
-    pub fn of(self, dimension: Dimension) -> Result<Self, Problem> {
+    fn of(self, dimension: Dimension) -> Result<Self, Problem> {
         if self.unit.dimension == dimension {
             return Ok(self);
         }
@@ -229,7 +229,7 @@ impl Tolerance {
 impl fmt::Display for Tolerance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Percent(percent) => write!(f, "+-{} %", trimmed(percent.to_f64(), 4)),
+            Self::Percent(percent) => write!(f, "+-{} %", figures(percent.to_f64(), "%")),
             Self::Absolute(quantity) => write!(f, "+-{quantity}"),
         }
     }
@@ -291,8 +291,11 @@ fn is_unit(c: char) -> bool {
     c.is_alphabetic() || c == '/' || c == '°' || c == '²'
 }
 
-/// Reads a number with its unit, which may be any of them.
-pub(super) fn quantity(scanner: &mut Scanner<'_>) -> Result<Quantity, Problem> {
+/// Reads a number with its unit; where it must measure something, only a unit of that will do.
+pub(super) fn quantity(
+    scanner: &mut Scanner<'_>,
+    dimension: Option<Dimension>,
+) -> Result<Quantity, Problem> {
     let start = scanner.here();
     let (digits, decimals) = number(scanner)?;
     let mut known: Vec<_> = UNITS.iter().collect();
@@ -313,12 +316,16 @@ pub(super) fn quantity(scanner: &mut Scanner<'_>) -> Result<Quantity, Problem> {
     let Some(unit) = found else {
         let word = ahead.take_while(|c| is_unit(c) || c.is_ascii_digit());
         let names: Vec<_> = UNITS.iter().map(|unit| unit.name).collect();
+        let expected = match dimension {
+            Some(dimension) => format!("a unit ({})", dimension.names()),
+            None => "a unit such as rpm".to_owned(),
+        };
         return Err(match word {
-            None => scanner.unexpected("a unit such as rpm"),
+            None => scanner.unexpected(&expected),
             Some(word) => Problem::new(
                 word.span,
                 format!("`{}` is no unit", word.value),
-                "a unit such as rpm expected here",
+                format!("{expected} expected here"),
             )
             .did_you_mean(word.value, &names),
         });
@@ -328,7 +335,11 @@ pub(super) fn quantity(scanner: &mut Scanner<'_>) -> Result<Quantity, Problem> {
     let (n, d) = unit.factor;
     let value = ratio(i128::from(digits) * n, d * 10_i128.pow(decimals))
         .ok_or_else(|| too_many_digits(span))?;
-    Ok(Quantity { value, unit, span })
+    let quantity = Quantity { value, unit, span };
+    match dimension {
+        Some(dimension) => quantity.of(dimension),
+        None => Ok(quantity),
+    }
 }
 
 /// Reads `+-` and how far a value may be off, if that comes next.
@@ -351,7 +362,7 @@ pub(super) fn tolerance(
         let percent = percent.ok_or_else(|| too_many_digits(scanner.since(start)))?;
         return Ok(Some(Tolerance::Percent(percent)));
     }
-    let quantity = quantity(scanner)?.of(dimension)?;
+    let quantity = quantity(scanner, Some(dimension))?;
     Ok(Some(Tolerance::Absolute(quantity)))
 }
 

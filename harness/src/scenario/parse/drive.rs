@@ -141,9 +141,7 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<DriveCheck, Problem> {
 fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
     let one = |stimulus| Ok(Line::Influence(Influence::Stimuli(vec![stimulus])));
     let number = |scanner: &mut Scanner<'_>, dimension, parts, least, most| {
-        quantity::quantity(scanner)?
-            .of(dimension)?
-            .whole(parts, least, most)
+        quantity::quantity(scanner, Some(dimension))?.whole(parts, least, most)
     };
     match word {
         Word::Memory => {
@@ -199,7 +197,7 @@ fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
 
 /// One of two words; true for the second.
 fn either(scanner: &mut Scanner<'_>, [no, yes]: [&str; 2]) -> Result<bool, Problem> {
-    named(scanner, &[(no, false), (yes, true)], "one of two words")
+    named(scanner, &[(no, false), (yes, true)], "its state")
 }
 
 fn device(scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
@@ -323,7 +321,7 @@ fn held_condition(held: Held, scanner: &mut Scanner<'_>) -> Result<Condition, Pr
         Held::Ready => Showing::Ready(either(scanner, ["open", "closed"])?),
         Held::AnalogueOutput => {
             equals(scanner)?;
-            let voltage = quantity::quantity(scanner)?.of(Dimension::Voltage)?;
+            let voltage = quantity::quantity(scanner, Some(Dimension::Voltage))?;
             let millivolts = voltage.whole(1_000, -20, 20)?;
             let tolerance = quantity::tolerance(scanner, Dimension::Voltage)?;
             Showing::Analogue(millivolts, voltage, tolerance)

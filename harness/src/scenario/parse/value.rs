@@ -180,9 +180,9 @@ fn value(scanner: &mut Scanner<'_>, place: &Place) -> Result<Written, Problem> {
     if !quantity::ahead(scanner) {
         return Ok(Written::Bytes(bytes(scanner)?));
     }
-    let quantity = quantity::quantity(scanner)?;
+    let quantity = quantity::quantity(scanner, dimension)?;
     match dimension {
-        Some(dimension) => Ok(Written::Number(quantity.of(dimension)?)),
+        Some(_) => Ok(Written::Number(quantity)),
         None => Err(Problem::new(
             quantity.span,
             match place.cell {
