@@ -285,6 +285,77 @@ fn two_rings_run_on_one_clock() {
     assert!(stderr(&output).contains("this fault never happened: 2:1->0 byte 20: drop"));
 }
 
+const RECORDED: &str = "title recorded\nring 2\ndrive 0..last model nd21\nrecord drive 0 nsoll every 1ms\n\
+    record drive 0 ps_status changes\nwrite-word 0 nsoll = 1500rpm\nwrite-byte 0 ps_status = 08\nwait 20ms\n";
+
+#[test]
+fn what_was_recorded_is_shown_below_the_scenario() {
+    let path = file("recorded", "a.scn", RECORDED);
+    let output = drivebench(&["run", text(&path)]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let shown = stdout(&output);
+    for part in [
+        "passed a ",
+        "  drive 0 nsoll, every 1.000 ms\n",
+        "  1499.9 rpm |   *****",
+        "       0 rpm |***\n",
+        "  drive 0 ps_status, changes\n",
+        "08  acceleration and constant drive\n",
+        "1 passed, 0 failed",
+    ] {
+        assert!(shown.contains(part), "{part}\n{shown}");
+    }
+    assert!(shown.is_ascii(), "{shown}");
+    assert_eq!(
+        stdout(&drivebench(&["run", text(&path)])),
+        shown,
+        "twice the same"
+    );
+    let table = drivebench(&["trace", text(&path)]);
+    assert!(stdout(&table).contains("\ndrive 0 nsoll, every 1.000 ms\n"));
+    let output = drivebench(&["trace", text(&path), "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(json["schema"], 1);
+    let records = json["records"].as_array().expect("records");
+    assert_eq!(records.len(), 2);
+    assert_eq!(
+        records[1]["samples"][0],
+        serde_json::json!({"t_ns": 0, "raw": "00", "value": 0.0})
+    );
+}
+
+#[test]
+fn a_cell_that_is_otherwise_is_shown_in_its_unit() {
+    let path = file(
+        "otherwise",
+        "a.scn",
+        "title a\nring 4\ndrive 3 memory nist = 1498.3rpm\nread-word 3 nist = 1500rpm +-1%\n\
+         drive 3 nist = 1500rpm +-0.1%\n",
+    );
+    let output = drivebench(&["run", text(&path)]);
+    assert_eq!(code(&output), 1);
+    let message = "a.scn:5:1: drive 3: nist is 1498.3 rpm (1618), expected 1500 rpm +-0.1 %\n";
+    assert!(stderr(&output).contains(message), "{}", stderr(&output));
+    let path = file(
+        "otherwise",
+        "b.scn",
+        "title b\nring 1\ndrive 0 rail 850V\n> 80\n",
+    );
+    let output = drivebench(&["run", text(&path)]);
+    assert_eq!(code(&output), 2);
+    for part in [
+        "b.scn:3:1",
+        "drive 0 has no plugs",
+        "add `drive 0 model nd21`",
+    ] {
+        assert!(
+            stderr(&output).contains(part),
+            "{part}\n{}",
+            stderr(&output)
+        );
+    }
+}
+
 #[test]
 fn help_has_examples_and_exit_codes() {
     let output = drivebench(&["--help"]);

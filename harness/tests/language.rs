@@ -12,6 +12,9 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 use std::path::Path;
 
+mod drives;
+mod records;
+
 fn entry(text: &str) -> Result<Entry, Vec<Problem>> {
     let source =
         Source::from_bytes("test.scn".to_owned(), text.as_bytes().to_vec()).expect("a text");
@@ -24,7 +27,7 @@ fn play(text: &str) -> (Outcome, String) {
     let mut link = simulated(&plan);
     let outcome = run(&plan, &mut link);
     let mut trace = Vec::new();
-    json::write(&[link.trace(0)], &mut trace).expect("JSON");
+    json::write(&[link.trace(0)], &outcome.records, &mut trace).expect("JSON");
     (outcome, String::from_utf8(trace).expect("text"))
 }
 
@@ -506,6 +509,11 @@ fn any_text_is_read_or_refused() {
         "\\? (located|drive|error|within|sent|corrected) [0-9a-zA-F .=]{0,24}\n",
         "[+@][0-9.]{1,6}(us|ms|s|bytes|x)?(\\.\\.[0-9]{1,4}ms)? [><!?] ?[0-9A-F]{2}\n",
         "(read-byte|write-word|go|recover|exchange|and) [0-9a-zA-F =]{0,16}\n",
+        "drive [0-2](\\.\\.last)? (model nd21|type 56[012][05]|input GPIN[0-9] (high|low)|(load|rail|cooler) -?[0-9]{1,3}[ACV])\n",
+        "([?] |until )?drive [0-3] (nist|imax|Flags2|nRampe[+]|position) [&=<>]{1,2} ?[0-9A-F.]{1,5} ?(rpm|A|turns|C)?( [+]-1%)?( within [0-9]ms)?\n",
+        "(drive 0 (memory|eeprom)|write-word 0|read-word 0) (nMax|EE_pole|nsoll|imax|i0) = [0-9.]{1,4}(rpm|A|Aeff)?\n",
+        "record drive [0-3] (nist|position|ps_status|stack) (every [0-9]ms|changes|off)\n",
+        "(wait [0-9]{1,2}ms|! drive 0: error 01[0-5][0-4])\n",
         "\\PC{0,20}\n",
     ];
     let texts = prop::collection::vec(piece, 0..8);

@@ -5,6 +5,7 @@
 
 use harness::library::Entry;
 use harness::link::Link;
+use harness::report::plot::plots;
 use harness::report::table::{LEGEND, Part, table, wires};
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
@@ -42,7 +43,7 @@ fn snapshot(path: &Path) -> datatest_stable::Result<()> {
         };
         write!(page, "\n{}{}", table(&trace, &part), wires(&trace, 20))?;
     }
-    write!(page, "\n{LEGEND}")?;
+    write!(page, "\n{LEGEND}{}", plots(&outcome.records))?;
 
     let folder = path
         .parent()

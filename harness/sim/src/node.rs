@@ -40,6 +40,10 @@ impl<D: Device> Node<D> {
         &mut self.device
     }
 
+    pub(crate) fn powered(&self) -> bool {
+        self.powered
+    }
+
     pub(crate) fn marks(&self) -> &[Mark] {
         &self.marks
     }

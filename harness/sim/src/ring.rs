@@ -86,6 +86,13 @@ impl<D: Device> Ring<D> {
         Some(self.nodes.get_mut(place)?.device_mut())
     }
 
+    /// Whether drive `k` has power.
+    #[must_use]
+    pub fn powered(&self, k: u8) -> bool {
+        let node = self.place(k).and_then(|place| self.nodes.get(place));
+        node.is_some_and(Node::powered)
+    }
+
     fn place(&self, k: u8) -> Option<usize> {
         self.size.first().checked_sub(k).map(usize::from)
     }

@@ -6,6 +6,7 @@ use super::output::Output;
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
 use crate::report::mismatch::mismatch;
+use crate::report::plot::plot;
 use crate::scenario::parse::parse;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
@@ -71,7 +72,8 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         let outcome = &played.outcome;
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
-        let line = line(entry, outcome, output);
+        let mut line = line(entry, outcome, output);
+        line.push_str(&records(outcome));
         bar.suspend(|| output.result(&line))?;
         let details = details(entry, &played);
         bar.suspend(|| output.say(&details));
@@ -96,12 +98,7 @@ pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
             .find(|(_, bus)| *bus == entry.scenario.bus);
         let bus = name.map_or("", |(name, _)| name);
         return Played {
-            outcome: Outcome {
-                verdict: Verdict::Skipped,
-                finding: None,
-                remarks: vec![format!("the bench has no bus `{bus}` yet")],
-                took: Span::ZERO,
-            },
+            outcome: Outcome::skipped(format!("the bench has no bus `{bus}` yet")),
             traces: Vec::new(),
         };
     };
@@ -111,6 +108,12 @@ pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
         outcome,
         traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
     }
+}
+
+/// What a scenario recorded, indented below its line.
+fn records(outcome: &Outcome) -> String {
+    let lines = outcome.records.iter().map(plot).collect::<String>();
+    lines.lines().map(|line| format!("  {line}\n")).collect()
 }
 
 fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {

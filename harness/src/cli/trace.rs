@@ -6,6 +6,7 @@ use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
 use crate::library::{Entry, sources};
 use crate::report::json;
+use crate::report::plot::plots;
 use crate::report::table::{LEGEND, Part, table, wires};
 use crate::scenario::run::AtFinding;
 use harness_sim::trace::Trace;
@@ -37,15 +38,17 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
         }
     };
     let played = play_entry(&entry, AtFinding::GoOn);
+    let records = &played.outcome.records;
     match arguments.format {
         Format::Json => {
             let out = BufWriter::new(std::io::stdout().lock());
-            unless_closed(json::write(&played.traces, out))?;
+            unless_closed(json::write(&played.traces, records, out))?;
         }
         Format::Table => {
             for trace in &played.traces {
                 output.result(&render(trace, arguments))?;
             }
+            output.result(&plots(records))?;
         }
     }
     output.say(&details(&entry, &played));

@@ -5,12 +5,13 @@
 
 mod sim;
 
+pub use harness_sim::fault::{DriveFault, LinkFault};
+pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use sim::SimulatedLink;
 
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
-use harness_sim::fault::{DriveFault, LinkFault};
 use harness_sim::trace::Trace;
 
 /// What a rig can be asked to have.
@@ -67,6 +68,8 @@ pub enum PlacedFault {
     Link(usize, LinkFault),
     /// In a drive.
     Drive(u8, DriveFault),
+    /// To a drive, from outside the bus; at a time only.
+    Stimulus(u8, Stimulus),
 }
 
 /// When a fault happens.
@@ -114,6 +117,14 @@ pub trait Link {
 
     /// Whether a drive is in the error mode, and why; `None` where this cannot be seen.
     fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>>;
+
+    /// Lets something happen to a drive from outside the bus, now.
+    fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
+        self.inject(ring, PlacedFault::Stimulus(drive, stimulus), Moment::Now);
+    }
+
+    /// What a drive shows outside the bus; `None` where this cannot be seen.
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown>;
 
     /// A drive's cell; `None` where this cannot be seen.
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8>;

@@ -1,6 +1,6 @@
 //! A link to simulated rings, in virtual time.
 
-use super::{Capability, Link, Moment, PlacedFault};
+use super::{Capability, Link, Mode, Moment, PlacedFault, Shown, Stimulus};
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::sync::SYNCO;
@@ -33,6 +33,17 @@ const CAPABILITIES: [Capability; 9] = [
     Capability::Simulator,
 ];
 
+/// What a drive without power shows.
+const DARK: Shown = Shown {
+    gpo1: false,
+    gpo2: false,
+    ready: false,
+    analogue: 0,
+    encoder: 0,
+    display: None,
+    mode: Mode::Reset,
+};
+
 impl SimulatedLink {
     /// A link to the rings of a bench.
     #[must_use]
@@ -59,7 +70,9 @@ impl SimulatedLink {
         };
         match fault {
             PlacedFault::Link(link, _) => format!("{prefix}{}->{}", end(link), end(link + 1)),
-            PlacedFault::Drive(drive, _) => format!("drive {prefix}{drive}"),
+            PlacedFault::Drive(drive, _) | PlacedFault::Stimulus(drive, _) => {
+                format!("drive {prefix}{drive}")
+            }
         }
     }
 
@@ -70,6 +83,12 @@ impl SimulatedLink {
         match fault {
             PlacedFault::Link(link, fault) => ring.suffer_link(link, fault),
             PlacedFault::Drive(drive, fault) => ring.suffer_drive(drive, fault),
+            PlacedFault::Stimulus(drive, stimulus) => {
+                if let Some(drive) = ring.drive_mut(drive) {
+                    // Planning has refused drives without an outside.
+                    let _happened = drive.stimulate(stimulus);
+                }
+            }
         }
     }
 }
@@ -137,6 +156,8 @@ impl Link for SimulatedLink {
                 match fault {
                     PlacedFault::Link(link, fault) => ring.arm_link(link, byte, fault),
                     PlacedFault::Drive(drive, fault) => ring.arm_drive(drive, byte, fault),
+                    // It has no byte; planning has refused one.
+                    PlacedFault::Stimulus(..) => {}
                 }
             }
         }
@@ -163,6 +184,19 @@ impl Link for SimulatedLink {
         Some(device.cause().filter(|_| device.in_error()))
     }
 
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
+        let ring = self.ring(ring)?;
+        let shown = ring.drive(drive)?.shown()?;
+        Some(if ring.powered(drive) {
+            shown
+        } else {
+            Shown {
+                encoder: shown.encoder,
+                ..DARK
+            }
+        })
+    }
+
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
         Some(self.ring(ring)?.drive(drive)?.cells().peek(address))
     }
@@ -184,6 +218,10 @@ impl Link for SimulatedLink {
             unused.push(match fault {
                 PlacedFault::Link(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Drive(_, fault) => format!("{place} at {at}: {fault}"),
+                PlacedFault::Stimulus(_, Stimulus::Error(error)) => {
+                    format!("{place} at {at}: error {error}")
+                }
+                PlacedFault::Stimulus(_, stimulus) => format!("{place} at {at}: {stimulus:?}"),
             });
         }
         unused

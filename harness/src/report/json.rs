@@ -16,9 +16,15 @@
 //! | `byte` | at which byte of the drive's inbound link, counted from 1 (at a time-out, the last before it) |
 //! | `kind` | `detected` (!), `upstream` (*), `seventeenth` (#), `sequence` (@) or `recovered` |
 //! | `cause` | for `detected`: `parity`, `framing`, `overrun`, `sync`, `command`, `parameter`, `checksum` or `time-out`; otherwise `null` |
+//! | `records` | the cells that the scenario recorded, in order of their beginnings; left out where there are none |
+//! | `cell`, `unit` | the cell as the scenario names it, and the unit of its values (empty for bytes without a scale) |
+//! | `every_ns` | how often it was noted; `null` where its changes were |
+//! | `samples` | what was found: `t_ns`, `raw` (the bytes in hexadecimal digits) and `value` (`null` where they have no meaning) |
 //! | `second` | the same object for the second ring, where there is one |
 
+use crate::scenario::run::Record;
 use harness_proto::novobus::error_mode::Marks;
+use harness_proto::time::Span;
 use harness_sim::link::LineByte;
 use harness_sim::trace::{LinkTrace, Mark, Trace};
 use serde::Serialize;
@@ -33,6 +39,8 @@ struct Object<'a> {
     ring: u8,
     links: Vec<LinkObject<'a>>,
     marks: Vec<MarkObject>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    records: Vec<RecordObject<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     second: Option<Box<Object<'a>>>,
 }
@@ -62,27 +70,66 @@ struct MarkObject {
     cause: Option<&'static str>,
 }
 
-/// Writes the traces of one or two rings as a line of JSON.
+#[derive(Serialize)]
+struct RecordObject<'a> {
+    drive: u8,
+    cell: &'a str,
+    unit: &'static str,
+    every_ns: Option<u64>,
+    samples: Vec<SampleObject>,
+}
+
+#[derive(Serialize)]
+struct SampleObject {
+    t_ns: u64,
+    raw: String,
+    value: Option<f64>,
+}
+
+/// Writes the traces of one or two rings, and what was recorded there, as a line of JSON.
 ///
 /// # Errors
 /// What the writer says.
-pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
-    let second = traces.get(1).map(|trace| Box::new(object(trace, None)));
+pub fn write(traces: &[Trace], records: &[Record], mut out: impl Write) -> std::io::Result<()> {
+    let of = |ring| records.iter().filter(move |record| record.ring == ring);
+    let second = traces
+        .get(1)
+        .map(|trace| Box::new(object(trace, of(1), None)));
     match traces.first() {
-        Some(first) => serde_json::to_writer(&mut out, &object(first, second))?,
+        Some(first) => serde_json::to_writer(&mut out, &object(first, of(0), second))?,
         None => out.write_all(b"null")?,
     }
     out.write_all(b"\n")?;
     out.flush()
 }
 
-fn object<'a>(trace: &'a Trace, second: Option<Box<Object<'a>>>) -> Object<'a> {
+fn object<'a>(
+    trace: &'a Trace,
+    records: impl Iterator<Item = &'a Record>,
+    second: Option<Box<Object<'a>>>,
+) -> Object<'a> {
     Object {
         schema: SCHEMA,
         ring: trace.drives,
         links: trace.links.iter().map(link).collect(),
         marks: trace.marks.iter().flat_map(marks).collect(),
+        records: records.map(record).collect(),
         second,
+    }
+}
+
+fn record(record: &Record) -> RecordObject<'_> {
+    let samples = record.samples.iter().map(|sample| SampleObject {
+        t_ns: sample.at.since_start().as_nanos(),
+        raw: Record::raw(sample),
+        value: record.value(sample),
+    });
+    RecordObject {
+        drive: record.drive,
+        cell: &record.name,
+        unit: record.unit(),
+        every_ns: record.every.map(Span::as_nanos),
+        samples: samples.collect(),
     }
 }
 

@@ -2,4 +2,5 @@
 
 pub mod json;
 pub mod mismatch;
+pub mod plot;
 pub mod table;

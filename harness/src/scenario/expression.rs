@@ -90,6 +90,19 @@ impl Expression {
     }
 }
 
+/// Reads a number without arithmetic.
+pub(super) fn plain(scanner: &mut Scanner<'_>) -> Result<i64, Problem> {
+    let mut ahead = scanner.clone();
+    let digits = ahead.take_while(|c| c.is_ascii_digit());
+    match digits.and_then(|digits| digits.value.parse().ok()) {
+        Some(number) => {
+            *scanner = ahead;
+            Ok(number)
+        }
+        None => Err(scanner.unexpected("a number such as 1024")),
+    }
+}
+
 /// Reads a sum.
 pub(super) fn sum(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
     let here = scanner.here();

@@ -10,6 +10,7 @@ pub mod parse;
 pub mod pattern;
 pub mod plan;
 pub mod problem;
+pub mod quantity;
 pub mod run;
 mod scanner;
 pub mod simulate;

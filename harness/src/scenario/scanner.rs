@@ -39,6 +39,11 @@ impl<'a> Scanner<'a> {
         &self.text[self.at..]
     }
 
+    /// What is left, white space in front included.
+    pub(super) fn tight(&self) -> &'a str {
+        &self.text[self.at..]
+    }
+
     pub(super) fn peek(&mut self) -> Option<char> {
         self.rest().chars().next()
     }
@@ -59,6 +64,22 @@ impl<'a> Scanner<'a> {
             start: from.start,
             end: self.offset + self.text[..self.at].trim_end().len(),
         }
+    }
+
+    /// The same place in a line that ends before the first of these tokens; [`Self::go_on`] comes back.
+    pub(super) fn before(&self, tokens: &[&str]) -> Self {
+        let rest = &self.text[self.at..];
+        let ends = tokens.iter().filter_map(|token| rest.find(token));
+        let end = ends.min().unwrap_or(rest.len());
+        Self {
+            text: &self.text[..self.at + rest[..end].trim_end().len()],
+            ..self.clone()
+        }
+    }
+
+    /// Goes on where a scanner from [`Self::before`] has come to.
+    pub(super) fn go_on(&mut self, from: &Self) {
+        self.at = from.at;
     }
 
     /// Takes `token` if it comes next.

@@ -4,6 +4,8 @@
 //! text gives a bit a number, that number holds. The others are choices, each named with its reason;
 //! erratum E91 to E92 and E102 keep them open.
 
+use super::ram;
+
 /// `Status` (ND21 14.4.1). Bits 0, 5 and 7 have their numbers from 14.10; the labels in their printed order
 /// fit bits 3 to 7 if "software stop" is taken as bit 7 and "software block" as bit 0.
 pub mod status {
@@ -159,4 +161,48 @@ pub mod scope_status {
     pub const ARMED: u8 = 1 << 5;
     /// Bit 4: trigger flank, 1 positive, 0 negative (14.10.6.6, E108).
     pub const POSITIVE: u8 = 1 << 4;
+}
+
+/// The bits that have a name of their own: address of the cell, bits, short name. A name of several bits
+/// holds where any of them is set.
+const NAMES: &[(u16, u8, &str)] = &[
+    (ram::STATUS, status::STOP, "stop"),
+    (ram::STATUS, status::RESET, "reset"),
+    (ram::STATUS, status::ERROR, "error"),
+    (ram::STATUS, status::CURRENT_LIMIT, "current limit"),
+    (ram::STATUS, status::BLOCK, "block"),
+    (ram::FLAGS, flags::BLOCK, "block"),
+    (ram::FLAGS, flags::HARDWARE_STOP, "hardware stop"),
+    (ram::FLAGS, flags::STOP, "stop"),
+    (ram::FLAGS, flags::I2T, "i2t limit"),
+    (ram::FLAGS, flags::RESOLVER, "resolver switch"),
+    (ram::FLAGS2, flags2::REFERENCING, "referencing"),
+    (ram::FLAGS2, flags2::TEACH_IN, "teach-in"),
+    (ram::FLAGS2, flags2::CALCULATE, "calculate"),
+    (ram::FLAGS2, flags2::MONITORING, "monitoring"),
+    (ram::FLAGS2, flags2::OK, "NOVOBUS OK"),
+    (ram::FLAGS2, flags2::TIMEOUT, "NOVOBUS timeout"),
+    (ram::PS_STATUS, ps_status::NEGATIVE, "negative"),
+    (ram::PS_STATUS, ps_status::CALCULATE, "calculate"),
+    (ram::PS_STATUS, ps_status::CALCULATED, "calculated"),
+    (ram::PS_STATUS, ps_status::START, "start"),
+    (
+        ram::PS_STATUS,
+        ps_status::CONSTANT,
+        "acceleration and constant drive",
+    ),
+    (ram::PS_STATUS, ps_status::BRAKING, "braking"),
+    (ram::PS_STATUS, ps_status::TARGET_BRAKING, "target braking"),
+    (ram::PS_STATUS, ps_status::FINISHED, "finished"),
+    (ram::SCOPE_STATUS, scope_status::STOPPED, "stopped"),
+    (ram::SCOPE_STATUS, scope_status::TRIGGERED, "triggered"),
+    (ram::SCOPE_STATUS, scope_status::ARMED, "trigger status"),
+    (ram::SCOPE_STATUS, scope_status::POSITIVE, "positive flank"),
+];
+
+/// The names of the bits that are set in `byte`, the content of the cell at `address`; the highest first.
+pub fn set_in(address: u16, byte: u8) -> impl Iterator<Item = &'static str> {
+    let names = NAMES.iter();
+    let set = names.filter(move |(cell, bits, _)| *cell == address && byte & bits != 0);
+    set.map(|(_, _, name)| *name)
 }

@@ -43,6 +43,16 @@ impl Cell {
         self.address..=self.address + (self.size - 1)
     }
 
+    /// The scale of the number that begins with this cell: that of a position where it is the word of the
+    /// whole turns, as the word behind it is the angle (14.5.5).
+    #[must_use]
+    pub const fn number(&self) -> Option<Scale> {
+        match self.scale {
+            Some(Scale::Turns) => Some(Scale::Position),
+            scale => scale,
+        }
+    }
+
     /// The value of these bytes, in the order of their addresses. `None` if the cell has no scale or
     /// another number of bytes.
     ///
@@ -345,6 +355,17 @@ mod tests {
                 let bytes = [0x10, 0x10];
                 let bytes = bytes.get(..usize::from(cell.size)).unwrap();
                 assert!(cell.value(bytes, DRIVE).is_some(), "{}", cell.printed);
+            }
+        }
+    }
+
+    /// ND21 14.5.5: behind every word of whole turns stands the angle.
+    #[test]
+    fn turns_and_angle_stand_together() {
+        for table in [RAM, super::super::eeprom::EEPROM] {
+            for pair in table.windows(2) {
+                let turns = pair[0].scale == Some(Scale::Turns);
+                assert!(!turns || pair[1].scale == Some(Scale::Angle));
             }
         }
     }

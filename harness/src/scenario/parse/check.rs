@@ -1,8 +1,8 @@
 //! Checks: `? located 97`, `? drive 3 memory FF08 = 1234`, `? error 0502 at 97`.
 
-use super::words::{address, drives, equals, named};
+use super::drive;
+use super::words::{drives, named, required};
 use crate::scenario::expression::{self, Located};
-use crate::scenario::pattern;
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::{Check, Drives};
@@ -43,7 +43,7 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
             Ok(Check::Located { drive, within })
         }
         Word::Within => Ok(Check::Within(zeros(scanner)?)),
-        Word::Drive => drive_check(scanner),
+        Word::Drive => Ok(Check::Drive(drive::check(scanner)?)),
         Word::Error => {
             let error = error_code(scanner)?;
             required(scanner, &["at"])?;
@@ -70,48 +70,6 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
     }
 }
 
-fn drive_check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
-    #[derive(Clone, Copy)]
-    enum Word {
-        Memory,
-        In,
-        Not,
-        Normal,
-    }
-    let drives = drives(scanner)?;
-    let words = [
-        ("memory", Word::Memory),
-        ("in", Word::In),
-        ("not", Word::Not),
-        ("normal", Word::Normal),
-    ];
-    let expected = match named(scanner, &words, "what must hold")? {
-        Word::Memory => {
-            let address = address(scanner)?;
-            equals(scanner)?;
-            let bytes = pattern::pattern(scanner)?;
-            return Ok(Check::Memory {
-                drives,
-                address,
-                bytes,
-            });
-        }
-        Word::Normal => {
-            return Ok(Check::InError {
-                drives,
-                expected: false,
-            });
-        }
-        Word::In => true,
-        Word::Not => {
-            required(scanner, &["in"])?;
-            false
-        }
-    };
-    required(scanner, &["error"])?;
-    Ok(Check::InError { drives, expected })
-}
-
 fn zeros(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
     let zeros = expression::sum(scanner)?;
     required(scanner, &["zeros", "zero"])?;
@@ -128,17 +86,6 @@ fn one_drive(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
             "one drive expected here",
         )),
     }
-}
-
-fn required(scanner: &mut Scanner<'_>, words: &[&str]) -> Result<(), Problem> {
-    if words.iter().any(|word| scanner.eat_word(word)) {
-        return Ok(());
-    }
-    let mut ahead = scanner.clone();
-    let found = ahead.chunk().value;
-    Err(scanner
-        .unexpected(&format!("`{}`", words[0]))
-        .did_you_mean(found, words))
 }
 
 fn error_code(scanner: &mut Scanner<'_>) -> Result<BusError, Problem> {

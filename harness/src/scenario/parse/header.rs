@@ -1,25 +1,22 @@
 //! The header, and the lines one after another.
 
+use super::drive::{self, Line};
 use super::step;
-use super::words::{address, drives, equals, named};
+use super::words::named;
 use crate::link::Capability;
-use crate::scenario::pattern;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Bus, Citation, RingRange, Scenario, Setup, SetupKind, Step};
+use crate::scenario::syntax::{Bus, Citation, RingRange, Scenario, Setup, SetupKind, Step, When};
 use crate::scenario::times;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
-use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::drive::Model;
-use harness_sim::nd21;
 
 /// The most lines of a scenario.
 const MAX_LINES: usize = 20_000;
 
-const HEADER_WORDS: [&str; 9] = [
-    "title", "source", "bus", "ring", "drive", "needs", "line", "strict", "deadline",
+const HEADER_WORDS: [&str; 8] = [
+    "title", "source", "bus", "ring", "needs", "line", "strict", "deadline",
 ];
 
 /// Reads a scenario.
@@ -75,23 +72,48 @@ impl Reader {
         let before = scanner.clone();
         let word = scanner.word();
         let header = word.as_ref().filter(|w| HEADER_WORDS.contains(&w.value));
+        if let Some(word) = word.as_ref().filter(|w| drive::WORDS.contains(&w.value)) {
+            return self.drive(word, scanner);
+        }
         let Some(header) = header else {
             let mut scanner = before;
             self.steps.push(step::step(&mut scanner)?);
             return Ok(());
         };
         if !self.steps.is_empty() {
-            return Err(Problem::new(
-                header.span,
-                format!("`{}` stands behind the first step", header.value),
-                "header lines come before all steps",
-            )
-            .help(format!(
-                "move the line up, above the first step (line `{}`)",
-                header.value
-            )));
+            return Err(
+                step::behind_the_first(header.span, header.value).help(format!(
+                    "move the line up, above the first step (line `{}`)",
+                    header.value
+                )),
+            );
         }
         self.header(header, &mut scanner)
+    }
+
+    /// A line that begins with `drive` is a header line where it can be one.
+    fn drive(&mut self, word: &Spanned<&str>, mut scanner: Scanner<'_>) -> Result<(), Problem> {
+        let (drives, line) = drive::line(&mut scanner)?;
+        scanner.expect_end()?;
+        let span = scanner.since(word.span);
+        let what = match line {
+            Line::Setup(what) => what,
+            Line::Influence(influence) if self.steps.is_empty() => SetupKind::Influence(influence),
+            line => {
+                let action = step::drive_action(drives, line, span)?;
+                self.steps.push(Step {
+                    when: When::Now,
+                    action,
+                    span,
+                });
+                return Ok(());
+            }
+        };
+        if !self.steps.is_empty() {
+            return Err(step::not_a_step(word.span, &what));
+        }
+        self.setups.push(Setup { drives, what, span });
+        Ok(())
     }
 
     fn header(&mut self, word: &Spanned<&str>, scanner: &mut Scanner<'_>) -> Result<(), Problem> {
@@ -119,11 +141,6 @@ impl Reader {
             "line" => {
                 let rate = rate(scanner)?;
                 once(&mut self.rate, rate, word)
-            }
-            "drive" => {
-                let setup = setup(scanner, word.span)?;
-                self.setups.push(setup);
-                Ok(())
             }
             "needs" => {
                 while !scanner.at_end() {
@@ -302,71 +319,4 @@ fn rate(scanner: &mut Scanner<'_>) -> Result<Rate, Problem> {
     *scanner = ahead;
     scanner.expect_end()?;
     Ok(rate)
-}
-
-fn setup(scanner: &mut Scanner<'_>, start: Span) -> Result<Setup, Problem> {
-    let drives = drives(scanner)?;
-    let what = named(
-        scanner,
-        &[("memory", 0), ("eeprom", 1), ("property", 2), ("model", 3)],
-        "what to set",
-    )?;
-    let what = match what {
-        0 => {
-            let address = address(scanner)?;
-            equals(scanner)?;
-            SetupKind::Memory(address, pattern::pattern(scanner)?)
-        }
-        1 => {
-            let address = eeprom_address(scanner)?;
-            equals(scanner)?;
-            SetupKind::Eeprom(address, pattern::pattern(scanner)?)
-        }
-        2 => property(scanner)?,
-        _ => SetupKind::Model(named(scanner, &Model::NAMES, "a drive model")?),
-    };
-    scanner.expect_end()?;
-    Ok(Setup {
-        drives,
-        what,
-        span: scanner.since(start),
-    })
-}
-
-fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
-    let bus = PROPERTIES.iter().map(|p| p.name);
-    let known: Vec<_> = bus
-        .chain(nd21::PROPERTIES.iter().map(|p| p.name))
-        .map(|name| (name, name))
-        .collect();
-    let here = scanner.here();
-    let name = named(scanner, &known, "a property")?;
-    let name = Spanned {
-        value: name.to_owned(),
-        span: scanner.since(here),
-    };
-    equals(scanner)?;
-    if scanner.peek().is_some_and(|c| c.is_ascii_digit()) {
-        return Ok(SetupKind::Time(name, times::duration(scanner)?));
-    }
-    let Some(word) = scanner.word() else {
-        return Err(scanner.unexpected("a value"));
-    };
-    let word = Spanned {
-        value: word.value.to_owned(),
-        span: word.span,
-    };
-    Ok(SetupKind::Word(name, word))
-}
-
-fn eeprom_address(scanner: &mut Scanner<'_>) -> Result<Spanned<u8>, Problem> {
-    let before = scanner.clone();
-    let word = scanner.take_while(|c| c.is_ascii_hexdigit());
-    match word.map(|w| (w.value.len(), u8::from_str_radix(w.value, 16), w.span)) {
-        Some((2, Ok(value), span)) => Ok(Spanned { value, span }),
-        _ => {
-            *scanner = before;
-            Err(scanner.unexpected("an EEPROM address of two hexadecimal digits, such as 47"))
-        }
-    }
 }

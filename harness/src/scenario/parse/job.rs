@@ -1,10 +1,11 @@
 //! Jobs of the master in the manual's terms: `read-byte 95 FE13 = 88`, `go 3`, `recover`.
 
-use super::words::{address, drives, equals};
+use super::value::{assigned, place, tolerance};
+use super::words::{drives, equals};
 use crate::scenario::pattern;
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Drives, Job, JobKind};
+use crate::scenario::syntax::{Drives, Job, JobKind, Written};
 
 /// What stands behind a job's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -101,24 +102,30 @@ fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
 
 fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     let drive = one(scanner)?;
-    let address = if form.cell {
-        Some(address(scanner)?)
+    let place = if form.cell {
+        Some(place(scanner)?)
     } else {
         None
     };
-    let data = match form.data {
-        Data::None => None,
-        Data::Read if scanner.at_end() => None,
-        Data::Read | Data::Written => {
+    let data = match (form.data, &place) {
+        (Data::None, _) => None,
+        (Data::Read, _) if scanner.at_end() => None,
+        (_, Some(place)) => Some(assigned(scanner, place)?),
+        (_, None) => {
             equals(scanner)?;
-            Some(pattern::pattern(scanner)?)
+            Some(Written::Bytes(pattern::pattern(scanner)?))
         }
+    };
+    let tolerance = match &data {
+        Some(data) if form.data == Data::Read => tolerance(scanner, data)?,
+        _ => None,
     };
     Ok(Job::Command {
         kind: form.kind,
         drive,
-        address,
+        place,
         data,
+        tolerance,
     })
 }
 

@@ -1,9 +1,11 @@
 //! From text to a [`Scenario`](super::syntax::Scenario): the header, then the steps, one line each.
 
 mod check;
+mod drive;
 mod header;
 mod job;
 mod step;
+mod value;
 mod words;
 
 pub use header::parse;

@@ -1,13 +1,18 @@
 //! Steps: a time or none, then `>`, `<`, `!`, `?` or a job.
 
 use super::check;
+use super::drive::{self, Line};
 use super::job;
-use super::words::{named, ring_prefix};
+use super::value::place as cell;
+use super::words::{drives, named, required, ring_prefix};
 use crate::scenario::expression::{self, Located};
 use crate::scenario::pattern;
-use crate::scenario::problem::{Problem, nearest};
+use crate::scenario::problem::{Problem, Span, nearest};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Action, Fault, FaultKind, LinkEnds, LinkFaultKind, Step, When};
+use crate::scenario::syntax::{
+    Action, Check, DriveCheck, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Looks, Recording,
+    SetupKind, Step, When,
+};
 use crate::scenario::times;
 use harness_sim::fault::{DriveFault, Flips};
 
@@ -71,8 +76,88 @@ fn action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
             scanner.eat("?");
             Ok(Action::Check(check::check(scanner)?))
         }
-        _ => job_action(scanner),
+        _ => word_action(scanner),
     }
+}
+
+/// A step that begins with a word.
+fn word_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
+    let here = scanner.here();
+    let mut ahead = scanner.clone();
+    let word = ahead.word().map_or("", |word| word.value);
+    let action = match word {
+        "until" => until(&mut ahead)?,
+        "wait" => Action::Wait(times::duration(&mut ahead)?),
+        "record" => Action::Record(record(&mut ahead)?),
+        word if drive::WORDS.contains(&word) => {
+            let (drives, line) = drive::line(&mut ahead)?;
+            drive_action(drives, line, ahead.since(here))?
+        }
+        _ => return job_action(scanner),
+    };
+    *scanner = ahead;
+    Ok(action)
+}
+
+/// A line that begins with `drive`, as a step.
+pub(super) fn drive_action(drives: Drives, line: Line, span: Span) -> Result<Action, Problem> {
+    match line {
+        Line::Setup(what) => Err(not_a_step(span, &what)),
+        Line::Influence(influence) => Ok(Action::Influence(drives, influence)),
+        Line::Condition(condition) => Ok(Action::Check(Check::Drive(DriveCheck {
+            drives,
+            condition,
+            span,
+        }))),
+    }
+}
+
+/// A header line among the steps.
+pub(super) fn behind_the_first(span: Span, word: &str) -> Problem {
+    Problem::new(
+        span,
+        format!("`{word}` stands behind the first step"),
+        "header lines come before all steps",
+    )
+}
+
+/// What a drive is set to hold or to be, among the steps.
+pub(super) fn not_a_step(span: Span, what: &SetupKind) -> Problem {
+    let help = match what {
+        SetupKind::Memory(..) => {
+            "move the line up, above the first step; `? drive ...` checks cells, `write-byte` writes one"
+        }
+        _ => "move the line up, above the first step (line `drive`)",
+    };
+    behind_the_first(span, "drive").help(help)
+}
+
+/// `until drive 3 ps_status = 01 within 2s`
+fn until(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
+    required(scanner, &drive::WORDS)?;
+    let check = drive::check(scanner)?;
+    if !scanner.eat_word("within") {
+        return Err(scanner.unexpected("`within` and the longest time, as in `within 2s`"));
+    }
+    Ok(Action::Until(check, times::duration(scanner)?))
+}
+
+/// `record drive 0 nist every 10ms`
+fn record(scanner: &mut Scanner<'_>) -> Result<Recording, Problem> {
+    required(scanner, &drive::WORDS)?;
+    let drives = drives(scanner)?;
+    let place = cell(scanner)?;
+    let names = [("every", 0), ("changes", 1), ("off", 2)];
+    let looks = match named(scanner, &names, "when to look at it")? {
+        0 => Looks::Every(times::duration(scanner)?),
+        1 => Looks::Changes,
+        _ => Looks::Off,
+    };
+    Ok(Recording {
+        drives,
+        place,
+        looks,
+    })
 }
 
 fn job_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
@@ -90,11 +175,15 @@ fn job_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
             let mut known = job::names();
             known.extend([
                 "title", "source", "bus", "ring", "drive", "needs", "line", "strict", "deadline",
+                "until", "wait", "record",
             ]);
             let problem = scanner.unexpected(expected);
             Err(match nearest(name.value, &known) {
                 Some(near) => problem.help(format!("did you mean `{near}`?")),
-                None => problem.help(format!("jobs are {}", job::names().join(", "))),
+                None => problem.help(format!(
+                    "jobs are {}; other steps are drive, until, wait, record",
+                    job::names().join(", ")
+                )),
             })
         }
     }
@@ -105,10 +194,10 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
         let ring = ring_prefix(scanner);
         let drive = expression::sum(scanner)?;
         let (byte, at) = place(scanner)?;
-        let kind = drive_fault(scanner)?;
+        let what = drive_fault(scanner, drive)?;
         return Ok(Fault {
             ring,
-            what: FaultKind::Drive(drive, kind),
+            what,
             byte,
             at,
         });
@@ -165,14 +254,22 @@ fn place(scanner: &mut Scanner<'_>) -> Result<(Option<Located>, Option<times::Du
     Ok((byte, at))
 }
 
-fn drive_fault(scanner: &mut Scanner<'_>) -> Result<DriveFault, Problem> {
-    let names = [("off", 0), ("on", 1), ("stuck", 2), ("unstuck", 3)];
-    Ok(match named(scanner, &names, "a fault of a drive")? {
+fn drive_fault(scanner: &mut Scanner<'_>, drive: Located) -> Result<FaultKind, Problem> {
+    let names = [
+        ("off", 0),
+        ("on", 1),
+        ("stuck", 2),
+        ("unstuck", 3),
+        ("error", 4),
+    ];
+    let fault = match named(scanner, &names, "a fault of a drive")? {
         0 => DriveFault::Off,
         1 => DriveFault::On,
         2 => DriveFault::Stuck(byte(scanner)?),
-        _ => DriveFault::Unstuck,
-    })
+        3 => DriveFault::Unstuck,
+        _ => return Ok(FaultKind::Error(drive, drive::error(scanner)?)),
+    };
+    Ok(FaultKind::Drive(drive, fault))
 }
 
 fn link_fault(scanner: &mut Scanner<'_>) -> Result<LinkFaultKind, Problem> {

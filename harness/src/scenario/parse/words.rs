@@ -1,10 +1,9 @@
-//! What stands in several kinds of lines: words of a list, drives, cells.
+//! What stands in several kinds of lines: words of a list, drives.
 
 use crate::scenario::expression;
-use crate::scenario::problem::{Problem, Spanned};
+use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Drives;
-use harness_proto::nd21::cells;
 
 /// Reads one of a list of words.
 pub(super) fn named<T: Copy>(
@@ -68,28 +67,14 @@ pub(super) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
     }
 }
 
-/// A cell: four hexadecimal digits, or its printed name (ND21 14.2.1).
-pub(super) fn address(scanner: &mut Scanner<'_>) -> Result<Spanned<u16>, Problem> {
-    let before = scanner.clone();
-    let Some(word) = scanner.take_while(|c| c.is_ascii_alphanumeric() || c == '_') else {
-        return Err(scanner.unexpected("an address of four hexadecimal digits (such as FE13)"));
-    };
-    let span = word.span;
-    if let Some(cell) = cells::cell(word.value) {
-        return Ok(Spanned {
-            value: cell.address,
-            span,
-        });
+/// One of these words must come next; the first of them is named where none does.
+pub(super) fn required(scanner: &mut Scanner<'_>, words: &[&str]) -> Result<(), Problem> {
+    if words.iter().any(|word| scanner.eat_word(word)) {
+        return Ok(());
     }
-    match u16::from_str_radix(word.value, 16) {
-        Ok(value) if word.value.len() == 4 => Ok(Spanned { value, span }),
-        _ => {
-            *scanner = before;
-            let names: Vec<_> = cells::RAM.iter().map(|cell| cell.printed).collect();
-            let problem = scanner
-                .unexpected("an address of four hexadecimal digits (such as FE13) or a cell's name")
-                .help("`drivebench cells` shows the names of the cells (ND21 14.2.1)");
-            Err(problem.did_you_mean(word.value, &names))
-        }
-    }
+    let mut ahead = scanner.clone();
+    let found = ahead.chunk().value;
+    Err(scanner
+        .unexpected(&format!("`{}`", words[0]))
+        .did_you_mean(found, words))
 }

@@ -1,11 +1,13 @@
 //! Jobs as telegrams, with the answers that they must get.
 
 use super::planner::Planner;
-use super::types::{PlannedAction, setups_of};
+use super::setup::number_bytes;
+use super::types::{CellTest, PlannedAction, PlannedCell, Reading, setups_of};
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
-use crate::scenario::problem::{Problem, Span, Spanned};
-use crate::scenario::syntax::{Job, JobKind};
+use crate::scenario::problem::{Problem, Span};
+use crate::scenario::syntax::{Job, JobKind, Place, Relation, Written};
 use harness_proto::nd21;
+use harness_proto::nd21::units::Scale;
 use harness_proto::novobus::command::{Command, Kind, PAGE, Reply};
 use harness_proto::novobus::memory;
 use harness_proto::novobus::output::OutputChange;
@@ -25,7 +27,7 @@ impl Planner {
                 receive,
             } => {
                 let (ring, k) = self.one(drive)?;
-                let data = self.written(send, 2, ring)?;
+                let data = self.known(send, 2, ring)?;
                 let word = u16::from_be_bytes([data[0], data[1]]);
                 let answer = match receive {
                     Some(pattern) => self.data(pattern, 2, ring)?,
@@ -36,37 +38,44 @@ impl Planner {
             Job::Command {
                 kind,
                 drive,
-                address,
+                place,
                 data,
+                tolerance,
             } => {
                 let (ring, k) = self.one(drive)?;
-                let command = self.command(*kind, ring, address.as_ref(), data.as_ref())?;
-                if let Some(address) = address
-                    && !memory::in_range(command.kind(), address.value)
-                {
-                    let layout = command.layout(ReadLongAnswer::default());
-                    return Err(Problem::new(
-                        address.span,
-                        format!(
-                            "{} does not reach {:04X}",
-                            layout.printed_name, address.value
-                        ),
-                        format!(
-                            "all of {} in {} expected here (ND21 {})",
-                            bytes_in_words(usize::from(command.kind().width())),
-                            ranges(command.kind()),
-                            layout.section
-                        ),
-                    ));
+                let command = self.command(*kind, (ring, k), place.as_ref(), data.as_ref())?;
+                if let Some(place) = place {
+                    reaches(&command, place)?;
                 }
-                let read = match data {
-                    Some(pattern) if command.kind().reads() => {
-                        self.data(pattern, usize::from(command.kind().width()), ring)?
+                let width = usize::from(command.kind().width());
+                let mut read = vec![Expected::Any; 4];
+                let mut cell = None;
+                if let Some(data) = data.as_ref().filter(|_| command.kind().reads()) {
+                    match (data, place) {
+                        (Written::Number(expected), Some(place)) => {
+                            let scale = scale_of(place, width)?;
+                            self.written(data, Some(place), width, (ring, k))?;
+                            let test = CellTest::Number {
+                                scale,
+                                relation: Relation::Equal,
+                                expected: *expected,
+                                tolerance: *tolerance,
+                            };
+                            cell = Some(PlannedCell::new(place, width, test));
+                        }
+                        _ => read = self.expected_data(data, place.as_ref(), width, (ring, k))?,
                     }
-                    _ => vec![Expected::Any; 4],
-                };
-                let answer = expected_answer(&command, &read, self.read_long(ring, k));
-                self.telegram(ring, k, drive.from.span, None, &command.encode(), answer)
+                }
+                let form = self.read_long(ring, k);
+                let answer = expected_answer(&command, &read, form);
+                let reading = cell.map(|cell| Reading {
+                    drive: k,
+                    bytes: data_places(&command, width, form),
+                    cell,
+                });
+                let span = drive.from.span;
+                self.telegram(ring, k, span, None, &command.encode(), answer)
+                    .map(|action| with_reading(action, reading))
             }
         }
     }
@@ -74,17 +83,25 @@ impl Planner {
     fn command(
         &self,
         kind: JobKind,
-        ring: usize,
-        address: Option<&Spanned<u16>>,
-        data: Option<&Pattern>,
+        drive: (usize, u8),
+        place: Option<&Place>,
+        data: Option<&Written>,
     ) -> Result<Command, Problem> {
-        let address = address.map_or(PAGE, |address| address.value);
+        let address = place.map_or(PAGE, |place| place.address);
         let [_, address_low] = address.to_be_bytes();
         let byte = || -> Result<u8, Problem> {
             match data {
-                Some(pattern) => Ok(self.written(pattern, 1, ring)?[0]),
+                Some(data) => Ok(self.written(data, place, 1, drive)?[0]),
                 None => Ok(0),
             }
+        };
+        let mask = || match data {
+            Some(Written::Number(number)) => Err(Problem::new(
+                number.span,
+                "bits are no number",
+                "a byte expected here",
+            )),
+            _ => byte(),
         };
         let [_, status] = nd21::ram::STATUS.to_be_bytes();
         let status_and = |data| Command::And {
@@ -105,7 +122,7 @@ impl Planner {
             },
             JobKind::WriteWord => {
                 let word = match data {
-                    Some(pattern) => self.written(pattern, 2, ring)?,
+                    Some(data) => self.written(data, place, 2, drive)?,
                     None => vec![0; 2],
                 };
                 Command::WriteWord {
@@ -115,17 +132,17 @@ impl Planner {
             }
             JobKind::And => Command::And {
                 address_low,
-                data: byte()?,
+                data: mask()?,
             },
             JobKind::Or => Command::Or {
                 address_low,
-                data: byte()?,
+                data: mask()?,
             },
             JobKind::WriteIo => {
                 let code = byte()?;
                 let change = OutputChange::from_code(code).ok_or_else(|| {
                     Problem::new(
-                        data.map_or(Span::default(), |pattern| pattern.span),
+                        data.map_or(Span::default(), Written::span),
                         format!("{code:02X} is no output code"),
                         "00 to 03 expected here (ND21 10.4)",
                     )
@@ -153,7 +170,40 @@ impl Planner {
     }
 
     /// Exactly `count` bytes that are written, so that each must be known.
-    fn written(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<u8>, Problem> {
+    fn written(
+        &self,
+        data: &Written,
+        place: Option<&Place>,
+        count: usize,
+        (ring, drive): (usize, u8),
+    ) -> Result<Vec<u8>, Problem> {
+        match (data, place) {
+            (Written::Bytes(pattern), _) => self.known(pattern, count, ring),
+            (number, Some(place)) => {
+                let scale = scale_of(place, count)?;
+                number_bytes(Some(scale), number, self.units_of(ring, drive))
+            }
+            (_, None) => Ok(vec![0; count]),
+        }
+    }
+
+    /// Exactly `count` bytes that are read.
+    fn expected_data(
+        &self,
+        data: &Written,
+        place: Option<&Place>,
+        count: usize,
+        drive: (usize, u8),
+    ) -> Result<Vec<Expected>, Problem> {
+        if let Written::Bytes(pattern) = data {
+            return self.data(pattern, count, drive.0);
+        }
+        let bytes = self.written(data, place, count, drive)?;
+        Ok(bytes.into_iter().map(Expected::Byte).collect())
+    }
+
+    /// Exactly `count` known bytes.
+    fn known(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<u8>, Problem> {
         self.data(pattern, count, ring)?;
         pattern.expand_known(self.size(ring), MAX_CELLS)
     }
@@ -195,7 +245,7 @@ impl Planner {
             .encode();
         let mut expected = vec![Expected::Byte(bytes[0]), Expected::Byte(drive)];
         expected.extend(answer);
-        Ok(PlannedAction::Telegram(ring, bytes, expected))
+        Ok(PlannedAction::Telegram(ring, bytes, expected, None))
     }
 }
 
@@ -215,6 +265,66 @@ fn expected_answer(
         });
     }
     expected
+}
+
+/// Where in the whole answer the data bytes stand, behind the sync byte and the address byte.
+fn data_places(command: &Command, width: usize, form: ReadLongAnswer) -> Vec<usize> {
+    let replies: Vec<_> = command.answer_form(form).into_iter().collect();
+    let place = |n: usize| {
+        let is = |reply: &Reply| matches!(reply, Reply::Data(m) if usize::from(*m) == n);
+        replies.iter().position(|(reply, _)| is(reply))
+    };
+    (0..width).filter_map(place).map(|i| i + 2).collect()
+}
+
+fn with_reading(action: PlannedAction, reading: Option<Reading>) -> PlannedAction {
+    match action {
+        PlannedAction::Telegram(ring, bytes, expected, _) => {
+            PlannedAction::Telegram(ring, bytes, expected, reading)
+        }
+        other => other,
+    }
+}
+
+/// The scale of the number of `width` bytes that begins at a place.
+fn scale_of(place: &Place, width: usize) -> Result<Scale, Problem> {
+    let own = place.cell.and_then(|cell| cell.scale);
+    let scales = [own, place.scale()].into_iter().flatten();
+    let mut fitting = scales.filter(|scale| usize::from(scale.size()) == width);
+    fitting.next().ok_or_else(|| {
+        let size = place.cell.map_or(1, |cell| usize::from(cell.size));
+        Problem::new(
+            place.span,
+            format!(
+                "`{}` has {}, the job has {}",
+                place.name,
+                bytes_in_words(size),
+                bytes_in_words(width)
+            ),
+            "a cell of this length expected here, or bytes behind the `=`",
+        )
+    })
+}
+
+/// Whether a command reaches a cell.
+fn reaches(command: &Command, place: &Place) -> Result<(), Problem> {
+    if memory::in_range(command.kind(), place.address) {
+        return Ok(());
+    }
+    let layout = command.layout(ReadLongAnswer::default());
+    Err(Problem::new(
+        place.span,
+        format!(
+            "{} does not reach {:04X}",
+            layout.printed_name, place.address
+        ),
+        format!(
+            "all of {} in {} expected here (ND21 {})",
+            bytes_in_words(usize::from(command.kind().width())),
+            ranges(command.kind()),
+            layout.section
+        ),
+    ))
 }
 
 fn bytes_in_words(count: usize) -> String {

@@ -1,11 +1,18 @@
 //! A scenario settled for rings of given sizes: every number is known, everything that cannot be is
 //! refused, and nothing has been sent yet.
 
+mod drive;
 mod job;
 mod planner;
+mod setup;
 mod types;
 
+pub(super) use drive::{MAX_LOOKS, number};
 pub(super) use planner::MAX_CARRIED;
 pub use planner::plan;
 pub(super) use types::PlannedSetupKind;
-pub use types::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen, PlannedWindow};
+pub use types::{
+    CellTest, LOOK, Plan, PlannedAction, PlannedCell, PlannedCheck, PlannedCondition,
+    PlannedDriveCheck, PlannedLooks, PlannedRecord, PlannedStep, PlannedWhen, PlannedWindow,
+    Reading,
+};

@@ -1,27 +1,23 @@
 //! Settles a scenario, line by line.
 
+use super::drive::Running;
 use super::types::{
-    Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedSetupKind, PlannedStep, PlannedWhen,
-    PlannedWindow, setups_of,
+    Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedStep, PlannedWhen, PlannedWindow,
 };
-use crate::link::{Capability, Moment, PlacedFault};
+use crate::link::{Capability, Moment, PlacedFault, Stimulus};
 use crate::scenario::expression::Located;
-use crate::scenario::pattern::{MAX_BYTES, MAX_CELLS};
-use crate::scenario::problem::{Problem, Problems, Span, Spanned};
+use crate::scenario::pattern::MAX_BYTES;
+use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{
-    Action, Check, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Scenario, Setup, SetupKind,
-    When,
+    Action, Check, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Scenario, Step, When,
 };
 use crate::scenario::times::Window;
+use harness_proto::nd21::units;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-use harness_proto::novobus::memory;
-use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time::{self, Instant};
-use harness_sim::drive::Model;
 use harness_sim::fault::LinkFault;
-use harness_sim::nd21::{self, Nd21Properties};
 use std::ops::RangeInclusive;
 
 /// The most bytes that a run may leave on all links together: its record is held in memory.
@@ -44,20 +40,10 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         byte_time: scenario.rate.byte_time(),
         rings,
         setups: Vec::new(),
+        units: Vec::new(),
     };
-    let mut found = Vec::new();
-    for setup in &scenario.setups {
-        match planner.setup(setup) {
-            Ok(setup) => planner.setups.push(setup),
-            Err(problem) => found.push(problem),
-        }
-    }
-    found.extend(
-        scenario
-            .setups
-            .iter()
-            .filter_map(|setup| planner.idle_property(setup)),
-    );
+    let mut found = planner.set_up(&scenario.setups);
+    let mut running = Running::default();
     let mut steps = Vec::new();
     let mut needs = scenario.needs.clone();
     let (mut sent, mut expected) = (0, 0);
@@ -68,7 +54,11 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         .sum();
     let room = MAX_BYTES.min(usize::try_from(MAX_CARRIED / links.max(1)).unwrap_or(MAX_BYTES));
     for step in &scenario.steps {
-        let action = planner.action(&step.action, &mut needs);
+        let action = planner.action(step, &mut needs);
+        let action = action.and_then(|action| match &action {
+            PlannedAction::Record(record) => running.take(record).map(|()| action),
+            _ => Ok(action),
+        });
         match action {
             Ok(action) => {
                 sent += action.bytes_sent();
@@ -99,6 +89,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         }
     }
     if !found.is_empty() {
+        found.sort_by_key(|problem| problem.span.start);
         return Err(problems(found));
     }
     if planner.rings.len() > 1 {
@@ -116,6 +107,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         needs,
         steps,
         setups: planner.setups,
+        units: planner.units,
         rings: planner.rings,
     })
 }
@@ -142,25 +134,27 @@ impl PlannedAction {
     /// How many bytes the master sends.
     fn bytes_sent(&self) -> usize {
         match self {
-            Self::Send(_, bytes) | Self::Telegram(_, bytes, _) => bytes.len(),
+            Self::Send(_, bytes) | Self::Telegram(_, bytes, ..) => bytes.len(),
             Self::Recover(_) => CHECK_SEQUENCE.len(),
-            Self::Receive(..) | Self::Fault(..) | Self::Check(_) => 0,
+            _ => 0,
         }
     }
 
     /// How many bytes the master must receive.
     fn bytes_expected(&self) -> usize {
         match self {
-            Self::Receive(_, bytes) | Self::Telegram(_, _, bytes) => bytes.len(),
+            Self::Receive(_, bytes) | Self::Telegram(_, _, bytes, _) => bytes.len(),
             _ => 0,
         }
     }
 }
 
 pub(super) struct Planner {
-    byte_time: time::Span,
-    rings: Vec<RingSize>,
+    pub(super) byte_time: time::Span,
+    pub(super) rings: Vec<RingSize>,
     pub(super) setups: Vec<PlannedSetup>,
+    /// What the scales of each ring's drives depend on.
+    pub(super) units: Vec<Vec<units::Drive>>,
 }
 
 impl Planner {
@@ -192,7 +186,7 @@ impl Planner {
         }
     }
 
-    fn drives(&self, drives: &Drives) -> Result<RangeInclusive<u8>, Problem> {
+    pub(super) fn drives(&self, drives: &Drives) -> Result<RangeInclusive<u8>, Problem> {
         let from = self.drive(drives.ring, &drives.from)?;
         let to = match &drives.to {
             Some(to) => self.drive(drives.ring, to)?,
@@ -203,65 +197,6 @@ impl Planner {
 
     pub(super) fn one(&self, drives: &Drives) -> Result<(usize, u8), Problem> {
         Ok((drives.ring, self.drive(drives.ring, &drives.from)?))
-    }
-
-    fn setup(&self, setup: &Setup) -> Result<PlannedSetup, Problem> {
-        let drives = self.drives(&setup.drives)?;
-        let size = self.size(setup.drives.ring);
-        let what = match &setup.what {
-            SetupKind::Memory(address, pattern) => {
-                let bytes = pattern.expand_known(size, MAX_CELLS)?;
-                in_memory(address, bytes.len())?;
-                PlannedSetupKind::Memory(address.value, bytes)
-            }
-            SetupKind::Eeprom(address, pattern) => {
-                let bytes = pattern.expand_known(size, MAX_CELLS)?;
-                if usize::from(address.value) + bytes.len() > 256 {
-                    return Err(Problem::new(
-                        address.span,
-                        "the bytes go beyond the EEPROM",
-                        "the EEPROM has the addresses 00 to FF (ND21 14.2.2)",
-                    ));
-                }
-                PlannedSetupKind::Eeprom(address.value, bytes)
-            }
-            SetupKind::Model(model) => PlannedSetupKind::Model(*model),
-            SetupKind::Word(name, word) => {
-                set_property(&name.value, Setting::Word(&word.value), word.span)?;
-                PlannedSetupKind::Word(name.value.clone(), word.value.clone())
-            }
-            SetupKind::Time(name, duration) => {
-                let span = duration.on(self.byte_time);
-                set_property(&name.value, Setting::Time(span), duration.span())?;
-                PlannedSetupKind::Time(name.value.clone(), span)
-            }
-        };
-        Ok(PlannedSetup {
-            ring: setup.drives.ring,
-            drives,
-            what,
-        })
-    }
-
-    /// A property of the nd21 model for a drive of another model would do nothing.
-    fn idle_property(&self, setup: &Setup) -> Option<Problem> {
-        let (SetupKind::Time(name, _) | SetupKind::Word(name, _)) = &setup.what else {
-            return None;
-        };
-        nd21::PROPERTIES.iter().find(|own| own.name == name.value)?;
-        let models = |drive| {
-            setups_of(&self.setups, setup.drives.ring, drive)
-                .filter_map(|what| match what {
-                    PlannedSetupKind::Model(model) => Some(*model),
-                    _ => None,
-                })
-                .last()
-        };
-        let mut drives = self.drives(&setup.drives).ok()?;
-        let other = drives.find(|drive| models(*drive) != Some(Model::Nd21))?;
-        let message = format!("drive {other} has no `{}`", name.value);
-        let problem = Problem::new(name.span, message, "a property of the model nd21");
-        Some(problem.help(format!("add `drive {other} model nd21`")))
     }
 
     fn when(&self, when: When) -> PlannedWhen {
@@ -285,12 +220,8 @@ impl Planner {
         }
     }
 
-    fn action(
-        &self,
-        action: &Action,
-        needs: &mut Vec<Capability>,
-    ) -> Result<PlannedAction, Problem> {
-        match action {
+    fn action(&self, step: &Step, needs: &mut Vec<Capability>) -> Result<PlannedAction, Problem> {
+        match &step.action {
             Action::Send { ring, bytes } => {
                 self.ring(*ring, bytes.span)?;
                 Ok(PlannedAction::Send(
@@ -311,6 +242,22 @@ impl Planner {
                 needs.extend(job.needs());
                 self.job(job)
             }
+            Action::Until(check, within) => {
+                let check = self.drive_check(check, needs)?;
+                Ok(PlannedAction::Until(check, within.on(self.byte_time)))
+            }
+            Action::Wait(time) => Ok(PlannedAction::Wait(time.on(self.byte_time))),
+            Action::Influence(drives, influence) => {
+                needs.push(influence.needs());
+                self.influence(drives, influence, step.span)?;
+                let range = self.drives(drives)?;
+                Ok(PlannedAction::Influence(
+                    drives.ring,
+                    range,
+                    influence.clone(),
+                ))
+            }
+            Action::Record(recording) => Ok(PlannedAction::Record(self.record(recording)?)),
         }
     }
 
@@ -325,6 +272,24 @@ impl Planner {
             FaultKind::Drive(drive, kind) => {
                 needs.push(Capability::Power);
                 PlacedFault::Drive(self.drive(fault.ring, drive)?, *kind)
+            }
+            FaultKind::Error(drive, error) => {
+                needs.push(Capability::Simulator);
+                if let Some(byte) = &fault.byte {
+                    return Err(Problem::new(
+                        byte.span,
+                        "the drive's monitoring knows no bytes of the bus",
+                        "a time expected here, as in `@20ms`",
+                    ));
+                }
+                let drives = Drives {
+                    ring: fault.ring,
+                    from: drive.clone(),
+                    to: None,
+                };
+                self.only_nd21(&drives, "monitoring", drive.span)?;
+                let drive = self.drive(fault.ring, drive)?;
+                PlacedFault::Stimulus(drive, Stimulus::Error(*error))
             }
         };
         let moment = match (&fault.byte, fault.at) {
@@ -419,24 +384,11 @@ impl Planner {
                 PlannedCheck::Located(ring, drive, within.as_ref().map(count).transpose()?)
             }
             Check::Within(zeros) => PlannedCheck::Within(count(zeros)?),
-            Check::InError { drives, expected } => {
-                needs.push(Capability::Tap);
-                PlannedCheck::InError(drives.ring, self.drives(drives)?, *expected)
-            }
+            Check::Drive(check) => PlannedCheck::Drive(self.drive_check(check, needs)?),
             Check::Error { error, drive } => {
                 needs.push(Capability::Tap);
                 let (ring, drive) = self.one(drive)?;
                 PlannedCheck::Error(ring, drive, *error)
-            }
-            Check::Memory {
-                drives,
-                address,
-                bytes,
-            } => {
-                let range = self.drives(drives)?;
-                let bytes = bytes.expand(self.size(drives.ring), MAX_CELLS)?;
-                in_memory(address, bytes.len())?;
-                PlannedCheck::Memory(drives.ring, range, address.value, bytes)
             }
             Check::Corrected(times) => PlannedCheck::Corrected(count(times)?),
             Check::Sent { bytes, time } => {
@@ -446,40 +398,4 @@ impl Planner {
             Check::Received(bytes) => PlannedCheck::Received(count(bytes)?),
         })
     }
-}
-
-fn in_memory(address: &Spanned<u16>, length: usize) -> Result<(), Problem> {
-    let last = usize::from(address.value) + length.max(1) - 1;
-    let inside = |range: &RangeInclusive<u16>| {
-        range.contains(&address.value) && last <= usize::from(*range.end())
-    };
-    if [memory::ROM_WORDS, memory::RAM_AND_REGISTERS]
-        .iter()
-        .any(inside)
-    {
-        return Ok(());
-    }
-    Err(Problem::new(
-        address.span,
-        format!("a drive has no memory at {last:04X}"),
-        "ROM 2F00-2FDF, RAM FD80-FF7F or registers FF80-FFFF (ND21 10.1) expected here",
-    ))
-}
-
-fn set_property(name: &str, setting: Setting<'_>, span: Span) -> Result<(), Problem> {
-    if let Some(own) = nd21::PROPERTIES.iter().find(|own| own.name == name) {
-        if own.set(&mut Nd21Properties::default(), setting) {
-            return Ok(());
-        }
-        let message = format!("`{name}` cannot be set to this");
-        let expected = format!("{} expected here", own.values());
-        return Err(Problem::new(span, message, expected));
-    }
-    Properties::default().set(name, setting).map_err(|error| {
-        Problem::new(
-            span,
-            format!("`{name}` cannot be set to this"),
-            error.to_string(),
-        )
-    })
 }

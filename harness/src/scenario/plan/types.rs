@@ -3,7 +3,10 @@
 use crate::link::{Capability, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::problem::Span;
+use crate::scenario::quantity::{Quantity, Tolerance};
+use crate::scenario::syntax::{Influence, Place, Relation, Showing};
 use harness_proto::line::Rate;
+use harness_proto::nd21::units::{self, Device, Scale};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
@@ -12,6 +15,10 @@ use harness_proto::time;
 use harness_sim::drive::Model;
 use harness_sim::nd21::Nd21Properties;
 use std::ops::RangeInclusive;
+
+/// How often the bench looks at cells while it waits for one: a quarter of the cycle of the drive's
+/// regulators (ND21 4.1).
+pub const LOOK: time::Span = time::Span::from_micros(108);
 
 /// A scenario for rings of given sizes.
 #[derive(Clone, Debug)]
@@ -29,6 +36,8 @@ pub struct Plan {
     /// The steps, in order.
     pub steps: Vec<PlannedStep>,
     pub(super) setups: Vec<PlannedSetup>,
+    /// What the scales of each ring's drives depend on.
+    pub(super) units: Vec<Vec<units::Drive>>,
 }
 
 #[derive(Clone, Debug)]
@@ -43,6 +52,8 @@ pub(in crate::scenario) enum PlannedSetupKind {
     Memory(u16, Vec<u8>),
     Eeprom(u8, Vec<u8>),
     Model(Model),
+    Type(Device),
+    Influence(Influence),
     Word(String, String),
     Time(String, time::Span),
 }
@@ -54,7 +65,7 @@ impl PlannedSetupKind {
         let _known = match self {
             Self::Word(name, word) => properties.set(name, Setting::Word(word)),
             Self::Time(name, span) => properties.set(name, Setting::Time(*span)),
-            Self::Memory(..) | Self::Eeprom(..) | Self::Model(_) => Ok(()),
+            _ => Ok(()),
         };
     }
 
@@ -67,17 +78,34 @@ impl PlannedSetupKind {
             Self::Eeprom(..) => Some(Capability::Eeprom),
             // A real drive is what it is.
             Self::Word(..) | Self::Time(..) => Some(Capability::Simulator),
-            Self::Model(_) => None,
+            Self::Model(_) | Self::Type(_) => None,
+            Self::Influence(influence) => Some(influence.needs()),
         }
     }
 
-    /// The same for what the manual does not say of the drive behind the bus.
+    /// The same for the drive behind the bus.
     pub(in crate::scenario) fn apply_to_nd21(&self, properties: &mut Nd21Properties) {
-        let _known = match self {
-            Self::Word(name, word) => properties.set(name, Setting::Word(word)),
-            Self::Time(name, span) => properties.set(name, Setting::Time(*span)),
-            _ => false,
-        };
+        match self {
+            // Planning has refused what cannot be set; the bus's own properties are not found here.
+            Self::Word(name, word) => {
+                let _own = properties.set(name, Setting::Word(word));
+            }
+            Self::Time(name, span) => {
+                let _own = properties.set(name, Setting::Time(*span));
+            }
+            Self::Type(device) => properties.device = *device,
+            _ => {}
+        }
+    }
+}
+
+impl Influence {
+    /// What a rig must have for it.
+    pub(super) fn needs(&self) -> Capability {
+        match self {
+            Self::Stimuli(_) => Capability::Simulator,
+            Self::Power(_) => Capability::Power,
+        }
     }
 }
 
@@ -125,10 +153,131 @@ pub enum PlannedAction {
     Fault(usize, PlacedFault, Moment),
     /// A check.
     Check(PlannedCheck),
-    /// A telegram and its answer.
-    Telegram(usize, Vec<u8>, Vec<Expected>),
+    /// A telegram and its answer, and what the number in the answer must be.
+    Telegram(usize, Vec<u8>, Vec<Expected>, Option<Reading>),
     /// 17 zeros and the check sequence.
     Recover(usize),
+    /// Time passes until a check holds, at most so long.
+    Until(PlannedDriveCheck, time::Span),
+    /// Time passes.
+    Wait(time::Span),
+    /// Something happens to drives from outside the bus.
+    Influence(usize, RangeInclusive<u8>, Influence),
+    /// Cells are recorded from here on, or no longer.
+    Record(PlannedRecord),
+}
+
+/// What the number in an answer must be.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// Which drive answers.
+    pub drive: u8,
+    /// Which bytes of the answer it is, the first byte of the cell first.
+    pub bytes: Vec<usize>,
+    /// What must hold of them.
+    pub cell: PlannedCell,
+}
+
+/// What must hold of drives, settled.
+#[derive(Clone, Debug)]
+pub struct PlannedDriveCheck {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// Which drives.
+    pub drives: RangeInclusive<u8>,
+    /// What.
+    pub condition: PlannedCondition,
+}
+
+/// What can hold of a drive, settled.
+#[derive(Clone, Debug)]
+pub enum PlannedCondition {
+    /// It is in the error mode, or is not.
+    InError(bool),
+    /// Its cells hold these bytes.
+    Memory(u16, Vec<Expected>),
+    /// A cell compares with a value.
+    Cell(PlannedCell),
+    /// It shows this outside the bus.
+    Shows(Showing),
+}
+
+/// What must hold of a cell.
+#[derive(Clone, Debug)]
+pub struct PlannedCell {
+    /// Its name as written.
+    pub name: String,
+    /// Its address.
+    pub address: u16,
+    /// How many bytes.
+    pub size: usize,
+    /// What must hold.
+    pub test: CellTest,
+}
+
+impl PlannedCell {
+    pub(super) fn new(place: &Place, size: usize, test: CellTest) -> Self {
+        Self {
+            name: place.name.clone(),
+            address: place.address,
+            size,
+            test,
+        }
+    }
+}
+
+/// What the bytes of a cell can be compared with.
+#[derive(Clone, Debug)]
+pub enum CellTest {
+    /// These bytes.
+    Bytes(Vec<Expected>),
+    /// The bits of the first are those of the second.
+    Masked(Vec<u8>, Vec<u8>),
+    /// The bytes as a number, and whether it has a sign.
+    Raw(Relation, i64, bool),
+    /// A number with a unit.
+    Number {
+        /// The scale of the bytes.
+        scale: Scale,
+        /// How it is compared.
+        relation: Relation,
+        /// With what.
+        expected: Quantity,
+        /// How far it may be off; without one the nearest raw value is meant.
+        tolerance: Option<Tolerance>,
+    },
+}
+
+/// A cell that is recorded, settled.
+#[derive(Clone, Debug)]
+pub struct PlannedRecord {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// Of which drives.
+    pub drives: RangeInclusive<u8>,
+    /// Its name as written.
+    pub name: String,
+    /// Its address.
+    pub address: u16,
+    /// How many bytes.
+    pub size: usize,
+    /// The scale of the bytes, if the manual gives one.
+    pub scale: Option<Scale>,
+    /// When it is looked at.
+    pub looks: PlannedLooks,
+    /// Where the cell stands.
+    pub span: Span,
+}
+
+/// When a recorded cell is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlannedLooks {
+    /// Every so often.
+    Every(time::Span),
+    /// Every [`LOOK`]; what changes is noted.
+    Changes,
+    /// No longer.
+    Off,
 }
 
 /// A check, settled.
@@ -138,12 +287,10 @@ pub enum PlannedCheck {
     Located(usize, u8, Option<u64>),
     /// It does so after at most so many zeros.
     Within(u64),
-    /// Drives are in the error mode, or are not.
-    InError(usize, RangeInclusive<u8>, bool),
+    /// Something holds of drives.
+    Drive(PlannedDriveCheck),
     /// A drive's error mode has this cause.
     Error(usize, u8, BusError),
-    /// Drives' cells hold these bytes.
-    Memory(usize, RangeInclusive<u8>, u16, Vec<Expected>),
     /// So many check sequences came back whole.
     Corrected(u64),
     /// So many bytes were sent since the last check, in this time (and its tolerance).
@@ -153,6 +300,27 @@ pub enum PlannedCheck {
 }
 
 impl Plan {
+    /// What the scales of a drive's cells depend on.
+    ///
+    /// # Panics
+    /// There is no such drive: planning has refused it.
+    #[must_use]
+    pub fn units(&self, ring: usize, drive: u8) -> units::Drive {
+        self.units[ring][usize::from(drive)]
+    }
+
+    /// What happens to drives from outside the bus before anything is sent, in order of the lines.
+    pub(in crate::scenario) fn influences(
+        &self,
+    ) -> impl Iterator<Item = (usize, RangeInclusive<u8>, &Influence)> + '_ {
+        self.setups.iter().filter_map(|setup| match &setup.what {
+            PlannedSetupKind::Influence(influence) => {
+                Some((setup.ring, setup.drives.clone(), influence))
+            }
+            _ => None,
+        })
+    }
+
     /// What drive `drive` is set to hold and how to behave, in order of the lines.
     pub(in crate::scenario) fn setups_of(
         &self,

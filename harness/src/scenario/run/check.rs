@@ -1,11 +1,10 @@
 //! Checks.
 
-use super::player::{Runner, Shown, Stop, matches};
+use super::look::Miss;
+use super::player::{Runner, Stop};
 use crate::locate::{self, Location};
-use crate::scenario::pattern::Expected;
 use crate::scenario::plan::PlannedCheck;
 use crate::scenario::problem::Span;
-use harness_proto::line::Received;
 
 /// SYNCO sent to let a ring spell out an address: the bound of 25 zeros, and enough behind it to see
 /// that the address stays (ND21 9.7).
@@ -29,38 +28,24 @@ impl Runner<'_> {
                 Some(location) => enough(location, Some(*zeros), span),
                 None => failed("the ring spells out no address".to_owned()),
             },
-            PlannedCheck::InError(ring, drives, expected) => {
-                let wrong: Vec<_> = drives
-                    .clone()
-                    .filter(|k| {
-                        self.link
-                            .error_of(*ring, *k)
-                            .is_some_and(|error| error.is_some() != *expected)
-                    })
-                    .collect();
-                if wrong.is_empty() {
-                    return Ok(());
-                }
-                let not = if *expected { " not" } else { "" };
-                failed(format!(
-                    "{} {}{not} in the error mode",
-                    list(&wrong),
-                    are(&wrong)
-                ))
+            PlannedCheck::Drive(check) => {
+                let seen = self.look(check);
+                self.judged(seen, span)
             }
             PlannedCheck::Error(ring, drive, error) => {
-                match self.link.error_of(*ring, *drive).flatten() {
-                    Some(found) if found == *error => Ok(()),
-                    Some(found) => failed(format!(
+                let seen = match self.link.error_of(*ring, *drive) {
+                    Some(Some(found)) if found == *error => Ok(()),
+                    Some(Some(found)) => Err(Miss::Otherwise(format!(
                         "drive {drive} has error {found}, expected is {error}"
-                    )),
-                    None => failed(format!(
+                    ))),
+                    Some(None) => Err(Miss::Otherwise(format!(
                         "drive {drive} is not in the error mode, expected is error {error}"
-                    )),
-                }
-            }
-            PlannedCheck::Memory(ring, drives, address, bytes) => {
-                self.check_memory(*ring, drives.clone(), *address, bytes, span)
+                    ))),
+                    None => Err(Miss::Unseen(format!(
+                        "this link does not show whether drive {drive} is in the error mode"
+                    ))),
+                };
+                self.judged(seen, span)
             }
             PlannedCheck::Corrected(times) if *times == self.corrected => Ok(()),
             PlannedCheck::Corrected(times) => failed(format!(
@@ -96,33 +81,6 @@ impl Runner<'_> {
         }
     }
 
-    fn check_memory(
-        &self,
-        ring: usize,
-        drives: std::ops::RangeInclusive<u8>,
-        address: u16,
-        bytes: &[Expected],
-        span: Span,
-    ) -> Result<(), Stop> {
-        for drive in drives {
-            for (cell, expected) in (address..=u16::MAX).zip(bytes) {
-                let Some(found) = self.link.peek(ring, drive, cell) else {
-                    continue;
-                };
-                if !matches(*expected, Received::good(found)) {
-                    return Err(Stop::failed(
-                        span,
-                        format!(
-                            "cell {cell:04X} of drive {drive} holds {found:02X}, expected is {}",
-                            Shown(*expected)
-                        ),
-                    ));
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// The address that the ring spells out, letting it go on where it has not come to it yet.
     fn locate(&mut self, ring: usize) -> Option<Location> {
         let size = self.link.drives(ring);
@@ -147,14 +105,4 @@ fn enough(location: Location, most: Option<u64>, span: Span) -> Result<(), Stop>
         )),
         _ => Ok(()),
     }
-}
-
-fn list(drives: &[u8]) -> String {
-    let names: Vec<_> = drives.iter().map(u8::to_string).collect();
-    let s = if drives.len() == 1 { "" } else { "s" };
-    format!("drive{s} {}", names.join(", "))
-}
-
-fn are(drives: &[u8]) -> &'static str {
-    if drives.len() == 1 { "is" } else { "are" }
 }

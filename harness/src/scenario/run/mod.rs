@@ -1,6 +1,12 @@
 //! Plays a plan on a link and says what came of it.
 
+mod bytes;
 mod check;
+mod drives;
+mod look;
 mod player;
+mod record;
 
-pub use player::{AtFinding, Difference, Finding, Outcome, Shown, needs, play, run, show};
+pub use bytes::{Shown, show};
+pub use player::{AtFinding, Difference, Finding, Outcome, needs, play, run};
+pub use record::{MAX_SAMPLES, Record, Sample};

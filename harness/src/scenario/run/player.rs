@@ -1,5 +1,7 @@
 //! Step by step.
 
+use super::bytes::{Shown, matches, resolve, show};
+use super::record::{Record, Recorder};
 use crate::link::{Capability, Link, Moment};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{
@@ -9,9 +11,7 @@ use crate::scenario::problem::Span;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
-use harness_proto::novobus::checksum::Checksum;
 use harness_proto::time::{self, Instant};
-use std::fmt::Write as _;
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
@@ -34,6 +34,22 @@ pub struct Outcome {
     pub remarks: Vec<String>,
     /// How long it took, on the line's clock.
     pub took: time::Span,
+    /// The cells that it recorded.
+    pub records: Vec<Record>,
+}
+
+impl Outcome {
+    /// A scenario that is not played, and why.
+    #[must_use]
+    pub fn skipped(remark: String) -> Self {
+        Self {
+            verdict: Verdict::Skipped,
+            finding: None,
+            remarks: vec![remark],
+            took: time::Span::ZERO,
+            records: Vec::new(),
+        }
+    }
 }
 
 /// Something that was otherwise than a step says.
@@ -88,12 +104,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         .map(|need| need.name())
         .collect();
     if !missing.is_empty() {
-        return Outcome {
-            verdict: Verdict::Skipped,
-            finding: None,
-            remarks: vec![format!("the rig has no {}", missing.join(", no "))],
-            took: time::Span::ZERO,
-        };
+        return Outcome::skipped(format!("the rig has no {}", missing.join(", no ")));
     }
     let mut runner = Runner {
         rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
@@ -104,11 +115,17 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         sent_from: link.now(),
         sent_to: link.now(),
         link,
+        plan,
         at_finding,
         strict: plan.strict,
-        full: false,
+        full: None,
+        unseen: None,
+        recorder: Recorder::default(),
     };
-    let mut result = runner.play(plan);
+    let mut result = runner.play();
+    if let (Ok(()), Some(unseen)) = (&result, runner.unseen.take()) {
+        result = Err(unseen);
+    }
     if let Err(stop) = &mut result {
         // What is under way still tells something, and nothing more is sent.
         stop.finding.in_error = runner.in_error();
@@ -131,6 +148,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         finding,
         remarks,
         took,
+        records: runner.recorder.records,
     }
 }
 
@@ -153,6 +171,13 @@ impl Stop {
         }
     }
 
+    pub(super) fn inconclusive(span: Span, message: impl Into<String>) -> Self {
+        Self {
+            verdict: Verdict::Inconclusive,
+            ..Self::failed(span, message)
+        }
+    }
+
     fn aborted(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Aborted,
@@ -171,20 +196,24 @@ impl Stop {
 pub(super) struct RingRecord {
     pub(super) received: Vec<(Instant, Received)>,
     /// The first byte that no line has asked for yet.
-    next: usize,
+    pub(super) next: usize,
     /// The first byte behind the last check sequence.
     pub(super) since_recovery: usize,
 }
 
 pub(super) struct Runner<'a> {
     pub(super) link: &'a mut dyn Link,
+    pub(super) plan: &'a Plan,
     at_finding: AtFinding,
     strict: bool,
-    /// The record is full.
-    full: bool,
+    /// Why there is no room for more in what is recorded.
+    pub(super) full: Option<String>,
+    /// The first check on something that the link does not show.
+    pub(super) unseen: Option<Stop>,
+    pub(super) recorder: Recorder,
     pub(super) rings: Vec<RingRecord>,
     /// When the line before was done.
-    line_before: Instant,
+    pub(super) line_before: Instant,
     deadline: time::Span,
     pub(super) corrected: u64,
     pub(super) sent: u64,
@@ -193,7 +222,11 @@ pub(super) struct Runner<'a> {
 }
 
 impl Runner<'_> {
-    fn play(&mut self, plan: &Plan) -> Result<(), Stop> {
+    fn play(&mut self) -> Result<(), Stop> {
+        let plan = self.plan;
+        for (ring, drives, influence) in plan.influences() {
+            self.influence(ring, drives, influence);
+        }
         // A fault at a byte is armed from the start, wherever its line stands: its byte is counted
         // from the start too.
         for step in &plan.steps {
@@ -207,7 +240,7 @@ impl Runner<'_> {
         for step in &plan.steps {
             let result = self.step(step);
             let result = self.room(step.span).and(result);
-            if result.is_err() && self.at_finding == AtFinding::Stop || self.full {
+            if result.is_err() && self.at_finding == AtFinding::Stop || self.full.is_some() {
                 return first.and(result);
             }
             first = first.and(result);
@@ -221,11 +254,10 @@ impl Runner<'_> {
 
     /// Whether the record has room for more.
     fn room(&self, span: Span) -> Result<(), Stop> {
-        if self.full {
-            let message = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
-            return Err(Stop::aborted(span, message));
+        match &self.full {
+            Some(why) => Err(Stop::aborted(span, why.clone())),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
@@ -269,6 +301,20 @@ impl Runner<'_> {
                 Ok(())
             }
             PlannedAction::Fault(..) | PlannedAction::Receive(..) => Ok(()),
+            PlannedAction::Influence(ring, drives, influence) => {
+                self.influence(*ring, drives.clone(), influence);
+                Ok(())
+            }
+            PlannedAction::Record(record) => {
+                self.record(record);
+                Ok(())
+            }
+            PlannedAction::Wait(time) => {
+                self.line_before = self.line_before.max(self.link.now()) + *time;
+                self.pass_until(self.line_before);
+                Ok(())
+            }
+            PlannedAction::Until(check, within) => self.until(check, *within, step.span),
             PlannedAction::Check(check) => {
                 if step.when == PlannedWhen::Now {
                     self.settle();
@@ -278,7 +324,7 @@ impl Runner<'_> {
                 self.sent = 0;
                 result
             }
-            PlannedAction::Telegram(ring, bytes, expected) => {
+            PlannedAction::Telegram(ring, bytes, expected, reading) => {
                 self.settle();
                 let asked = self.nothing_unasked(step.span);
                 if asked.is_err() && self.at_finding == AtFinding::Stop {
@@ -286,7 +332,9 @@ impl Runner<'_> {
                 }
                 self.forget(*ring);
                 self.send(*ring, bytes);
-                asked.and(self.expect(step.span, *ring, expected, None))
+                asked
+                    .and(self.expect(step.span, *ring, expected, None))
+                    .and_then(|()| self.read(*ring, expected.len(), reading.as_ref(), step.span))
             }
             PlannedAction::Recover(ring) => self.recover(*ring, step.span),
         }
@@ -302,8 +350,8 @@ impl Runner<'_> {
     }
 
     /// Lets time pass up to `until`.
-    fn pass_until(&mut self, until: Instant) {
-        while self.link.now() < until && !self.full {
+    pub(super) fn pass_until(&mut self, until: Instant) {
+        while self.link.now() < until && self.full.is_none() {
             self.wait(until);
         }
     }
@@ -317,10 +365,24 @@ impl Runner<'_> {
 
     /// Lets time pass until something happens. False where nothing will, or where the record is full.
     fn wait(&mut self, until: Instant) -> bool {
-        self.full |= self.link.carried() > MAX_CARRIED;
-        let more = !self.full && self.link.wait(until);
-        self.fetch();
-        more
+        loop {
+            if self.link.carried() > MAX_CARRIED {
+                let why = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
+                self.full = Some(why);
+            }
+            self.full = self.full.take().or_else(|| self.recorder.too_much());
+            if self.full.is_some() {
+                self.fetch();
+                return false;
+            }
+            // Time stops on its way where a cell is to be looked at.
+            let more = self.link.wait(until.min(self.recorder.next()));
+            self.note();
+            self.fetch();
+            if more || self.link.now() >= until {
+                return more;
+            }
+        }
     }
 
     fn fetch(&mut self) {
@@ -519,54 +581,6 @@ fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
             .iter()
             .zip(SEQUENCE)
             .all(|((_, byte), wanted)| byte.is(wanted))
-}
-
-pub(super) fn matches(expected: Expected, received: Received) -> bool {
-    match expected {
-        Expected::Byte(byte) => received.is(byte),
-        Expected::Any => received.error.is_none(),
-        // Resolved before it is compared.
-        Expected::MinusChecksum(_) => false,
-    }
-}
-
-/// A checking byte as the byte that it must be, by what was received before it.
-fn resolve(expected: Expected, before: &[(Instant, Received)]) -> Expected {
-    match expected {
-        Expected::MinusChecksum(over) => {
-            let from = before.len().saturating_sub(usize::from(over));
-            let sum = before[from..]
-                .iter()
-                .fold(Checksum::EMPTY, |sum, (_, byte)| sum.with(byte.byte));
-            Expected::Byte(sum.minus())
-        }
-        known => known,
-    }
-}
-
-/// A received byte as reports show it: `88`, or `12 (parity)`.
-#[must_use]
-pub fn show(received: Received) -> String {
-    let mut text = format!("{:02X}", received.byte);
-    if let Some(error) = received.error {
-        // Writing to a String cannot fail.
-        let _infallible = write!(text, " ({error})");
-    }
-    text
-}
-
-/// An expected byte as reports show it.
-#[derive(Clone, Copy)]
-pub struct Shown(pub Expected);
-
-impl std::fmt::Display for Shown {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.0 {
-            Expected::Byte(byte) => write!(f, "{byte:02X}"),
-            Expected::Any => f.write_str("xx"),
-            Expected::MinusChecksum(_) => f.write_str("-checksum"),
-        }
-    }
 }
 
 /// What a plan needs that a rig may lack, in words.

@@ -1,9 +1,12 @@
 //! What a scenario can check.
 
 use super::Drives;
+use super::cell::{CellCheck, Place};
+use crate::link::Mode;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::Spanned;
+use crate::scenario::problem::Span;
+use crate::scenario::quantity::{Quantity, Tolerance};
 use crate::scenario::times::Duration;
 use harness_proto::novobus::error::BusError;
 
@@ -19,28 +22,14 @@ pub enum Check {
     },
     /// It does so after at most so many zeros (ND21 9.7: 25).
     Within(Located),
-    /// These drives are in the error mode, or are not.
-    InError {
-        /// Which drives.
-        drives: Drives,
-        /// Whether they are, or must not be.
-        expected: bool,
-    },
+    /// Something holds of drives.
+    Drive(DriveCheck),
     /// This drive's error mode has this cause.
     Error {
         /// The cause.
         error: BusError,
         /// Which drive.
         drive: Drives,
-    },
-    /// A drive's cells hold these bytes.
-    Memory {
-        /// Which drives.
-        drives: Drives,
-        /// From which address on.
-        address: Spanned<u16>,
-        /// What.
-        bytes: Pattern,
     },
     /// So many check sequences came back whole.
     Corrected(Located),
@@ -53,4 +42,47 @@ pub enum Check {
     },
     /// So many bytes were received since the start.
     Received(Located),
+}
+
+/// What must hold of drives.
+#[derive(Clone, Debug)]
+pub struct DriveCheck {
+    /// Which drives.
+    pub drives: Drives,
+    /// What.
+    pub condition: Condition,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// What can hold of a drive.
+#[derive(Clone, Debug)]
+pub enum Condition {
+    /// It is in the error mode, or is not.
+    InError(bool),
+    /// `memory ADDRESS = BYTES`
+    Memory(Place, Pattern),
+    /// A cell compares with a value.
+    Cell(CellCheck),
+    /// It shows this outside the bus.
+    Shows(Showing),
+}
+
+/// What a drive can show outside the bus (ND21 5.3, 11.8).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Showing {
+    /// `GPO1 high`
+    Gpo1(bool),
+    /// `GPO2 high`
+    Gpo2(bool),
+    /// `ready closed`
+    Ready(bool),
+    /// `analogue-output = 2.5V +-0.1V`: the voltage in mV too.
+    Analogue(i32, Quantity, Option<Tolerance>),
+    /// `encoder = 1024 +-2`
+    Encoder(i64, i64),
+    /// `display 508`, or `display blank`
+    Display(Option<[u8; 3]>),
+    /// `mode go`
+    Mode(Mode),
 }

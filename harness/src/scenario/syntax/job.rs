@@ -1,9 +1,10 @@
 //! The jobs of the master that a scenario can give.
 
 use super::Drives;
+use super::cell::{Place, Written};
 use crate::link::Capability;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::Spanned;
+use crate::scenario::quantity::Tolerance;
 
 /// A job as written.
 #[derive(Clone, Debug)]
@@ -26,9 +27,11 @@ pub enum Job {
         /// Which drive.
         drive: Drives,
         /// The cell, where the command has one.
-        address: Option<Spanned<u16>>,
+        place: Option<Place>,
         /// The data that are written, or that must be read.
-        data: Option<Pattern>,
+        data: Option<Written>,
+        /// How far what is read may be off.
+        tolerance: Option<Tolerance>,
     },
 }
 

@@ -1,9 +1,11 @@
 //! A scenario as written, for a ring of any size.
 
+mod cell;
 mod check;
 mod job;
 mod scenario;
 
-pub use check::Check;
+pub use cell::{CellCheck, Place, Relation, Written};
+pub use check::{Check, Condition, DriveCheck, Showing};
 pub use job::{Job, JobKind};
 pub use scenario::*;

@@ -1,13 +1,16 @@
 //! The scenario, its header and its steps.
 
-use super::check::Check;
+use super::cell::{Place, Written};
+use super::check::{Check, DriveCheck};
 use super::job::Job;
-use crate::link::Capability;
+use crate::link::{Capability, Stimulus};
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::{Span, Spanned};
 use crate::scenario::times::{Duration, Window};
 use harness_proto::line::Rate;
+use harness_proto::nd21::errors::ErrorCode;
+use harness_proto::nd21::units::Device;
 use harness_sim::drive::Model;
 use harness_sim::fault::{DriveFault, Flips};
 
@@ -103,16 +106,51 @@ pub struct Setup {
 /// The kinds of a [`Setup`].
 #[derive(Clone, Debug)]
 pub enum SetupKind {
-    /// `memory ADDRESS = BYTES`
-    Memory(Spanned<u16>, Pattern),
-    /// `eeprom ADDRESS = BYTES`
-    Eeprom(Spanned<u8>, Pattern),
+    /// `memory CELL = VALUE`
+    Memory(Place, Written),
+    /// `eeprom CELL = VALUE`
+    Eeprom(Place, Written),
     /// `model NAME`
     Model(Model),
+    /// `type NUMBER`
+    Type(Device),
+    /// Something from outside the bus, before anything is sent.
+    Influence(Influence),
     /// `property NAME = WORD`
     Word(Spanned<String>, Spanned<String>),
     /// `property NAME = TIME`
     Time(Spanned<String>, Duration),
+}
+
+/// What happens to drives from outside the bus: `input GPIN5 high`, `power off`.
+#[derive(Clone, Debug)]
+pub enum Influence {
+    /// At the plugs or the motor.
+    Stimuli(Vec<Stimulus>),
+    /// The power is switched on or off.
+    Power(bool),
+}
+
+/// A cell that is recorded: `record drive 0 nist every 10ms`.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Of which drives.
+    pub drives: Drives,
+    /// Which cell.
+    pub place: Place,
+    /// When it is looked at.
+    pub looks: Looks,
+}
+
+/// When a recorded cell is noted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Looks {
+    /// `every T`
+    Every(Duration),
+    /// `changes`
+    Changes,
+    /// `off`: no longer.
+    Off,
 }
 
 /// A step.
@@ -158,6 +196,14 @@ pub enum Action {
     Fault(Fault),
     /// `?`: a check.
     Check(Check),
+    /// `until`: time passes until a check holds, at most so long.
+    Until(DriveCheck, Duration),
+    /// `wait`: time passes.
+    Wait(Duration),
+    /// `drive ...`: something happens to drives from outside the bus.
+    Influence(Drives, Influence),
+    /// `record`: cells are recorded from here on, or no longer.
+    Record(Recording),
     /// A job of the master.
     Job(Job),
 }
@@ -182,6 +228,8 @@ pub enum FaultKind {
     Link(Located, LinkEnds, LinkFaultKind),
     /// In a drive.
     Drive(Located, DriveFault),
+    /// The drive's own monitoring reports an error.
+    Error(Located, ErrorCode),
 }
 
 /// The ends of a link.

@@ -1,0 +1,271 @@
+//! What drives hold and are before anything is sent, and what their scales depend on.
+
+use super::planner::Planner;
+use super::types::{PlannedSetup, PlannedSetupKind, setups_of};
+use crate::scenario::pattern::MAX_CELLS;
+use crate::scenario::problem::{Problem, Span};
+use crate::scenario::syntax::{Drives, Influence, Place, Setup, SetupKind, Written};
+use harness_proto::nd21;
+use harness_proto::nd21::units::{self, Device, Scale, SpeedRange, Value};
+use harness_proto::novobus::memory;
+use harness_proto::novobus::properties::{Properties, Setting};
+use harness_sim::drive::Model;
+use harness_sim::nd21::{Nd21Properties, PROPERTIES};
+use std::ops::RangeInclusive;
+
+impl Planner {
+    /// Settles what the header says of drives. Bytes and types come first: on them depends what numbers
+    /// with a unit are.
+    pub(super) fn set_up(&mut self, setups: &[Setup]) -> Vec<Problem> {
+        let mut found = Vec::new();
+        let mut planned = Vec::new();
+        for numbers in [false, true] {
+            for (line, setup) in setups.iter().enumerate() {
+                if has_number(setup) == numbers {
+                    match self.setup(setup) {
+                        Ok(all) => planned.extend(all.into_iter().map(|one| (line, one))),
+                        Err(problem) => found.push(problem),
+                    }
+                }
+            }
+            planned.sort_by_key(|(line, _)| *line);
+            self.setups = planned.iter().map(|(_, setup)| setup.clone()).collect();
+            if !numbers {
+                self.units = self.all_units();
+            }
+        }
+        found.extend(setups.iter().filter_map(|setup| self.idle(setup)));
+        found
+    }
+
+    fn setup(&self, setup: &Setup) -> Result<Vec<PlannedSetup>, Problem> {
+        let ring = setup.drives.ring;
+        let drives = self.drives(&setup.drives)?;
+        let what = match &setup.what {
+            SetupKind::Memory(place, value) => {
+                return self.cells(ring, drives, place, value, |bytes| {
+                    in_memory(place, bytes.len())?;
+                    Ok(PlannedSetupKind::Memory(place.address, bytes))
+                });
+            }
+            SetupKind::Eeprom(place, value) => {
+                return self.cells(ring, drives, place, value, |bytes| {
+                    let [_, address] = place.address.to_be_bytes();
+                    if usize::from(address) + bytes.len() > 256 {
+                        return Err(Problem::new(
+                            place.span,
+                            "the bytes go beyond the EEPROM",
+                            "the EEPROM has the addresses 00 to FF (ND21 14.2.2)",
+                        ));
+                    }
+                    Ok(PlannedSetupKind::Eeprom(address, bytes))
+                });
+            }
+            SetupKind::Model(model) => PlannedSetupKind::Model(*model),
+            SetupKind::Type(device) => PlannedSetupKind::Type(*device),
+            SetupKind::Influence(influence) => PlannedSetupKind::Influence(influence.clone()),
+            SetupKind::Word(name, word) => {
+                set_property(&name.value, Setting::Word(&word.value), word.span)?;
+                PlannedSetupKind::Word(name.value.clone(), word.value.clone())
+            }
+            SetupKind::Time(name, duration) => {
+                let span = duration.on(self.byte_time);
+                set_property(&name.value, Setting::Time(span), duration.span())?;
+                PlannedSetupKind::Time(name.value.clone(), span)
+            }
+        };
+        Ok(vec![PlannedSetup { ring, drives, what }])
+    }
+
+    /// Cells that are set to a value: one setup for all drives that have the same bytes for it.
+    fn cells(
+        &self,
+        ring: usize,
+        drives: RangeInclusive<u8>,
+        place: &Place,
+        value: &Written,
+        setup: impl Fn(Vec<u8>) -> Result<PlannedSetupKind, Problem>,
+    ) -> Result<Vec<PlannedSetup>, Problem> {
+        if let Written::Bytes(pattern) = value {
+            let what = setup(pattern.expand_known(self.size(ring), MAX_CELLS)?)?;
+            return Ok(vec![PlannedSetup { ring, drives, what }]);
+        }
+        let mut planned = Vec::new();
+        for (units, drives) in self.alike(ring, drives) {
+            let what = setup(number_bytes(place.scale(), value, units)?)?;
+            planned.push(PlannedSetup { ring, drives, what });
+        }
+        Ok(planned)
+    }
+
+    /// Runs of drives with the same scales.
+    pub(super) fn alike(
+        &self,
+        ring: usize,
+        drives: RangeInclusive<u8>,
+    ) -> Vec<(units::Drive, RangeInclusive<u8>)> {
+        let mut runs: Vec<(units::Drive, RangeInclusive<u8>)> = Vec::new();
+        for drive in drives {
+            let units = self.units_of(ring, drive);
+            match runs.last_mut() {
+                Some((same, run)) if *same == units => *run = *run.start()..=drive,
+                _ => runs.push((units, drive..=drive)),
+            }
+        }
+        runs
+    }
+
+    /// What a drive's scales depend on.
+    pub(super) fn units_of(&self, ring: usize, drive: u8) -> units::Drive {
+        let of_ring = self.units.get(ring);
+        let units = of_ring.and_then(|drives| drives.get(usize::from(drive)));
+        units.copied().unwrap_or(DEFAULT_UNITS)
+    }
+
+    fn all_units(&self) -> Vec<Vec<units::Drive>> {
+        let rings = self.rings.iter().enumerate();
+        rings
+            .map(|(ring, size)| {
+                let drives = 0..size.drives();
+                drives.map(|drive| self.read_units(ring, drive)).collect()
+            })
+            .collect()
+    }
+
+    /// The type and the range of speeds as the header sets them. RAM is set after it has been loaded from
+    /// the EEPROM.
+    fn read_units(&self, ring: usize, drive: u8) -> units::Drive {
+        let mut units = DEFAULT_UNITS;
+        let (mut ram, mut eeprom) = (None, None);
+        for setup in setups_of(&self.setups, ring, drive) {
+            match setup {
+                PlannedSetupKind::Type(device) => units.device = *device,
+                PlannedSetupKind::Memory(address, bytes) => {
+                    let place = nd21::ram::SW_VERSION2.checked_sub(*address);
+                    ram = place.and_then(|i| bytes.get(usize::from(i))).or(ram);
+                }
+                PlannedSetupKind::Eeprom(address, bytes) => {
+                    let cell = nd21::eeprom::eeprom_of(nd21::ram::SW_VERSION2);
+                    let place = cell.and_then(|cell| cell.checked_sub(*address));
+                    eeprom = place.and_then(|i| bytes.get(usize::from(i))).or(eeprom);
+                }
+                _ => {}
+            }
+        }
+        if let Some(byte) = ram.or(eeprom) {
+            units.range = SpeedRange::from_sw_version2(*byte);
+        }
+        units
+    }
+
+    /// What only the nd21 model has would do nothing in a drive of another model.
+    fn idle(&self, setup: &Setup) -> Option<Problem> {
+        let (what, span) = match &setup.what {
+            SetupKind::Time(name, _) | SetupKind::Word(name, _)
+                if PROPERTIES.iter().any(|own| own.name == name.value) =>
+            {
+                (format!("`{}`", name.value), name.span)
+            }
+            SetupKind::Influence(Influence::Stimuli(_)) => (OUTSIDE.to_owned(), setup.span),
+            _ => return None,
+        };
+        self.only_nd21(&setup.drives, &what, span).err()
+    }
+
+    /// Refuses what only the nd21 model has for a drive of another.
+    pub(super) fn only_nd21(&self, drives: &Drives, what: &str, span: Span) -> Result<(), Problem> {
+        let model = |drive: &u8| {
+            let setups = setups_of(&self.setups, drives.ring, *drive);
+            let models = setups.filter_map(|setup| match setup {
+                PlannedSetupKind::Model(model) => Some(*model),
+                _ => None,
+            });
+            models.last().unwrap_or_default()
+        };
+        let prefix = if drives.ring == 0 { "" } else { "2:" };
+        let other = self
+            .drives(drives)?
+            .find(|drive| model(drive) != Model::Nd21);
+        other.map_or(Ok(()), |drive| {
+            let message = format!("drive {prefix}{drive} has no {what}: its model is `plain`");
+            let problem = Problem::new(span, message, "a drive of the model nd21 expected here");
+            Err(problem.help(format!("add `drive {prefix}{drive} model nd21`")))
+        })
+    }
+}
+
+/// What a plain drive has not got.
+pub(super) const OUTSIDE: &str = "plugs, motor and display";
+
+/// A drive of which the header says nothing (LANGUAGE.md, "Types and ranges").
+const DEFAULT_UNITS: units::Drive = units::Drive {
+    device: Device::Nd5610,
+    range: SpeedRange::To8000,
+};
+
+fn has_number(setup: &Setup) -> bool {
+    matches!(
+        &setup.what,
+        SetupKind::Memory(_, Written::Number(_) | Written::Off(_))
+            | SetupKind::Eeprom(_, Written::Number(_) | Written::Off(_))
+    )
+}
+
+/// The bytes of a number with a unit.
+pub(super) fn number_bytes(
+    scale: Option<Scale>,
+    value: &Written,
+    units: units::Drive,
+) -> Result<Vec<u8>, Problem> {
+    let (value, span) = match value {
+        Written::Number(number) => (Value::Exact(number.value), number.span),
+        Written::Off(span) => (Value::Off, *span),
+        Written::Bytes(pattern) => (Value::Off, pattern.span),
+    };
+    let expected = "a number that the cell can hold expected here";
+    let encoded = scale.and_then(|scale| Some((scale.encode(value, units)?, scale.size())));
+    match encoded {
+        Some((Ok(raw), size)) => {
+            let bytes = raw.to_be_bytes();
+            Ok(bytes[bytes.len() - usize::from(size)..].to_vec())
+        }
+        Some((Err(error), _)) => Err(Problem::new(span, error.to_string(), expected)),
+        None => Err(Problem::new(span, "the cell cannot hold this", expected)),
+    }
+}
+
+pub(super) fn in_memory(place: &Place, length: usize) -> Result<(), Problem> {
+    let last = usize::from(place.address) + length.max(1) - 1;
+    let inside = |range: &RangeInclusive<u16>| {
+        range.contains(&place.address) && last <= usize::from(*range.end())
+    };
+    if [memory::ROM_WORDS, memory::RAM_AND_REGISTERS]
+        .iter()
+        .any(inside)
+    {
+        return Ok(());
+    }
+    Err(Problem::new(
+        place.span,
+        format!("a drive has no memory at {last:04X}"),
+        "ROM 2F00-2FDF, RAM FD80-FF7F or registers FF80-FFFF (ND21 10.1) expected here",
+    ))
+}
+
+fn set_property(name: &str, setting: Setting<'_>, span: Span) -> Result<(), Problem> {
+    if let Some(own) = PROPERTIES.iter().find(|own| own.name == name) {
+        if own.set(&mut Nd21Properties::default(), setting) {
+            return Ok(());
+        }
+        let message = format!("`{name}` cannot be set to this");
+        let expected = format!("{} expected here", own.values());
+        return Err(Problem::new(span, message, expected));
+    }
+    Properties::default().set(name, setting).map_err(|error| {
+        Problem::new(
+            span,
+            format!("`{name}` cannot be set to this"),
+            error.to_string(),
+        )
+    })
+}

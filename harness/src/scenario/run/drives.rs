@@ -1,0 +1,99 @@
+//! What a step does to drives, and what it waits for or reads of them.
+
+use super::look::{Miss, judge};
+use super::player::{Runner, Stop};
+use crate::link::{DriveFault, Moment, PlacedFault};
+use crate::scenario::plan::{LOOK, PlannedDriveCheck, Reading};
+use crate::scenario::problem::Span;
+use crate::scenario::syntax::Influence;
+use harness_proto::time;
+use std::ops::RangeInclusive;
+
+impl Runner<'_> {
+    /// Lets something happen to drives from outside the bus.
+    pub(super) fn influence(
+        &mut self,
+        ring: usize,
+        drives: RangeInclusive<u8>,
+        influence: &Influence,
+    ) {
+        for drive in drives {
+            match influence {
+                Influence::Stimuli(stimuli) => {
+                    for stimulus in stimuli {
+                        self.link.stimulate(ring, drive, *stimulus);
+                    }
+                }
+                Influence::Power(on) => {
+                    let fault = if *on { DriveFault::On } else { DriveFault::Off };
+                    let fault = PlacedFault::Drive(drive, fault);
+                    self.link.inject(ring, fault, Moment::Now);
+                }
+            }
+        }
+    }
+
+    /// Lets time pass until a check holds. What was sent before goes on its way meanwhile.
+    pub(super) fn until(
+        &mut self,
+        check: &PlannedDriveCheck,
+        within: time::Span,
+        span: Span,
+    ) -> Result<(), Stop> {
+        let end = self.link.now() + within;
+        loop {
+            let miss = self.look(check);
+            let now = self.link.now();
+            self.line_before = now;
+            match miss {
+                Err(Miss::Otherwise(message)) if now >= end => {
+                    let message = format!("not within {within}: {message}");
+                    return Err(Stop::failed(span, message));
+                }
+                Err(Miss::Otherwise(_)) => {
+                    self.recorder.count_look();
+                    self.pass_until(end.min(now + LOOK));
+                    // Why there is no room is said by whoever plays the step.
+                    if self.full.is_some() {
+                        return Ok(());
+                    }
+                }
+                seen => return self.judged(seen, span),
+            }
+        }
+    }
+
+    /// What a look at drives is for the verdict. What the link does not show does not end the scenario.
+    pub(super) fn judged(&mut self, seen: Result<(), Miss>, span: Span) -> Result<(), Stop> {
+        match seen {
+            Ok(()) => Ok(()),
+            Err(Miss::Otherwise(message)) => Err(Stop::failed(span, message)),
+            Err(Miss::Unseen(message)) => {
+                let first = self.unseen.take();
+                self.unseen = first.or_else(|| Some(Stop::inconclusive(span, message)));
+                Ok(())
+            }
+        }
+    }
+
+    /// The number in an answer that has just come whole.
+    pub(super) fn read(
+        &self,
+        ring: usize,
+        answer: usize,
+        reading: Option<&Reading>,
+        span: Span,
+    ) -> Result<(), Stop> {
+        let Some(reading) = reading else {
+            return Ok(());
+        };
+        let record = &self.rings[ring];
+        let answer = &record.received[record.next - answer..record.next];
+        let bytes: Vec<_> = reading.bytes.iter().map(|i| answer[*i].1.byte).collect();
+        let units = self.plan.units(ring, reading.drive);
+        judge(&reading.cell, &bytes, units).map_err(|message| {
+            let prefix = if ring == 0 { "" } else { "2:" };
+            Stop::failed(span, format!("drive {prefix}{}: {message}", reading.drive))
+        })
+    }
+}

@@ -1,0 +1,106 @@
+//! Cells as a scenario names them, and the values that it gives them.
+
+use crate::scenario::pattern::Pattern;
+use crate::scenario::problem::Span;
+use crate::scenario::quantity::{Quantity, Tolerance};
+use harness_proto::nd21::cells::Cell;
+use harness_proto::nd21::units::Scale;
+
+/// A place in a drive's RAM, its registers or its EEPROM.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The name or the address as written.
+    pub name: String,
+    /// The address.
+    pub address: u16,
+    /// The cell that begins there, if one does.
+    pub cell: Option<&'static Cell>,
+    /// Whether it was written by its name.
+    pub named: bool,
+    /// Where it stands.
+    pub span: Span,
+}
+
+impl Place {
+    /// The scale of the number that begins there.
+    #[must_use]
+    pub fn scale(&self) -> Option<Scale> {
+        self.cell?.number()
+    }
+}
+
+/// A value as written.
+#[derive(Clone, Debug)]
+pub enum Written {
+    /// Bytes.
+    Bytes(Pattern),
+    /// A number with a unit.
+    Number(Quantity),
+    /// `off`: a limit that is switched off.
+    Off(Span),
+}
+
+impl Written {
+    /// Where it stands.
+    #[must_use]
+    pub fn span(&self) -> Span {
+        match self {
+            Self::Bytes(pattern) => pattern.span,
+            Self::Number(number) => number.span,
+            Self::Off(span) => *span,
+        }
+    }
+}
+
+/// How a value is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relation {
+    /// `=`
+    Equal,
+    /// `<`
+    Less,
+    /// `>`
+    Greater,
+    /// `<=`
+    AtMost,
+    /// `>=`
+    AtLeast,
+}
+
+impl Relation {
+    /// As written; what begins as another does comes first.
+    pub const NAMES: [(&'static str, Self); 5] = [
+        ("<=", Self::AtMost),
+        (">=", Self::AtLeast),
+        ("<", Self::Less),
+        (">", Self::Greater),
+        ("=", Self::Equal),
+    ];
+
+    /// Whether it holds between what was found and what is expected.
+    #[must_use]
+    pub fn holds<T: PartialOrd>(self, found: T, expected: T) -> bool {
+        match self {
+            Self::Equal => found == expected,
+            Self::Less => found < expected,
+            Self::Greater => found > expected,
+            Self::AtMost => found <= expected,
+            Self::AtLeast => found >= expected,
+        }
+    }
+}
+
+/// What must hold of a cell: `nist = 1500rpm +-1%`, `Flags2 & E0 = 00`, `nist < 100rpm`.
+#[derive(Clone, Debug)]
+pub struct CellCheck {
+    /// Which cell.
+    pub place: Place,
+    /// The bits that count; all where `None`.
+    pub mask: Option<Pattern>,
+    /// How it is compared.
+    pub relation: Relation,
+    /// With what.
+    pub value: Written,
+    /// How far it may be off.
+    pub tolerance: Option<Tolerance>,
+}

@@ -1,0 +1,263 @@
+//! What is waited for, what is recorded, and what cannot be seen.
+
+use super::drives::nd21;
+use super::{entry, fails, passes, play, refused};
+use harness::link::{Capability, Link, Moment, PlacedFault, Shown};
+use harness::report::plot::plot;
+use harness::scenario::run::{Outcome, run};
+use harness::scenario::simulate::simulated;
+use harness::scenario::verdict::Verdict;
+use harness_proto::line::Received;
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::{Instant, Span};
+use harness_sim::trace::Trace;
+
+#[test]
+fn until_waits_for_what_must_hold() {
+    // It is seen at the next look, every 108 us, and the line behind counts from there.
+    let (outcome, _) = play(&nd21(
+        "! drive 1 @20ms: error 0151\nuntil drive 1 errorcode = 0151 within 1s\n+5ms drive 1 Status & 20 = 20",
+    ));
+    let took = outcome.took.as_nanos();
+    assert!((25_000_000..25_108_000).contains(&took), "{outcome:?}");
+    fails(
+        &nd21("until drive 1 ps_status = 01 within 50ms"),
+        "not within 50.000 ms: drive 1: ps_status is 00, expected 01 (finished)",
+    );
+    let (outcome, _) = play(&nd21("until drive 1 ps_status = 01 within 50ms"));
+    assert_eq!(outcome.took, Span::from_millis(50));
+    // Bytes go on meanwhile.
+    passes(&nd21(
+        "> 00\nuntil drives 0..1 in error within 2ms\nrecover\nuntil drives 0..1 normal within 2ms",
+    ));
+    passes(&nd21(
+        "> 80*100\nuntil drive 0 normal within 1ms\n+1ms ! master->1: drop\n? received 99 bytes",
+    ));
+    refused(&nd21("until drive 0 nist = 0rpm"), "", "`within`", None);
+    refused(
+        &nd21("until drive 0 nist = 0rpm within 11s0"),
+        "0",
+        "complete",
+        None,
+    );
+    refused(
+        &nd21("until drive 0 nist = 0rpm within 700s"),
+        "700s",
+        "ten minutes",
+        None,
+    );
+    refused(
+        &nd21("until located 3 within 1s"),
+        "located",
+        "`drive`",
+        None,
+    );
+    refused(
+        &nd21("utnil drive 0 normal within 1s"),
+        "utnil",
+        "a step",
+        Some("`until`"),
+    );
+}
+
+#[test]
+fn wait_lets_time_pass() {
+    let (outcome, _) = play(&nd21("wait 50ms"));
+    assert_eq!(
+        (outcome.verdict, outcome.took),
+        (Verdict::Passed, Span::from_millis(50))
+    );
+    // It counts from when the last byte has left the master, and the next line from its end: with byte
+    // times of 286.458 us that is 11.146 ms for the first byte of the second line, three byte times before
+    // it is back.
+    passes(&nd21(
+        "> 80*4\nwait 5ms\n+5ms > A0\n< 80*4\n@12.0ms..12.1ms < A0",
+    ));
+    refused(&nd21("wait"), "", "a time such as 5ms", None);
+}
+
+#[test]
+fn cells_are_recorded() {
+    let (outcome, trace) = play(&nd21(
+        "record drive 0 nsoll every 10ms\nrecord drive 0 ps_status changes\nwait 25ms\n\
+         write-word 0 nsoll = 1500rpm\nwrite-byte 0 ps_status = 21\nwait 20ms\nrecord drive 0 nsoll off\nwait 1s",
+    ));
+    assert_eq!(outcome.verdict, Verdict::Passed, "{:?}", outcome.finding);
+    let [speed, changes] = &outcome.records[..] else {
+        panic!("{:?}", outcome.records);
+    };
+    let ms: Vec<_> = speed
+        .samples
+        .iter()
+        .map(|s| s.at.since_start().as_nanos() / 1_000_000)
+        .collect();
+    assert_eq!(ms, [0, 10, 20, 30, 40, 50]);
+    let values: Vec<_> = speed
+        .samples
+        .iter()
+        .filter_map(|s| speed.value(s))
+        .collect();
+    assert!(
+        values[2] == 0.0 && (values[3] - 1_500.0).abs() < 0.2,
+        "{values:?}"
+    );
+    assert_eq!(changes.samples.len(), 2);
+    assert!(plot(speed).contains("rpm |"), "{}", plot(speed));
+    assert!(
+        plot(changes).contains("21  calculated, finished"),
+        "{}",
+        plot(changes)
+    );
+    let json: serde_json::Value = serde_json::from_str(&trace).expect("JSON");
+    assert_eq!(json["schema"], 1);
+    assert_eq!(json["records"][0]["cell"], "nsoll");
+    assert_eq!(json["records"][0]["unit"], "rpm");
+    assert_eq!(json["records"][0]["every_ns"], 10_000_000);
+    assert_eq!(json["records"][0]["samples"][4]["raw"], "161E");
+    assert_eq!(json["records"][1]["every_ns"], serde_json::Value::Null);
+    let (_, trace) = play(&nd21("> 80"));
+    assert!(!trace.contains("records"), "{trace}");
+    // A whole position, a range of drives, and a second record of the same cell.
+    let (outcome, _) = play(&nd21(
+        "drive 0 memory umdrist = 10.25turns\nrecord drive 0..last position every 1ms\nwait 2ms\n\
+         record drive 0 umdrist changes\nwait 2ms",
+    ));
+    let lengths: Vec<_> = outcome.records.iter().map(|r| r.samples.len()).collect();
+    assert_eq!(lengths, [3, 5, 1]);
+    let position = &outcome.records[0];
+    assert_eq!(position.value(&position.samples[0]), Some(10.25));
+    // What is recorded does not change what happens.
+    let text = |record: &str| {
+        nd21(&format!(
+            "{record}> 80*9\n< 80*9\n+5ms > 00\n? drives 0..1 in error"
+        ))
+    };
+    let (with, _) = play(&text("record drive 0 nist every 1ms\n"));
+    let (without, _) = play(&text(""));
+    assert_eq!((with.verdict, with.took), (without.verdict, without.took));
+}
+
+#[test]
+fn records_that_cannot_be_are_refused_and_bounded() {
+    refused(&nd21("record drive 0 nist"), "", "when to look", None);
+    refused(
+        &nd21("record drive 0 nist every 100us"),
+        "100us",
+        "too short",
+        None,
+    );
+    refused(
+        &nd21("record drive 0 nist off"),
+        "nist",
+        "no record of `nist`",
+        None,
+    );
+    refused(
+        &nd21("record drive 0 scope_puffer changes"),
+        "scope_puffer",
+        "no number",
+        None,
+    );
+    refused(
+        &nd21("record drive 2 nist changes"),
+        "2",
+        "no drive 2",
+        None,
+    );
+    refused(
+        &nd21("record drive 0 nits changes"),
+        "nits",
+        "a cell's name",
+        Some("`nist`"),
+    );
+    let (outcome, _) = play(
+        "title x\nring 1\nrecord drive 0 nist every 108us\nrecord drive 0 nsoll every 108us\nwait 60s\n",
+    );
+    assert_eq!(outcome.verdict, Verdict::Aborted);
+    let message = outcome.finding.expect("a finding").message;
+    assert!(message.contains("more than 1000000 samples"), "{message}");
+}
+
+/// A link that shows nothing of its drives: a ring of which only the master's ends are known.
+struct Blind<L>(L);
+
+impl<L: Link> Link for Blind<L> {
+    fn capabilities(&self) -> &[Capability] {
+        self.0.capabilities()
+    }
+    fn byte_time(&self) -> Span {
+        self.0.byte_time()
+    }
+    fn now(&self) -> Instant {
+        self.0.now()
+    }
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        self.0.send(ring, bytes)
+    }
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        self.0.receive(ring)
+    }
+    fn wait(&mut self, until: Instant) -> bool {
+        self.0.wait(until)
+    }
+    fn busy(&self) -> bool {
+        self.0.busy()
+    }
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        self.0.inject(ring, fault, moment);
+    }
+    fn shown(&self, _: usize, _: u8) -> Option<Shown> {
+        None
+    }
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+        self.0.probe(ring, count)
+    }
+    fn error_of(&self, _: usize, _: u8) -> Option<Option<BusError>> {
+        None
+    }
+    fn peek(&self, _: usize, _: u8, _: u16) -> Option<u8> {
+        None
+    }
+    fn unused_faults(&self) -> Vec<String> {
+        self.0.unused_faults()
+    }
+    fn carried(&self) -> u64 {
+        self.0.carried()
+    }
+    fn drives(&self, ring: usize) -> u8 {
+        self.0.drives(ring)
+    }
+    fn trace(&self, ring: usize) -> Trace {
+        self.0.trace(ring)
+    }
+}
+
+fn play_blind(lines: &str) -> Outcome {
+    let entry = entry(&nd21(lines)).expect("no mistake");
+    let plan = entry.plan.expect("novobus");
+    run(&plan, &mut Blind(simulated(&plan)))
+}
+
+#[test]
+fn what_cannot_be_seen_is_inconclusive() {
+    for check in [
+        "? drive 0 memory FE13 = 00",
+        "? drive 0 nist = 0rpm",
+        "? drives 0..1 normal",
+        "? error 0502 at 0",
+        "? drive 0 GPO1 low",
+        "until drive 0 nist = 0rpm within 1s",
+    ] {
+        let outcome = play_blind(check);
+        assert_eq!(outcome.verdict, Verdict::Inconclusive, "{check}");
+        let message = outcome.finding.expect("a finding").message;
+        assert!(message.contains("this link does not show"), "{message}");
+        assert_eq!(outcome.took, Span::ZERO, "nothing is waited for");
+        // A line behind it that is not met weighs more.
+        let failed = play_blind(&format!("{check}\n? received 1 bytes"));
+        assert_eq!(failed.verdict, Verdict::Failed, "{check}");
+    }
+    let recorded = play_blind("record drive 0 nist every 1ms\nwait 5ms");
+    assert_eq!(recorded.verdict, Verdict::Passed);
+    assert!(plot(&recorded.records[0]).contains("nothing was seen"));
+}
