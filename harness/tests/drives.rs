@@ -462,3 +462,23 @@ fn values_are_written_in_units() {
     refused_line("or 0 imax = 10 A", "10 A", "bits are no number");
     refused_line("write-word 0 nsoll = 1500rpm +-1%", "+-1%", "complete");
 }
+
+/// Every line of the page's tables that begins with `drive` is a line of the language.
+#[test]
+fn the_lines_of_the_page_are_accepted() {
+    let page = include_str!("../src/scenario/LANGUAGE.md");
+    let rows = page
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `drive "));
+    let mut lines = 0;
+    for row in rows {
+        let line = row.split('`').next().expect("the end of the code");
+        let line = line
+            .replace("95..99", "1..2")
+            .replace("NAME = VALUE", "time-out = 12ms");
+        let text = format!("title x\nring 4\ndrive 0..last model nd21\ndrive {line}\n> 80\n");
+        assert!(entry(&text).is_ok(), "{line}: {:#?}", entry(&text).err());
+        lines += 1;
+    }
+    assert!(lines > 25, "{lines}");
+}

@@ -132,9 +132,23 @@ fn cells_are_recorded() {
             "{record}> 80*9\n< 80*9\n+5ms > 00\n? drives 0..1 in error"
         ))
     };
-    let (with, _) = play(&text("record drive 0 nist every 1ms\n"));
-    let (without, _) = play(&text(""));
-    assert_eq!((with.verdict, with.took), (without.verdict, without.took));
+    let (with, trace_with) = play(&text("record drive 0 nist every 1ms\n"));
+    let (without, trace_without) = play(&text(""));
+    assert_eq!(
+        (with.verdict, with.took),
+        (Verdict::Passed, without.took),
+        "{:?}",
+        with.finding
+    );
+    let [mut with, without]: [serde_json::Value; 2] =
+        [trace_with, trace_without].map(|text| serde_json::from_str(&text).expect("JSON"));
+    assert!(
+        with.as_object_mut()
+            .expect("an object")
+            .remove("records")
+            .is_some()
+    );
+    assert_eq!(with, without);
 }
 
 #[test]

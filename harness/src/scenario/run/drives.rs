@@ -42,10 +42,14 @@ impl Runner<'_> {
     ) -> Result<(), Stop> {
         let end = self.link.now() + within;
         loop {
-            let miss = self.look(check);
             let now = self.link.now();
             self.line_before = now;
-            match miss {
+            let seen = if now < end {
+                self.glance(check)
+            } else {
+                self.look(check)
+            };
+            match seen {
                 Err(Miss::Otherwise(message)) if now >= end => {
                     let message = format!("not within {within}: {message}");
                     return Err(Stop::failed(span, message));

@@ -10,6 +10,7 @@ use crate::scenario::syntax::{Relation, Showing};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits;
 use harness_proto::nd21::units::{self, Scale, Value};
+use std::ops::RangeInclusive;
 
 /// The difference that two computed numbers may have by rounding alone, as a part of the larger.
 const ROUNDING: f64 = 1e-12;
@@ -23,14 +24,28 @@ pub(super) enum Miss {
 }
 
 impl Runner<'_> {
-    /// Whether something holds of drives.
+    /// Whether something holds of drives, and of which of them it does not.
     pub(super) fn look(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
+        self.look_at_drives(check, check.drives.clone())
+    }
+
+    /// The same, up to the first drive of which it does not hold: for whoever looks often.
+    pub(super) fn glance(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
+        let mut drives = check.drives.clone();
+        drives.try_for_each(|drive| self.look_at_drives(check, drive..=drive))
+    }
+
+    fn look_at_drives(
+        &self,
+        check: &PlannedDriveCheck,
+        drives: RangeInclusive<u8>,
+    ) -> Result<(), Miss> {
         if let PlannedCondition::InError(expected) = check.condition {
-            return self.look_at_errors(check, expected);
+            return self.look_at_errors(check.ring, drives, expected);
         }
         let mut first = None;
         let mut others: u32 = 0;
-        for drive in check.drives.clone() {
+        for drive in drives {
             match self.look_at(check, drive) {
                 Ok(()) => {}
                 // What is seen to be wrong weighs more than what cannot be seen.
@@ -48,11 +63,16 @@ impl Runner<'_> {
         }
     }
 
-    fn look_at_errors(&self, check: &PlannedDriveCheck, expected: bool) -> Result<(), Miss> {
+    fn look_at_errors(
+        &self,
+        ring: usize,
+        drives: RangeInclusive<u8>,
+        expected: bool,
+    ) -> Result<(), Miss> {
         let mut wrong = Vec::new();
         let mut unseen = Vec::new();
-        for drive in check.drives.clone() {
-            match self.link.error_of(check.ring, drive) {
+        for drive in drives {
+            match self.link.error_of(ring, drive) {
                 None => unseen.push(drive),
                 Some(error) if error.is_some() != expected => wrong.push(drive),
                 Some(_) => {}
@@ -61,13 +81,13 @@ impl Runner<'_> {
         if !wrong.is_empty() {
             let not = if expected { " not" } else { "" };
             let are = if wrong.len() == 1 { "is" } else { "are" };
-            let drives = list(check.ring, &wrong);
+            let drives = list(ring, &wrong);
             return Err(Miss::Otherwise(format!(
                 "{drives} {are}{not} in the error mode"
             )));
         }
         if !unseen.is_empty() {
-            let drives = list(check.ring, &unseen);
+            let drives = list(ring, &unseen);
             return Err(Miss::Unseen(format!(
                 "this link does not show whether {drives} are in the error mode"
             )));
@@ -77,8 +97,9 @@ impl Runner<'_> {
 
     fn look_at(&self, check: &PlannedDriveCheck, drive: u8) -> Result<(), Miss> {
         let ring = check.ring;
-        let label = list(ring, &[drive]);
-        let unseen = |what: &str| Miss::Unseen(format!("{label}: this link does not show {what}"));
+        let label = || list(ring, &[drive]);
+        let unseen =
+            |what: &str| Miss::Unseen(format!("{}: this link does not show {what}", label()));
         match &check.condition {
             PlannedCondition::InError(_) => Ok(()),
             PlannedCondition::Memory(address, bytes) => {
@@ -86,9 +107,9 @@ impl Runner<'_> {
                     let found = self.link.peek(ring, drive, cell);
                     let found = found.ok_or_else(|| unseen(&format!("cell {cell:04X}")))?;
                     if !matches(*expected, Received::good(found)) {
-                        let label = label.trim_start_matches("drive ");
                         return Err(Miss::Otherwise(format!(
-                            "cell {cell:04X} of drive {label} holds {found:02X}, expected is {}",
+                            "cell {cell:04X} of {} holds {found:02X}, expected is {}",
+                            label(),
                             Byte(*expected)
                         )));
                     }
@@ -99,13 +120,13 @@ impl Runner<'_> {
                 let bytes = self.bytes(ring, drive, cell.address, cell.size);
                 let bytes = bytes.ok_or_else(|| unseen(&cell.name))?;
                 judge(cell, &bytes, self.plan.units(ring, drive))
-                    .map_err(|message| Miss::Otherwise(format!("{label}: {message}")))
+                    .map_err(|message| Miss::Otherwise(format!("{}: {message}", label())))
             }
             PlannedCondition::Shows(showing) => {
                 let shown = self.link.shown(ring, drive);
                 let shown = shown.ok_or_else(|| unseen("what stands outside the bus"))?;
                 shows(*showing, &shown)
-                    .map_err(|message| Miss::Otherwise(format!("{label}: {message}")))
+                    .map_err(|message| Miss::Otherwise(format!("{}: {message}", label())))
             }
         }
     }
