@@ -167,14 +167,13 @@ fn every_property_is_exercised_and_described() {
         .iter()
         .map(|path| read(path))
         .collect();
-    for property in &harness_proto::novobus::properties::PROPERTIES {
-        assert!(
-            page.contains(&format!("| `{}` |", property.name)),
-            "{}",
-            property.name
-        );
-        let set = format!("property {} =", property.name);
-        assert!(texts.contains(&set), "no scenario sets {}", property.name);
+    let bus = &harness_proto::novobus::properties::PROPERTIES;
+    let own = &harness_sim::nd21::PROPERTIES;
+    let names = bus.iter().map(|p| p.name).chain(own.iter().map(|p| p.name));
+    for name in names {
+        assert!(page.contains(&format!("| `{name}` |")), "{name}");
+        let set = format!("property {name} =");
+        assert!(texts.contains(&set), "no scenario sets {name}");
     }
 }
 

@@ -7,6 +7,7 @@ use super::run::select;
 use crate::library::Entry;
 use crate::manual::{Erratum, ManualTable, NOT_YET, errata, pinned_by, tables};
 use harness_proto::novobus::properties::PROPERTIES;
+use harness_sim::nd21;
 use std::fmt::Write as _;
 
 /// Shows the coverage of the manual and the ledger.
@@ -45,14 +46,16 @@ fn open_points(wanted: &dyn Fn(&str) -> bool) -> String {
     let mut text = String::from(
         "Open: what only hardware can settle, as properties of a drive, the default first\n",
     );
-    for property in &PROPERTIES {
-        let line = format!(
-            "nd21 {:6} {:22} {:26} {}\n",
-            property.section,
-            property.name,
-            property.values.join(" | "),
-            property.about
-        );
+    let bus = PROPERTIES.iter().map(|property| {
+        let values = property.values.join(" or ");
+        (property.section, property.name, values, property.about)
+    });
+    let own = nd21::PROPERTIES.iter().map(|property| {
+        let values = property.values();
+        (property.section, property.name, values, property.about)
+    });
+    for (section, name, values, about) in bus.chain(own) {
+        let line = format!("nd21 {section:8} {name:22} {values:27} {about}\n");
         if wanted(&line) {
             text.push_str(&line);
         }

@@ -76,6 +76,8 @@ pub struct Property {
     pub name: &'static str,
     /// The section that leaves it open.
     pub section: &'static str,
+    /// What it is about.
+    pub about: &'static str,
     values: Values,
 }
 
@@ -92,42 +94,73 @@ enum Values {
 const fn time(
     name: &'static str,
     section: &'static str,
+    about: &'static str,
     longest_ms: u64,
     set: fn(&mut Nd21Properties, Span),
 ) -> Property {
     Property {
         name,
         section,
+        about,
         values: Values::Time(Span::from_millis(longest_ms), set),
     }
 }
 
-const fn words(name: &'static str, section: &'static str, words: &'static [Word]) -> Property {
+const fn words(
+    name: &'static str,
+    section: &'static str,
+    about: &'static str,
+    words: &'static [Word],
+) -> Property {
     Property {
         name,
         section,
+        about,
         values: Values::Words(words),
     }
 }
 
 /// Every property.
 pub const PROPERTIES: [Property; 8] = [
-    time("eeprom-read-time", "14.10.5.2", 1_000, |p, t| {
-        p.eeprom_read_time = t
-    }),
-    time("eeprom-write-time", "14.10.5.3", 1_000, |p, t| {
-        p.eeprom_write_time = t
-    }),
-    time("self-test-time", "11.8", 60_000, |p, t| {
-        p.self_test_time = t
-    }),
-    time("ps-calculation-time", "13.3.2.2", 1_000, |p, t| {
-        p.ps_calculation_time = t
-    }),
-    time("i2t-time", "14.4.2", 60_000, |p, t| p.i2t_time = t),
+    time(
+        "eeprom-read-time",
+        "14.10.5.2",
+        "how long the EEPROM controller reads a byte",
+        1_000,
+        |p, t| p.eeprom_read_time = t,
+    ),
+    time(
+        "eeprom-write-time",
+        "14.10.5.3",
+        "how long it writes a byte",
+        1_000,
+        |p, t| p.eeprom_write_time = t,
+    ),
+    time(
+        "self-test-time",
+        "11.8",
+        "how long the reset mode lasts",
+        60_000,
+        |p, t| p.self_test_time = t,
+    ),
+    time(
+        "ps-calculation-time",
+        "13.3.2.2",
+        "how long the positioning controller calculates",
+        1_000,
+        |p, t| p.ps_calculation_time = t,
+    ),
+    time(
+        "i2t-time",
+        "14.4.2",
+        "how long the motor may have its peak current",
+        60_000,
+        |p, t| p.i2t_time = t,
+    ),
     words(
         "ps-position",
         "13.3.2.1",
+        "the format of ps_positionH and ps_positionL",
         &[
             ("mode-bit", |p| p.ps_position = PsPosition::ModeBit),
             ("whole-word", |p| p.ps_position = PsPosition::WholeWords),
@@ -136,6 +169,7 @@ pub const PROPERTIES: [Property; 8] = [
     words(
         "bus-errors",
         "11.8",
+        "which errors of the bus block the regulator",
         &[
             ("block", |p| p.bus_errors = BusErrors::Block),
             ("time-out-only", |p| p.bus_errors = BusErrors::TimeOutOnly),
@@ -144,6 +178,7 @@ pub const PROPERTIES: [Property; 8] = [
     words(
         "s-ramp-wire",
         "13.5.3",
+        "how the points of support come to the drive",
         &[
             ("none", |p| p.s_ramp_wire = SRampWire::None),
             ("puffer", |p| p.s_ramp_wire = SRampWire::Puffer),
@@ -152,7 +187,7 @@ pub const PROPERTIES: [Property; 8] = [
 ];
 
 impl Property {
-    /// What it can be set to, in words.
+    /// What it can be set to, in words; the default first where it is a word.
     #[must_use]
     pub fn values(&self) -> String {
         match self.values {
