@@ -3,6 +3,11 @@
 
 use super::{entry, fails, passes, play, refused};
 
+/// A scenario for two plain drives, which hold what they are given, with these lines.
+pub(crate) fn plain(lines: &str) -> String {
+    format!("title test\nring 2\n{lines}\n")
+}
+
 /// A scenario for two nd21 with these lines.
 pub(crate) fn nd21(lines: &str) -> String {
     format!("title test\nring 2\ndrive 0..last model nd21\n{lines}\n")
@@ -199,7 +204,7 @@ fn a_drives_monitoring_reports_errors() {
 #[test]
 fn cells_are_checked_by_their_names() {
     let cells = |check: &str| {
-        nd21(&format!(
+        plain(&format!(
             "drive 0..last memory nist = 1500rpm\ndrive 0..last memory nRampe+ = 100000rpm/s\n\
              drive 0..last memory Slipping error = 90deg\ndrive 0..last memory Flags2 = E4\n\
              drive 0..last memory umdrist = 10.25turns\ndrive 0..last memory umdrsoll = -10.25turns\n\
@@ -297,7 +302,7 @@ fn cells_are_checked_by_their_names() {
 
 #[test]
 fn cells_that_cannot_be_are_refused() {
-    let check = |check: &str| nd21(&format!("? drive 0 {check}"));
+    let check = |check: &str| plain(&format!("? drive 0 {check}"));
     refused(
         &check("nits = 00"),
         "nits",
@@ -399,10 +404,10 @@ fn outputs_are_checked() {
 
 #[test]
 fn values_are_written_in_units() {
-    passes(&nd21(
+    passes(&plain(
         "drive 0 memory nMax = 3000rpm\ndrive 0 memory FF66 = 5A\ndrive 0 memory FF68 = 2C3D\n> 80",
     ));
-    passes(&nd21(
+    passes(&plain(
         "drive 0 memory nMax = 3000rpm\n? drive 0 memory nMax = 2C3D",
     ));
     passes(&nd21(
@@ -412,22 +417,22 @@ fn values_are_written_in_units() {
          drive 0 nRampe+ = 7FFF",
     ));
     // Every type and range has its own scale.
-    passes(&nd21(
+    passes(&plain(
         "drive 0 memory imax = 10.0A\ndrive 1 type 5620\ndrive 0..1 memory i0 = 10.0A\n\
          drive 0 memory nsoll = 1500rpm\ndrive 1 memory nsoll = 1500rpm\ndrive 1 eeprom SwVersion2 = 00\n\
          ? drive 0 memory i0 = 3A\n? drive 1 memory i0 = 1D\n? drive 0 memory nsoll = 161E\n\
          ? drive 1 memory nsoll = 0B0F\ndrive 0..1 nsoll = 1500rpm",
     ));
-    passes(&nd21(
+    passes(&plain(
         "drive 1 eeprom 23 = 00\ndrive 1 memory SwVersion2 = 80\ndrive 1 memory nsoll = 1500rpm\n? drive 1 memory nsoll = 161E",
     ));
-    passes(&nd21(
+    passes(&plain(
         "write-word 0 nsoll = 1500rpm\nread-word 0 nsoll = 161E\nread-word 0 nsoll = 1500rpm\n\
          read-word 0 nsoll = 1490rpm +-1%\nwrite-byte 0 imax = 10 A\nread-byte 0 imax = 10Aeff +-1%\n\
          write-word 0 umdrist = 10turns\nwrite-word 0 lageist = 90deg\nread-long 0 umdrist = 10.25turns",
     ));
     fails(
-        &nd21("drive 0 memory nist = 1498.3rpm\nread-word 0 nist = 1550rpm +-1%"),
+        &plain("drive 0 memory nist = 1498.3rpm\nread-word 0 nist = 1550rpm +-1%"),
         "drive 0: nist is 1498.3 rpm (1618), expected 1550 rpm +-1 %",
     );
     fails(

@@ -1,6 +1,6 @@
 //! What is waited for, what is recorded, and what cannot be seen.
 
-use super::drives::nd21;
+use super::drives::{nd21, plain};
 use super::{entry, fails, passes, play, refused};
 use harness::link::{Capability, Link, Moment, PlacedFault, Shown};
 use harness::report::plot::plot;
@@ -78,7 +78,7 @@ fn wait_lets_time_pass() {
 
 #[test]
 fn cells_are_recorded() {
-    let (outcome, trace) = play(&nd21(
+    let (outcome, trace) = play(&plain(
         "record drive 0 nsoll every 10ms\nrecord drive 0 ps_status changes\nwait 25ms\n\
          write-word 0 nsoll = 1500rpm\nwrite-byte 0 ps_status = 21\nwait 20ms\nrecord drive 0 nsoll off\nwait 1s",
     ));
@@ -115,10 +115,10 @@ fn cells_are_recorded() {
     assert_eq!(json["records"][0]["every_ns"], 10_000_000);
     assert_eq!(json["records"][0]["samples"][4]["raw"], "161E");
     assert_eq!(json["records"][1]["every_ns"], serde_json::Value::Null);
-    let (_, trace) = play(&nd21("> 80"));
+    let (_, trace) = play(&plain("> 80"));
     assert!(!trace.contains("records"), "{trace}");
     // A whole position, a range of drives, and a second record of the same cell.
-    let (outcome, _) = play(&nd21(
+    let (outcome, _) = play(&plain(
         "drive 0 memory umdrist = 10.25turns\nrecord drive 0..last position every 1ms\nwait 2ms\n\
          record drive 0 umdrist changes\nwait 2ms",
     ));
@@ -128,7 +128,7 @@ fn cells_are_recorded() {
     assert_eq!(position.value(&position.samples[0]), Some(10.25));
     // What is recorded does not change what happens.
     let text = |record: &str| {
-        nd21(&format!(
+        plain(&format!(
             "{record}> 80*9\n< 80*9\n+5ms > 00\n? drives 0..1 in error"
         ))
     };
