@@ -184,6 +184,15 @@ fn records_that_cannot_be_are_refused_and_bounded() {
         "a cell's name",
         Some("`nist`"),
     );
+    refused(
+        &format!(
+            "title x\nring 250\n{}",
+            "record drive 0..last nist changes\n".repeat(5)
+        ),
+        "nist",
+        "more than 1000 records",
+        None,
+    );
     let (outcome, _) = play(
         "title x\nring 1\nrecord drive 0 nist every 108us\nrecord drive 0 nsoll every 108us\nwait 60s\n",
     );

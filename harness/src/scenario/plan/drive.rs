@@ -12,6 +12,10 @@ use crate::scenario::syntax::{
     CellCheck, Condition, DriveCheck, Drives, Influence, Looks, Place, Recording, Relation, Written,
 };
 use harness_proto::time;
+use std::collections::BTreeSet;
+
+/// The most records of a scenario, each of one cell of one drive.
+const MAX_RECORDS: usize = 1_000;
 
 /// The longest cell that is a number.
 const NUMBER: usize = 4;
@@ -198,24 +202,35 @@ impl Planner {
     }
 }
 
-/// Records that run, by ring, drive and address.
+/// Records that run, by ring, drive and address, and how many there were.
 #[derive(Default)]
-pub(super) struct Running(std::collections::BTreeSet<(usize, u8, u16)>);
+pub(super) struct Running {
+    cells: BTreeSet<(usize, u8, u16)>,
+    records: usize,
+}
 
 impl Running {
-    /// What does not run cannot be ended.
+    /// What does not run cannot be ended, and a report has an end too.
     pub(super) fn take(&mut self, record: &PlannedRecord) -> Result<(), Problem> {
         for drive in record.drives.clone() {
-            let key = (record.ring, drive, record.address);
+            let cell = (record.ring, drive, record.address);
             if record.looks != PlannedLooks::Off {
-                self.0.insert(key);
-            } else if !self.0.remove(&key) {
+                self.cells.insert(cell);
+                self.records += 1;
+            } else if !self.cells.remove(&cell) {
                 return Err(Problem::new(
                     record.span,
                     format!("no record of `{}` of drive {drive} runs here", record.name),
                     "a cell that is being recorded expected here",
                 ));
             }
+        }
+        if self.records > MAX_RECORDS {
+            return Err(Problem::new(
+                record.span,
+                format!("more than {MAX_RECORDS} records in one scenario"),
+                "fewer drives or cells expected here",
+            ));
         }
         Ok(())
     }

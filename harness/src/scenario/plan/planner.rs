@@ -17,6 +17,7 @@ use harness_proto::nd21::units;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::time::{self, Instant};
+use harness_sim::drive::Model;
 use harness_sim::fault::LinkFault;
 use std::ops::RangeInclusive;
 
@@ -41,6 +42,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         rings,
         setups: Vec::new(),
         units: Vec::new(),
+        models: Vec::new(),
     };
     let mut found = planner.set_up(&scenario.setups);
     let mut running = Running::default();
@@ -155,6 +157,8 @@ pub(super) struct Planner {
     pub(super) setups: Vec<PlannedSetup>,
     /// What the scales of each ring's drives depend on.
     pub(super) units: Vec<Vec<units::Drive>>,
+    /// The model of each ring's drives.
+    pub(super) models: Vec<Vec<Model>>,
 }
 
 impl Planner {

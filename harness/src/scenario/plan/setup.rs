@@ -27,11 +27,20 @@ impl Planner {
                         Err(problem) => found.push(problem),
                     }
                 }
+                if planned.len() > MAX_SETUPS {
+                    found.push(Problem::new(
+                        setup.span,
+                        "too many cells are set in drives of different types and ranges",
+                        "fewer drives or cells expected here",
+                    ));
+                    return found;
+                }
             }
             planned.sort_by_key(|(line, _)| *line);
             self.setups = planned.iter().map(|(_, setup)| setup.clone()).collect();
             if !numbers {
-                self.units = self.all_units();
+                self.units = self.of_each(Self::read_units);
+                self.models = self.of_each(Self::read_model);
             }
         }
         found.extend(setups.iter().filter_map(|setup| self.idle(setup)));
@@ -122,14 +131,24 @@ impl Planner {
         units.copied().unwrap_or(DEFAULT_UNITS)
     }
 
-    fn all_units(&self) -> Vec<Vec<units::Drive>> {
+    /// What `read` finds for each drive of each ring.
+    fn of_each<T>(&self, read: impl Fn(&Self, usize, u8) -> T) -> Vec<Vec<T>> {
         let rings = self.rings.iter().enumerate();
         rings
             .map(|(ring, size)| {
                 let drives = 0..size.drives();
-                drives.map(|drive| self.read_units(ring, drive)).collect()
+                drives.map(|drive| read(self, ring, drive)).collect()
             })
             .collect()
+    }
+
+    fn read_model(&self, ring: usize, drive: u8) -> Model {
+        let setups = setups_of(&self.setups, ring, drive);
+        let models = setups.filter_map(|setup| match setup {
+            PlannedSetupKind::Model(model) => Some(*model),
+            _ => None,
+        });
+        models.last().unwrap_or_default()
     }
 
     /// The type and the range of speeds as the header sets them. RAM is set after it has been loaded from
@@ -175,17 +194,13 @@ impl Planner {
     /// Refuses what only the nd21 model has for a drive of another.
     pub(super) fn only_nd21(&self, drives: &Drives, what: &str, span: Span) -> Result<(), Problem> {
         let model = |drive: &u8| {
-            let setups = setups_of(&self.setups, drives.ring, *drive);
-            let models = setups.filter_map(|setup| match setup {
-                PlannedSetupKind::Model(model) => Some(*model),
-                _ => None,
-            });
-            models.last().unwrap_or_default()
+            let of_ring = self.models.get(drives.ring);
+            of_ring.and_then(|models| models.get(usize::from(*drive)))
         };
         let prefix = if drives.ring == 0 { "" } else { "2:" };
         let other = self
             .drives(drives)?
-            .find(|drive| model(drive) != Model::Nd21);
+            .find(|drive| model(drive) != Some(&Model::Nd21));
         other.map_or(Ok(()), |drive| {
             let message = format!("drive {prefix}{drive} has no {what}: its model is `plain`");
             let problem = Problem::new(span, message, "a drive of the model nd21 expected here");
@@ -193,6 +208,9 @@ impl Planner {
         })
     }
 }
+
+/// The most settings that the header may come to: of drives with different scales each has its own.
+const MAX_SETUPS: usize = 100_000;
 
 /// What a plain drive has not got.
 pub(super) const OUTSIDE: &str = "plugs, motor and display";

@@ -106,10 +106,9 @@ impl Recorder {
         times.fold(Instant::NEVER, Instant::min)
     }
 
-    /// Counts a look at cells; false where there were too many.
-    pub(super) fn count_look(&mut self) -> bool {
+    /// Counts a look at cells.
+    pub(super) fn count_look(&mut self) {
         self.looks += 1;
-        self.looks <= MAX_LOOKS
     }
 
     /// Whether there was too much to record, in a sentence.
@@ -162,7 +161,7 @@ impl Runner<'_> {
         if self.recorder.next() > now {
             return;
         }
-        self.recorder.looks += 1;
+        self.recorder.count_look();
         for place in 0..self.recorder.running.len() {
             let (index, at) = self.recorder.running[place];
             if at > now {
