@@ -2,10 +2,11 @@
 
 use super::plan::{Plan, PlannedSetupKind};
 use crate::link::SimulatedLink;
+use harness_proto::nd21::ee;
 use harness_proto::novobus::properties::Properties;
 use harness_sim::bench::Bench;
 use harness_sim::drive::{Drive, Model};
-use harness_sim::nd21::{Nd21Drive, Nd21Properties};
+use harness_sim::nd21::{Nd21Drive, Nd21Properties, set_parity};
 use harness_sim::plain::PlainDrive;
 use harness_sim::ring::Ring;
 
@@ -38,12 +39,19 @@ fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
         }
     }
     let mut eeprom = model.eeprom();
+    let parity = usize::from(ee::PARITY);
+    let mut own_parity = false;
     for setup in plan.setups_of(ring, k) {
         if let PlannedSetupKind::Eeprom(address, bytes) = setup {
             for (cell, byte) in eeprom.iter_mut().skip(usize::from(*address)).zip(bytes) {
                 *cell = *byte;
             }
+            let first = usize::from(*address);
+            own_parity |= (first..first + bytes.len()).contains(&parity);
         }
+    }
+    if model == Model::Nd21 && !own_parity {
+        set_parity(&mut eeprom);
     }
     let mut drive = match model {
         Model::Plain => Drive::Plain(PlainDrive::new(properties, eeprom)),

@@ -8,6 +8,7 @@ pub mod bits;
 pub mod cells;
 pub mod eeprom;
 pub mod errors;
+pub mod functions;
 pub mod io;
 pub mod position;
 pub mod s_ramp;

@@ -4,6 +4,7 @@
 //! (110.6 ms); `uP` is the time in us that the processor needs of a cycle, 150 with the regulator blocked
 //! and 250 with it released.
 
+use super::eeprom_controller::count_in;
 use crate::cells::Cells;
 use harness_proto::nd21::bits::flags;
 use harness_proto::nd21::{ee, ram};
@@ -50,9 +51,9 @@ impl Clock {
 /// The hours in the EEPROM have the low byte first (14.8.2, E115).
 fn add_hours(hours: u64, address: u8, cells: &mut Cells) {
     let first = usize::from(address);
-    if let [low, high] = &mut cells.eeprom_mut()[first..first + 2] {
-        let sum = u64::from(u16::from_le_bytes([*low, *high])) + hours;
-        let sum = u16::try_from(sum).unwrap_or(u16::MAX);
-        [*low, *high] = sum.to_le_bytes();
-    }
+    count_in(cells.eeprom_mut(), |eeprom| {
+        let before = u16::from_le_bytes([eeprom[first], eeprom[first + 1]]);
+        let sum = u16::try_from(u64::from(before) + hours).unwrap_or(u16::MAX);
+        [eeprom[first], eeprom[first + 1]] = sum.to_le_bytes();
+    });
 }

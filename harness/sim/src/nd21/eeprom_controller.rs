@@ -1,16 +1,20 @@
-//! The EEPROM controller (ND21 14.10.5): commands in the cell `EEPROMcontrol`, done when a bit of it is 1.
+//! The EEPROM controller (ND21 14.10.5): commands in the cell `EEPROMcontrol`, done when a bit of it is 1;
+//! and the cycle control's own way to store a position, which leaves the cells of the bus alone.
+//!
+//! Choice (E124): `EE_parity` is the exclusive or of the other 255 bytes and FF. It is wrong while something is
+//! being written and put right behind it: a power failure in mid-write leaves FF where it was writing, and a
+//! wrong test byte.
 
 use super::properties::Nd21Properties;
 use crate::cells::Cells;
-use harness_proto::nd21::{self, cells};
+use harness_proto::nd21::{self, cells, ee, ram};
 use harness_proto::time::Instant;
 
 /// `EEPROMbuffer`: the EEPROM address goes in here, and a byte that was read comes out.
-const BUFFER: u16 = 0xFD88;
+const BUFFER: u16 = ram::EEPROM_BUFFER;
 /// The byte behind it: what is to be written.
-const DATA: u16 = 0xFD89;
-/// `EEPROMcontrol`.
-pub(super) const CONTROL: u16 = 0xFD8A;
+const DATA: u16 = ram::EEPROM_BUFFER + 1;
+const CONTROL: u16 = ram::EEPROM_CONTROL;
 
 /// Bit 4 of `EEPROMcontrol`: writing is completed; nothing is going on.
 const READY: u8 = 1 << 4;
@@ -40,12 +44,14 @@ impl Command {
 #[derive(Clone, Debug, Default)]
 pub(super) struct EepromController {
     busy: Option<(Command, Instant)>,
+    /// Where a position is being stored, which, and until when.
+    storing: Option<(u8, [u8; 4], Instant)>,
 }
 
 impl EepromController {
     /// As after power-up.
     pub(super) fn start(&mut self, memory: &mut Cells) {
-        self.busy = None;
+        *self = Self::default();
         put(memory, CONTROL, READY);
     }
 
@@ -73,13 +79,42 @@ impl EepromController {
         });
     }
 
-    /// When the command that is being done is done.
+    /// When something that is being done is done.
     pub(super) fn busy_until(&self) -> Option<Instant> {
-        self.busy.map(|(_, until)| until)
+        let bus = self.busy.map(|(_, until)| until);
+        let own = self.storing.map(|(_, _, until)| until);
+        bus.into_iter().chain(own).min()
+    }
+
+    /// Begins to store a position for the cycle control; false while another is being stored.
+    pub(super) fn store(
+        &mut self,
+        now: Instant,
+        address: u8,
+        position: [u8; 4],
+        properties: &Nd21Properties,
+    ) -> bool {
+        if self.storing.is_some() {
+            return false;
+        }
+        let until = now + properties.eeprom_write_time * position.len() as u64;
+        self.storing = Some((address, position, until));
+        true
+    }
+
+    /// A position is being stored.
+    pub(super) fn storing(&self) -> bool {
+        self.storing.is_some()
     }
 
     /// Finishes what is due.
     pub(super) fn advance(&mut self, now: Instant, memory: &mut Cells) {
+        if let Some((address, position, _)) = self.storing.filter(|(_, _, until)| *until <= now) {
+            self.storing = None;
+            let first = usize::from(address);
+            memory.eeprom_mut()[first..first + position.len()].copy_from_slice(&position);
+            set_parity(memory.eeprom_mut());
+        }
         let Some((command, _)) = self.busy.filter(|(_, until)| *until <= now) else {
             return;
         };
@@ -93,6 +128,10 @@ impl EepromController {
             }
             Command::WriteByte => {
                 memory.eeprom_mut()[address] = memory.peek(DATA);
+                // Whoever writes the test byte itself means it.
+                if address != usize::from(ee::PARITY) {
+                    set_parity(memory.eeprom_mut());
+                }
                 put(memory, CONTROL, READY);
             }
             Command::ProgParam => {
@@ -100,27 +139,56 @@ impl EepromController {
                     let byte = memory.peek(nd21::PARAMETERS + i);
                     memory.eeprom_mut()[usize::from(u16::from(nd21::EE_PARAMETERS) + i)] = byte;
                 }
+                set_parity(memory.eeprom_mut());
                 put(memory, CONTROL, READY);
             }
         }
     }
 
-    /// The power fails: bytes that are being written are lost (they read FF). True where there are some.
-    pub(super) fn damage(&self, memory: &mut Cells) -> bool {
-        let written = match self.busy {
+    /// The power fails: bytes that are being written are lost (they read FF).
+    pub(super) fn damage(&mut self, memory: &mut Cells) {
+        let position = self.storing.take().map(|(address, position, _)| {
+            let first = usize::from(address);
+            first..first + position.len()
+        });
+        let bus = match self.busy.take() {
             Some((Command::WriteByte, _)) => {
                 let address = usize::from(memory.peek(BUFFER));
-                address..address + 1
+                Some(address..address + 1)
             }
             Some((Command::ProgParam, _)) => {
                 let first = usize::from(nd21::EE_PARAMETERS);
-                first..first + usize::from(nd21::PARAMETER_COUNT)
+                Some(first..first + usize::from(nd21::PARAMETER_COUNT))
             }
-            _ => return false,
+            _ => None,
         };
-        memory.eeprom_mut()[written].fill(0xFF);
-        true
+        for written in position.into_iter().chain(bus) {
+            memory.eeprom_mut()[written].fill(0xFF);
+            let right = parity(memory.eeprom());
+            memory.eeprom_mut()[usize::from(ee::PARITY)] = !right;
+        }
     }
+}
+
+fn parity(eeprom: &[u8; 256]) -> u8 {
+    eeprom.iter().fold(0xFF, |sum, byte| sum ^ byte) ^ eeprom[usize::from(ee::PARITY)]
+}
+
+/// Puts the test byte `EE_parity` right.
+pub fn set_parity(eeprom: &mut [u8; 256]) {
+    eeprom[usize::from(ee::PARITY)] = parity(eeprom);
+}
+
+/// Whether the test byte is right (14.11.2).
+pub(super) fn parity_is_right(eeprom: &[u8; 256]) -> bool {
+    eeprom[usize::from(ee::PARITY)] == parity(eeprom)
+}
+
+/// Changes bytes that the drive counts up by itself; a test byte that is wrong stays wrong.
+pub(super) fn count_in(eeprom: &mut [u8; 256], change: impl FnOnce(&mut [u8; 256])) {
+    let before = parity(eeprom);
+    change(eeprom);
+    eeprom[usize::from(ee::PARITY)] ^= before ^ parity(eeprom);
 }
 
 fn put(memory: &mut Cells, address: u16, byte: u8) {

@@ -3,6 +3,7 @@
 //! Choice (E120): the history in EEPROM 10-1E, fifteen bytes without a printed form, holds the ten last
 //! codes of 12 bits each, the newest first.
 
+use super::eeprom_controller::count_in;
 use crate::cells::Cells;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::errors::display_digits;
@@ -46,7 +47,12 @@ pub(super) fn display(cells: &Cells) -> Option<[u8; 3]> {
 
 /// Puts a code of 12 bits in front of the others: everything moves up by three half bytes.
 fn remember(code: u16, cells: &mut Cells) {
-    let history = &mut cells.eeprom_mut()[HISTORY];
+    count_in(cells.eeprom_mut(), |eeprom| {
+        put_first(code, &mut eeprom[HISTORY]);
+    });
+}
+
+fn put_first(code: u16, history: &mut [u8]) {
     let mut halves = [0; 30];
     for (pair, byte) in halves.chunks_mut(2).zip(history.iter()) {
         pair.copy_from_slice(&[byte >> 4, byte & 0xF]);
@@ -77,7 +83,7 @@ mod tests {
             0x02,
         ];
         assert_eq!(cells.eeprom()[HISTORY], expected);
-        assert_eq!((cells.eeprom()[0x0F], cells.eeprom()[0x1F]), (0xEE, 0xEE));
+        assert_eq!((cells.eeprom()[0x0F], cells.eeprom()[0x20]), (0xEE, 0xEE));
     }
 
     /// ND21 11.8, 14.10.1.

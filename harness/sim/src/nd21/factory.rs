@@ -4,6 +4,7 @@
 //! value from NOVOBUS, position regulator on (`SwVersion` 43), GPO2 shows "in position" (`HwVersion` C4), end
 //! switches active high, so that none is needed. With nothing in plug X3 such a drive is blocked.
 
+use super::eeprom_controller::set_parity;
 use harness_proto::nd21::ee;
 
 /// EEPROM address and bytes; everything else is 00.
@@ -44,5 +45,6 @@ pub fn eeprom() -> [u8; 256] {
             place.copy_from_slice(bytes);
         }
     }
+    set_parity(&mut eeprom);
     eeprom
 }

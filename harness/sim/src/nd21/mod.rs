@@ -1,12 +1,14 @@
 //! The ND21 behind its bus.
 //!
 //! [`Program`] is the drive's program; every 432 us it does one cycle, room by room: `world` and `monitor`
-//! (what comes from outside and what of it is an error), `referencing`, `positioning`, `s_ramp`
+//! (what comes from outside and what of it is an error), `cycle_control`
+//! (what a PLC orders), `referencing`, `positioning`, `s_ramp`
 //! and `source` (what is demanded), `motion` and `plant` (what becomes of it), `outputs` and `clock` (what is shown
 //! of it); `scope` looks on every 108 us. The rooms
 //! speak through the drive's own cells, as the firmware's parts do, so that a bus master sees every step.
 
 mod clock;
+mod cycle_control;
 mod drive;
 mod eeprom_controller;
 mod error_state;
@@ -28,6 +30,7 @@ mod wave;
 mod world;
 
 pub use drive::Nd21Drive;
+pub use eeprom_controller::set_parity;
 pub use plant::PlantParameters;
 pub use program::Program;
 pub use properties::{BusErrors, Nd21Properties, PROPERTIES, Property, PsPosition};

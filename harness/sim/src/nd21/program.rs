@@ -3,7 +3,8 @@
 //! A cycle that changes nothing but the clocks will change nothing again until something comes from
 //! outside: then the program is quiet, and cycles are only counted.
 
-use super::eeprom_controller::EepromController;
+use super::cycle_control::{CycleControl, Orders};
+use super::eeprom_controller::{EepromController, parity_is_right};
 use super::error_state;
 use super::invariants::{self, State};
 use super::monitor::{self, EndSwitches};
@@ -57,6 +58,7 @@ pub struct Program {
     referencing: Referencing,
     s_ramp: SRampRun,
     scope: Scope,
+    cycle_control: CycleControl,
     eeprom_controller: EepromController,
     clock: Clock,
     /// Of the power-up: from there the encoder emulation counts.
@@ -95,6 +97,7 @@ impl Program {
             referencing: Referencing::default(),
             s_ramp: SRampRun::default(),
             scope: Scope::default(),
+            cycle_control: CycleControl::default(),
             eeprom_controller: EepromController::default(),
             clock: Clock::default(),
             encoder_zero: 0,
@@ -183,7 +186,6 @@ impl Program {
     }
 
     fn catch_up(&mut self, now: Instant) {
-        self.eeprom_controller.advance(now, &mut self.cells);
         loop {
             let scanning = self.scope.running(&self.cells);
             let scan_first = scanning && self.next_scan < self.next_cycle;
@@ -207,11 +209,14 @@ impl Program {
                 }
                 self.clock.pass(cycles, self.released(), &mut self.cells);
             } else {
+                self.eeprom_controller
+                    .advance(self.next_cycle, &mut self.cells);
                 self.cycle(self.next_cycle);
             }
             self.next_scan = self.next_cycle;
             self.next_cycle += CYCLE * cycles;
         }
+        self.eeprom_controller.advance(now, &mut self.cells);
         if let Some(until) = self.eeprom_controller.busy_until() {
             self.due = self.due.min(until);
         }
@@ -258,9 +263,13 @@ impl Program {
         self.referencing.start();
         self.s_ramp = SRampRun::default();
         self.scope.start(cells);
+        self.cycle_control.start();
         self.eeprom_controller.start(cells);
         self.positioning = Positioning::default();
         monitor::show_temperatures(&self.world, cells);
+        if !parity_is_right(self.cells.eeprom()) {
+            error_state::raise(ErrorCode::EepromParity.code(), &mut self.cells);
+        }
         self.self_test_until = self.now + self.properties.self_test_time;
         self.mode = Mode::Reset;
         self.quiet = false;
@@ -272,12 +281,9 @@ impl Program {
     /// The power has come back. What was being written to the EEPROM when it failed is damaged, which the
     /// self-test finds (14.11.2).
     pub(super) fn power_on(&mut self) {
-        let damaged = self.eeprom_controller.damage(&mut self.cells);
+        self.eeprom_controller.damage(&mut self.cells);
         self.encoder_zero = self.plant.increments();
         self.start();
-        if damaged {
-            error_state::raise(ErrorCode::EepromParity.code(), &mut self.cells);
-        }
     }
 
     /// One cycle, at `now`.
@@ -297,7 +303,14 @@ impl Program {
             error_state::raise(error.code(), &mut self.cells);
         }
         self.mode = self.work_out_mode();
-        let demand = self.demand(switches);
+        let orders = self.plc(now);
+        let demand = self.demand(switches, orders);
+        let torque_share = if orders.analogue_torque {
+            // 10 V leave the whole limit (13.1.4).
+            (self.world.analogue.unsigned_abs() * 256 / 10_000).min(256)
+        } else {
+            256
+        };
         let moved = self.motion.cycle(
             demand,
             Outside {
@@ -306,7 +319,7 @@ impl Program {
                 jammed: self.world.jammed,
                 pole_pairs: self.pole_pairs,
                 i2t_cycles: self.i2t_cycles,
-                torque_share: 256,
+                torque_share: u16::try_from(torque_share).unwrap_or(256),
             },
             &mut self.plant,
             &mut self.cells,
@@ -324,6 +337,7 @@ impl Program {
             && self.positioning.at_rest(&self.cells)
             && self.referencing.at_rest(&self.cells)
             && self.s_ramp.status() != Status::Doing
+            && self.cycle_control.at_rest(&self.cells)
             && self.still_demands_nothing();
         debug_assert_eq!(self.broken_invariant(), None);
     }
@@ -372,8 +386,30 @@ impl Program {
         }
     }
 
+    /// The cycle control's part of this cycle (13.1.5).
+    fn plc(&mut self, now: Instant) -> Orders {
+        let orders = self.cycle_control.cycle(
+            self.world.inputs,
+            self.mode,
+            now,
+            &mut self.cells,
+            &mut self.eeprom_controller,
+            &self.properties,
+        );
+        if let Some(code) = orders.error {
+            error_state::raise(code, &mut self.cells);
+        }
+        if orders.confirm {
+            error_state::confirm(&mut self.cells);
+        }
+        if orders.error.is_some() || orders.confirm {
+            self.mode = self.work_out_mode();
+        }
+        orders
+    }
+
     /// What the motor is to do in this cycle.
-    fn demand(&mut self, switches: EndSwitches) -> Demand {
+    fn demand(&mut self, switches: EndSwitches, orders: Orders) -> Demand {
         let cells = &mut self.cells;
         let standing = cells.word(ram::NSOLLRAMPE) == 0 && cells.signed(ram::NIST).abs() < 8;
         let range = SpeedRange::from_sw_version2(cells.byte(ram::SW_VERSION2));
@@ -444,7 +480,10 @@ impl Program {
                 let speed = match run {
                     Run::Speed(speed) => speed,
                     Run::Positioning => 0,
-                    Run::Off => self.source.cycle(&self.world, false, cells),
+                    Run::Off => match orders.jog {
+                        Some(speed) => speed,
+                        None => self.source.cycle(&self.world, orders.analogue, cells),
+                    },
                 };
                 Demand::Speed(switches.restrain(speed))
             }

@@ -15,6 +15,7 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::device::Device;
 use harness_sim::nd21::{
     BusErrors, Mode, Nd21Drive, Nd21Properties, PsPosition, SRampWire, Stimulus, factory,
+    set_parity,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -167,7 +168,8 @@ impl Seen {
 }
 
 fn play(properties: Nd21Properties, seeded: Option<u8>, operations: &[Operation], seen: &mut Seen) {
-    let eeprom = seeded.map_or_else(factory::eeprom, |byte| [byte; 256]);
+    let mut eeprom = seeded.map_or_else(factory::eeprom, |byte| [byte; 256]);
+    set_parity(&mut eeprom);
     let mut drive = Nd21Drive::new(Properties::default(), properties, eeprom);
     let mut now = Instant::START;
     for operation in operations {

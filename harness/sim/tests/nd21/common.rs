@@ -6,7 +6,7 @@ use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
 use harness_sim::device::Device;
-use harness_sim::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory};
+use harness_sim::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory, set_parity};
 
 /// A drive on the bench.
 pub(crate) struct Rig {
@@ -19,6 +19,7 @@ impl Rig {
     pub(crate) fn with(properties: Nd21Properties, change: impl FnOnce(&mut [u8; 256])) -> Self {
         let mut eeprom = factory::eeprom();
         change(&mut eeprom);
+        set_parity(&mut eeprom);
         let mut rig = Self {
             drive: Nd21Drive::new(Properties::default(), properties, eeprom),
             now: Instant::START,

@@ -2,6 +2,7 @@
 
 mod any_operations;
 mod common;
+mod cycle_control;
 mod motion;
 mod positioning;
 mod recording;

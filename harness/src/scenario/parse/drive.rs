@@ -12,13 +12,16 @@ use crate::scenario::syntax::{Condition, DriveCheck, Drives, Influence, SetupKin
 use crate::scenario::times;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;
-use harness_proto::nd21::units::Device;
+use harness_proto::nd21::units::{Device, INCREMENTS_PER_TURN};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::drive::Model;
 use harness_sim::nd21;
 
 /// The words with which such a line begins.
 pub(super) const WORDS: [&str; 2] = ["drive", "drives"];
+
+/// Positions have 31 bits (ND21 13.1.9).
+const MAX_TURNS: i32 = 16_384;
 
 /// The most ohms: more is an open circuit.
 const MAX_OHM: i32 = 10_000_000;
@@ -48,6 +51,7 @@ enum Word {
     Model,
     Type,
     Input,
+    Cam,
     Analogue,
     Frequency,
     Cooler,
@@ -61,13 +65,14 @@ enum Word {
 }
 
 /// What can be set, and what can happen.
-const SETTINGS: [(&str, Word); 16] = [
+const SETTINGS: [(&str, Word); 17] = [
     ("memory", Word::Memory),
     ("eeprom", Word::Eeprom),
     ("property", Word::Property),
     ("model", Word::Model),
     ("type", Word::Type),
     ("input", Word::Input),
+    ("cam", Word::Cam),
     ("analogue", Word::Analogue),
     ("frequency", Word::Frequency),
     ("cooler", Word::Cooler),
@@ -161,6 +166,7 @@ fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
         }
         Word::Type => device(scanner),
         Word::Input => Ok(Line::Influence(Influence::Stimuli(inputs(scanner)?))),
+        Word::Cam => one(cam(scanner)?),
         Word::Analogue => {
             let millivolts = number(scanner, Dimension::Voltage, 1_000, -10, 10)?;
             one(Stimulus::Analogue(millivolts))
@@ -236,6 +242,30 @@ fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {
         span: word.span,
     };
     Ok(SetupKind::Word(name, word))
+}
+
+/// `GPIN4 3turns..3.5turns`: the positions of the rotor since power-up between which it is high.
+fn cam(scanner: &mut Scanner<'_>) -> Result<Stimulus, Problem> {
+    let names = Input::ALL.map(|input| (input.name(), input));
+    let input = named(scanner, &names, "an input")?;
+    let position = |scanner: &mut Scanner<'_>| {
+        let turns = quantity::quantity(scanner, Some(Dimension::Angle))?;
+        let increments = turns.whole(INCREMENTS_PER_TURN.cast_signed(), -MAX_TURNS, MAX_TURNS)?;
+        Ok((i64::from(increments), turns.span))
+    };
+    let (from, _) = position(scanner)?;
+    if !scanner.eat("..") {
+        return Err(scanner.unexpected("`..` and where it ends, as in 3turns..3.5turns"));
+    }
+    let (to, span) = position(scanner)?;
+    if to <= from {
+        return Err(Problem::new(
+            span,
+            "the cam ends before it begins",
+            "a position beyond the first expected here",
+        ));
+    }
+    Ok(Stimulus::Cam(input, from, to))
 }
 
 /// `GPIN3 GPIN5 high`
