@@ -424,19 +424,12 @@ impl Program {
                 SpeedRange::To12000 => 4,
             },
         };
-        let was_on = self.referencing.on();
         let run = self.referencing.cycle(
             situation,
             self.world.inputs.is_high(Input::Gpin4),
             &self.positioning,
             cells,
         );
-        if self.referencing.finished(was_on, cells) {
-            // 13.1.1 step 7.
-            let point = cells.long(ram::REF_UMDR0);
-            self.motion.set_position(point, cells);
-            self.positioning.set_target(point);
-        }
         let situation = Situation {
             referencing: self.referencing.on(),
             ..situation
@@ -461,6 +454,12 @@ impl Program {
                 }
             }
         };
+        if self.referencing.ends(cells) {
+            // 13.1.1 step 7.
+            let point = cells.long(ram::REF_UMDR0);
+            self.motion.set_position(point, cells);
+            self.positioning.set_target(point);
+        }
         if let Some(speed) = self.s_ramp.cycle(self.mode) {
             profile = i16::try_from(speed).ok();
         }

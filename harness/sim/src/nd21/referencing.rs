@@ -121,8 +121,8 @@ impl Referencing {
             Some(Step::Return) => Run::Speed(back),
             Some(Step::BrakeOn | Step::BrakeOff | Step::BrakeLast) => Run::Speed(0),
             Some(Step::Position) => {
-                let over = cells.byte(ram::PS_STATUS) == ps_status::FINISHED;
-                if over || !positioning.running() && positioning.at_rest(cells) {
+                if !positioning.running() && positioning.at_rest(cells) {
+                    // The bus has taken the positioning back.
                     self.end(cells);
                 }
                 Run::Positioning
@@ -130,9 +130,15 @@ impl Referencing {
         }
     }
 
-    /// The run has come to its end in this cycle: 13.1.1 step 7 is due.
-    pub(super) fn finished(&self, before: bool, cells: &Cells) -> bool {
-        before && self.step.is_none() && cells.byte(ram::PS_STATUS) == ps_status::FINISHED
+    /// After the positioning controller's cycle: true where the run has come to its end, and 13.1.1 step 7 is
+    /// due.
+    pub(super) fn ends(&mut self, cells: &mut Cells) -> bool {
+        let ends =
+            self.step == Some(Step::Position) && cells.byte(ram::PS_STATUS) == ps_status::FINISHED;
+        if ends {
+            self.end(cells);
+        }
+        ends
     }
 
     /// A run is on.
