@@ -2,4 +2,6 @@
 //! elsewhere.
 
 mod common;
+mod figures;
+mod recovery;
 mod thin;

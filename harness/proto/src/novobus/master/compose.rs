@@ -10,6 +10,8 @@ use crate::time::Instant;
 
 /// Sync byte, address byte and the net bytes.
 const MOST_BYTES: usize = 2 + MAX_NET_LENGTH as usize;
+/// Parameter bytes beside process data (ND21 9.1).
+const ROOM: usize = MAX_NET_LENGTH as usize - 2;
 
 /// A telegram on its way out.
 #[derive(Clone, Debug)]
@@ -75,8 +77,8 @@ impl Master {
     /// Composes the next telegram, if there is anything to say.
     pub(super) fn compose(&mut self, now: Instant) {
         let jobs = self.store.first().is_some();
-        let exchange =
-            self.cycle.inside_round() || self.cycle.is_due(now) && !(self.jobs_turn && jobs);
+        let exchange = self.cycle.inside_round()
+            || self.cycle.is_due(now) && !(self.jobs_turn && jobs && !self.is_woven());
         if exchange {
             if let Some(drive) = self.cycle.compose(now) {
                 self.compose_exchange(drive);
@@ -86,6 +88,14 @@ impl Master {
             self.jobs_turn = false;
             self.compose_jobs();
         }
+    }
+
+    /// Whether the first job is one for which the process data leave room.
+    fn is_woven(&self) -> bool {
+        let first = self.store.first().and_then(|slot| self.store.get(slot));
+        first.is_some_and(|job| {
+            self.cycle.includes(job.drive) && (self.options.packing.cut || job.left() <= ROOM)
+        })
     }
 
     /// The telegram that counts the drives: with the address byte 00 no drive is meant, and the sum comes
@@ -110,7 +120,7 @@ impl Master {
     /// A telegram with process data for `drive`, and with as much of its commands as there is room for.
     fn compose_exchange(&mut self, drive: u8) {
         let owner = Owner::Exchange(drive);
-        let (length, reset) = self.plan(drive, Order::Drive, usize::from(MAX_NET_LENGTH) - 2);
+        let (length, reset) = self.plan(drive, Order::Drive, ROOM);
         self.begin(drive, true, 2 + length, owner);
         let [high, low] = self.cycle.nominal(drive).to_be_bytes();
         self.outgoing.push(high, None, Place::ProcessHigh, owner);

@@ -8,7 +8,8 @@ use alloc::vec::Vec;
 /// When the rounds of the exchange begin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pace {
-    /// One after another. Jobs for drives that take no part get one telegram between two rounds.
+    /// One after another. A job for a drive that takes no part gets a telegram between two
+    /// rounds.
     #[default]
     Continuous,
     /// At least so long from the beginning of one round to that of the next; jobs go in between.
@@ -69,6 +70,11 @@ impl Cycle {
 
     pub(super) fn actual(&self, drive: u8) -> Option<u16> {
         *self.actual.get(usize::from(drive))?
+    }
+
+    /// Whether a drive takes part.
+    pub(super) fn includes(&self, drive: u8) -> bool {
+        self.drives.binary_search(&drive).is_ok()
     }
 
     fn position(&self) -> usize {

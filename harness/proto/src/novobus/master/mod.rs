@@ -66,7 +66,7 @@ pub use job::{Data, Job, JobId, Outcome, Refused, Repeat};
 pub use options::{Options, Packing};
 
 use super::address::RingSize;
-use super::check_sequence::CHECK_SEQUENCE;
+use super::check_sequence::{CHECK_SEQUENCE, Watch};
 use super::sync::{PAUSE, SYNCO};
 use crate::line::{Rate, Received};
 use crate::time::{Instant, Span};
@@ -250,7 +250,7 @@ impl Master {
             State::Running | State::Counting { .. } => true,
             State::Verifying { .. } => return self.transmit(Composed::SYNCO, true, now),
             State::Locating { .. } => false,
-            State::Resetting { next } => return self.reset_byte(next, now),
+            State::Resetting { next, watch } => return self.reset_byte(next, watch, now),
             State::Stopped(_) => return None,
         };
         if watched && self.in_flight.is_full() {
@@ -296,16 +296,21 @@ impl Master {
     }
 
     /// Lets out the next byte of the check sequence.
-    fn reset_byte(&mut self, next: u8, now: Instant) -> Option<u8> {
+    fn reset_byte(&mut self, next: u8, watch: Watch, now: Instant) -> Option<u8> {
         let next = usize::from(next);
         let byte = *CHECK_SEQUENCE.get(next)?;
         self.counters.sent += 1;
         self.state = if next + 1 < CHECK_SEQUENCE.len() {
             State::Resetting {
                 next: u8::try_from(next + 1).unwrap_or(u8::MAX),
+                watch,
             }
         } else {
-            State::verifying(now + self.patience)
+            State::Verifying {
+                watch,
+                heard: false,
+                until: now + self.patience,
+            }
         };
         Some(byte)
     }
@@ -324,8 +329,8 @@ impl Master {
                     self.located(spelled);
                 }
             }
-            State::Verifying { .. } => self.verify(received),
-            State::Resetting { .. } | State::Stopped(_) => {}
+            State::Resetting { .. } | State::Verifying { .. } => self.verify(received),
+            State::Stopped(_) => {}
         }
     }
 

@@ -24,8 +24,10 @@ pub(super) enum State {
         evidence: Evidence,
         until: Instant,
     },
+    /// The sequence begins to come back before all of it is sent: in a small ring two bytes later.
     Resetting {
         next: u8,
+        watch: Watch,
     },
     Verifying {
         watch: Watch,
@@ -40,11 +42,10 @@ impl State {
         Self::Counting { composed: false }
     }
 
-    pub(super) fn verifying(until: Instant) -> Self {
-        Self::Verifying {
+    pub(super) fn resetting() -> Self {
+        Self::Resetting {
+            next: 0,
             watch: Watch::default(),
-            heard: false,
-            until,
         }
     }
 
@@ -212,16 +213,23 @@ impl Master {
             self.report(Event::Disturbed { fault, attempt });
             // Long sent, unless nobody has asked for it.
             self.outgoing.clear();
-            self.state = State::Resetting { next: 0 };
+            self.state = State::resetting();
         }
     }
 
     /// Looks for the check sequence in what comes back.
     pub(super) fn verify(&mut self, received: Received) {
-        let State::Verifying { watch, heard, .. } = &mut self.state else {
-            return;
+        let watch = match &mut self.state {
+            State::Resetting { watch, .. } => {
+                watch.see(received.byte, received.error.is_none());
+                return;
+            }
+            State::Verifying { watch, heard, .. } => {
+                *heard = true;
+                watch
+            }
+            _ => return,
         };
-        *heard = true;
         if watch.see(received.byte, received.error.is_none()) == Progress::Complete {
             // All drives are back, and what was sent behind the sequence comes next.
             if self.episode.count || !self.episode.ran {
