@@ -15,6 +15,7 @@
 //! | 9.7, 9.9 | the error mode | [`error_mode`] |
 //! | 9.8 | the check sequence | [`check_sequence`] |
 //! | 9.1-9.9 | a drive's end of the bus | [`bus_end`] |
+//! | 8-11 | the master's end of the bus | [`master`] |
 //! | 10.1-10.3 | what of a drive the bus reaches | [`memory`] |
 //! | 10.4 | the digital outputs | [`output`] |
 //!
@@ -28,6 +29,7 @@ pub mod command;
 pub mod decode;
 pub mod error;
 pub mod error_mode;
+pub mod master;
 pub mod memory;
 pub mod output;
 mod parameter_channel;

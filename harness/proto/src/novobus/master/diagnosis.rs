@@ -1,0 +1,222 @@
+//! From the first wrong byte to the name of the fault: what was expected, what came instead, and what
+//! the ring spelled out (ND21 9.7-9.9).
+
+use super::super::address::RingSize;
+use super::super::check_sequence::ZEROS;
+use super::super::error_mode::UPSTREAM_ZEROS;
+use super::super::sync::SYNCO;
+use super::fault::{Fault, RingLink};
+use super::in_flight::{Place, Sent};
+use crate::line::Received;
+use alloc::vec::Vec;
+
+/// How many bytes after the first wrong one are kept to be compared.
+const KEPT: usize = 32;
+/// The most bytes that can be found to be lost or too many.
+const MOST_SHIFT: usize = 9;
+/// So many bytes must fit for a shift to be believed.
+const FITTING: usize = 4;
+
+/// After so many bytes every drive behind the one that detected the error has sent its 17 zeros: they
+/// notice the error after at most 9 bytes, the length of a telegram (ND21 9.7).
+const SETTLED: u32 = ZEROS as u32 + 9;
+/// So often must a byte come then to be what the ring spells out: a telegram holds at most seven equal
+/// net bytes.
+const STEADY: u32 = UPSTREAM_ZEROS as u32 + 1;
+/// Byte times, besides those of the way round, within which a ring has spelled out what it has to say: a
+/// telegram is ended first, and drives that send zeros unasked need as many again.
+pub(super) const SPELLING: u64 = 2 * (SETTLED + STEADY) as u64;
+
+/// What the ring says once it is steady.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Spelled {
+    /// The address of the drive that detected the error.
+    Address(u8),
+    /// SYNCO as it was sent: no drive is in the error mode.
+    Sound,
+    /// Nothing comes.
+    Nothing,
+    /// Bytes without sense.
+    Noise,
+}
+
+/// With what a disturbance began.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Cause {
+    /// Another byte came than this one, or it was damaged.
+    Wrong(Sent),
+    /// This byte did not come.
+    Missed(Sent),
+    /// A byte came that nothing had been sent for.
+    Unasked,
+    /// A check sequence did not come back.
+    NotBack,
+}
+
+impl Cause {
+    /// The byte at which it began.
+    pub(super) const fn sent(&self) -> Option<&Sent> {
+        match self {
+            Self::Wrong(sent) | Self::Missed(sent) => Some(sent),
+            Self::Unasked | Self::NotBack => None,
+        }
+    }
+}
+
+/// What is known about a disturbance.
+#[derive(Clone, Debug)]
+pub(super) struct Evidence {
+    cause: Cause,
+    /// What must have come, from the byte on with which it began.
+    expected: Vec<Option<u8>>,
+    /// What came from there on.
+    received: Vec<Received>,
+    seen: u32,
+    last: Option<Received>,
+    run: u32,
+    longest_zeros: u32,
+}
+
+impl Evidence {
+    /// A disturbance, with the bytes under way behind it.
+    pub(super) fn new<'a>(cause: Cause, behind: impl Iterator<Item = &'a Sent>) -> Self {
+        let all = cause
+            .sent()
+            .copied()
+            .into_iter()
+            .chain(behind.copied())
+            .take(KEPT);
+        Self {
+            cause,
+            expected: all.map(|sent| sent.composed.back).collect(),
+            received: Vec::new(),
+            seen: 0,
+            last: None,
+            run: 0,
+            longest_zeros: 0,
+        }
+    }
+
+    /// With what it began.
+    pub(super) fn cause(&self) -> &Cause {
+        &self.cause
+    }
+
+    /// Takes a byte of what came.
+    pub(super) fn see(&mut self, received: Received) {
+        if self.received.len() < KEPT {
+            self.received.push(received);
+        }
+        self.seen = self.seen.saturating_add(1);
+        self.run = if self.last == Some(received) {
+            self.run.saturating_add(1)
+        } else {
+            1
+        };
+        self.last = Some(received);
+        if received.is(0) {
+            self.longest_zeros = self.longest_zeros.max(self.run);
+        }
+    }
+
+    /// What the ring spells out; `None` as long as that may change.
+    pub(super) fn settled(&self, ring: RingSize) -> Option<Spelled> {
+        (self.seen >= SETTLED + STEADY && self.run >= STEADY)
+            .then(|| self.spelled(ring))
+            .filter(|spelled| *spelled != Spelled::Noise)
+    }
+
+    /// What the ring spells out, when there is no more time.
+    pub(super) fn spelled(&self, ring: RingSize) -> Spelled {
+        let Some(last) = self.last else {
+            return Spelled::Nothing;
+        };
+        if last.error.is_some() || self.run < STEADY {
+            return Spelled::Noise;
+        }
+        // In a ring of more than 128 drives SYNCO is an address as well; but before an address come zeros.
+        let zeros = self.longest_zeros >= u32::from(UPSTREAM_ZEROS);
+        if last.byte < ring.drives() && (zeros || last.byte != SYNCO) {
+            Spelled::Address(last.byte)
+        } else if last.byte == SYNCO {
+            Spelled::Sound
+        } else {
+            Spelled::Noise
+        }
+    }
+
+    /// The name of the fault. `silent`: a byte was missed, now or since the disturbance began; `drive`:
+    /// the drive that was to answer.
+    pub(super) fn name(
+        &self,
+        ring: RingSize,
+        spelled: Spelled,
+        silent: bool,
+        drive: Option<u8>,
+    ) -> Fault {
+        match spelled {
+            Spelled::Address(drive) if silent => Fault::Broken(RingLink::into(ring, drive)),
+            Spelled::Address(drive) => Fault::Damaged(RingLink::into(ring, drive)),
+            // What only the master heard wrong happened on the last link.
+            _ if self.received.first().is_some_and(|r| r.error.is_some()) => {
+                Fault::Damaged(RingLink::last())
+            }
+            Spelled::Nothing => Fault::Silent,
+            Spelled::Sound => self.compare(ring, drive),
+            Spelled::Noise => Fault::Unclear,
+        }
+    }
+
+    /// The fault of a ring in which no drive is in the error mode.
+    fn compare(&self, ring: RingSize, drive: Option<u8>) -> Fault {
+        let first = self.received.first().map(|received| received.byte);
+        match (&self.cause, first) {
+            (Cause::Unasked, _) => return Fault::Extra { bytes: 1 },
+            (Cause::Missed(_), _) if self.fit(0, 0) => return Fault::Late,
+            (Cause::Wrong(sent), Some(received)) if self.fit(1, 1) => {
+                return match (sent.composed.place, sent.composed.back, drive) {
+                    // The address byte comes back increased by the number of drives (9.3).
+                    (Place::Address, Some(expected), _) => Fault::WrongRingSize {
+                        counted: received.wrapping_sub(expected).wrapping_add(ring.drives()),
+                        ring,
+                    },
+                    (Place::Parameter, expected, Some(drive)) => Fault::Protocol {
+                        drive,
+                        expected,
+                        received,
+                    },
+                    _ => Fault::Unclear,
+                };
+            }
+            _ => {}
+        }
+        for shift in 1..=MOST_SHIFT {
+            let bytes = u8::try_from(shift).unwrap_or(u8::MAX);
+            if self.fit(shift, 0) {
+                return Fault::Lost { bytes };
+            }
+            if self.fit(0, shift) {
+                return Fault::Extra { bytes };
+            }
+        }
+        Fault::Unclear
+    }
+
+    /// Whether what came from `received` on is what must have come from `expected` on.
+    fn fit(&self, expected: usize, received: usize) -> bool {
+        let expected = self.expected.get(expected..).unwrap_or_default();
+        let received = self.received.get(received..).unwrap_or_default();
+        let mut telling = 0;
+        let fits = expected
+            .iter()
+            .zip(received)
+            .all(|(expected, received)| match expected {
+                None => received.error.is_none(),
+                Some(byte) => {
+                    telling += usize::from(*byte != SYNCO);
+                    received.is(*byte)
+                }
+            });
+        fits && (telling >= FITTING || expected.len().min(received.len()) >= KEPT / 2)
+    }
+}

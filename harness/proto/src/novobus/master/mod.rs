@@ -1,0 +1,377 @@
+//! The master's end of the bus (ND21 8.2, 9, 10, 11): jobs in, telegrams out, results and named faults
+//! back, for one ring.
+//!
+//! It owns no port and no clock. Whoever does calls
+//!
+//! * [`Master::poll_transmit`] whenever the line is free, and sends the byte that it gives;
+//! * [`Master::handle_byte`] with every byte that has come back;
+//! * [`Master::handle_timeout`] when [`Master::poll_timeout`] is past;
+//! * [`Master::poll_event`] after any of these.
+//!
+//! Work is given by [`Master::submit`] (a command for a drive) and [`Master::set_exchange`] (cyclic
+//! process data). The line is kept without a gap (9.1): with nothing to do SYNCO goes out. No answer is
+//! waited for: what is under way is a bounded list of the bytes that must come back, and every one is
+//! compared: sync byte, address, echo, checking byte.
+//!
+//! # When something comes back wrong
+//!
+//! ```text
+//! Counting -> Running -> Locating -> Resetting -> Verifying -> Running
+//!                           ^                         |
+//!                           +------ not back ---------+     Locating -> Stopped, after too many
+//! ```
+//!
+//! *Locating*: the telegram that has been begun is ended (broken off it would make a sound drive detect
+//! an error of its own, and the ring would spell out that one), then SYNCO goes out until the ring
+//! spells out an address (9.7), or the time is up. *Resetting*: 17 zeros and the check sequence (9.8).
+//! *Verifying*: a drive passes the five bytes on only when they have brought it back; so once all five
+//! have come round, all drives are back. The manual repeats at once; this master waits for that, because
+//! a job that reaches drives half of which are in the error mode would run without an answer. *Counting*:
+//! a telegram for nobody (address byte 00) comes back with the number of drives; so it is at the
+//! beginning, because in a ring of another size than thought every address means another drive, and after
+//! an address byte has come back wrong.
+//!
+//! # What is known of a job that was under way
+//!
+//! * It *ran* when every byte up to the drive's own -checksum has come back right: the address says who
+//!   answered, and only a drive whose check of the command was right sends that byte.
+//! * It *did not run* when its checking byte was never sent: until then a drive changes nothing (9.6).
+//! * In between nobody can say. That the ring names a drive does not prove that the byte had not reached
+//!   those behind it: the named one is the first *in the ring* that is in the error mode, and may have
+//!   come to it later than another one, further down, whose address was overwritten.
+//!
+//! What did not run is sent again, and so is what may have run, in the order in which it was submitted,
+//! if it [may run twice](Repeat); otherwise it ends as [`Outcome::Unknown`]. A write that may have run
+//! twice says so. Reads that are sent again bring what the cell holds then.
+//!
+//! Data without a check of their own (process data, the four data bytes of `ReadLong`) count only when a
+//! byte other than 00 has come back right behind them: a drive in the error mode answers 00.
+
+mod answers;
+mod compose;
+mod cycle;
+mod diagnosis;
+mod event;
+mod fault;
+mod in_flight;
+mod job;
+mod options;
+mod recovery;
+mod store;
+
+pub use cycle::Pace;
+pub use event::{Counters, Event};
+pub use fault::{End, Fault, RingLink, Stop};
+pub use job::{Data, Job, JobId, Outcome, Refused, Repeat};
+pub use options::{Options, Packing};
+
+use super::address::RingSize;
+use super::check_sequence::{CHECK_SEQUENCE, Watch};
+use super::sync::{PAUSE, SYNCO};
+use crate::line::{Rate, Received};
+use crate::time::{Instant, Span};
+use alloc::vec::Vec;
+use answers::Unconfirmed;
+use compose::Outgoing;
+use cycle::Cycle;
+use diagnosis::Cause;
+use event::Events;
+use in_flight::{Composed, InFlight, Sent};
+use recovery::{Episode, State};
+use store::Store;
+
+/// The master's end of one ring.
+#[derive(Clone, Debug)]
+pub struct Master {
+    ring: RingSize,
+    options: Options,
+    byte_time: Span,
+    /// From the beginning of a byte to when it must be back.
+    patience: Span,
+    state: State,
+    episode: Episode,
+    store: Store,
+    cycle: Cycle,
+    /// The last round is sent whole, and a telegram with jobs comes before the next one.
+    jobs_turn: bool,
+    outgoing: Outgoing,
+    in_flight: InFlight,
+    unconfirmed: Unconfirmed,
+    /// The drive for which "same drive" would be meant; `None` where no short address is valid.
+    last_addressed: Option<u8>,
+    pauses: u16,
+    events: Events,
+    counters: Counters,
+}
+
+/// What a master is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// It counts the drives.
+    Counting,
+    /// It does its work.
+    Running,
+    /// It waits for the ring to spell out an address (ND21 9.7).
+    Locating,
+    /// It sends the check sequence (ND21 9.8).
+    Resetting,
+    /// It waits for the check sequence to come back.
+    Verifying,
+    /// It has given up.
+    Stopped,
+}
+
+impl Master {
+    /// A master for a ring of so many drives on a line of this rate.
+    #[must_use]
+    pub fn new(ring: RingSize, rate: Rate, options: Options) -> Self {
+        let byte_time = rate.byte_time();
+        // A byte needs one byte time to the first drive and one for each drive that passes it on.
+        let round = u64::from(ring.drives()) + 1;
+        let slack = options.slack.units() / byte_time.units() + 2;
+        let most = usize::try_from(round + slack).unwrap_or(usize::MAX);
+        Self {
+            ring,
+            options,
+            byte_time,
+            patience: byte_time * round + options.slack,
+            state: State::counting(),
+            episode: Episode::default(),
+            store: Store::new(ring, options.capacity),
+            cycle: Cycle::new(ring),
+            jobs_turn: false,
+            outgoing: Outgoing::default(),
+            in_flight: InFlight::new(most),
+            unconfirmed: Unconfirmed::default(),
+            last_addressed: None,
+            pauses: 0,
+            events: Events::default(),
+            counters: Counters::default(),
+        }
+    }
+
+    /// How many drives the ring should have.
+    #[must_use]
+    pub const fn ring(&self) -> RingSize {
+        self.ring
+    }
+
+    /// What the master is doing.
+    #[must_use]
+    pub const fn phase(&self) -> Phase {
+        self.state.phase()
+    }
+
+    /// What it has done so far.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// How many jobs are queued or under way.
+    #[must_use]
+    pub fn jobs(&self) -> usize {
+        self.store.len()
+    }
+
+    /// How many bytes have been sent and must come back.
+    #[must_use]
+    pub fn under_way(&self) -> usize {
+        self.in_flight.len()
+    }
+
+    /// Takes a job behind those that it has. Jobs for one drive run in this order; so do all jobs as
+    /// long as there is no cyclic exchange with one of their drives.
+    ///
+    /// # Errors
+    /// Why the job cannot be done: see [`Refused`].
+    pub fn submit(&mut self, job: Job) -> Result<JobId, Refused> {
+        if let State::Stopped(stop) = self.state {
+            return Err(Refused::Stopped(stop));
+        }
+        job.check(self.ring)?;
+        let full = Refused::Full {
+            capacity: self.options.capacity,
+        };
+        if self.store.len() + self.events.results() >= usize::from(self.options.capacity) {
+            return Err(full);
+        }
+        self.store.add(&job, self.options.read_long).ok_or(full)
+    }
+
+    /// Exchanges process data with these drives from the next round on (ND21 9.4), in ascending order;
+    /// with none, the exchange ends. Drives get the value set last by [`Self::set_nominal`], 0 at first.
+    ///
+    /// # Errors
+    /// [`Refused::Drive`] where the ring has not all of them.
+    pub fn set_exchange(&mut self, drives: &[u8], pace: Pace) -> Result<(), Refused> {
+        let mut list: Vec<u8> = drives.to_vec();
+        for &drive in drives {
+            self.ring.address_byte(drive).map_err(Refused::Drive)?;
+        }
+        list.sort_unstable();
+        list.dedup();
+        self.cycle.set(list, pace);
+        Ok(())
+    }
+
+    /// Lets one more round begin, at [`Pace::OnRequest`].
+    pub fn start_round(&mut self) {
+        self.cycle.request();
+    }
+
+    /// Sets what a drive gets in the cyclic exchange from its next telegram on.
+    ///
+    /// # Errors
+    /// [`Refused::Drive`] where the ring has no such drive.
+    pub fn set_nominal(&mut self, drive: u8, value: u16) -> Result<(), Refused> {
+        self.ring.address_byte(drive).map_err(Refused::Drive)?;
+        self.cycle.set_nominal(drive, value);
+        Ok(())
+    }
+
+    /// What a drive gave last in the cyclic exchange.
+    #[must_use]
+    pub fn actual(&self, drive: u8) -> Option<u16> {
+        self.cycle.actual(drive)
+    }
+
+    /// Sends PAUSE in place of the next `count` SYNCO, to loosen the data flow (ND21 9.2). The first drive
+    /// swallows them: the others hear nothing, and after 10 ms those with monitoring report a time-out.
+    pub fn pause(&mut self, count: u16) {
+        self.pauses = count;
+    }
+
+    /// The next byte to be sent; to be asked for whenever the line is free. `None` when the bus is
+    /// stopped, and while so many bytes are missed that no more may be under way.
+    #[inline]
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<u8> {
+        let watched = match self.state {
+            State::Running | State::Counting { .. } => true,
+            State::Verifying { .. } => return self.transmit(Composed::SYNCO, true, now),
+            State::Locating { .. } => false,
+            State::Resetting { next, watch } => return self.reset_byte(next, watch, now),
+            State::Stopped(_) => return None,
+        };
+        if watched && self.in_flight.is_full() {
+            return None;
+        }
+        if self.outgoing.is_empty() {
+            match &mut self.state {
+                State::Running => self.compose(now),
+                State::Counting { composed } if !*composed => {
+                    *composed = true;
+                    self.compose_count();
+                }
+                _ => {}
+            }
+        }
+        let composed = match self.outgoing.next() {
+            Some(composed) => composed,
+            None if matches!(self.state, State::Running) && self.pauses > 0 => {
+                self.pauses -= 1;
+                self.counters.idle += 1;
+                self.counters.sent += 1;
+                return Some(PAUSE);
+            }
+            None => Composed::SYNCO,
+        };
+        self.transmit(composed, watched, now)
+    }
+
+    /// Lets a byte out; `watched`: it must come back as composed.
+    fn transmit(&mut self, composed: Composed, watched: bool, now: Instant) -> Option<u8> {
+        if watched {
+            if self.in_flight.is_full() {
+                return None;
+            }
+            self.in_flight.push(Sent {
+                composed,
+                due: now + self.patience,
+            });
+        }
+        self.counters.sent += 1;
+        self.counters.idle += u64::from(composed.byte == SYNCO && composed == Composed::SYNCO);
+        Some(composed.byte)
+    }
+
+    /// Lets out the next byte of the check sequence.
+    fn reset_byte(&mut self, next: u8, watch: Watch, now: Instant) -> Option<u8> {
+        let next = usize::from(next);
+        let byte = *CHECK_SEQUENCE.get(next)?;
+        self.counters.sent += 1;
+        self.state = if next + 1 < CHECK_SEQUENCE.len() {
+            State::Resetting {
+                next: u8::try_from(next + 1).unwrap_or(u8::MAX),
+                watch,
+            }
+        } else {
+            State::Verifying {
+                watch,
+                heard: false,
+                until: now + self.patience,
+            }
+        };
+        Some(byte)
+    }
+
+    /// Takes a byte that has come back.
+    pub fn handle_byte(&mut self, now: Instant, received: Received) {
+        if self.poll_timeout().is_some_and(|due| due < now) {
+            self.handle_timeout(now);
+        }
+        self.counters.received += 1;
+        match &mut self.state {
+            State::Running | State::Counting { .. } => self.take(received, now),
+            State::Locating { evidence, .. } => {
+                evidence.see(received);
+                if let Some(spelled) = evidence.settled(self.ring) {
+                    self.located(spelled);
+                }
+            }
+            State::Resetting { .. } | State::Verifying { .. } => self.verify(received),
+            State::Stopped(_) => {}
+        }
+    }
+
+    /// When [`Self::handle_timeout`] is to be called, if no byte comes before.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        match self.state {
+            State::Running | State::Counting { .. } => self.in_flight.due(),
+            State::Locating { until, .. } | State::Verifying { until, .. } => Some(until),
+            State::Resetting { .. } | State::Stopped(_) => None,
+        }
+    }
+
+    /// Does what is due: a byte is missed, or a phase of the recovery has taken too long.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        if self.poll_timeout().is_none_or(|due| due > now) {
+            return;
+        }
+        match &self.state {
+            State::Running | State::Counting { .. } => {
+                if let Some(sent) = self.in_flight.pop() {
+                    self.disturb(Cause::Missed(sent), now);
+                }
+            }
+            State::Locating { evidence, .. } => {
+                let spelled = evidence.spelled(self.ring);
+                self.located(spelled);
+            }
+            State::Verifying { .. } => self.disturb(Cause::NotBack, now),
+            State::Resetting { .. } | State::Stopped(_) => {}
+        }
+    }
+
+    /// The next thing to report.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.events.next()
+    }
+
+    fn report(&mut self, event: Event) {
+        if !self.events.add(event) {
+            self.counters.lost_events += 1;
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! From the first wrong byte back to work, or to the end (ND21 9.7-9.9, 11.5).
+
+use super::super::address::RingSize;
+use super::super::check_sequence::{Progress, Watch};
+use super::super::error_mode::UPSTREAM_ZEROS;
+use super::diagnosis::{Cause, Evidence, SPELLING, Spelled};
+use super::event::Event;
+use super::fault::{Fault, RingLink, Stop};
+use super::in_flight::{Owner, Place};
+use super::job::{JobId, Outcome};
+use super::store::Entry;
+use super::{Master, Phase};
+use crate::line::Received;
+use crate::time::Instant;
+
+/// What a master is doing, with what it needs for that.
+#[derive(Clone, Debug)]
+pub(super) enum State {
+    Counting {
+        composed: bool,
+    },
+    Running,
+    Locating {
+        evidence: Evidence,
+        until: Instant,
+    },
+    /// The sequence begins to come back before all of it is sent: in a small ring two bytes later.
+    Resetting {
+        next: u8,
+        watch: Watch,
+    },
+    Verifying {
+        watch: Watch,
+        heard: bool,
+        until: Instant,
+    },
+    Stopped(Stop),
+}
+
+impl State {
+    pub(super) const fn counting() -> Self {
+        Self::Counting { composed: false }
+    }
+
+    pub(super) fn resetting() -> Self {
+        Self::Resetting {
+            next: 0,
+            watch: Watch::default(),
+        }
+    }
+
+    pub(super) const fn phase(&self) -> Phase {
+        match self {
+            Self::Counting { .. } => Phase::Counting,
+            Self::Running => Phase::Running,
+            Self::Locating { .. } => Phase::Locating,
+            Self::Resetting { .. } => Phase::Resetting,
+            Self::Verifying { .. } => Phase::Verifying,
+            Self::Stopped(_) => Phase::Stopped,
+        }
+    }
+}
+
+/// The work at which a disturbance began. Recoveries are counted until it is done: a ring that comes back
+/// each time and fails again at the same place is as bad as one that does not come back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Stumble {
+    /// None, or none that can be named: done when a round of the ring has come back right.
+    #[default]
+    Idle,
+    Job(JobId),
+    Exchange(u8),
+}
+
+/// How the recoveries go.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Episode {
+    /// Recoveries since the stumble was last got over.
+    failures: u8,
+    /// Recoveries since the ring last ran.
+    attempts: u8,
+    /// How many of the failures began within one and the same command of the drive that was named.
+    rejections: u8,
+    stumble: Stumble,
+    /// Bytes that have come back right since then.
+    clean: u16,
+    /// A byte was missed since the ring last ran.
+    silent: bool,
+    /// The drives are to be counted before the ring runs.
+    count: bool,
+    /// The ring has run.
+    ran: bool,
+    /// What was found out last.
+    fault: Option<Fault>,
+}
+
+impl Episode {
+    /// Whether the ring has not run yet.
+    pub(super) fn is_first(&self) -> bool {
+        !self.ran
+    }
+
+    /// A piece of work is done.
+    #[inline]
+    pub(super) fn is_done(&mut self, work: Stumble) {
+        if self.failures > 0 && self.stumble == work {
+            self.got_over();
+        }
+    }
+
+    /// A byte has come back right.
+    #[inline]
+    pub(super) fn byte_was_right(&mut self, ring: RingSize) {
+        if self.failures > 0 && self.stumble == Stumble::Idle {
+            self.clean = self.clean.saturating_add(1);
+            if self.clean > u16::from(ring.drives()) + 4 * u16::from(UPSTREAM_ZEROS) {
+                self.got_over();
+            }
+        }
+    }
+
+    fn got_over(&mut self) {
+        self.failures = 0;
+        self.rejections = 0;
+        self.stumble = Stumble::Idle;
+    }
+}
+
+impl Master {
+    /// The ring is disturbed: work stops, and the ring is given time to spell out where.
+    pub(super) fn disturb(&mut self, cause: Cause, now: Instant) {
+        if self.episode.attempts == 0 {
+            self.counters.disturbed += 1;
+        }
+        match cause {
+            Cause::Missed(_) => self.episode.silent = true,
+            Cause::NotBack => {
+                if matches!(self.state, State::Verifying { heard: false, .. }) {
+                    self.episode.silent = true;
+                }
+            }
+            Cause::Wrong(sent) => self.episode.count |= sent.composed.place == Place::Address,
+            Cause::Unasked => {}
+        }
+        if self.episode.failures == 0 {
+            self.episode.stumble = match cause.sent().map(|sent| sent.composed.owner) {
+                Some(Owner::Job(slot)) => self
+                    .store
+                    .get(slot)
+                    .map_or(Stumble::Idle, |entry| Stumble::Job(entry.id)),
+                Some(Owner::Exchange(drive)) => Stumble::Exchange(drive),
+                Some(Owner::Idle | Owner::Count) | None => Stumble::Idle,
+            };
+        }
+        self.episode.clean = 0;
+        let evidence = Evidence::new(cause, self.in_flight.iter());
+        self.in_flight.clear();
+        self.unconfirmed = super::Unconfirmed::default();
+        let mut until = now + self.patience + self.byte_time * SPELLING;
+        if self.episode.silent {
+            until += self.options.monitoring;
+        }
+        self.state = State::Locating { evidence, until };
+    }
+
+    /// Keeps the byte at which it began.
+    pub(super) fn see(&mut self, received: Received) {
+        if let State::Locating { evidence, .. } = &mut self.state {
+            evidence.see(received);
+        }
+    }
+
+    /// The ring has said what it had to say.
+    pub(super) fn located(&mut self, spelled: Spelled) {
+        let State::Locating { evidence, .. } = &self.state else {
+            return;
+        };
+        let job = match evidence.cause() {
+            Cause::Wrong(sent) => match sent.composed.owner {
+                Owner::Job(slot) => self.store.get(slot).map(|job| (sent, job)),
+                _ => None,
+            },
+            _ => None,
+        };
+        let drive = job.map(|(_, job)| job.drive);
+        let mut fault = evidence.name(self.ring, spelled, self.episode.silent, drive);
+        let episode = &mut self.episode;
+        let named = |job: &Entry| fault == Fault::Damaged(RingLink::into(self.ring, job.drive));
+        episode.failures = episode.failures.saturating_add(1);
+        episode.attempts = episode.attempts.saturating_add(1);
+        let rejected = job.filter(|(sent, job)| {
+            sent.composed.place == Place::Parameter
+                && named(job)
+                && episode.stumble == Stumble::Job(job.id)
+        });
+        if rejected.is_some() {
+            episode.rejections = episode.rejections.saturating_add(1);
+        }
+        episode.silent |= spelled == Spelled::Nothing;
+        episode.fault = Some(fault);
+        let (failures, attempt) = (episode.failures, episode.attempts);
+        let always_rejected = episode.rejections == failures;
+        if failures > self.options.attempts {
+            if let Some((_, job)) = rejected.filter(|_| always_rejected) {
+                fault = Fault::Rejected {
+                    drive: job.drive,
+                    kind: job.kind,
+                };
+            }
+            self.report(Event::Disturbed { fault, attempt });
+            self.stop(fault);
+        } else {
+            self.report(Event::Disturbed { fault, attempt });
+            // Long sent, unless nobody has asked for it.
+            self.outgoing.clear();
+            self.state = State::resetting();
+        }
+    }
+
+    /// Looks for the check sequence in what comes back.
+    pub(super) fn verify(&mut self, received: Received) {
+        let watch = match &mut self.state {
+            State::Resetting { watch, .. } => {
+                watch.see(received.byte, received.error.is_none());
+                return;
+            }
+            State::Verifying { watch, heard, .. } => {
+                *heard = true;
+                watch
+            }
+            _ => return,
+        };
+        if watch.see(received.byte, received.error.is_none()) == Progress::Complete {
+            // All drives are back, and what was sent behind the sequence comes next.
+            if self.episode.count || !self.episode.ran {
+                self.state = State::counting();
+            } else {
+                self.resume();
+            }
+        }
+    }
+
+    /// The ring is back: what was not done is sent again.
+    pub(super) fn resume(&mut self) {
+        let attempts = core::mem::take(&mut self.episode.attempts);
+        self.episode.ran = true;
+        self.episode.silent = false;
+        self.episode.count = false;
+        self.last_addressed = None;
+        self.state = State::Running;
+        if attempts == 0 {
+            return;
+        }
+        self.counters.corrected += 1;
+        self.report(Event::Recovered { attempts });
+        let fault = self.episode.fault.unwrap_or(Fault::Unclear);
+        let (events, episode) = (&mut self.events, &mut self.episode);
+        self.counters.repeated += self.store.restart(|job| {
+            let again = job.left() > 0 || job.may_repeat;
+            if !again {
+                events.ended(job.id, Outcome::Unknown(fault));
+                if episode.stumble == Stumble::Job(job.id) {
+                    episode.stumble = Stumble::Idle;
+                }
+            }
+            again
+        });
+        self.cycle.restart();
+    }
+
+    /// The bus is stopped; every job ends.
+    fn stop(&mut self, fault: Fault) {
+        let stop = Stop {
+            fault,
+            attempts: self.episode.failures.saturating_sub(1),
+        };
+        let events = &mut self.events;
+        self.store.restart(|job| {
+            let perhaps_run = job.perhaps_run || job.left() == 0;
+            let outcome = if perhaps_run && !job.kind.reads() {
+                Outcome::Unknown(fault)
+            } else {
+                Outcome::Failed(stop)
+            };
+            events.ended(job.id, outcome);
+            false
+        });
+        self.state = State::Stopped(stop);
+        self.report(Event::Stopped(stop));
+    }
+}
