@@ -5,6 +5,7 @@
 //! buses themselves are in `harness_proto`, the simulated rings in `harness_sim`.
 #![forbid(unsafe_code)]
 
+pub mod bus;
 pub mod cli;
 pub mod library;
 pub mod link;

@@ -1,0 +1,148 @@
+//! Reading and writing cells (ND21 12.2-12.4).
+
+use super::{Axis, Bus, Error, Order};
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::Job;
+use harness_proto::time::Span;
+
+/// The numbers that a read brings have the width of the cell.
+fn narrow<T: TryFrom<u32>>(value: Option<u32>) -> Result<T, Error> {
+    value
+        .and_then(|value| T::try_from(value).ok())
+        .ok_or_else(|| Error::Open("the answer leaves a byte out (ReadLong as printed, ND21 10.1)"))
+}
+
+/// The bit commands reach one page only (10.3).
+fn page(address: u16) -> Result<u8, Error> {
+    let [high, low] = address.to_be_bytes();
+    if high == 0xFF && low <= 0x7F {
+        return Ok(low);
+    }
+    Err(Error::Value(format!(
+        "And and Or reach FF00 to FF7F and not {address:04X} (ND21 10.3)"
+    )))
+}
+
+impl Bus {
+    /// Reads a byte of RAM, ROM or the register field (12.3).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_ReadByte")]
+    pub fn read_byte(&self, axis: Axis, address: u16) -> Result<u8, Error> {
+        narrow(self.run_job(axis, |drive| Job::new(drive, Command::ReadByte { address }))?)
+    }
+
+    /// Reads a word of RAM or ROM (12.3).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_ReadWord")]
+    pub fn read_word(&self, axis: Axis, address: u16) -> Result<u16, Error> {
+        narrow(self.run_job(axis, |drive| Job::new(drive, Command::ReadWord { address }))?)
+    }
+
+    /// Reads four bytes of RAM (12.3).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_ReadLong")]
+    pub fn read_long(&self, axis: Axis, address: u16) -> Result<u32, Error> {
+        narrow(self.run_job(axis, |drive| Job::new(drive, Command::ReadLong { address }))?)
+    }
+
+    /// Reads `count` bytes from `address` on, pipelined.
+    ///
+    /// # Errors
+    /// See [`Error`]; the first one where several reads fail.
+    pub fn read_bytes(&self, axis: Axis, address: u16, count: u16) -> Result<Vec<u8>, Error> {
+        let mut orders: Vec<Order> = Vec::new();
+        let mut bytes = Vec::new();
+        for offset in 0..count {
+            let Some(address) = address.checked_add(offset) else {
+                break;
+            };
+            orders.push(self.start(axis, |drive| {
+                Job::new(drive, Command::ReadByte { address })
+            })?);
+        }
+        for order in orders {
+            bytes.push(narrow(self.result(order)?)?);
+        }
+        Ok(bytes)
+    }
+
+    /// Writes a byte of RAM (12.2).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_WriteByte")]
+    pub fn write_byte(&self, axis: Axis, address: u16, data: u8) -> Result<(), Error> {
+        let command = Command::WriteByte { address, data };
+        self.run_job(axis, |drive| Job::new(drive, command))?;
+        Ok(())
+    }
+
+    /// Writes a word of RAM (12.2).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_WriteWord")]
+    pub fn write_word(&self, axis: Axis, address: u16, data: u16) -> Result<(), Error> {
+        let command = Command::WriteWord { address, data };
+        self.run_job(axis, |drive| Job::new(drive, command))?;
+        Ok(())
+    }
+
+    /// Clears the bits of a cell FF00-FF7F that `mask` has as 0 (10.3).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn and(&self, axis: Axis, address: u16, mask: u8) -> Result<(), Error> {
+        let address_low = page(address)?;
+        let command = Command::And {
+            address_low,
+            data: mask,
+        };
+        self.run_job(axis, |drive| Job::new(drive, command))?;
+        Ok(())
+    }
+
+    /// Sets the bits of a cell FF00-FF7F that `mask` has as 1 (10.3).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn or(&self, axis: Axis, address: u16, mask: u8) -> Result<(), Error> {
+        let address_low = page(address)?;
+        let command = Command::Or {
+            address_low,
+            data: mask,
+        };
+        self.run_job(axis, |drive| Job::new(drive, command))?;
+        Ok(())
+    }
+
+    /// Reads a byte until `done` says that it is as it should be.
+    pub(super) fn poll_byte(
+        &self,
+        axis: Axis,
+        address: u16,
+        patience: Span,
+        what: &str,
+        mut done: impl FnMut(u8) -> Result<bool, Error>,
+    ) -> Result<u8, Error> {
+        let end = self.lock().now() + patience;
+        loop {
+            let byte = self.read_byte(axis, address)?;
+            if done(byte)? {
+                return Ok(byte);
+            }
+            if self.lock().now() >= end {
+                return Err(Error::TimeOut {
+                    waited: patience,
+                    what: format!("{what} of drive {axis} (found {byte:02X})"),
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! How many drives a ring has, and which (ND21 8.5, 9.3, 14.8).
+
+use super::error::in_words;
+use super::{Axis, Bus, Error};
+use crate::link::Link;
+use harness_proto::nd21::bits::{flags, status};
+use harness_proto::nd21::errors::display_digits;
+use harness_proto::nd21::units::{Date, operating_hours_from_bytes, serial_number_from_bytes};
+use harness_proto::nd21::{ee, ram};
+use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, ZEROS};
+use harness_proto::novobus::sync::SYNCO;
+use harness_proto::time::Span;
+
+/// A telegram whose address nobody has: each of N drives adds 1 to the 00, and no sum is 0 (9.3). The net
+/// byte is passed on by all.
+const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
+
+/// Counts the drives of a ring, first as it is and then, if nothing sensible comes back, once more behind
+/// 17 zeros and the check sequence (9.8). Nothing is changed in any drive.
+///
+/// # Errors
+/// [`Error::TimeOut`] where no ring answers.
+pub fn count_drives(link: &mut dyn Link, ring: usize) -> Result<RingSize, Error> {
+    let mut zeros = vec![0; usize::from(ZEROS)];
+    zeros.extend(CHECK_SEQUENCE);
+    for before in [&[] as &[u8], &zeros] {
+        while link.receive(ring).is_some() {}
+        link.send(ring, before);
+        link.send(ring, &[SYNCO, SYNCO]);
+        let sent = link.send(ring, &COUNT);
+        let end = sent + link.byte_time() * (u64::from(MAX_DRIVES) + 8) + Span::from_millis(50);
+        let mut heard = Vec::new();
+        while link.now() < end {
+            if !link.wait(end) && link.now() < end {
+                continue;
+            }
+            while let Some((_, received)) = link.receive(ring) {
+                heard.push(if received.error.is_none() { received.byte } else { 0 });
+                if let [.., sync, drives, net] = heard[..]
+                    && (sync, net) == (COUNT[0], COUNT[2])
+                    && let Ok(size) = RingSize::new(u64::from(drives))
+                {
+                    return Ok(size);
+                }
+            }
+        }
+    }
+    Err(Error::TimeOut {
+        waited: Span::from_millis(50),
+        what: "a ring to answer: it is broken, or a drive is not ready for operation (ND21 9.9)"
+            .to_owned(),
+    })
+}
+
+/// What a drive says of itself (14.3.5, 14.8).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// The serial number; `None` where the EEPROM holds none.
+    pub serial_number: Option<u32>,
+    /// `EE_Version` as it stands: the places of its bits are lost in the print (14.3.5).
+    pub ee_version: u8,
+    /// Hours of operation, and hours blocked (14.8.2).
+    pub hours: (u16, u16),
+    /// The start-up date, if there is one.
+    pub start_up: Option<Date>,
+    /// The date of the last change of parameters, if there is one.
+    pub changed: Option<Date>,
+    /// The first bytes of the ROM information (12.3).
+    pub rom: [u8; 8],
+}
+
+/// How a drive is (11.8, 14.4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State {
+    /// `Status`.
+    pub status: u8,
+    /// `Flags`.
+    pub flags: u8,
+    /// `Flags2`.
+    pub flags2: u8,
+    /// `errorcode`.
+    pub error: u16,
+}
+
+impl State {
+    /// The mode in the manual's words (11.8): reset, error, block, stop or go.
+    #[must_use]
+    pub fn mode(&self) -> &'static str {
+        if self.status & status::RESET != 0 {
+            "reset"
+        } else if self.status & status::ERROR != 0 {
+            "error"
+        } else if self.flags & flags::BLOCK != 0 {
+            "block"
+        } else if self.flags & flags::STOP != 0 {
+            "stop"
+        } else {
+            "go"
+        }
+    }
+
+    /// The error in words; `None` where there is none.
+    #[must_use]
+    pub fn error_in_words(&self) -> Option<String> {
+        (self.error != 0 && display_digits(self.error).is_some()).then(|| in_words(self.error))
+    }
+}
+
+impl Bus {
+    /// Reads how a drive is.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn state(&self, axis: Axis) -> Result<State, Error> {
+        Ok(State {
+            status: self.read_byte(axis, ram::STATUS)?,
+            flags: self.read_byte(axis, ram::FLAGS)?,
+            flags2: self.read_byte(axis, ram::FLAGS2)?,
+            error: self.read_word(axis, ram::ERRORCODE)?,
+        })
+    }
+
+    /// Reads what a drive says of itself, from its EEPROM.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn identity(&self, axis: Axis) -> Result<Identity, Error> {
+        let word = |address: u8| -> Result<[u8; 2], Error> {
+            Ok([
+                self.read_eeprom(axis, address)?,
+                self.read_eeprom(axis, address + 1)?,
+            ])
+        };
+        let mut serial = [0; 3];
+        for (address, byte) in (ee::SERIENNUMMER..).zip(&mut serial) {
+            *byte = self.read_eeprom(axis, address)?;
+        }
+        let mut rom = [0; 8];
+        for (address, byte) in (0x2F00..).zip(&mut rom) {
+            *byte = self.read_byte(axis, address)?;
+        }
+        let date = |bytes| Date::from_raw(u16::from_be_bytes(bytes)).ok();
+        Ok(Identity {
+            serial_number: serial_number_from_bytes(serial).ok(),
+            ee_version: self.read_eeprom(axis, ee::VERSION)?,
+            hours: (
+                operating_hours_from_bytes(word(ee::BETRIEB_STD)?),
+                operating_hours_from_bytes(word(ee::SPERRE_STD)?),
+            ),
+            start_up: date(word(ee::INIT_DATUM)?),
+            changed: date(word(ee::PROG_DATUM)?),
+            rom,
+        })
+    }
+}

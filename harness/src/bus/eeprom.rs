@@ -1,0 +1,72 @@
+//! Reading and writing the EEPROM (ND21 12.5), by the steps of 14.10.5.
+
+use super::{Axis, Bus, Error};
+use harness_proto::nd21::ram;
+
+/// The commands of 14.10.5.1.
+const READ_BYTE: u8 = 0x81;
+const WRITE_BYTE: u8 = 0x82;
+const PROG_PARAM: u8 = 0x84;
+/// What ends a read (14.10.5.2).
+const READ_DONE: u8 = 0x10;
+/// Bit 5 of `EEPROMcontrol`: a byte has been read; bit 4: writing is completed.
+const READ: u8 = 1 << 5;
+const WRITTEN: u8 = 1 << 4;
+
+impl Bus {
+    /// Reads a byte of the EEPROM.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_ReadEEPROM")]
+    pub fn read_eeprom(&self, axis: Axis, address: u8) -> Result<u8, Error> {
+        self.write_byte(axis, ram::EEPROM_BUFFER, address)?;
+        self.write_byte(axis, ram::EEPROM_CONTROL, READ_BYTE)?;
+        self.wait_for_eeprom(axis, READ)?;
+        let byte = self.read_byte(axis, ram::EEPROM_BUFFER)?;
+        self.write_byte(axis, ram::EEPROM_CONTROL, READ_DONE)?;
+        Ok(byte)
+    }
+
+    /// Reads bytes of the EEPROM from `address` on; those beyond FF are left out.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn read_eeprom_bytes(&self, axis: Axis, address: u8, count: u16) -> Result<Vec<u8>, Error> {
+        (u16::from(address)..u16::from(address) + count)
+            .filter_map(|address| u8::try_from(address).ok())
+            .map(|address| self.read_eeprom(axis, address))
+            .collect()
+    }
+
+    /// Writes a byte of the EEPROM and waits until it is written.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_WriteEEPROM")]
+    pub fn write_eeprom(&self, axis: Axis, address: u8, data: u8) -> Result<(), Error> {
+        self.write_byte(axis, ram::EEPROM_BUFFER, address)?;
+        self.write_byte(axis, ram::EEPROM_BUFFER + 1, data)?;
+        self.write_byte(axis, ram::EEPROM_CONTROL, WRITE_BYTE)?;
+        self.wait_for_eeprom(axis, WRITTEN)
+    }
+
+    /// Copies the parameters FF60-FF7F into the EEPROM and waits until they are written.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    #[doc(alias = "NB_RAMtoEEPROM")]
+    #[doc(alias = "ProgParam")]
+    pub fn ram_to_eeprom(&self, axis: Axis) -> Result<(), Error> {
+        self.write_byte(axis, ram::EEPROM_CONTROL, PROG_PARAM)?;
+        self.wait_for_eeprom(axis, WRITTEN)
+    }
+
+    fn wait_for_eeprom(&self, axis: Axis, bit: u8) -> Result<(), Error> {
+        let patience = self.options.drive_patience;
+        self.poll_byte(axis, ram::EEPROM_CONTROL, patience, "the EEPROM", |byte| {
+            Ok(byte & bit != 0)
+        })?;
+        Ok(())
+    }
+}

@@ -1,0 +1,234 @@
+//! The driver: what NOVOBUS.LIB did for a program, over any link (ND21 chapters 11, 12, 13.2).
+//!
+//! [`Bus`] opens one or two rings and hands out drives by their axis number ([`Axis`], 12.2). Its calls block,
+//! each with a time-out; [`Bus::start`], [`Bus::test`] and [`Bus::result`] are the non-blocking form (11.6). A
+//! `Bus` is a handle: clones of it may be used from several threads, and jobs of all of them go out pipelined.
+//! Every function has the manual's name as an alias for the search of the documentation.
+//!
+//! The functions of several steps follow the manual's numbered steps, which the code cites.
+
+mod access;
+mod axis;
+mod control;
+mod discovery;
+mod eeprom;
+mod error;
+mod positioning;
+mod pump;
+mod s_ramp;
+
+pub use axis::Axis;
+pub use discovery::{Identity, State, count_drives};
+pub use error::Error;
+pub use s_ramp::SkStatus;
+
+use crate::link::Link;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::master::{self, Counters, Job, JobId, Outcome, Phase, Refused};
+use harness_proto::time::Span;
+use pump::Pump;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// How a bus works. All of it can be left at its default.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// How the masters of the rings work.
+    pub master: master::Options,
+    /// How long a call waits for the end of its job, beside what the ring itself needs.
+    pub patience: Span,
+    /// How long a call of several steps waits for the drive: an EEPROM byte, a calculation.
+    pub drive_patience: Span,
+    /// How long it waits for a motion to end.
+    pub motion_patience: Span,
+    /// Whether the points of the S-ramp go over the wire `puffer`, an invention of this project for its
+    /// simulated drives: the manual does not say how they come to the drive (13.5.3).
+    pub s_ramp_puffer: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            master: master::Options::default(),
+            patience: Span::from_millis(5_000),
+            drive_patience: Span::from_millis(5_000),
+            motion_patience: Span::from_millis(60_000),
+            s_ramp_puffer: false,
+        }
+    }
+}
+
+/// One or two open rings. Clones are handles of the same bus.
+#[derive(Clone)]
+pub struct Bus {
+    pump: Arc<Mutex<Pump>>,
+    options: Options,
+}
+
+/// The number of a job that was started: an order of NOVOBUS.LIB (11.6).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Order {
+    ring: usize,
+    id: JobId,
+}
+
+impl Bus {
+    /// Opens a bus with one ring or two over `link`; the drives are counted by the first telegram, and a
+    /// ring of another size is an error.
+    ///
+    /// # Errors
+    /// The rings do not answer, or have another number of drives.
+    #[doc(alias = "InitNovobus1")]
+    #[doc(alias = "InitNovobus2")]
+    #[doc(alias = "NB_OpenBus1")]
+    pub fn open(
+        link: Box<dyn Link + Send>,
+        rings: &[RingSize],
+        options: Options,
+    ) -> Result<Self, Error> {
+        let bus = Self {
+            pump: Arc::new(Mutex::new(Pump::new(link, rings, options.master))),
+            options,
+        };
+        bus.wait_until_open()?;
+        Ok(bus)
+    }
+
+    fn wait_until_open(&self) -> Result<(), Error> {
+        let mut pump = self.lock();
+        let end = pump.now() + self.options.patience;
+        loop {
+            if let Some(stop) = pump.stopped() {
+                return Err(Error::Stopped(stop));
+            }
+            if pump.phases().all(|phase| phase == Phase::Running) {
+                return Ok(());
+            }
+            if pump.now() >= end {
+                return Err(Error::TimeOut {
+                    waited: self.options.patience,
+                    what: "the ring to answer".to_owned(),
+                });
+            }
+            pump.step(end);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Pump> {
+        // A panic in another thread leaves masters and link as they are: each byte is done whole.
+        self.pump.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How many rings are active: 0 when a bus has been stopped (12.1).
+    #[doc(alias = "NB_Status")]
+    #[must_use]
+    pub fn active_rings(&self) -> usize {
+        let pump = self.lock();
+        pump.phases()
+            .filter(|phase| *phase != Phase::Stopped)
+            .count()
+    }
+
+    /// How many errors were corrected since the bus was opened (11.5).
+    #[doc(alias = "NB_BusError")]
+    #[must_use]
+    pub fn corrected_errors(&self) -> u64 {
+        self.counters().iter().map(|ring| ring.corrected).sum()
+    }
+
+    /// What the master of each ring has done.
+    #[must_use]
+    pub fn counters(&self) -> Vec<Counters> {
+        self.lock().counters()
+    }
+
+    /// Every axis of the bus, ring after ring.
+    #[must_use]
+    pub fn axes(&self) -> Vec<Axis> {
+        let sizes = self.lock().sizes();
+        sizes
+            .iter()
+            .enumerate()
+            .flat_map(|(ring, size)| (0..size.drives()).filter_map(move |k| Axis::new(ring, k)))
+            .collect()
+    }
+
+    /// Lets the bus work for this long: what a program does while it waits for something else.
+    pub fn run(&self, span: Span) {
+        let mut pump = self.lock();
+        let end = pump.now() + span;
+        while pump.now() < end && pump.stopped().is_none() {
+            pump.step(end);
+        }
+    }
+
+    /// What happened on the way that no call reports: faults and recoveries, oldest first, in words.
+    #[must_use]
+    pub fn take_log(&self) -> Vec<String> {
+        self.lock().take_log()
+    }
+
+    /// Starts a job; its order is for [`Self::test`] and [`Self::result`].
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where the ring, the drive or the address does not exist, or too many jobs wait.
+    #[doc(alias = "NB_StartReadByte")]
+    #[doc(alias = "NB_StartReadWord")]
+    pub fn start(&self, axis: Axis, job: impl FnOnce(u8) -> Job) -> Result<Order, Error> {
+        let ring = axis.ring();
+        let mut pump = self.lock();
+        match pump.submit(ring, job(axis.drive())) {
+            None => Err(Error::Value(format!("the bus has no ring {}", ring + 1))),
+            // A bus that was stopped is not the job's fault.
+            Some(Err(Refused::Stopped(stop))) => Err(Error::Stopped(stop)),
+            Some(Err(refused)) => Err(Error::Refused(refused)),
+            Some(Ok(id)) => Ok(Order { ring, id }),
+        }
+    }
+
+    /// Whether a job has ended, so that [`Self::result`] does not wait (12.4).
+    #[doc(alias = "NB_Test")]
+    #[must_use]
+    pub fn test(&self, order: Order) -> bool {
+        let mut pump = self.lock();
+        pump.poll();
+        pump.has(order.ring, order.id)
+    }
+
+    /// Waits for the end of a job and fetches its outcome; a second time there is none (11.6).
+    ///
+    /// # Errors
+    /// [`Error::TimeOut`], [`Error::Unknown`], [`Error::Stopped`], or [`Error::NoSuchOrder`] for an order whose
+    /// result has been fetched.
+    #[doc(alias = "NB_Result")]
+    pub fn result(&self, order: Order) -> Result<Option<u32>, Error> {
+        let end = self.lock().now() + self.options.patience;
+        loop {
+            let mut pump = self.lock();
+            if let Some(outcome) = pump.take(order.ring, order.id) {
+                return match outcome {
+                    Outcome::Read(data) => Ok(data.value()),
+                    Outcome::Done { .. } => Ok(None),
+                    Outcome::Unknown(fault) => Err(Error::Unknown(fault)),
+                    Outcome::Failed(stop) => Err(Error::Stopped(stop)),
+                };
+            }
+            if !pump.knows(order.ring, order.id) {
+                return Err(Error::NoSuchOrder);
+            }
+            if pump.now() >= end {
+                pump.forget(order.ring, order.id);
+                return Err(Error::TimeOut {
+                    waited: self.options.patience,
+                    what: "the end of a job".to_owned(),
+                });
+            }
+            pump.step(end);
+        }
+    }
+
+    /// Starts a job and waits for it.
+    fn run_job(&self, axis: Axis, job: impl FnOnce(u8) -> Job) -> Result<Option<u32>, Error> {
+        let order = self.start(axis, job)?;
+        self.result(order)
+    }
+}

@@ -1,0 +1,178 @@
+//! Masters and their link, coupled: bytes out when the line is free, bytes in as they come.
+
+use crate::link::Link;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::line::Rate;
+use harness_proto::novobus::master::{
+    Counters, Event, Job, JobId, Master, Options, Outcome, Phase, Refused, Stop,
+};
+use harness_proto::time::Instant;
+use std::collections::BTreeMap;
+
+/// The most lines of the log that wait to be fetched.
+const MOST_LINES: usize = 256;
+
+struct Ring {
+    master: Master,
+    /// When the line is free for the next byte.
+    free: Instant,
+    results: BTreeMap<JobId, Option<Outcome>>,
+    stopped: Option<Stop>,
+}
+
+/// The masters of one or two rings over one link.
+pub(super) struct Pump {
+    link: Box<dyn Link + Send>,
+    rings: Vec<Ring>,
+    log: Vec<String>,
+}
+
+impl Pump {
+    pub(super) fn new(link: Box<dyn Link + Send>, sizes: &[RingSize], options: Options) -> Self {
+        let now = link.now();
+        let rate = Rate::ALL
+            .into_iter()
+            .find(|rate| rate.byte_time() == link.byte_time())
+            .unwrap_or_default();
+        let rings = sizes.iter().map(|&size| Ring {
+            master: Master::new(size, rate, options),
+            free: now,
+            results: BTreeMap::new(),
+            stopped: None,
+        });
+        Self {
+            rings: rings.collect(),
+            link,
+            log: Vec::new(),
+        }
+    }
+
+    pub(super) fn now(&self) -> Instant {
+        self.link.now()
+    }
+
+    pub(super) fn sizes(&self) -> Vec<RingSize> {
+        self.rings.iter().map(|ring| ring.master.ring()).collect()
+    }
+
+    pub(super) fn phases(&self) -> impl Iterator<Item = Phase> + '_ {
+        self.rings.iter().map(|ring| ring.master.phase())
+    }
+
+    pub(super) fn counters(&self) -> Vec<Counters> {
+        self.rings
+            .iter()
+            .map(|ring| ring.master.counters())
+            .collect()
+    }
+
+    /// Why a ring has been stopped, if one has.
+    pub(super) fn stopped(&self) -> Option<Stop> {
+        self.rings.iter().find_map(|ring| ring.stopped)
+    }
+
+    /// Takes a job; `None` where there is no such ring.
+    pub(super) fn submit(&mut self, ring: usize, job: Job) -> Option<Result<JobId, Refused>> {
+        let ring = self.rings.get_mut(ring)?;
+        let id = ring.master.submit(job);
+        if let Ok(id) = id {
+            ring.results.insert(id, None);
+        }
+        Some(id)
+    }
+
+    /// The outcome of a job has come.
+    pub(super) fn has(&self, ring: usize, id: JobId) -> bool {
+        let result = self.rings.get(ring).and_then(|ring| ring.results.get(&id));
+        matches!(result, Some(Some(_)))
+    }
+
+    /// The job was started here, and its outcome has not been fetched.
+    pub(super) fn knows(&self, ring: usize, id: JobId) -> bool {
+        self.rings
+            .get(ring)
+            .is_some_and(|ring| ring.results.contains_key(&id))
+    }
+
+    pub(super) fn take(&mut self, ring: usize, id: JobId) -> Option<Outcome> {
+        if !self.has(ring, id) {
+            return None;
+        }
+        self.rings.get_mut(ring)?.results.remove(&id)?
+    }
+
+    /// Nobody will ask for this outcome.
+    pub(super) fn forget(&mut self, ring: usize, id: JobId) {
+        if let Some(ring) = self.rings.get_mut(ring) {
+            ring.results.remove(&id);
+        }
+    }
+
+    pub(super) fn take_log(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.log)
+    }
+
+    /// Takes what has come and does what is due, without letting time pass.
+    pub(super) fn poll(&mut self) {
+        let now = self.link.now();
+        let several = self.rings.len() > 1;
+        for (index, ring) in self.rings.iter_mut().enumerate() {
+            while let Some((at, received)) = self.link.receive(index) {
+                ring.master.handle_byte(at, received);
+            }
+            if ring.master.poll_timeout().is_some_and(|due| due <= now) {
+                ring.master.handle_timeout(now);
+            }
+            while let Some(event) = ring.master.poll_event() {
+                let line = match event {
+                    Event::Ended { id, outcome } => {
+                        // A result that was given up is dropped.
+                        if let Some(result) = ring.results.get_mut(&id) {
+                            *result = Some(outcome);
+                        }
+                        continue;
+                    }
+                    Event::Disturbed { fault, attempt } => format!("recovery {attempt}: {fault}"),
+                    Event::Recovered { attempts } => {
+                        format!("the ring is back after {attempts} recoveries")
+                    }
+                    Event::Stopped(stop) => {
+                        ring.stopped = Some(stop);
+                        stop.to_string()
+                    }
+                    Event::Ready | Event::Round { .. } => continue,
+                };
+                let prefix = if several {
+                    format!("ring {}: ", index + 1)
+                } else {
+                    String::new()
+                };
+                if self.log.len() < MOST_LINES {
+                    self.log.push(format!("{prefix}{line}"));
+                }
+            }
+        }
+    }
+
+    /// Sends what the lines are free for and lets time pass until the next byte is due, at most until
+    /// `end`.
+    pub(super) fn step(&mut self, end: Instant) {
+        self.poll();
+        let now = self.link.now();
+        let byte_time = self.link.byte_time();
+        let mut until = end;
+        for (index, ring) in self.rings.iter_mut().enumerate() {
+            if ring.free <= now {
+                ring.free = match ring.master.poll_transmit(now) {
+                    Some(byte) => self.link.send(index, &[byte]),
+                    None => now + byte_time,
+                };
+            }
+            until = until.min(ring.free);
+        }
+        while self.link.now() < until {
+            self.link.wait(until);
+            self.poll();
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! The driver over a simulated ring of three ND21 (ND21 chapters 11, 12, 13.2).
+
+use harness::bus::{Axis, Bus, Error, Options, SkStatus, count_drives};
+use harness::link::{Link, Moment, PlacedFault, SimulatedLink, Stimulus};
+use harness_proto::line::Rate;
+use harness_proto::nd21::io::Input;
+use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::s_ramp::Direction;
+use harness_proto::nd21::units::Ratio;
+use harness_proto::nd21::{ee, ram};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::Job;
+use harness_proto::novobus::output::{Output, OutputChange};
+use harness_proto::novobus::properties::Properties;
+use harness_proto::time::Span;
+use harness_sim::bench::Bench;
+use harness_sim::drive::Drive;
+use harness_sim::fault::LinkFault;
+use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, factory};
+use harness_sim::ring::Ring;
+
+fn size(drives: u64) -> RingSize {
+    RingSize::new(drives).expect("1 to 250")
+}
+
+fn ring(drives: u64, properties: Nd21Properties) -> Ring<Drive> {
+    Ring::new(size(drives), Rate::Baud38400, |k| {
+        let mut eeprom = factory::eeprom();
+        eeprom[usize::from(ee::SERIENNUMMER) + 2] = k;
+        eeprom[0x23] = 0xFB;
+        harness_sim::nd21::set_parity(&mut eeprom);
+        let mut drive = Nd21Drive::new(Properties::default(), properties, eeprom);
+        drive.stimulate(Stimulus::Input(Input::Gpin3, true));
+        drive.stimulate(Stimulus::Input(Input::Gpin5, true));
+        drive.stimulate(Stimulus::Cam(Input::Gpin4, 65_536, 100_000));
+        Drive::Nd21(drive)
+    })
+}
+
+fn bus_of(ring: Ring<Drive>, options: Options) -> Bus {
+    let drives = u64::from(ring.size().drives());
+    let link = SimulatedLink::new(Bench::one(ring));
+    Bus::open(Box::new(link), &[size(drives)], options).expect("an open bus")
+}
+
+fn bus() -> Bus {
+    bus_of(ring(3, Nd21Properties::default()), Options::default())
+}
+
+fn axis(number: u16) -> Axis {
+    Axis::from_number(number).expect("an axis")
+}
+
+/// ND21 12.2, 12.3: bytes, words and longs; ranges are refused before a byte is sent.
+#[test]
+fn reading_and_writing_of_12_2_and_12_3() {
+    let bus = bus();
+    bus.write_word(axis(1), ram::NSOLL, 0x0123).expect("written");
+    assert_eq!(bus.read_word(axis(1), ram::NSOLL), Ok(0x0123));
+    assert_eq!(bus.read_byte(axis(1), ram::NSOLL + 1), Ok(0x23));
+    bus.write_byte(axis(2), ram::VCO_LIN, 0x44).expect("written");
+    assert_eq!(bus.read_byte(axis(2), ram::VCO_LIN), Ok(0x44));
+    assert_eq!(bus.read_long(axis(0), ram::N_MAX), Ok(0x2C3D_0000));
+    assert_eq!(bus.read_bytes(axis(0), ram::N_MAX, 2), Ok(vec![0x2C, 0x3D]));
+    let before = bus.counters()[0].sent;
+    for (refused, part) in [
+        (bus.read_byte(axis(3), 0xFF00).map(|_| ()), "drive 3"),
+        (bus.read_byte(axis(1), 0x1000).map(|_| ()), "FD80"),
+        (bus.write_byte(axis(1), 0xFF80, 0), "FF7F"),
+        (bus.read_long(axis(1), 0xFF7D).map(|_| ()), "FF7F"),
+        (bus.or(axis(1), 0xFE00, 1), "FF00 to FF7F"),
+        (bus.read_byte(axis(0x0100), 0xFF00).map(|_| ()), "no ring 2"),
+    ] {
+        let message = refused.expect_err("refused").to_string();
+        assert!(message.contains(part), "{message}");
+    }
+    assert_eq!(bus.counters()[0].sent, before, "before a byte is sent");
+}
+
+/// ND21 11.6, 12.4: orders are pipelined, tested, and their result can be fetched once.
+#[test]
+fn orders_of_11_6() {
+    let bus = bus();
+    let read = |drive| Job::new(drive, Command::ReadWord { address: ram::N_MAX });
+    let orders: Vec<_> = (0..20)
+        .map(|i| bus.start(axis(i % 3), read).expect("started"))
+        .collect();
+    assert!(!bus.test(orders[19]));
+    for order in &orders {
+        assert_eq!(bus.result(*order), Ok(Some(0x2C3D)));
+    }
+    assert_eq!(bus.result(orders[0]), Err(Error::NoSuchOrder));
+    // Twenty answers of five bytes and the ring's three byte times, not twenty times both.
+    let counters = bus.counters()[0];
+    assert!(counters.sent - counters.idle < 20 * 7, "{counters:?}");
+}
+
+/// Clones may be used from several threads.
+#[test]
+fn used_from_threads() {
+    let bus = bus();
+    std::thread::scope(|scope| {
+        for k in 0..3 {
+            let bus = bus.clone();
+            scope.spawn(move || {
+                for value in 0..40 {
+                    bus.write_word(axis(k), ram::NSOLL, value).expect("written");
+                    assert_eq!(bus.read_word(axis(k), ram::NSOLL), Ok(value));
+                }
+            });
+        }
+    });
+}
+
+/// ND21 12.5: EEPROM read and write, RAM to EEPROM.
+#[test]
+fn eeprom_of_12_5() {
+    let bus = bus();
+    assert_eq!(bus.read_eeprom(axis(2), ee::POLE), Ok(6));
+    bus.write_eeprom(axis(2), 0x60, 0x12).expect("written");
+    assert_eq!(bus.read_eeprom(axis(2), 0x60), Ok(0x12));
+    bus.write_word(axis(2), ram::N_MAX, 0x1000).expect("written");
+    bus.ram_to_eeprom(axis(2)).expect("copied");
+    bus.reset(axis(2)).expect("reset");
+    bus.run(Span::from_millis(200));
+    assert_eq!(bus.read_word(axis(2), ram::N_MAX), Ok(0x1000));
+}
+
+/// ND21 11.8, 12.6-12.8.
+#[test]
+fn start_stop_error_and_outputs() {
+    let bus = bus();
+    let mode = |k| bus.state(axis(k)).expect("a state").mode();
+    assert_eq!(mode(1), "go");
+    bus.stop(axis(1)).expect("stopped");
+    bus.run(Span::from_millis(1));
+    assert_eq!(mode(1), "stop");
+    bus.block(axis(1)).expect("blocked");
+    bus.run(Span::from_millis(1));
+    assert_eq!(mode(1), "block");
+    bus.go(axis(1)).expect("started");
+    bus.run(Span::from_millis(1));
+    assert_eq!(mode(1), "go");
+    let output = Output::Gpo1;
+    bus.write_output(axis(0), OutputChange { output, set: true })
+        .expect("set");
+    assert_eq!(bus.read_byte(axis(0), 0xFFB7).expect("read") & 0x80, 0x80);
+    // 13.4: a calculation without initialisation is error 601.
+    bus.or(axis(1), ram::FLAGS2, 0x08).expect("set");
+    bus.run(Span::from_millis(1));
+    let state = bus.state(axis(1)).expect("a state");
+    assert_eq!((state.mode(), state.error), ("error", 0x0601));
+    assert!(state.error_in_words().is_some_and(|words| words.contains("DisPS")));
+    bus.delete_error(axis(1)).expect("confirmed");
+    bus.run(Span::from_millis(1));
+    assert_eq!(mode(1), "go");
+}
+
+/// ND21 13.2.1.1, 13.2.2-13.2.4: referencing, then a target, then back; interrupted by a stop.
+#[test]
+fn positioning_of_13_2() {
+    let bus = bus();
+    bus.write_word(axis(1), ram::PS_V0, 0x0800).expect("written");
+    bus.reference(axis(1)).expect("referenced");
+    assert_eq!(bus.read_word(axis(1), ram::PS_V0), Ok(0x0800), "step 9");
+    let target = Position::from_turns(Mode::Absolute, Ratio::decimal(1025, 2).expect("turns"));
+    bus.write_ps(axis(1), target.expect("a position")).expect("sent");
+    bus.start_ps(axis(1)).expect("started");
+    bus.wait_for_end(axis(1)).expect("there");
+    assert_eq!(bus.read_long(axis(1), ram::UMDRSOLL), Ok(0x000A_4000));
+    bus.stop(axis(1)).expect("stopped");
+    let interrupted = bus.reference(axis(1)).expect_err("stopped");
+    assert!(matches!(interrupted, Error::Interrupted { by: "stop", .. }), "{interrupted}");
+    assert_eq!(bus.read_word(axis(1), ram::PS_V0), Ok(0x0800));
+}
+
+/// ND21 13.2.1.2, 13.2.1.3.
+#[test]
+fn actual_value_and_init() {
+    let bus = bus();
+    bus.set_actual_value(axis(0), 0xFFFB_1234).expect("set");
+    let actual = bus.read_long(axis(0), ram::UMDRIST).expect("read");
+    assert!(actual.abs_diff(0xFFFB_1234) < 256, "{actual:08X}");
+    assert_eq!(bus.read_byte(axis(0), ram::PS_STATUS), Ok(0x01));
+    bus.init_ps(axis(2)).expect("initialised");
+    assert_eq!(bus.read_byte(axis(2), ram::PS_STATUS), Ok(0x01));
+}
+
+/// ND21 13.5.3, 13.5.4: open where the manual is silent; over the wire `puffer` it runs.
+#[test]
+fn s_ramp_of_13_5() {
+    let closed = bus().sk_write_ps(axis(1), 65_536, 1_500, 100);
+    assert!(matches!(closed, Err(Error::Open(_))));
+    let properties = Nd21Properties {
+        s_ramp_wire: SRampWire::Puffer,
+        ..Nd21Properties::default()
+    };
+    let options = Options {
+        s_ramp_puffer: true,
+        ..Options::default()
+    };
+    let bus = bus_of(ring(3, properties), options);
+    bus.sk_write_ps(axis(1), 3 * 65_536, 1_500, 100).expect("sent");
+    assert_eq!(bus.sk_status_ps(axis(1)), Ok(SkStatus::Ready));
+    bus.sk_start_ps(axis(1), Direction::Negative).expect("started");
+    bus.run(Span::from_millis(50));
+    assert_eq!(bus.sk_status_ps(axis(1)), Ok(SkStatus::Doing));
+    bus.run(Span::from_millis(1_000));
+    assert_eq!(bus.sk_status_ps(axis(1)), Ok(SkStatus::Done));
+    let end = bus.read_long(axis(1), ram::UMDRSOLL).expect("read");
+    assert_eq!(end.cast_signed(), -3 * 65_536);
+}
+
+/// ND21 9.3, 14.8: drives are counted without touching them, and say who they are.
+#[test]
+fn discovery() {
+    for drives in [1, 3, 40, 250] {
+        let mut link = SimulatedLink::new(Bench::one(ring(drives, Nd21Properties::default())));
+        assert_eq!(count_drives(&mut link, 0), Ok(size(drives)));
+        // Also out of the error mode.
+        link.send(0, &[0x11, 0x22]);
+        assert_eq!(count_drives(&mut link, 0), Ok(size(drives)));
+    }
+    let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
+    link.inject(0, PlacedFault::Link(1, LinkFault::Cut), Moment::Now);
+    assert!(matches!(count_drives(&mut link, 0), Err(Error::TimeOut { .. })));
+    let identity = bus().identity(axis(2)).expect("an identity");
+    assert_eq!(identity.serial_number, Some(2));
+    assert_eq!(identity.start_up.map(|date| date.year()), Some(1996));
+}
+
+/// ND21 11.4, 11.5: a ring of another size is not opened; disturbances are corrected and counted.
+#[test]
+fn opening_and_correcting() {
+    let link = SimulatedLink::new(Bench::one(ring(4, Nd21Properties::default())));
+    let opened = Bus::open(Box::new(link), &[size(3)], Options::default());
+    let message = opened.map(|_| ()).expect_err("another size").to_string();
+    assert!(message.contains("4 drives"), "{message}");
+
+    let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
+    link.inject(
+        0,
+        PlacedFault::Link(1, LinkFault::Drop),
+        Moment::Byte(40),
+    );
+    let bus = Bus::open(Box::new(link), &[size(3)], Options::default()).expect("open");
+    for value in 0..30 {
+        bus.write_word(axis(0), ram::NSOLL, value).expect("written");
+        assert_eq!(bus.read_word(axis(0), ram::NSOLL), Ok(value));
+    }
+    assert_eq!(bus.corrected_errors(), 1);
+    assert!(!bus.take_log().is_empty());
+    assert_eq!(bus.active_rings(), 1);
+}
+
+/// ND21 12.2: two loops, axis numbers 0x0100 and up.
+#[test]
+fn two_rings() {
+    let bench = Bench::two(
+        ring(2, Nd21Properties::default()),
+        ring(3, Nd21Properties::default()),
+    );
+    let link = Box::new(SimulatedLink::new(bench));
+    let bus = Bus::open(link, &[size(2), size(3)], Options::default()).expect("open");
+    assert_eq!(bus.axes().len(), 5);
+    bus.write_word(axis(0x0102), ram::NSOLL, 7).expect("written");
+    assert_eq!(bus.read_word(axis(0x0102), ram::NSOLL), Ok(7));
+    assert_eq!(bus.read_word(axis(0x0001), ram::NSOLL), Ok(0));
+    assert_eq!(bus.active_rings(), 2);
+}
