@@ -56,10 +56,12 @@ fn axis(number: u16) -> Axis {
 #[test]
 fn reading_and_writing_of_12_2_and_12_3() {
     let bus = bus();
-    bus.write_word(axis(1), ram::NSOLL, 0x0123).expect("written");
+    bus.write_word(axis(1), ram::NSOLL, 0x0123)
+        .expect("written");
     assert_eq!(bus.read_word(axis(1), ram::NSOLL), Ok(0x0123));
     assert_eq!(bus.read_byte(axis(1), ram::NSOLL + 1), Ok(0x23));
-    bus.write_byte(axis(2), ram::VCO_LIN, 0x44).expect("written");
+    bus.write_byte(axis(2), ram::VCO_LIN, 0x44)
+        .expect("written");
     assert_eq!(bus.read_byte(axis(2), ram::VCO_LIN), Ok(0x44));
     assert_eq!(bus.read_long(axis(0), ram::N_MAX), Ok(0x2C3D_0000));
     assert_eq!(bus.read_bytes(axis(0), ram::N_MAX, 2), Ok(vec![0x2C, 0x3D]));
@@ -82,7 +84,14 @@ fn reading_and_writing_of_12_2_and_12_3() {
 #[test]
 fn orders_of_11_6() {
     let bus = bus();
-    let read = |drive| Job::new(drive, Command::ReadWord { address: ram::N_MAX });
+    let read = |drive| {
+        Job::new(
+            drive,
+            Command::ReadWord {
+                address: ram::N_MAX,
+            },
+        )
+    };
     let orders: Vec<_> = (0..20)
         .map(|i| bus.start(axis(i % 3), read).expect("started"))
         .collect();
@@ -120,7 +129,8 @@ fn eeprom_of_12_5() {
     assert_eq!(bus.read_eeprom(axis(2), ee::POLE), Ok(6));
     bus.write_eeprom(axis(2), 0x60, 0x12).expect("written");
     assert_eq!(bus.read_eeprom(axis(2), 0x60), Ok(0x12));
-    bus.write_word(axis(2), ram::N_MAX, 0x1000).expect("written");
+    bus.write_word(axis(2), ram::N_MAX, 0x1000)
+        .expect("written");
     bus.ram_to_eeprom(axis(2)).expect("copied");
     bus.reset(axis(2)).expect("reset");
     bus.run(Span::from_millis(200));
@@ -151,7 +161,11 @@ fn start_stop_error_and_outputs() {
     bus.run(Span::from_millis(1));
     let state = bus.state(axis(1)).expect("a state");
     assert_eq!((state.mode(), state.error), ("error", 0x0601));
-    assert!(state.error_in_words().is_some_and(|words| words.contains("DisPS")));
+    assert!(
+        state
+            .error_in_words()
+            .is_some_and(|words| words.contains("DisPS"))
+    );
     bus.delete_error(axis(1)).expect("confirmed");
     bus.run(Span::from_millis(1));
     assert_eq!(mode(1), "go");
@@ -161,17 +175,22 @@ fn start_stop_error_and_outputs() {
 #[test]
 fn positioning_of_13_2() {
     let bus = bus();
-    bus.write_word(axis(1), ram::PS_V0, 0x0800).expect("written");
+    bus.write_word(axis(1), ram::PS_V0, 0x0800)
+        .expect("written");
     bus.reference(axis(1)).expect("referenced");
     assert_eq!(bus.read_word(axis(1), ram::PS_V0), Ok(0x0800), "step 9");
     let target = Position::from_turns(Mode::Absolute, Ratio::decimal(1025, 2).expect("turns"));
-    bus.write_ps(axis(1), target.expect("a position")).expect("sent");
+    bus.write_ps(axis(1), target.expect("a position"))
+        .expect("sent");
     bus.start_ps(axis(1)).expect("started");
     bus.wait_for_end(axis(1)).expect("there");
     assert_eq!(bus.read_long(axis(1), ram::UMDRSOLL), Ok(0x000A_4000));
     bus.stop(axis(1)).expect("stopped");
     let interrupted = bus.reference(axis(1)).expect_err("stopped");
-    assert!(matches!(interrupted, Error::Interrupted { by: "stop", .. }), "{interrupted}");
+    assert!(
+        matches!(interrupted, Error::Interrupted { by: "stop", .. }),
+        "{interrupted}"
+    );
     assert_eq!(bus.read_word(axis(1), ram::PS_V0), Ok(0x0800));
 }
 
@@ -201,9 +220,11 @@ fn s_ramp_of_13_5() {
         ..Options::default()
     };
     let bus = bus_of(ring(3, properties), options);
-    bus.sk_write_ps(axis(1), 3 * 65_536, 1_500, 100).expect("sent");
+    bus.sk_write_ps(axis(1), 3 * 65_536, 1_500, 100)
+        .expect("sent");
     assert_eq!(bus.sk_status_ps(axis(1)), Ok(SkStatus::Ready));
-    bus.sk_start_ps(axis(1), Direction::Negative).expect("started");
+    bus.sk_start_ps(axis(1), Direction::Negative)
+        .expect("started");
     bus.run(Span::from_millis(50));
     assert_eq!(bus.sk_status_ps(axis(1)), Ok(SkStatus::Doing));
     bus.run(Span::from_millis(1_000));
@@ -224,7 +245,10 @@ fn discovery() {
     }
     let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
     link.inject(0, PlacedFault::Link(1, LinkFault::Cut), Moment::Now);
-    assert!(matches!(count_drives(&mut link, 0), Err(Error::TimeOut { .. })));
+    assert!(matches!(
+        count_drives(&mut link, 0),
+        Err(Error::TimeOut { .. })
+    ));
     let identity = bus().identity(axis(2)).expect("an identity");
     assert_eq!(identity.serial_number, Some(2));
     assert_eq!(identity.start_up.map(|date| date.year()), Some(1996));
@@ -239,11 +263,7 @@ fn opening_and_correcting() {
     assert!(message.contains("4 drives"), "{message}");
 
     let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
-    link.inject(
-        0,
-        PlacedFault::Link(1, LinkFault::Drop),
-        Moment::Byte(40),
-    );
+    link.inject(0, PlacedFault::Link(1, LinkFault::Drop), Moment::Byte(40));
     let bus = Bus::open(Box::new(link), &[size(3)], Options::default()).expect("open");
     for value in 0..30 {
         bus.write_word(axis(0), ram::NSOLL, value).expect("written");
@@ -264,7 +284,8 @@ fn two_rings() {
     let link = Box::new(SimulatedLink::new(bench));
     let bus = Bus::open(link, &[size(2), size(3)], Options::default()).expect("open");
     assert_eq!(bus.axes().len(), 5);
-    bus.write_word(axis(0x0102), ram::NSOLL, 7).expect("written");
+    bus.write_word(axis(0x0102), ram::NSOLL, 7)
+        .expect("written");
     assert_eq!(bus.read_word(axis(0x0102), ram::NSOLL), Ok(7));
     assert_eq!(bus.read_word(axis(0x0001), ram::NSOLL), Ok(0));
     assert_eq!(bus.active_rings(), 2);

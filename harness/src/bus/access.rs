@@ -62,9 +62,7 @@ impl Bus {
             let Some(address) = address.checked_add(offset) else {
                 break;
             };
-            orders.push(self.start(axis, |drive| {
-                Job::new(drive, Command::ReadByte { address })
-            })?);
+            orders.push(self.start(axis, |drive| Job::new(drive, Command::ReadByte { address }))?);
         }
         for order in orders {
             bytes.push(narrow(self.result(order)?)?);

@@ -70,7 +70,10 @@ mod tests {
             (0x01F9, 1, 249),
         ] {
             let axis = Axis::from_number(number).unwrap();
-            assert_eq!((axis.ring(), axis.drive(), axis.number()), (ring, drive, number));
+            assert_eq!(
+                (axis.ring(), axis.drive(), axis.number()),
+                (ring, drive, number)
+            );
         }
         for number in [0x00FA, 0x01FA, 0x0200, 0xFFFF] {
             assert_eq!(Axis::from_number(number), None);

@@ -36,7 +36,11 @@ pub fn count_drives(link: &mut dyn Link, ring: usize) -> Result<RingSize, Error>
                 continue;
             }
             while let Some((_, received)) = link.receive(ring) {
-                heard.push(if received.error.is_none() { received.byte } else { 0 });
+                heard.push(if received.error.is_none() {
+                    received.byte
+                } else {
+                    0
+                });
                 if let [.., sync, drives, net] = heard[..]
                     && (sync, net) == (COUNT[0], COUNT[2])
                     && let Ok(size) = RingSize::new(u64::from(drives))

@@ -54,7 +54,9 @@ pub enum Error {
         by: &'static str,
     },
     /// The drive's position would not settle at the value given.
-    #[error("drive {axis}: the actual value is off by {deviation} increments after {attempts} attempts (ND21 13.2.1.2)")]
+    #[error(
+        "drive {axis}: the actual value is off by {deviation} increments after {attempts} attempts (ND21 13.2.1.2)"
+    )]
     NotSet {
         /// The drive.
         axis: Axis,

@@ -114,7 +114,11 @@ impl Bus {
             }
         }
         let attempts = ATTEMPTS;
-        Err(Error::NotSet { axis, deviation, attempts })
+        Err(Error::NotSet {
+            axis,
+            deviation,
+            attempts,
+        })
     }
 
     /// Initialises the positioning controller without a run and without touching the actual value
@@ -151,9 +155,13 @@ impl Bus {
     pub fn write_ps(&self, axis: Axis, position: Position) -> Result<(), Error> {
         // Step 1.
         let patience = self.options.motion_patience;
-        self.poll_byte(axis, ram::FLAGS2, patience, "the last positioning", |byte| {
-            Ok(byte & flags2::CALCULATE == 0)
-        })?;
+        self.poll_byte(
+            axis,
+            ram::FLAGS2,
+            patience,
+            "the last positioning",
+            |byte| Ok(byte & flags2::CALCULATE == 0),
+        )?;
         // Step 2.
         let [high, low] = words(position.encode());
         self.write_word(axis, ram::PS_POSITION_H, high)?;

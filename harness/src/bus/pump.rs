@@ -1,8 +1,8 @@
 //! Masters and their link, coupled: bytes out when the line is free, bytes in as they come.
 
 use crate::link::Link;
-use harness_proto::novobus::address::RingSize;
 use harness_proto::line::Rate;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{
     Counters, Event, Job, JobId, Master, Options, Outcome, Phase, Refused, Stop,
 };

@@ -37,7 +37,13 @@ impl Bus {
     /// [`Error::Open`], see the module; [`Error::Value`] where the run would last longer than 120 minutes;
     /// others see [`Error`].
     #[doc(alias = "SK_WritePS")]
-    pub fn sk_write_ps(&self, axis: Axis, distance: u32, rpm: u16, ramp_ms: u8) -> Result<(), Error> {
+    pub fn sk_write_ps(
+        &self,
+        axis: Axis,
+        distance: u32,
+        rpm: u16,
+        ramp_ms: u8,
+    ) -> Result<(), Error> {
         if !self.options.s_ramp_puffer {
             return Err(OPEN);
         }
@@ -50,7 +56,8 @@ impl Bus {
         let range = SpeedRange::from_sw_version2(software);
         let value = |error: &dyn std::fmt::Display| Error::Value(error.to_string());
         let speed = speed_to_raw(Ratio::whole(i32::from(rpm)), range).map_err(|e| value(&e))?;
-        let ramp = SRamp::new(distance, speed.unsigned_abs(), range, ramp_ms).map_err(|e| value(&e))?;
+        let ramp =
+            SRamp::new(distance, speed.unsigned_abs(), range, ramp_ms).map_err(|e| value(&e))?;
         let mut address = ram::SCOPE_PUFFER;
         for point in ramp.points() {
             for byte in point.to_bytes() {

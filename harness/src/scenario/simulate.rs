@@ -30,13 +30,10 @@ pub fn simulated(plan: &Plan) -> SimulatedLink {
 fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
     let mut properties = Properties::default();
     let mut own = Nd21Properties::default();
-    let mut model = Model::default();
+    let model = plan.model(ring, k);
     for setup in plan.setups_of(ring, k) {
         setup.apply_to(&mut properties);
         setup.apply_to_nd21(&mut own);
-        if let PlannedSetupKind::Model(named) = setup {
-            model = *named;
-        }
     }
     let mut eeprom = model.eeprom();
     let parity = usize::from(ee::PARITY);

@@ -1,6 +1,7 @@
 //! Settles a scenario, line by line.
 
 use super::drive::Running;
+use super::setup::model_unless_said;
 use super::types::{
     Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedStep, PlannedWhen, PlannedWindow,
 };
@@ -42,6 +43,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         rings,
         setups: Vec::new(),
         units: Vec::new(),
+        model: model_unless_said(scenario),
         models: Vec::new(),
     };
     let mut found = planner.set_up(&scenario.setups);
@@ -110,6 +112,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         steps,
         setups: planner.setups,
         units: planner.units,
+        models: planner.models,
         rings: planner.rings,
     })
 }
@@ -157,6 +160,8 @@ pub(super) struct Planner {
     pub(super) setups: Vec<PlannedSetup>,
     /// What the scales of each ring's drives depend on.
     pub(super) units: Vec<Vec<units::Drive>>,
+    /// The model of drives of which the header does not say it.
+    pub(super) model: Model,
     /// The model of each ring's drives.
     pub(super) models: Vec<Vec<Model>>,
 }

@@ -4,7 +4,10 @@ use super::planner::Planner;
 use super::types::{PlannedSetup, PlannedSetupKind, setups_of};
 use crate::scenario::pattern::MAX_CELLS;
 use crate::scenario::problem::{Problem, Span};
-use crate::scenario::syntax::{Drives, Influence, Place, Setup, SetupKind, Written};
+use crate::scenario::syntax::{
+    Action, Check, Condition, DriveCheck, Drives, FaultKind, Influence, Place, Scenario, Setup,
+    SetupKind, Written,
+};
 use harness_proto::nd21;
 use harness_proto::nd21::units::{self, Device, Scale, SpeedRange, Value};
 use harness_proto::novobus::memory;
@@ -148,7 +151,7 @@ impl Planner {
             PlannedSetupKind::Model(model) => Some(*model),
             _ => None,
         });
-        models.last().unwrap_or_default()
+        models.last().unwrap_or(self.model)
     }
 
     /// The type and the range of speeds as the header sets them. RAM is set after it has been loaded from
@@ -206,6 +209,34 @@ impl Planner {
             let problem = Problem::new(span, message, "a drive of the model nd21 expected here");
             Err(problem.help(format!("add `drive {prefix}{drive} model nd21`")))
         })
+    }
+}
+
+/// Which model stands where the header says nothing: `nd21` where no line names a model and one needs what
+/// only it has.
+pub(super) fn model_unless_said(scenario: &Scenario) -> Model {
+    let said = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
+    if scenario.setups.iter().any(said) {
+        return Model::default();
+    }
+    let set = scenario.setups.iter().any(|setup| match &setup.what {
+        SetupKind::Influence(Influence::Stimuli(_)) => true,
+        SetupKind::Word(name, _) | SetupKind::Time(name, _) => {
+            PROPERTIES.iter().any(|own| own.name == name.value)
+        }
+        _ => false,
+    });
+    let shows = |check: &DriveCheck| matches!(check.condition, Condition::Shows(_));
+    let done = scenario.steps.iter().any(|step| match &step.action {
+        Action::Influence(_, Influence::Stimuli(_)) => true,
+        Action::Check(Check::Drive(check)) | Action::Until(check, _) => shows(check),
+        Action::Fault(fault) => matches!(fault.what, FaultKind::Error(..)),
+        _ => false,
+    });
+    if set || done {
+        Model::Nd21
+    } else {
+        Model::default()
     }
 }
 

@@ -38,6 +38,8 @@ pub struct Plan {
     pub(super) setups: Vec<PlannedSetup>,
     /// What the scales of each ring's drives depend on.
     pub(super) units: Vec<Vec<units::Drive>>,
+    /// The model of each ring's drives.
+    pub(super) models: Vec<Vec<Model>>,
 }
 
 #[derive(Clone, Debug)]
@@ -300,6 +302,13 @@ pub enum PlannedCheck {
 }
 
 impl Plan {
+    /// The model of drive `drive`.
+    pub(in crate::scenario) fn model(&self, ring: usize, drive: u8) -> Model {
+        let ring = self.models.get(ring);
+        let model = ring.and_then(|ring| ring.get(usize::from(drive)));
+        model.copied().unwrap_or_default()
+    }
+
     /// What the scales of a drive's cells depend on.
     ///
     /// # Panics
