@@ -130,13 +130,13 @@ fn stimuli_that_cannot_be_are_refused() {
         Some("`drive 0 model nd21`"),
     );
     refused(
-        "title x\nring 2\n> 80\n+5ms drive 0 input GPIN3 high\n",
+        "title x\nring 2\ndrive 0 model plain\n> 80\n+5ms drive 0 input GPIN3 high\n",
         "+5ms drive 0 input GPIN3 high",
         "drive 0 has no plugs",
         Some("`drive 0 model nd21`"),
     );
     refused(
-        "title x\nring 1\n? drive 0 GPO1 high\n",
+        "title x\nring 1\ndrive 0 model plain\n? drive 0 GPO1 high\n",
         "0 GPO1 high",
         "drive 0 has no plugs",
         Some("model nd21"),
@@ -194,7 +194,7 @@ fn a_drives_monitoring_reports_errors() {
         None,
     );
     refused(
-        "title x\nring 1\n! drive 0: error 0151\n",
+        "title x\nring 1\ndrive 0 model plain\n! drive 0: error 0151\n",
         "0",
         "drive 0 has no monitoring",
         None,
