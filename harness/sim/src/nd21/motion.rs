@@ -157,7 +157,7 @@ impl Motion {
             self.slip = 0.0;
             self.limited = false;
             cells.put_word(ram::N_INTEGRATOR, 0);
-            0
+            0.0
         } else {
             let mut speed = f64::from(i32::from(nominal) * eighths);
             if regulated {
@@ -174,6 +174,7 @@ impl Motion {
         if demand == Demand::Free || !regulated {
             self.follow(cells);
         }
+        let torque = word(torque);
         self.show(torque, eighths, outside, cells);
         Moved {
             slipped,
@@ -181,6 +182,7 @@ impl Motion {
                 && plant.speed == 0.0
                 && self.filtered == 0.0
                 && nominal == 0
+                && self.slip == 0.0
                 && before == (torque.cast_unsigned(), 0)
                 && cells.long(ram::I2) == 0,
             flags: self.flags(),
@@ -263,7 +265,7 @@ impl Motion {
     }
 
     /// The speed regulator (14.6.4).
-    fn regulate(&mut self, deviation: f64, limit: u8, cells: &mut Cells) -> i16 {
+    fn regulate(&mut self, deviation: f64, limit: u8, cells: &mut Cells) -> f64 {
         let most = f64::from(u32::from(limit) * 256);
         let proportional = f64::from(cells.byte(ram::NKP)) * 4.0 * deviation;
         let integral = f64::from(cells.signed(ram::N_INTEGRATOR)) + self.integral;
@@ -278,20 +280,19 @@ impl Motion {
         let whole = word(integral);
         self.integral = integral - f64::from(whole);
         cells.put_word(ram::N_INTEGRATOR, whole.cast_unsigned());
-        word(torque.clamp(-most, most))
+        torque.clamp(-most, most)
     }
 
     /// The motor turns, and the resolver sees it.
-    fn turn(&mut self, torque: i16, outside: Outside, plant: &mut Plant, cells: &mut Cells) {
+    fn turn(&mut self, torque: f64, outside: Outside, plant: &mut Plant, cells: &mut Cells) {
         let sign = if cells.byte(ram::SW_VERSION) & sw_version::REVERSED == 0 {
             1.0
         } else {
             -1.0
         };
-        let before = plant.position;
-        let current = f64::from(torque) * outside.amperes;
-        plant.step(current * sign, outside.load * sign, outside.jammed);
-        self.seen += (plant.position - before) * sign;
+        let current = torque * (outside.amperes * sign);
+        let way = plant.step(current, outside.load * sign, outside.jammed);
+        self.seen += way * sign;
         let measured = plant.speed * sign;
         // ND21 14.6.3: the time constant is 432 us / (1 - nFilter / 128).
         let filter = cells.byte(ram::N_FILTER).min(0x7F);

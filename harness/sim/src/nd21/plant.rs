@@ -68,19 +68,20 @@ impl Plant {
         }
     }
 
-    /// One cycle with a motor current of `current` Aeff against a load of `load` Aeff.
+    /// One cycle with a motor current of `current` Aeff against a load of `load` Aeff; how far the rotor has
+    /// turned in it, in increments.
     #[inline]
-    pub(super) fn step(&mut self, current: f64, load: f64, jammed: bool) {
+    pub(super) fn step(&mut self, current: f64, load: f64, jammed: bool) -> f64 {
         if jammed {
             self.speed = 0.0;
-            return;
+            return 0.0;
         }
         let drive = current - load;
         let before = self.speed;
         if before == 0.0 {
             // Friction holds what it can.
             if drive.abs() <= self.friction {
-                return;
+                return 0.0;
             }
             let after = (drive - self.friction.copysign(drive)) * self.gain;
             self.speed = after.clamp(-FASTEST, FASTEST);
@@ -95,7 +96,9 @@ impl Plant {
                 after.clamp(-FASTEST, FASTEST)
             };
         }
-        self.position += (before + self.speed) / 16.0;
+        let way = (before + self.speed) / 16.0;
+        self.position += way;
+        way
     }
 
     /// The rotor's whole increments since power-up.

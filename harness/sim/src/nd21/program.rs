@@ -79,6 +79,8 @@ pub struct Program {
     self_test_until: Instant,
     mode: Mode,
     quiet: bool,
+    /// Something has come from outside since the last cycle: what is watched is to be looked at.
+    stirred: bool,
     /// What the ports of the inputs were last made to show.
     shown_inputs: Option<(Inputs, Option<ErrorCode>)>,
 }
@@ -113,6 +115,7 @@ impl Program {
             self_test_until: Instant::START,
             mode: Mode::Reset,
             quiet: false,
+            stirred: true,
             shown_inputs: None,
         };
         program.start();
@@ -131,14 +134,14 @@ impl Program {
 
     /// The cells, past all rules of access.
     pub fn cells_mut(&mut self) -> &mut Cells {
-        self.quiet = false;
+        self.stir();
         self.shown_inputs = None;
         &mut self.cells
     }
 
     /// Lets something happen from outside the bus.
     pub(super) fn stimulate(&mut self, stimulus: Stimulus) {
-        self.quiet = false;
+        self.stir();
         if let Some(error) = self.world.change(stimulus) {
             error_state::raise(error.code(), &mut self.cells);
         }
@@ -154,7 +157,7 @@ impl Program {
     /// `SK_StartPS` beside the bus (13.5.4).
     pub(super) fn start_s_ramp(&mut self, direction: Direction) {
         self.s_ramp.start(direction, self.mode);
-        self.quiet = false;
+        self.stir();
     }
 
     /// `SK_StatusPS` beside the bus (13.5.4).
@@ -233,6 +236,12 @@ impl Program {
                 .saturating_sub(SCAN * quarters);
     }
 
+    /// Something comes from outside.
+    fn stir(&mut self) {
+        self.quiet = false;
+        self.stirred = true;
+    }
+
     fn released(&self) -> bool {
         matches!(self.mode, Mode::Stop | Mode::Go)
     }
@@ -272,7 +281,7 @@ impl Program {
         }
         self.self_test_until = self.now + self.properties.self_test_time;
         self.mode = Mode::Reset;
-        self.quiet = false;
+        self.stir();
         self.shown_inputs = None;
         self.show_inputs();
         self.show_flags(EndSwitches::new(&self.world, &self.cells), 0);
@@ -289,19 +298,21 @@ impl Program {
     /// One cycle, at `now`.
     fn cycle(&mut self, now: Instant) {
         if self.world.has_cams() {
-            self.world.turn_to(self.plant.increments());
+            self.stirred |= self.world.turn_to(self.plant.increments());
         }
         self.show_inputs();
         let switches = EndSwitches::new(&self.world, &self.cells);
         if self.mode == Mode::Reset && now >= self.self_test_until {
             self.end_self_test();
         }
-        if !error_state::is_set(&self.cells)
+        if self.stirred
+            && !error_state::is_set(&self.cells)
             && self.mode != Mode::Reset
             && let Some(error) = monitor::error(&self.world, switches, &self.cells)
         {
             error_state::raise(error.code(), &mut self.cells);
         }
+        self.stirred = self.mode == Mode::Reset;
         self.mode = self.work_out_mode();
         let orders = self.plc(now);
         let demand = self.demand(switches, orders);
@@ -548,7 +559,7 @@ impl Memory for Program {
             }
             (ram::ERRORCODE, nd21::CONFIRM_ERROR) => {
                 error_state::confirm(&mut self.cells);
-                self.quiet = false;
+                self.stir();
             }
             _ => {
                 let Some(byte) = memory_rules::written(address, data, &self.cells) else {
@@ -556,7 +567,7 @@ impl Memory for Program {
                 };
                 if byte != self.cells.byte(address) {
                     self.cells.put(address, byte);
-                    self.quiet = false;
+                    self.stir();
                 }
                 if address == ram::SCOPE_STATUS {
                     self.align_scan();
@@ -567,7 +578,7 @@ impl Memory for Program {
 
     fn write_output(&mut self, change: OutputChange) {
         self.cells.write_output(change);
-        self.quiet = false;
+        self.stir();
     }
 
     fn reset(&mut self) {
@@ -585,7 +596,7 @@ impl Memory for Program {
         } else {
             error_state::note(code, cells);
         }
-        self.quiet = false;
+        self.stir();
     }
 
     fn monitors_time_out(&self) -> bool {

@@ -136,13 +136,15 @@ impl World {
         self.has_cams
     }
 
-    /// The rotor is here: cams switch their inputs.
-    pub(super) fn turn_to(&mut self, position: i64) {
+    /// The rotor is here: cams switch their inputs. Whether one has.
+    pub(super) fn turn_to(&mut self, position: i64) -> bool {
+        let before = self.inputs;
         for (input, cam) in Input::ALL.into_iter().zip(self.cams) {
             if let Some((from, to)) = cam {
                 self.inputs = self.inputs.with(input, (from..to).contains(&position));
             }
         }
+        self.inputs != before
     }
 
     /// Lets `stimulus` happen; the error is returned if it is one.
