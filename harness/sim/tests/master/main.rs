@@ -2,6 +2,8 @@
 //! elsewhere.
 
 mod common;
+mod counted;
+mod faults;
 mod figures;
 mod recovery;
 mod thin;

@@ -2,7 +2,7 @@
 //! the ring spelled out (ND21 9.7-9.9).
 
 use super::super::address::RingSize;
-use super::super::check_sequence::ZEROS;
+use super::super::check_sequence::{SEQUENCE, ZEROS};
 use super::super::error_mode::UPSTREAM_ZEROS;
 use super::super::sync::SYNCO;
 use super::fault::{Fault, RingLink};
@@ -172,6 +172,14 @@ impl Evidence {
         let first = self.received.first().map(|received| received.byte);
         match (&self.cause, first) {
             (Cause::Unasked, _) => return Fault::Extra { bytes: 1 },
+            (Cause::NotBack, _) => {
+                let whole = |bytes: &[Received]| {
+                    let pairs = bytes.iter().zip(SEQUENCE);
+                    pairs.into_iter().all(|(received, byte)| received.is(byte))
+                };
+                let back = self.received.windows(SEQUENCE.len()).any(whole);
+                return if back { Fault::Late } else { Fault::Unclear };
+            }
             (Cause::Missed(_), _) if self.fit(0, 0) => return Fault::Late,
             (Cause::Wrong(sent), Some(received)) if self.fit(1, 1) => {
                 return match (sent.composed.place, sent.composed.back, drive) {

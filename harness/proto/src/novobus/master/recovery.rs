@@ -11,7 +11,11 @@ use super::job::{JobId, Outcome};
 use super::store::Entry;
 use super::{Master, Phase};
 use crate::line::Received;
-use crate::time::Instant;
+use crate::time::{Instant, Span};
+
+/// How long nothing is sent after a recovery that failed: less than the 10 ms after which the drives
+/// with monitoring would report a time-out, each to be spelled out in place of what was wrong (ND21 9.9).
+const DRAINING: Span = Span::from_millis(8);
 
 /// What a master is doing, with what it needs for that.
 #[derive(Clone, Debug)]
@@ -34,6 +38,11 @@ pub(super) enum State {
         heard: bool,
         until: Instant,
     },
+    /// Nothing is sent, because what has once come to be late stays late: a line that is never free never
+    /// catches up.
+    Draining {
+        until: Instant,
+    },
     Stopped(Stop),
 }
 
@@ -54,6 +63,7 @@ impl State {
             Self::Counting { .. } => Phase::Counting,
             Self::Running => Phase::Running,
             Self::Locating { .. } => Phase::Locating,
+            Self::Draining { .. } => Phase::Draining,
             Self::Resetting { .. } => Phase::Resetting,
             Self::Verifying { .. } => Phase::Verifying,
             Self::Stopped(_) => Phase::Stopped,
@@ -171,7 +181,7 @@ impl Master {
     }
 
     /// The ring has said what it had to say.
-    pub(super) fn located(&mut self, spelled: Spelled) {
+    pub(super) fn located(&mut self, spelled: Spelled, now: Instant) {
         let State::Locating { evidence, .. } = &self.state else {
             return;
         };
@@ -213,7 +223,13 @@ impl Master {
             self.report(Event::Disturbed { fault, attempt });
             // Long sent, unless nobody has asked for it.
             self.outgoing.clear();
-            self.state = State::resetting();
+            self.state = if attempt == 1 {
+                State::resetting()
+            } else {
+                State::Draining {
+                    until: now + DRAINING,
+                }
+            };
         }
     }
 
