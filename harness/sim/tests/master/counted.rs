@@ -18,11 +18,17 @@ pub(crate) struct CountedCells {
     cells: Cells,
     written: BTreeMap<u16, u32>,
     pub(crate) resets: u32,
+    refused: Option<u16>,
 }
 
 impl CountedCells {
     pub(crate) fn written(&self, address: u16) -> u32 {
         self.written.get(&address).copied().unwrap_or(0)
+    }
+
+    /// From now on the drive takes no command for this address.
+    pub(crate) fn refuse(&mut self, address: u16) {
+        self.refused = Some(address);
     }
 
     pub(crate) fn peek(&self, address: u16) -> u8 {
@@ -45,7 +51,7 @@ impl Memory for CountedCells {
     }
 
     fn permits(&self, kind: Kind, address: u16) -> bool {
-        self.cells.permits(kind, address)
+        self.refused != Some(address) && self.cells.permits(kind, address)
     }
 
     fn write_output(&mut self, change: OutputChange) {
@@ -86,6 +92,7 @@ impl Counted {
                 cells: drive.memory().clone(),
                 written: BTreeMap::new(),
                 resets: 0,
+                refused: None,
             },
             starts: 0,
         }

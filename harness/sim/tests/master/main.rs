@@ -5,5 +5,6 @@ mod common;
 mod counted;
 mod faults;
 mod figures;
+mod named;
 mod recovery;
 mod thin;

@@ -102,6 +102,14 @@ impl Evidence {
         &self.cause
     }
 
+    /// Takes a byte that was sent since.
+    #[inline]
+    pub(super) fn expect(&mut self, back: Option<u8>) {
+        if self.expected.len() < KEPT {
+            self.expected.push(back);
+        }
+    }
+
     /// Takes a byte of what came.
     pub(super) fn see(&mut self, received: Received) {
         if self.received.len() < KEPT {
@@ -131,7 +139,9 @@ impl Evidence {
         let Some(last) = self.last else {
             return Spelled::Nothing;
         };
-        if last.error.is_some() || self.run < STEADY {
+        // At most 25 zeros come before an address (ND21 9.7); more are the address of drive 0.
+        let steady = if last.byte == 0 { SETTLED } else { STEADY };
+        if last.error.is_some() || self.run < steady {
             return Spelled::Noise;
         }
         // In a ring of more than 128 drives SYNCO is an address as well; but before an address come zeros.

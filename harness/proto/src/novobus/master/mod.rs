@@ -103,9 +103,15 @@ pub struct Master {
     /// The drive for which "same drive" would be meant; `None` where no short address is valid.
     last_addressed: Option<u8>,
     pauses: u16,
+    /// When the last byte came back.
+    last_heard: Instant,
     events: Events,
     counters: Counters,
 }
+
+/// The silence after which a drive with monitoring reports a time-out (ND21 9.9). What comes after it was
+/// sent unasked: at least 10 ms later, which may be sooner than the master misses a byte.
+const TIME_OUT: Span = Span::from_millis(10);
 
 /// What a master is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,6 +160,7 @@ impl Master {
             unconfirmed: Unconfirmed::default(),
             last_addressed: None,
             pauses: 0,
+            last_heard: Instant::START,
             events: Events::default(),
             counters: Counters::default(),
         }
@@ -299,6 +306,9 @@ impl Master {
                 due: now + self.patience,
             });
         }
+        if let State::Locating { evidence, .. } = &mut self.state {
+            evidence.expect(composed.back);
+        }
         self.counters.sent += 1;
         self.counters.idle += u64::from(composed.byte == SYNCO && composed == Composed::SYNCO);
         Some(composed.byte)
@@ -330,6 +340,8 @@ impl Master {
             self.handle_timeout(now);
         }
         self.counters.received += 1;
+        let silent = now.since(core::mem::replace(&mut self.last_heard, now)) >= TIME_OUT;
+        self.episode.heard_after(silent);
         match &mut self.state {
             State::Running | State::Counting { .. } => self.take(received, now),
             State::Locating { evidence, .. } => {

@@ -96,6 +96,8 @@ pub(super) struct Episode {
     clean: u16,
     /// A byte was missed since the ring last ran.
     silent: bool,
+    /// The last byte came after a silence.
+    after_silence: bool,
     /// The drives are to be counted before the ring runs.
     count: bool,
     /// The ring has run.
@@ -116,6 +118,12 @@ impl Episode {
         if self.failures > 0 && self.stumble == work {
             self.got_over();
         }
+    }
+
+    /// A byte has come, after a silence or not.
+    #[inline]
+    pub(super) fn heard_after(&mut self, silence: bool) {
+        self.after_silence = silence;
     }
 
     /// A byte has come back right.
@@ -151,6 +159,9 @@ impl Master {
             }
             Cause::Wrong(sent) => self.episode.count |= sent.composed.place == Place::Address,
             Cause::Unasked => {}
+        }
+        if matches!(cause, Cause::Wrong(_) | Cause::Unasked) {
+            self.episode.silent |= self.episode.after_silence;
         }
         if self.episode.failures == 0 {
             self.episode.stumble = match cause.sent().map(|sent| sent.composed.owner) {
