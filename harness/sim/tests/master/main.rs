@@ -5,6 +5,7 @@ mod common;
 mod counted;
 mod faults;
 mod figures;
+mod hostile;
 mod named;
 mod recovery;
 mod thin;

@@ -92,7 +92,7 @@ pub(super) struct Episode {
     /// How many of the failures began within one and the same command of the drive that was named.
     rejections: u8,
     stumble: Stumble,
-    /// Bytes that have come back right since then.
+    /// Bytes that have come back right since the ring runs again.
     clean: u16,
     /// A byte was missed since the ring last ran.
     silent: bool,
@@ -129,7 +129,8 @@ impl Episode {
     /// A byte has come back right.
     #[inline]
     pub(super) fn byte_was_right(&mut self, ring: RingSize) {
-        if self.failures > 0 && self.stumble == Stumble::Idle {
+        let runs = self.attempts == 0;
+        if self.failures > 0 && runs && self.stumble == Stumble::Idle {
             self.clean = self.clean.saturating_add(1);
             if self.clean > u16::from(ring.drives()) + 4 * u16::from(UPSTREAM_ZEROS) {
                 self.got_over();
