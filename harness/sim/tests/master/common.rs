@@ -131,3 +131,33 @@ impl<D: Device> Couple<D> {
         (0..drives).all(|k| self.ring.drive(k).is_some_and(|drive| !drive.in_error()))
     }
 }
+
+/// The seed of every random test: `DRIVEBENCH_SEED`, or always the same.
+pub(crate) fn seed() -> u64 {
+    std::env::var("DRIVEBENCH_SEED")
+        .ok()
+        .and_then(|seed| seed.parse().ok())
+        .unwrap_or(38_400)
+}
+
+/// The command that repeats a random failure.
+pub(crate) fn repeat(test: &str) -> String {
+    format!(
+        "repeat with: DRIVEBENCH_SEED={} cargo test -p harness-sim --test master {test}",
+        seed()
+    )
+}
+
+/// A small generator of numbers (splitmix64): the same seed gives the same numbers everywhere.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    /// A number below `limit`; `limit` is small, so that the bias does not matter.
+    pub(crate) fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (z ^ (z >> 31)) % limit.max(1)
+    }
+}

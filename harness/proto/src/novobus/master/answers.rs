@@ -1,21 +1,78 @@
 //! What comes back while all is well: every byte is compared, and data are taken out (ND21 9.3-9.6, 10).
 
+use super::super::sync::SYNCO;
 use super::Master;
 use super::diagnosis::Cause;
 use super::event::Event;
-use super::in_flight::{Owner, Place, Slot};
+use super::in_flight::{Composed, Owner, Place, Slot};
 use super::job::Outcome;
 use super::recovery::Stumble;
 use crate::line::Received;
 use crate::time::Instant;
 
-/// Data that have come back and have no check of their own: they count when a byte other than 00 has
-/// come back right behind them.
+/// Data that have come back and have no check of their own: they count when the byte behind them has come
+/// back right, and says something. 00 does not: a drive in the error mode sends it. A byte that is the same
+/// as the last of the data does not: had one been lost, it would stand in its place.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Unconfirmed {
     high: u8,
     exchange: Option<(u8, u16)>,
-    read: Option<Slot>,
+    /// A job, and the last byte of its data.
+    read: Option<(Slot, u8)>,
+    doubt: Doubt,
+}
+
+/// Whether data wait for a byte that settles them, although one has come back right behind them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Doubt {
+    #[default]
+    None,
+    /// It said nothing, and the next ones may say no more.
+    Raised,
+    /// The telegram that settles it is on its way.
+    Asked,
+}
+
+impl Unconfirmed {
+    /// The exchange that is settled by a byte that has come back right. Behind process data the sync byte
+    /// of any telegram is good enough: telegrams may follow that hold nothing else that is known.
+    fn settled_exchange(&mut self, composed: &Composed) -> Option<(u8, u16)> {
+        let (_, value) = self.exchange?;
+        let idle = *composed == Composed::SYNCO && value.to_be_bytes()[1] == SYNCO;
+        self.settle(composed, idle)
+            .then(|| self.exchange.take())
+            .flatten()
+    }
+
+    /// The read that is settled by a byte that has come back right.
+    fn settled_read(&mut self, composed: &Composed) -> Option<Slot> {
+        let (slot, last) = self.read?;
+        let same = composed.back == Some(last);
+        self.settle(composed, same).then(|| {
+            self.read = None;
+            slot
+        })
+    }
+
+    fn settle(&mut self, composed: &Composed, same: bool) -> bool {
+        let known = composed.back.is_some_and(|back| back != 0);
+        if known && same && self.doubt == Doubt::None {
+            self.doubt = Doubt::Raised;
+        }
+        if known && !same {
+            self.doubt = Doubt::None;
+        }
+        known && !same
+    }
+
+    /// Whether only another telegram can settle the data. Asks but once.
+    pub(super) fn must_ask(&mut self) -> bool {
+        let raised = self.doubt == Doubt::Raised;
+        if raised {
+            self.doubt = Doubt::Asked;
+        }
+        raised
+    }
 }
 
 impl Master {
@@ -31,9 +88,7 @@ impl Master {
         let byte = received.byte;
         let mut right = received.error.is_none() && composed.back.is_none_or(|back| back == byte);
         if right {
-            if composed.back.is_some_and(|back| back != 0) {
-                self.confirm();
-            }
+            self.confirm(&composed);
             match (composed.place, composed.owner) {
                 (Place::Parameter, Owner::Job(slot)) => right = self.take_answer(slot, byte),
                 (Place::ProcessHigh, _) => self.unconfirmed.high = byte,
@@ -63,25 +118,26 @@ impl Master {
         }
         if entry.is_answered() {
             if entry.is_checked() {
-                // A checking byte is never 00: it speaks for what came before it.
-                self.confirm();
                 self.finish(slot);
             } else {
-                self.unconfirmed.read = Some(slot);
+                if let Some((before, _)) = self.unconfirmed.read.replace((slot, byte)) {
+                    self.finish(before);
+                }
             }
         }
         true
     }
 
-    fn confirm(&mut self) {
-        if let Some((drive, value)) = self.unconfirmed.exchange.take() {
+    /// A byte has come back right: what stood before it may count.
+    fn confirm(&mut self, composed: &Composed) {
+        if let Some((drive, value)) = self.unconfirmed.settled_exchange(composed) {
             self.episode.is_done(Stumble::Exchange(drive));
             if self.cycle.answer(drive, value) {
                 self.counters.rounds += 1;
                 self.events.round(self.counters.rounds);
             }
         }
-        if let Some(slot) = self.unconfirmed.read.take() {
+        if let Some(slot) = self.unconfirmed.settled_read(composed) {
             self.finish(slot);
         }
     }

@@ -76,6 +76,10 @@ enum Order {
 impl Master {
     /// Composes the next telegram, if there is anything to say.
     pub(super) fn compose(&mut self, now: Instant) {
+        if self.unconfirmed.must_ask() {
+            self.compose_count();
+            return;
+        }
         let jobs = self.store.first().is_some();
         let exchange = self.cycle.inside_round()
             || self.cycle.is_due(now) && !(self.jobs_turn && jobs && !self.is_woven());

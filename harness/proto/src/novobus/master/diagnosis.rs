@@ -2,7 +2,7 @@
 //! the ring spelled out (ND21 9.7-9.9).
 
 use super::super::address::RingSize;
-use super::super::check_sequence::ZEROS;
+use super::super::check_sequence::{SEQUENCE, ZEROS};
 use super::super::error_mode::UPSTREAM_ZEROS;
 use super::super::sync::SYNCO;
 use super::fault::{Fault, RingLink};
@@ -102,6 +102,14 @@ impl Evidence {
         &self.cause
     }
 
+    /// Takes a byte that was sent since.
+    #[inline]
+    pub(super) fn expect(&mut self, back: Option<u8>) {
+        if self.expected.len() < KEPT {
+            self.expected.push(back);
+        }
+    }
+
     /// Takes a byte of what came.
     pub(super) fn see(&mut self, received: Received) {
         if self.received.len() < KEPT {
@@ -131,7 +139,9 @@ impl Evidence {
         let Some(last) = self.last else {
             return Spelled::Nothing;
         };
-        if last.error.is_some() || self.run < STEADY {
+        // At most 25 zeros come before an address (ND21 9.7); more are the address of drive 0.
+        let steady = if last.byte == 0 { SETTLED } else { STEADY };
+        if last.error.is_some() || self.run < steady {
             return Spelled::Noise;
         }
         // In a ring of more than 128 drives SYNCO is an address as well; but before an address come zeros.
@@ -172,6 +182,14 @@ impl Evidence {
         let first = self.received.first().map(|received| received.byte);
         match (&self.cause, first) {
             (Cause::Unasked, _) => return Fault::Extra { bytes: 1 },
+            (Cause::NotBack, _) => {
+                let whole = |bytes: &[Received]| {
+                    let pairs = bytes.iter().zip(SEQUENCE);
+                    pairs.into_iter().all(|(received, byte)| received.is(byte))
+                };
+                let back = self.received.windows(SEQUENCE.len()).any(whole);
+                return if back { Fault::Late } else { Fault::Unclear };
+            }
             (Cause::Missed(_), _) if self.fit(0, 0) => return Fault::Late,
             (Cause::Wrong(sent), Some(received)) if self.fit(1, 1) => {
                 return match (sent.composed.place, sent.composed.back, drive) {

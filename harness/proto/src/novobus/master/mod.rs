@@ -18,12 +18,14 @@
 //! ```text
 //! Counting -> Running -> Locating -> Resetting -> Verifying -> Running
 //!                           ^                         |
-//!                           +------ not back ---------+     Locating -> Stopped, after too many
+//!                           +------ not back ---------+     Locating -> Draining -> Resetting, then
+//!                                                           Locating -> Stopped, after too many
 //! ```
 //!
 //! *Locating*: the telegram that has been begun is ended (broken off it would make a sound drive detect
 //! an error of its own, and the ring would spell out that one), then SYNCO goes out until the ring
-//! spells out an address (9.7), or the time is up. *Resetting*: 17 zeros and the check sequence (9.8).
+//! spells out an address (9.7), or the time is up. *Draining*, from the second recovery on: 8 ms of
+//! silence, in which bytes that are late catch up. *Resetting*: 17 zeros and the check sequence (9.8).
 //! *Verifying*: a drive passes the five bytes on only when they have brought it back; so once all five
 //! have come round, all drives are back. The manual repeats at once; this master waits for that, because
 //! a job that reaches drives half of which are in the error mode would run without an answer. *Counting*:
@@ -45,7 +47,8 @@
 //! twice says so. Reads that are sent again bring what the cell holds then.
 //!
 //! Data without a check of their own (process data, the four data bytes of `ReadLong`) count only when a
-//! byte other than 00 has come back right behind them: a drive in the error mode answers 00.
+//! byte other than 00 has come back right behind them: a drive in the error mode answers 00. Where they
+//! end with 80, and only SYNCO follows, a lost byte would look the same; then the drives are counted.
 
 mod answers;
 mod compose;
@@ -100,9 +103,15 @@ pub struct Master {
     /// The drive for which "same drive" would be meant; `None` where no short address is valid.
     last_addressed: Option<u8>,
     pauses: u16,
+    /// When the last byte came back.
+    last_heard: Instant,
     events: Events,
     counters: Counters,
 }
+
+/// The silence after which a drive with monitoring reports a time-out (ND21 9.9). What comes after it was
+/// sent unasked: at least 10 ms later, which may be sooner than the master misses a byte.
+const TIME_OUT: Span = Span::from_millis(10);
 
 /// What a master is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +122,8 @@ pub enum Phase {
     Running,
     /// It waits for the ring to spell out an address (ND21 9.7).
     Locating,
+    /// A recovery has failed: for 8 ms it sends nothing.
+    Draining,
     /// It sends the check sequence (ND21 9.8).
     Resetting,
     /// It waits for the check sequence to come back.
@@ -135,7 +146,11 @@ impl Master {
             options,
             byte_time,
             patience: byte_time * round + options.slack,
-            state: State::counting(),
+            state: if options.check_first {
+                State::resetting()
+            } else {
+                State::counting()
+            },
             episode: Episode::default(),
             store: Store::new(ring, options.capacity),
             cycle: Cycle::new(ring),
@@ -145,6 +160,7 @@ impl Master {
             unconfirmed: Unconfirmed::default(),
             last_addressed: None,
             pauses: 0,
+            last_heard: Instant::START,
             events: Events::default(),
             counters: Counters::default(),
         }
@@ -251,7 +267,7 @@ impl Master {
             State::Verifying { .. } => return self.transmit(Composed::SYNCO, true, now),
             State::Locating { .. } => false,
             State::Resetting { next, watch } => return self.reset_byte(next, watch, now),
-            State::Stopped(_) => return None,
+            State::Draining { .. } | State::Stopped(_) => return None,
         };
         if watched && self.in_flight.is_full() {
             return None;
@@ -290,6 +306,9 @@ impl Master {
                 due: now + self.patience,
             });
         }
+        if let State::Locating { evidence, .. } = &mut self.state {
+            evidence.expect(composed.back);
+        }
         self.counters.sent += 1;
         self.counters.idle += u64::from(composed.byte == SYNCO && composed == Composed::SYNCO);
         Some(composed.byte)
@@ -321,16 +340,18 @@ impl Master {
             self.handle_timeout(now);
         }
         self.counters.received += 1;
+        let silent = now.since(core::mem::replace(&mut self.last_heard, now)) >= TIME_OUT;
+        self.episode.heard_after(silent);
         match &mut self.state {
             State::Running | State::Counting { .. } => self.take(received, now),
             State::Locating { evidence, .. } => {
                 evidence.see(received);
                 if let Some(spelled) = evidence.settled(self.ring) {
-                    self.located(spelled);
+                    self.located(spelled, now);
                 }
             }
             State::Resetting { .. } | State::Verifying { .. } => self.verify(received),
-            State::Stopped(_) => {}
+            State::Draining { .. } | State::Stopped(_) => {}
         }
     }
 
@@ -339,7 +360,9 @@ impl Master {
     pub fn poll_timeout(&self) -> Option<Instant> {
         match self.state {
             State::Running | State::Counting { .. } => self.in_flight.due(),
-            State::Locating { until, .. } | State::Verifying { until, .. } => Some(until),
+            State::Locating { until, .. }
+            | State::Draining { until }
+            | State::Verifying { until, .. } => Some(until),
             State::Resetting { .. } | State::Stopped(_) => None,
         }
     }
@@ -357,8 +380,9 @@ impl Master {
             }
             State::Locating { evidence, .. } => {
                 let spelled = evidence.spelled(self.ring);
-                self.located(spelled);
+                self.located(spelled, now);
             }
+            State::Draining { .. } => self.state = State::resetting(),
             State::Verifying { .. } => self.disturb(Cause::NotBack, now),
             State::Resetting { .. } | State::Stopped(_) => {}
         }

@@ -21,6 +21,11 @@ pub struct Options {
     /// How long after a silence the ring has time to name the drive that hears nothing: the drives wait
     /// 10 to 20 ms, and then 10 ms more (ND21 9.9).
     pub monitoring: Span,
+    /// Whether to begin with the check sequence (ND21 9.8). A master that was stopped, or a program that
+    /// ended, can leave drives with half a command, at which the first whole one is found wrong; but the
+    /// zeros of the sequence put every drive into the error mode for a moment, and its cell `errorcode`
+    /// says so.
+    pub check_first: bool,
 }
 
 impl Default for Options {
@@ -32,6 +37,7 @@ impl Default for Options {
             attempts: 8,
             slack: Span::from_millis(20),
             monitoring: Span::from_millis(40),
+            check_first: false,
         }
     }
 }

@@ -11,7 +11,11 @@ use super::job::{JobId, Outcome};
 use super::store::Entry;
 use super::{Master, Phase};
 use crate::line::Received;
-use crate::time::Instant;
+use crate::time::{Instant, Span};
+
+/// How long nothing is sent after a recovery that failed: less than the 10 ms after which the drives
+/// with monitoring would report a time-out, each to be spelled out in place of what was wrong (ND21 9.9).
+const DRAINING: Span = Span::from_millis(8);
 
 /// What a master is doing, with what it needs for that.
 #[derive(Clone, Debug)]
@@ -34,6 +38,11 @@ pub(super) enum State {
         heard: bool,
         until: Instant,
     },
+    /// Nothing is sent, because what has once come to be late stays late: a line that is never free never
+    /// catches up.
+    Draining {
+        until: Instant,
+    },
     Stopped(Stop),
 }
 
@@ -54,6 +63,7 @@ impl State {
             Self::Counting { .. } => Phase::Counting,
             Self::Running => Phase::Running,
             Self::Locating { .. } => Phase::Locating,
+            Self::Draining { .. } => Phase::Draining,
             Self::Resetting { .. } => Phase::Resetting,
             Self::Verifying { .. } => Phase::Verifying,
             Self::Stopped(_) => Phase::Stopped,
@@ -82,10 +92,12 @@ pub(super) struct Episode {
     /// How many of the failures began within one and the same command of the drive that was named.
     rejections: u8,
     stumble: Stumble,
-    /// Bytes that have come back right since then.
+    /// Bytes that have come back right since the ring runs again.
     clean: u16,
     /// A byte was missed since the ring last ran.
     silent: bool,
+    /// The last byte came after a silence.
+    after_silence: bool,
     /// The drives are to be counted before the ring runs.
     count: bool,
     /// The ring has run.
@@ -108,10 +120,17 @@ impl Episode {
         }
     }
 
+    /// A byte has come, after a silence or not.
+    #[inline]
+    pub(super) fn heard_after(&mut self, silence: bool) {
+        self.after_silence = silence;
+    }
+
     /// A byte has come back right.
     #[inline]
     pub(super) fn byte_was_right(&mut self, ring: RingSize) {
-        if self.failures > 0 && self.stumble == Stumble::Idle {
+        let runs = self.attempts == 0;
+        if self.failures > 0 && runs && self.stumble == Stumble::Idle {
             self.clean = self.clean.saturating_add(1);
             if self.clean > u16::from(ring.drives()) + 4 * u16::from(UPSTREAM_ZEROS) {
                 self.got_over();
@@ -142,6 +161,9 @@ impl Master {
             Cause::Wrong(sent) => self.episode.count |= sent.composed.place == Place::Address,
             Cause::Unasked => {}
         }
+        if matches!(cause, Cause::Wrong(_) | Cause::Unasked) {
+            self.episode.silent |= self.episode.after_silence;
+        }
         if self.episode.failures == 0 {
             self.episode.stumble = match cause.sent().map(|sent| sent.composed.owner) {
                 Some(Owner::Job(slot)) => self
@@ -171,7 +193,7 @@ impl Master {
     }
 
     /// The ring has said what it had to say.
-    pub(super) fn located(&mut self, spelled: Spelled) {
+    pub(super) fn located(&mut self, spelled: Spelled, now: Instant) {
         let State::Locating { evidence, .. } = &self.state else {
             return;
         };
@@ -213,7 +235,13 @@ impl Master {
             self.report(Event::Disturbed { fault, attempt });
             // Long sent, unless nobody has asked for it.
             self.outgoing.clear();
-            self.state = State::resetting();
+            self.state = if attempt == 1 {
+                State::resetting()
+            } else {
+                State::Draining {
+                    until: now + DRAINING,
+                }
+            };
         }
     }
 

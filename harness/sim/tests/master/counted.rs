@@ -1,0 +1,128 @@
+//! A plain drive that counts what is written to it.
+
+use harness_proto::line::Received;
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
+use harness_proto::novobus::command::Kind;
+use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::memory::Memory;
+use harness_proto::novobus::output::OutputChange;
+use harness_proto::novobus::properties::Properties;
+use harness_proto::time::Instant;
+use harness_sim::cells::Cells;
+use harness_sim::device::Device;
+use harness_sim::plain::PlainDrive;
+use std::collections::BTreeMap;
+
+/// A plain drive's cells, with a count of the writes to each.
+pub(crate) struct CountedCells {
+    cells: Cells,
+    written: BTreeMap<u16, u32>,
+    pub(crate) resets: u32,
+    refused: Option<u16>,
+}
+
+impl CountedCells {
+    pub(crate) fn written(&self, address: u16) -> u32 {
+        self.written.get(&address).copied().unwrap_or(0)
+    }
+
+    /// From now on the drive takes no command for this address.
+    pub(crate) fn refuse(&mut self, address: u16) {
+        self.refused = Some(address);
+    }
+
+    pub(crate) fn peek(&self, address: u16) -> u8 {
+        self.cells.peek(address)
+    }
+
+    pub(crate) fn poke(&mut self, address: u16, byte: u8) {
+        assert!(self.cells.poke(address, byte));
+    }
+}
+
+impl Memory for CountedCells {
+    fn read(&mut self, address: u16) -> u8 {
+        self.cells.read(address)
+    }
+
+    fn write(&mut self, address: u16, data: u8) {
+        *self.written.entry(address).or_default() += 1;
+        self.cells.write(address, data);
+    }
+
+    fn permits(&self, kind: Kind, address: u16) -> bool {
+        self.refused != Some(address) && self.cells.permits(kind, address)
+    }
+
+    fn write_output(&mut self, change: OutputChange) {
+        self.cells.write_output(change);
+    }
+
+    fn reset(&mut self) {
+        self.resets += 1;
+        self.cells.reset();
+    }
+
+    fn bus_error(&mut self, error: BusError) {
+        self.cells.bus_error(error);
+    }
+
+    fn monitors_time_out(&self) -> bool {
+        self.cells.monitors_time_out()
+    }
+}
+
+/// A plain drive with counted cells.
+pub(crate) struct Counted {
+    bus_end: BusEnd,
+    pub(crate) memory: CountedCells,
+    /// How often the power came back.
+    pub(crate) starts: u32,
+}
+
+impl Counted {
+    /// After power-up, with time-out monitoring or without (EESelftest bit 7, ND21 14.3.6).
+    pub(crate) fn new(monitoring: bool) -> Self {
+        let mut eeprom = [0; 256];
+        eeprom[0x47] = if monitoring { 0x80 } else { 0 };
+        let drive = PlainDrive::new(Properties::default(), eeprom);
+        Self {
+            bus_end: BusEnd::new(Properties::default()),
+            memory: CountedCells {
+                cells: drive.memory().clone(),
+                written: BTreeMap::new(),
+                resets: 0,
+                refused: None,
+            },
+            starts: 0,
+        }
+    }
+}
+
+impl Device for Counted {
+    fn receive(&mut self, now: Instant, received: Received) -> Step {
+        self.bus_end.receive(now, received, &mut self.memory)
+    }
+
+    fn deadline(&self) -> Option<Deadline> {
+        self.bus_end.deadline(&self.memory)
+    }
+
+    fn handle_deadline(&mut self, now: Instant) -> Step {
+        self.bus_end.handle_deadline(now, &mut self.memory)
+    }
+
+    fn power_on(&mut self) {
+        self.starts += 1;
+        self.memory.cells.reset();
+        self.bus_end = BusEnd::new(Properties::default());
+    }
+
+    fn in_error(&self) -> bool {
+        self.bus_end.in_error()
+    }
+
+    fn cause(&self) -> Option<BusError> {
+        self.bus_end.cause()
+    }
+}
