@@ -1,7 +1,7 @@
 //! The driver over a simulated ring of three ND21 (ND21 chapters 11, 12, 13.2).
 
 use harness::bus::{Axis, Bus, Error, Options, SkStatus, count_drives};
-use harness::link::{Link, Moment, PlacedFault, SimulatedLink, Stimulus};
+use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink, Stimulus};
 use harness_proto::line::Rate;
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::position::{Mode, Position};
@@ -38,13 +38,13 @@ fn ring(drives: u64, properties: Nd21Properties) -> Ring<Drive> {
     })
 }
 
-fn bus_of(ring: Ring<Drive>, options: Options) -> Bus {
+fn bus_of(ring: Ring<Drive>, options: Options) -> Bus<'static> {
     let drives = u64::from(ring.size().drives());
     let link = SimulatedLink::new(Bench::one(ring));
     Bus::open(Box::new(link), &[size(drives)], options).expect("an open bus")
 }
 
-fn bus() -> Bus {
+fn bus() -> Bus<'static> {
     bus_of(ring(3, Nd21Properties::default()), Options::default())
 }
 

@@ -2,7 +2,7 @@
 
 use super::drives::{nd21, plain};
 use super::{entry, fails, passes, play, refused};
-use harness::link::{Capability, Link, Moment, PlacedFault, Shown};
+use harness::link::{Capability, Line, Link, Moment, PlacedFault, Shown};
 use harness::report::plot::plot;
 use harness::scenario::run::{Outcome, run};
 use harness::scenario::simulate::simulated;
@@ -204,10 +204,7 @@ fn records_that_cannot_be_are_refused_and_bounded() {
 /// A link that shows nothing of its drives: a ring of which only the master's ends are known.
 struct Blind<L>(L);
 
-impl<L: Link> Link for Blind<L> {
-    fn capabilities(&self) -> &[Capability] {
-        self.0.capabilities()
-    }
+impl<L: Link> Line for Blind<L> {
     fn byte_time(&self) -> Span {
         self.0.byte_time()
     }
@@ -222,6 +219,12 @@ impl<L: Link> Link for Blind<L> {
     }
     fn wait(&mut self, until: Instant) -> bool {
         self.0.wait(until)
+    }
+}
+
+impl<L: Link> Link for Blind<L> {
+    fn capabilities(&self) -> &[Capability] {
+        self.0.capabilities()
     }
     fn busy(&self) -> bool {
         self.0.busy()

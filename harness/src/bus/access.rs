@@ -9,7 +9,9 @@ use harness_proto::time::Span;
 fn narrow<T: TryFrom<u32>>(value: Option<u32>) -> Result<T, Error> {
     value
         .and_then(|value| T::try_from(value).ok())
-        .ok_or(Error::Open("the answer leaves a byte out (ReadLong as printed, ND21 10.1)"))
+        .ok_or(Error::Open(
+            "the answer leaves a byte out (ReadLong as printed, ND21 10.1)",
+        ))
 }
 
 /// The bit commands reach one page only (10.3).
@@ -23,7 +25,7 @@ fn page(address: u16) -> Result<u8, Error> {
     )))
 }
 
-impl Bus {
+impl Bus<'_> {
     /// Reads a byte of RAM, ROM or the register field (12.3).
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Job;
 use harness_proto::novobus::output::OutputChange;
 
-impl Bus {
+impl Bus<'_> {
     /// Takes the software block and the software stop away: the drive starts if its inputs let it.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use super::error::in_words;
 use super::{Axis, Bus, Error};
-use crate::link::Link;
+use crate::link::Line;
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::errors::display_digits;
 use harness_proto::nd21::units::{Date, operating_hours_from_bytes, serial_number_from_bytes};
@@ -21,7 +21,7 @@ const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 ///
 /// # Errors
 /// [`Error::TimeOut`] where no ring answers.
-pub fn count_drives(link: &mut dyn Link, ring: usize) -> Result<RingSize, Error> {
+pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error> {
     let mut zeros = vec![0; usize::from(ZEROS)];
     zeros.extend(CHECK_SEQUENCE);
     for before in [&[] as &[u8], &zeros] {
@@ -111,7 +111,7 @@ impl State {
     }
 }
 
-impl Bus {
+impl Bus<'_> {
     /// Reads how a drive is.
     ///
     /// # Errors

@@ -13,7 +13,7 @@ const READ_DONE: u8 = 0x10;
 const READ: u8 = 1 << 5;
 const WRITTEN: u8 = 1 << 4;
 
-impl Bus {
+impl Bus<'_> {
     /// Reads a byte of the EEPROM.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ pub use discovery::{Identity, State, count_drives};
 pub use error::Error;
 pub use s_ramp::SkStatus;
 
-use crate::link::Link;
+use crate::link::Line;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{self, Counters, Job, JobId, Outcome, Phase, Refused};
 use harness_proto::time::Span;
@@ -59,8 +59,8 @@ impl Default for Options {
 
 /// One or two open rings. Clones are handles of the same bus.
 #[derive(Clone)]
-pub struct Bus {
-    pump: Arc<Mutex<Pump>>,
+pub struct Bus<'l> {
+    pump: Arc<Mutex<Pump<'l>>>,
     options: Options,
 }
 
@@ -71,7 +71,7 @@ pub struct Order {
     id: JobId,
 }
 
-impl Bus {
+impl<'l> Bus<'l> {
     /// Opens a bus with one ring or two over `link`; the drives are counted by the first telegram, and a
     /// ring of another size is an error.
     ///
@@ -81,7 +81,7 @@ impl Bus {
     #[doc(alias = "InitNovobus2")]
     #[doc(alias = "NB_OpenBus1")]
     pub fn open(
-        link: Box<dyn Link + Send>,
+        link: Box<dyn Line + 'l>,
         rings: &[RingSize],
         options: Options,
     ) -> Result<Self, Error> {
@@ -113,9 +113,18 @@ impl Bus {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Pump> {
+    fn lock(&self) -> MutexGuard<'_, Pump<'l>> {
         // A panic in another thread leaves masters and link as they are: each byte is done whole.
         self.pump.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Closes the bus: nothing more is sent, and what is under way comes home.
+    #[doc(alias = "CloseNovobus")]
+    #[doc(alias = "NB_CloseBus")]
+    pub fn close(self) {
+        let mut pump = self.lock();
+        let end = pump.now() + self.options.patience;
+        pump.drain(end);
     }
 
     /// How many rings are active: 0 when a bus has been stopped (12.1).

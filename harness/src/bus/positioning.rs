@@ -18,7 +18,7 @@ fn words(long: u32) -> [u16; 2] {
     [u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])]
 }
 
-impl Bus {
+impl Bus<'_> {
     /// Initialises the positioning controller with a referencing run (13.2.1.1) and waits for its end.
     /// The motor turns.
     ///

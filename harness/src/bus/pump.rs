@@ -1,6 +1,6 @@
 //! Masters and their link, coupled: bytes out when the line is free, bytes in as they come.
 
-use crate::link::Link;
+use crate::link::Line;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{
@@ -21,14 +21,14 @@ struct Ring {
 }
 
 /// The masters of one or two rings over one link.
-pub(super) struct Pump {
-    link: Box<dyn Link + Send>,
+pub(super) struct Pump<'l> {
+    link: Box<dyn Line + 'l>,
     rings: Vec<Ring>,
     log: Vec<String>,
 }
 
-impl Pump {
-    pub(super) fn new(link: Box<dyn Link + Send>, sizes: &[RingSize], options: Options) -> Self {
+impl<'l> Pump<'l> {
+    pub(super) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: Options) -> Self {
         let now = link.now();
         let rate = Rate::ALL
             .into_iter()
@@ -172,6 +172,18 @@ impl Pump {
         }
         while self.link.now() < until {
             self.link.wait(until);
+            self.poll();
+        }
+    }
+
+    /// Sends nothing more and lets what is under way come home, at most until `end`.
+    pub(super) fn drain(&mut self, end: Instant) {
+        let under_way = |ring: &Ring| ring.master.under_way() > 0;
+        self.poll();
+        while self.stopped().is_none() && self.rings.iter().any(under_way) && self.link.now() < end
+        {
+            let until = self.link.now() + self.link.byte_time();
+            self.link.wait(until.min(end));
             self.poll();
         }
     }

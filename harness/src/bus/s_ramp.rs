@@ -30,7 +30,7 @@ const OPEN: Error = Error::Open(
      only simulated drives with the property s-ramp-wire = puffer take them",
 );
 
-impl Bus {
+impl Bus<'_> {
     /// Sends a distance in impulses (65536 a turn), a speed in rpm and an acceleration time in ms.
     ///
     /// # Errors

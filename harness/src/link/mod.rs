@@ -83,11 +83,8 @@ pub enum Moment {
     At(Instant),
 }
 
-/// One or two rings as the master sees them.
-pub trait Link {
-    /// What this link can do beside sending and receiving.
-    fn capabilities(&self) -> &[Capability];
-
+/// One or two rings as the master sees them: bytes and time, and nothing else.
+pub trait Line: Send {
     /// How long a byte takes.
     fn byte_time(&self) -> Span;
 
@@ -104,6 +101,12 @@ pub trait Link {
     /// Lets time pass until something happens, at most until `until`. False where nothing ever will
     /// unless the master sends.
     fn wait(&mut self, until: Instant) -> bool;
+}
+
+/// One or two rings as a scenario sees them.
+pub trait Link: Line {
+    /// What this link can do beside sending and receiving.
+    fn capabilities(&self) -> &[Capability];
 
     /// Whether bytes of the master's are still on their way round.
     fn busy(&self) -> bool;

@@ -1,6 +1,6 @@
 //! A link to simulated rings, in virtual time.
 
-use super::{Capability, Link, Mode, Moment, PlacedFault, Shown, Stimulus};
+use super::{Capability, Line, Link, Mode, Moment, PlacedFault, Shown, Stimulus};
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::sync::SYNCO;
@@ -93,11 +93,7 @@ impl SimulatedLink {
     }
 }
 
-impl Link for SimulatedLink {
-    fn capabilities(&self) -> &[Capability] {
-        &CAPABILITIES
-    }
-
+impl Line for SimulatedLink {
     fn byte_time(&self) -> Span {
         self.byte_time
     }
@@ -136,6 +132,12 @@ impl Link for SimulatedLink {
             self.suffer(ring, fault);
         }
         next.is_some()
+    }
+}
+
+impl Link for SimulatedLink {
+    fn capabilities(&self) -> &[Capability] {
+        &CAPABILITIES
     }
 
     fn busy(&self) -> bool {
