@@ -1,11 +1,12 @@
 //! Jobs of the master in the manual's terms: `read-byte 95 FE13 = 88`, `go 3`, `recover`.
 
+use super::master;
 use super::value::{assigned, place, tolerance};
 use super::words::{drives, equals};
 use crate::scenario::pattern;
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Drives, Job, JobKind, Written};
+use crate::scenario::syntax::{Drives, Job, JobKind, MasterCall, Place, Written};
 
 /// What stands behind a job's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -51,7 +52,7 @@ const FORMS: [Form; 13] = [
 /// Every name that a job can have.
 pub(super) fn names() -> Vec<&'static str> {
     let mut names: Vec<_> = FORMS.iter().map(|form| form.name).collect();
-    names.extend(["recover", "exchange"]);
+    names.extend(["recover", "exchange", "master"]);
     names
 }
 
@@ -60,6 +61,7 @@ pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, P
     match name {
         "recover" => Some(recover(scanner)),
         "exchange" => Some(exchange(scanner)),
+        "master" => Some(master::call(scanner)),
         _ => {
             let form = FORMS.iter().find(|form| form.name == name)?;
             Some(command(*form, scanner))
@@ -68,16 +70,21 @@ pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, P
 }
 
 fn recover(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+    Ok(Job::Recover(which_ring(scanner)?))
+}
+
+/// `ring 2`, or nothing for the first one.
+pub(super) fn which_ring(scanner: &mut Scanner<'_>) -> Result<usize, Problem> {
     let named = scanner.eat_word("ring");
     let mut ahead = scanner.clone();
     let ring = match ahead.take_while(|c| c.is_ascii_digit()).map(|d| d.value) {
-        None if !named => return Ok(Job::Recover(0)),
+        None if !named => return Ok(0),
         Some("1") => 0,
         Some("2") => 1,
         _ => return Err(scanner.unexpected("the ring, 1 or 2")),
     };
     *scanner = ahead;
-    Ok(Job::Recover(ring))
+    Ok(ring)
 }
 
 fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
@@ -100,8 +107,11 @@ fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     })
 }
 
-fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
-    let drive = one(scanner)?;
+/// What stands behind the drive: the cell and the data.
+fn operands(
+    form: Form,
+    scanner: &mut Scanner<'_>,
+) -> Result<(Option<Place>, Option<Written>), Problem> {
     let place = if form.cell {
         Some(place(scanner)?)
     } else {
@@ -116,6 +126,26 @@ fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
             Some(Written::Bytes(pattern::pattern(scanner)?))
         }
     };
+    Ok((place, data))
+}
+
+/// A command of the driver; `None` where there is none of this name.
+pub(super) fn driver_command(
+    name: &str,
+    scanner: &mut Scanner<'_>,
+) -> Option<Result<Job, Problem>> {
+    let form = FORMS.iter().find(|form| form.name == name)?;
+    let job = drives(scanner).and_then(|drives| {
+        let (place, data) = operands(*form, scanner)?;
+        let call = MasterCall::Command(form.kind, place, data);
+        Ok(Job::Master(drives, call))
+    });
+    Some(job)
+}
+
+fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+    let drive = one(scanner)?;
+    let (place, data) = operands(form, scanner)?;
     let tolerance = match &data {
         Some(data) if form.data == Data::Read => tolerance(scanner, data)?,
         _ => None,

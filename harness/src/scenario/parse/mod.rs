@@ -4,6 +4,7 @@ mod check;
 mod drive;
 mod header;
 mod job;
+mod master;
 mod step;
 mod value;
 mod words;

@@ -21,6 +21,19 @@ impl Planner {
                 self.ring(*ring, Span::default())?;
                 Ok(PlannedAction::Recover(*ring))
             }
+            Job::Master(drives, call) => self.master(drives, call),
+            Job::Count(ring, number) => {
+                self.ring(*ring, number.span)?;
+                let drives = number.value(i64::from(self.size(*ring)))?;
+                let drives = u8::try_from(drives).map_err(|_| {
+                    Problem::new(
+                        number.span,
+                        format!("{drives} drives"),
+                        "1 to 250 expected here",
+                    )
+                })?;
+                Ok(PlannedAction::Count(*ring, drives))
+            }
             Job::Exchange {
                 drive,
                 send,
@@ -80,7 +93,7 @@ impl Planner {
         }
     }
 
-    fn command(
+    pub(super) fn command(
         &self,
         kind: JobKind,
         drive: (usize, u8),
@@ -188,7 +201,7 @@ impl Planner {
     }
 
     /// Exactly `count` bytes that are read.
-    fn expected_data(
+    pub(super) fn expected_data(
         &self,
         data: &Written,
         place: Option<&Place>,
@@ -203,13 +216,23 @@ impl Planner {
     }
 
     /// Exactly `count` known bytes.
-    fn known(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<u8>, Problem> {
+    pub(super) fn known(
+        &self,
+        pattern: &Pattern,
+        count: usize,
+        ring: usize,
+    ) -> Result<Vec<u8>, Problem> {
         self.data(pattern, count, ring)?;
         pattern.expand_known(self.size(ring), MAX_CELLS)
     }
 
     /// Exactly `count` bytes.
-    fn data(&self, pattern: &Pattern, count: usize, ring: usize) -> Result<Vec<Expected>, Problem> {
+    pub(super) fn data(
+        &self,
+        pattern: &Pattern,
+        count: usize,
+        ring: usize,
+    ) -> Result<Vec<Expected>, Problem> {
         let found = pattern.expand(self.size(ring), MAX_CELLS)?;
         if found.len() == count {
             return Ok(found);
@@ -307,7 +330,7 @@ fn scale_of(place: &Place, width: usize) -> Result<Scale, Problem> {
 }
 
 /// Whether a command reaches a cell.
-fn reaches(command: &Command, place: &Place) -> Result<(), Problem> {
+pub(super) fn reaches(command: &Command, place: &Place) -> Result<(), Problem> {
     if memory::in_range(command.kind(), place.address) {
         return Ok(());
     }

@@ -3,6 +3,7 @@
 
 mod drive;
 mod job;
+mod master;
 mod planner;
 mod setup;
 mod types;
@@ -12,7 +13,7 @@ pub(super) use planner::MAX_CARRIED;
 pub use planner::plan;
 pub(super) use types::PlannedSetupKind;
 pub use types::{
-    CellTest, LOOK, Plan, PlannedAction, PlannedCell, PlannedCheck, PlannedCondition,
+    CellTest, LOOK, Plan, PlannedAction, PlannedCall, PlannedCell, PlannedCheck, PlannedCondition,
     PlannedDriveCheck, PlannedLooks, PlannedRecord, PlannedStep, PlannedWhen, PlannedWindow,
     Reading,
 };

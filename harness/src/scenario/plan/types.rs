@@ -6,8 +6,10 @@ use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
 use crate::scenario::syntax::{Influence, Place, Relation, Showing};
 use harness_proto::line::Rate;
+use harness_proto::nd21::position::Position;
 use harness_proto::nd21::units::{self, Device, Scale};
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
 use harness_proto::novobus::properties::{Properties, Setting};
@@ -159,6 +161,10 @@ pub enum PlannedAction {
     Telegram(usize, Vec<u8>, Vec<Expected>, Option<Reading>),
     /// 17 zeros and the check sequence.
     Recover(usize),
+    /// The driver does this of these drives.
+    Master(usize, Vec<(u8, PlannedCall)>),
+    /// The driver counts so many drives.
+    Count(usize, u8),
     /// Time passes until a check holds, at most so long.
     Until(PlannedDriveCheck, time::Span),
     /// Time passes.
@@ -248,6 +254,31 @@ pub enum CellTest {
         /// How far it may be off; without one the nearest raw value is meant.
         tolerance: Option<Tolerance>,
     },
+}
+
+/// What the driver is to do of one drive.
+#[derive(Clone, Debug)]
+pub enum PlannedCall {
+    /// A command, and the data that must be read.
+    Command(Command, Vec<Expected>),
+    /// A byte of the EEPROM, and what it must be.
+    ReadEeprom(u8, Expected),
+    /// A byte of the EEPROM.
+    WriteEeprom(u8, u8),
+    /// The parameters into the EEPROM.
+    RamToEeprom,
+    /// A referencing run.
+    Reference,
+    /// The rotor's present place has this position.
+    SetActualValue(u32),
+    /// The positioning controller is initialised.
+    InitPs,
+    /// A target.
+    WritePs(Position),
+    /// The positioning is started.
+    StartPs,
+    /// It has come to its end.
+    WaitForEnd,
 }
 
 /// A cell that is recorded, settled.

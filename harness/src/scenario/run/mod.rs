@@ -4,6 +4,7 @@ mod bytes;
 mod check;
 mod drives;
 mod look;
+mod master;
 mod player;
 mod record;
 

@@ -337,16 +337,28 @@ impl Runner<'_> {
                     .and_then(|()| self.read(*ring, expected.len(), reading.as_ref(), step.span))
             }
             PlannedAction::Recover(ring) => self.recover(*ring, step.span),
+            PlannedAction::Master(ring, calls) => self.master(*ring, calls, step.span),
+            PlannedAction::Count(ring, drives) => self.count(*ring, *drives, step.span),
         }
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) {
+    pub(super) fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         if self.sent == 0 {
             self.sent_from = self.link.now().max(self.sent_to);
         }
         self.sent += bytes.len() as u64;
         self.line_before = self.link.send(ring, bytes);
         self.sent_to = self.line_before;
+        self.sent_to
+    }
+
+    /// The next byte that nobody has asked for.
+    pub(super) fn take_next(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        self.fetch();
+        let record = &mut self.rings[ring];
+        let byte = record.received.get(record.next).copied()?;
+        record.next += 1;
+        Some(byte)
     }
 
     /// Lets time pass up to `until`.
@@ -357,14 +369,14 @@ impl Runner<'_> {
     }
 
     /// Lets time pass until everything that was sent has come round (or has been lost).
-    fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         let end = self.link.now() + MAX_ROUND;
         while self.link.busy() && self.link.now() < end && self.wait(end) {}
         self.fetch();
     }
 
     /// Lets time pass until something happens. False where nothing will, or where the record is full.
-    fn wait(&mut self, until: Instant) -> bool {
+    pub(super) fn wait(&mut self, until: Instant) -> bool {
         loop {
             if self.link.carried() > MAX_CARRIED {
                 let why = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
@@ -398,7 +410,7 @@ impl Runner<'_> {
     }
 
     /// Bytes that no line has asked for are none of the next line's business.
-    fn forget(&mut self, ring: usize) {
+    pub(super) fn forget(&mut self, ring: usize) {
         self.rings[ring].next = self.rings[ring].received.len();
     }
 

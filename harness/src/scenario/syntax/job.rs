@@ -3,8 +3,9 @@
 use super::Drives;
 use super::cell::{Place, Written};
 use crate::link::Capability;
+use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::quantity::Tolerance;
+use crate::scenario::quantity::{Quantity, Tolerance};
 
 /// A job as written.
 #[derive(Clone, Debug)]
@@ -33,6 +34,46 @@ pub enum Job {
         /// How far what is read may be off.
         tolerance: Option<Tolerance>,
     },
+    /// `master ...`: the driver does it, of one drive or of several at once (ND21 11 to 13).
+    Master(Drives, MasterCall),
+    /// `master count = N`: the drives of a ring are counted (ND21 9.3).
+    Count(usize, Located),
+}
+
+/// What the driver is to do.
+#[derive(Clone, Debug)]
+pub enum MasterCall {
+    /// A command, with what is read or written.
+    Command(JobKind, Option<Place>, Option<Written>),
+    /// `read-eeprom K CELL [= HH]` (12.5)
+    ReadEeprom(Place, Option<Pattern>),
+    /// `write-eeprom K CELL = HH` (12.5)
+    WriteEeprom(Place, Pattern),
+    /// `ram-to-eeprom K` (12.5)
+    RamToEeprom,
+    /// `reference K` (13.2.1.1)
+    Reference,
+    /// `set-actual-value K = TURNS` (13.2.1.2)
+    SetActualValue(Target),
+    /// `init-ps K` (13.2.1.3)
+    InitPs,
+    /// `write-ps K = TURNS` or `= by TURNS` (13.2.2)
+    WritePs(Target),
+    /// `start-ps K` (13.2.3)
+    StartPs,
+    /// `wait-for-end K` (13.2.4)
+    WaitForEnd,
+}
+
+/// A position as written.
+#[derive(Clone, Debug)]
+pub enum Target {
+    /// Four bytes: of a target in the format of 13.1.9.
+    Bytes(Pattern),
+    /// Turns from the zero point.
+    At(Quantity),
+    /// Turns from here.
+    By(Quantity),
 }
 
 /// The jobs that are one command.
@@ -76,7 +117,15 @@ impl Job {
             } => Some(Capability::Reset),
             Self::Command {
                 kind: JobKind::Go, ..
-            } => Some(Capability::Motion),
+            }
+            | Self::Master(
+                _,
+                MasterCall::Command(JobKind::Go, ..) | MasterCall::Reference | MasterCall::StartPs,
+            ) => Some(Capability::Motion),
+            Self::Master(_, MasterCall::Command(JobKind::Reset, ..)) => Some(Capability::Reset),
+            Self::Master(_, MasterCall::WriteEeprom(..) | MasterCall::RamToEeprom) => {
+                Some(Capability::Eeprom)
+            }
             _ => None,
         }
     }

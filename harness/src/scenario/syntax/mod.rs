@@ -7,5 +7,5 @@ mod scenario;
 
 pub use cell::{CellCheck, Place, Relation, Written};
 pub use check::{Check, Condition, DriveCheck, Showing};
-pub use job::{Job, JobKind};
+pub use job::{Job, JobKind, MasterCall, Target};
 pub use scenario::*;

@@ -1,0 +1,102 @@
+//! What the driver is to do, settled.
+
+use super::planner::Planner;
+use super::types::{PlannedAction, PlannedCall};
+use crate::scenario::pattern::{Expected, Pattern};
+use crate::scenario::problem::Problem;
+use crate::scenario::quantity::Quantity;
+use crate::scenario::syntax::{Drives, JobKind, MasterCall, Place, Target, Written};
+use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::units::turns_to_raw;
+
+impl Planner {
+    pub(super) fn master(
+        &self,
+        drives: &Drives,
+        call: &MasterCall,
+    ) -> Result<PlannedAction, Problem> {
+        let ring = drives.ring;
+        let calls = self
+            .drives(drives)?
+            .map(|drive| Ok((drive, self.call((ring, drive), call)?)));
+        let calls = calls.collect::<Result<_, Problem>>()?;
+        Ok(PlannedAction::Master(ring, calls))
+    }
+
+    fn call(&self, drive: (usize, u8), call: &MasterCall) -> Result<PlannedCall, Problem> {
+        let ring = drive.0;
+        Ok(match call {
+            MasterCall::Command(kind, place, data) => {
+                return self.driver_command(drive, *kind, place.as_ref(), data.as_ref());
+            }
+            MasterCall::ReadEeprom(place, data) => {
+                let expected = match data {
+                    Some(data) => self.data(data, 1, ring)?[0],
+                    None => Expected::Any,
+                };
+                PlannedCall::ReadEeprom(low(place), expected)
+            }
+            MasterCall::WriteEeprom(place, data) => {
+                PlannedCall::WriteEeprom(low(place), self.known(data, 1, ring)?[0])
+            }
+            MasterCall::RamToEeprom => PlannedCall::RamToEeprom,
+            MasterCall::Reference => PlannedCall::Reference,
+            MasterCall::SetActualValue(target) => PlannedCall::SetActualValue(match target {
+                Target::Bytes(pattern) => self.long(pattern, ring)?,
+                Target::At(turns) | Target::By(turns) => increments(*turns)?.cast_unsigned(),
+            }),
+            MasterCall::InitPs => PlannedCall::InitPs,
+            MasterCall::WritePs(target) => PlannedCall::WritePs(match target {
+                Target::Bytes(pattern) => Position::decode(self.long(pattern, ring)?),
+                Target::At(turns) => position(Mode::Absolute, *turns)?,
+                Target::By(turns) => position(Mode::Relative, *turns)?,
+            }),
+            MasterCall::StartPs => PlannedCall::StartPs,
+            MasterCall::WaitForEnd => PlannedCall::WaitForEnd,
+        })
+    }
+
+    fn driver_command(
+        &self,
+        drive: (usize, u8),
+        kind: JobKind,
+        place: Option<&Place>,
+        data: Option<&Written>,
+    ) -> Result<PlannedCall, Problem> {
+        let command = self.command(kind, drive, place, data)?;
+        if let Some(place) = place {
+            super::job::reaches(&command, place)?;
+        }
+        let width = usize::from(command.kind().width());
+        let expected = match data {
+            Some(data) if command.kind().reads() => {
+                self.expected_data(data, place, width, drive)?
+            }
+            _ => Vec::new(),
+        };
+        Ok(PlannedCall::Command(command, expected))
+    }
+
+    fn long(&self, pattern: &Pattern, ring: usize) -> Result<u32, Problem> {
+        let bytes = self.known(pattern, 4, ring)?;
+        Ok(bytes
+            .iter()
+            .fold(0, |long, byte| long << 8 | u32::from(*byte)))
+    }
+}
+
+fn low(place: &Place) -> u8 {
+    place.address.to_le_bytes()[0]
+}
+
+fn increments(turns: Quantity) -> Result<i32, Problem> {
+    turns_to_raw(turns.value).map_err(|error| wrong(turns, &error.to_string()))
+}
+
+fn position(mode: Mode, turns: Quantity) -> Result<Position, Problem> {
+    Position::from_turns(mode, turns.value).map_err(|error| wrong(turns, &error.to_string()))
+}
+
+fn wrong(turns: Quantity, message: &str) -> Problem {
+    Problem::new(turns.span, message, "a position that fits expected here")
+}

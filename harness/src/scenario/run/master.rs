@@ -1,0 +1,171 @@
+//! The driver's part of a scenario: calls over the same line that the scenario plays on, so that what is
+//! recorded, limited and shown is all the same.
+
+use super::player::{Runner, Stop};
+use crate::bus::{Axis, Bus, Error, Options, count_drives};
+use crate::link::Line;
+use crate::scenario::pattern::Expected;
+use crate::scenario::plan::PlannedCall;
+use crate::scenario::problem::Span;
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::Job;
+use harness_proto::time::{self, Instant};
+
+/// The line as a master sees it that works in the middle of a scenario.
+struct Through<'r, 'a> {
+    runner: &'r mut Runner<'a>,
+    /// The ring that it works on.
+    ring: usize,
+}
+
+impl Line for Through<'_, '_> {
+    fn byte_time(&self) -> time::Span {
+        self.runner.link.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.runner.link.now()
+    }
+
+    fn send(&mut self, _ring: usize, bytes: &[u8]) -> Instant {
+        self.runner.send(self.ring, bytes)
+    }
+
+    fn receive(&mut self, _ring: usize) -> Option<(Instant, Received)> {
+        self.runner.take_next(self.ring)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.runner.wait(until)
+    }
+}
+
+impl Runner<'_> {
+    /// Lets the driver do this of these drives; commands go out together.
+    pub(super) fn master(
+        &mut self,
+        ring: usize,
+        calls: &[(u8, PlannedCall)],
+        span: Span,
+    ) -> Result<(), Stop> {
+        self.settle();
+        self.forget(ring);
+        let size = self.link.drives(ring);
+        let failed = |error: Error| Stop::failed(span, error.to_string());
+        let Ok(size) = RingSize::new(u64::from(size)) else {
+            return Err(Stop::failed(span, "the ring has no drives"));
+        };
+        let line = Through { runner: self, ring };
+        let result = Bus::open(Box::new(line), &[size], Options::default())
+            .map_err(failed)
+            .and_then(|bus| {
+                let result = do_all(&bus, calls).map_err(|message| Stop::failed(span, message));
+                bus.close();
+                result
+            });
+        self.settle();
+        self.forget(ring);
+        self.line_before = self.link.now();
+        result
+    }
+
+    /// Lets the driver count the drives.
+    pub(super) fn count(&mut self, ring: usize, expected: u8, span: Span) -> Result<(), Stop> {
+        self.settle();
+        self.forget(ring);
+        let counted = count_drives(&mut Through { runner: self, ring }, 0);
+        self.settle();
+        self.forget(ring);
+        self.line_before = self.link.now();
+        match counted {
+            Ok(size) if size.drives() == expected => Ok(()),
+            Ok(size) => Err(Stop::failed(
+                span,
+                format!(
+                    "the ring has {} drives, expected are {expected}",
+                    size.drives()
+                ),
+            )),
+            Err(error) => Err(Stop::failed(span, error.to_string())),
+        }
+    }
+}
+
+fn do_all(bus: &Bus<'_>, calls: &[(u8, PlannedCall)]) -> Result<(), String> {
+    let mut orders = Vec::new();
+    for (drive, call) in calls {
+        let Some(axis) = Axis::new(0, *drive) else {
+            continue;
+        };
+        let words = |error: Error| format!("drive {axis}: {error}");
+        match call {
+            PlannedCall::Command(command, expected) => {
+                let job = job(*command);
+                let order = bus
+                    .start(axis, |drive| Job { drive, ..job })
+                    .map_err(words)?;
+                orders.push((axis, order, expected));
+            }
+            other => do_one(bus, axis, other).map_err(words)?,
+        }
+    }
+    for (axis, order, expected) in orders {
+        let words = |error: Error| format!("drive {axis}: {error}");
+        let value = bus.result(order).map_err(words)?;
+        compare(axis, value, expected)?;
+    }
+    Ok(())
+}
+
+fn job(command: Command) -> Job {
+    Job::new(0, command)
+}
+
+fn do_one(bus: &Bus<'_>, axis: Axis, call: &PlannedCall) -> Result<(), Error> {
+    match call {
+        PlannedCall::Command(..) => Ok(()),
+        PlannedCall::ReadEeprom(address, expected) => {
+            let byte = bus.read_eeprom(axis, *address)?;
+            compare(axis, Some(u32::from(byte)), &[*expected]).map_err(Error::Value)
+        }
+        PlannedCall::WriteEeprom(address, byte) => bus.write_eeprom(axis, *address, *byte),
+        PlannedCall::RamToEeprom => bus.ram_to_eeprom(axis),
+        PlannedCall::Reference => bus.reference(axis),
+        PlannedCall::SetActualValue(position) => bus.set_actual_value(axis, *position),
+        PlannedCall::InitPs => bus.init_ps(axis),
+        PlannedCall::WritePs(position) => bus.write_ps(axis, *position),
+        PlannedCall::StartPs => bus.start_ps(axis),
+        PlannedCall::WaitForEnd => bus.wait_for_end(axis),
+    }
+}
+
+/// Whether what was read is what is expected, byte by byte.
+fn compare(axis: Axis, value: Option<u32>, expected: &[Expected]) -> Result<(), String> {
+    let Some(value) = value else { return Ok(()) };
+    let bytes = value.to_be_bytes();
+    let bytes = &bytes[bytes.len() - expected.len().min(bytes.len())..];
+    let same = bytes
+        .iter()
+        .zip(expected)
+        .all(|(byte, expected)| match expected {
+            Expected::Byte(wanted) => byte == wanted,
+            _ => true,
+        });
+    if same {
+        return Ok(());
+    }
+    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X}")).collect::<String>();
+    let wanted: String = expected
+        .iter()
+        .map(|expected| match expected {
+            Expected::Byte(byte) => format!("{byte:02X}"),
+            _ => "xx".to_owned(),
+        })
+        .collect();
+    Err(format!(
+        "drive {axis} holds {}, expected is {wanted}",
+        hex(bytes)
+    ))
+}
