@@ -24,7 +24,7 @@ impl Planner {
             Job::Master(drives, call) => self.master(drives, call),
             Job::Count(ring, number) => {
                 self.ring(*ring, number.span)?;
-                let drives = number.value(i64::from(self.size(*ring)))?;
+                let drives = number.value(self.size(*ring))?;
                 let drives = u8::try_from(drives).map_err(|_| {
                     Problem::new(
                         number.span,
