@@ -2,8 +2,7 @@
 
 use super::super::address::RingSize;
 use super::super::check_sequence::{Progress, Watch};
-use super::super::error_mode::UPSTREAM_ZEROS;
-use super::diagnosis::{Cause, Evidence, SPELLING, Spelled};
+use super::diagnosis::{Cause, Evidence, NO_TELEGRAM, SPELLING, Spelled};
 use super::event::Event;
 use super::fault::{Fault, RingLink, Stop};
 use super::in_flight::{Owner, Place};
@@ -132,7 +131,7 @@ impl Episode {
         let runs = self.attempts == 0;
         if self.failures > 0 && runs && self.stumble == Stumble::Idle {
             self.clean = self.clean.saturating_add(1);
-            if self.clean > u16::from(ring.drives()) + 4 * u16::from(UPSTREAM_ZEROS) {
+            if self.clean > u16::from(ring.drives()) + 4 * u16::from(NO_TELEGRAM) {
                 self.got_over();
             }
         }
