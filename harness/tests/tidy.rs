@@ -64,6 +64,11 @@ fn imports_go_one_way() {
             "harness/sim/src/reference.rs",
             &["harness_proto", "crate::"],
         ),
+        // The master and the drive share the codec and nothing else.
+        (
+            "harness/proto/src/novobus/master",
+            &["bus_end", "error_mode", "parameter_channel", "Memory"],
+        ),
         // A scenario sees a link; only `simulate` makes simulated ones.
         (
             "harness/src/scenario/run",

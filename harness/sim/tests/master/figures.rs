@@ -283,6 +283,13 @@ fn the_line_has_no_gaps() {
         }
         let carried = couple.sent.iter().filter(|(_, b)| b.is_some()).count();
         assert!(carried * 1000 >= couple.sent.len() * 995, "ring {drives}");
+        // Jobs a byte time: at least as many as by the table, which has 2N jobs in 14N + 1 bytes.
+        let done = couple.master.counters().done;
+        let rounds = (carried as u64 - 8 - u64::from(drives)) / position_bytes(size(drives));
+        assert!(
+            done >= 2 * u64::from(drives) * rounds,
+            "ring {drives}: {done} jobs"
+        );
         assert_eq!(couple.bytes().iter().filter(|b| **b == 0x80).count(), 0);
     }
 }

@@ -133,7 +133,8 @@ impl Cycle {
             *actual = Some(value);
         }
         self.answered += 1;
-        self.answered % (self.drives.len() as u64).max(1) == 0
+        self.answered
+            .is_multiple_of((self.drives.len() as u64).max(1))
     }
 
     /// What was sent and not answered is sent again. A round that begins anew has been asked for already.

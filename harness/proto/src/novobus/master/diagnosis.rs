@@ -3,8 +3,7 @@
 
 use super::super::address::RingSize;
 use super::super::check_sequence::{SEQUENCE, ZEROS};
-use super::super::error_mode::UPSTREAM_ZEROS;
-use super::super::sync::SYNCO;
+use super::super::sync::{MAX_NET_LENGTH, SYNCO};
 use super::fault::{Fault, RingLink};
 use super::in_flight::{Place, Sent};
 use crate::line::Received;
@@ -17,12 +16,14 @@ const MOST_SHIFT: usize = 9;
 /// So many bytes must fit for a shift to be believed.
 const FITTING: usize = 4;
 
+/// So many zeros in a row are no telegram's: it holds at most seven (ND21 9.7).
+pub(super) const NO_TELEGRAM: u8 = MAX_NET_LENGTH + 1;
 /// After so many bytes every drive behind the one that detected the error has sent its 17 zeros: they
 /// notice the error after at most 9 bytes, the length of a telegram (ND21 9.7).
 const SETTLED: u32 = ZEROS as u32 + 9;
-/// So often must a byte come then to be what the ring spells out: a telegram holds at most seven equal
-/// net bytes.
-const STEADY: u32 = UPSTREAM_ZEROS as u32 + 1;
+/// So often must a byte come then to be what the ring spells out: more than an address and net bytes can
+/// be equal in a row.
+const STEADY: u32 = NO_TELEGRAM as u32 + 1;
 /// Byte times, besides those of the way round, within which a ring has spelled out what it has to say: a
 /// telegram is ended first, and drives that send zeros unasked need as many again.
 pub(super) const SPELLING: u64 = 2 * (SETTLED + STEADY) as u64;
@@ -145,7 +146,7 @@ impl Evidence {
             return Spelled::Noise;
         }
         // In a ring of more than 128 drives SYNCO is an address as well; but before an address come zeros.
-        let zeros = self.longest_zeros >= u32::from(UPSTREAM_ZEROS);
+        let zeros = self.longest_zeros >= u32::from(NO_TELEGRAM);
         if last.byte < ring.drives() && (zeros || last.byte != SYNCO) {
             Spelled::Address(last.byte)
         } else if last.byte == SYNCO {

@@ -160,7 +160,7 @@ impl fmt::Display for Fault {
 pub struct Stop {
     /// What was wrong when the last recovery had failed.
     pub fault: Fault,
-    /// How many recoveries had failed.
+    /// How many recoveries had not helped.
     pub attempts: u8,
 }
 

@@ -61,6 +61,8 @@ mod job;
 mod options;
 mod recovery;
 mod store;
+#[cfg(test)]
+mod tests;
 
 pub use cycle::Pace;
 pub use event::{Counters, Event};
@@ -109,6 +111,10 @@ pub struct Master {
     counters: Counters,
 }
 
+/// The most bytes that may be under way besides those that a ring needs by itself, however much slack
+/// there is.
+const MOST_SLACK: u64 = 4096;
+
 /// The silence after which a drive with monitoring reports a time-out (ND21 9.9). What comes after it was
 /// sent unasked: at least 10 ms later, which may be sooner than the master misses a byte.
 const TIME_OUT: Span = Span::from_millis(10);
@@ -140,7 +146,7 @@ impl Master {
         // A byte needs one byte time to the first drive and one for each drive that passes it on.
         let round = u64::from(ring.drives()) + 1;
         let slack = options.slack.units() / byte_time.units() + 2;
-        let most = usize::try_from(round + slack).unwrap_or(usize::MAX);
+        let most = usize::try_from(round + slack.min(MOST_SLACK)).unwrap_or(usize::MAX);
         Self {
             ring,
             options,
@@ -227,6 +233,7 @@ impl Master {
         }
         list.sort_unstable();
         list.dedup();
+        self.episode.exchange_with(&list);
         self.cycle.set(list, pace);
         Ok(())
     }

@@ -2,8 +2,7 @@
 
 use super::super::address::RingSize;
 use super::super::check_sequence::{Progress, Watch};
-use super::super::error_mode::UPSTREAM_ZEROS;
-use super::diagnosis::{Cause, Evidence, SPELLING, Spelled};
+use super::diagnosis::{Cause, Evidence, NO_TELEGRAM, SPELLING, Spelled};
 use super::event::Event;
 use super::fault::{Fault, RingLink, Stop};
 use super::in_flight::{Owner, Place};
@@ -86,11 +85,11 @@ pub(super) enum Stumble {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Episode {
     /// Recoveries since the stumble was last got over.
-    failures: u8,
+    failures: u16,
     /// Recoveries since the ring last ran.
     attempts: u8,
     /// How many of the failures began within one and the same command of the drive that was named.
-    rejections: u8,
+    rejections: u16,
     stumble: Stumble,
     /// Bytes that have come back right since the ring runs again.
     clean: u16,
@@ -132,9 +131,16 @@ impl Episode {
         let runs = self.attempts == 0;
         if self.failures > 0 && runs && self.stumble == Stumble::Idle {
             self.clean = self.clean.saturating_add(1);
-            if self.clean > u16::from(ring.drives()) + 4 * u16::from(UPSTREAM_ZEROS) {
+            if self.clean > u16::from(ring.drives()) + 4 * u16::from(NO_TELEGRAM) {
                 self.got_over();
             }
+        }
+    }
+
+    /// From now on process data are exchanged with these drives only.
+    pub(super) fn exchange_with(&mut self, drives: &[u8]) {
+        if matches!(self.stumble, Stumble::Exchange(drive) if !drives.contains(&drive)) {
+            self.stumble = Stumble::Idle;
         }
     }
 
@@ -222,7 +228,7 @@ impl Master {
         episode.fault = Some(fault);
         let (failures, attempt) = (episode.failures, episode.attempts);
         let always_rejected = episode.rejections == failures;
-        if failures > self.options.attempts {
+        if failures > u16::from(self.options.attempts) {
             if let Some((_, job)) = rejected.filter(|_| always_rejected) {
                 fault = Fault::Rejected {
                     drive: job.drive,
@@ -300,7 +306,7 @@ impl Master {
     fn stop(&mut self, fault: Fault) {
         let stop = Stop {
             fault,
-            attempts: self.episode.failures.saturating_sub(1),
+            attempts: self.options.attempts,
         };
         let events = &mut self.events;
         self.store.restart(|job| {
