@@ -2,7 +2,7 @@
 
 use harness::bus::{Axis, Bus, Error, Options, SkStatus, count_drives};
 use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink, Stimulus};
-use harness_proto::line::Rate;
+use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::s_ramp::Direction;
@@ -13,7 +13,7 @@ use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Job;
 use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::novobus::properties::Properties;
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
 use harness_sim::bench::Bench;
 use harness_sim::drive::Drive;
 use harness_sim::fault::LinkFault;
@@ -289,4 +289,82 @@ fn two_rings() {
     assert_eq!(bus.read_word(axis(0x0102), ram::NSOLL), Ok(7));
     assert_eq!(bus.read_word(axis(0x0001), ram::NSOLL), Ok(0));
     assert_eq!(bus.active_rings(), 2);
+}
+
+/// A ring that answers as it likes: random bytes, late, too many, or nothing.
+struct Hostile {
+    seed: u64,
+    now: Instant,
+    /// Bytes that come for each that is sent, in hundredths.
+    answers: u64,
+    waiting: u64,
+    echo: bool,
+    last: u8,
+}
+
+impl Hostile {
+    fn random(&mut self) -> u64 {
+        self.seed ^= self.seed << 13;
+        self.seed ^= self.seed >> 7;
+        self.seed ^= self.seed << 17;
+        self.seed
+    }
+}
+
+impl Line for Hostile {
+    fn byte_time(&self) -> Span {
+        Rate::Baud38400.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn send(&mut self, _ring: usize, bytes: &[u8]) -> Instant {
+        self.waiting += self.answers * bytes.len() as u64;
+        self.last = bytes.last().copied().unwrap_or(self.last);
+        self.now + self.byte_time() * bytes.len() as u64
+    }
+
+    fn receive(&mut self, _ring: usize) -> Option<(Instant, Received)> {
+        self.waiting = self.waiting.checked_sub(100)?;
+        let byte = if self.echo && self.random() % 50 > 0 {
+            self.last
+        } else {
+            self.random().to_le_bytes()[0]
+        };
+        Some((self.now, Received::good(byte)))
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.now = self.now.max(until);
+        true
+    }
+}
+
+/// Whatever comes back, opening and every call end within bounded time, with a value or a named failure.
+#[test]
+fn a_hostile_ring_ends_every_call() {
+    for case in 0..60 {
+        let line = Hostile {
+            seed: 0x9E37_79B9_7F4A_7C15 ^ case,
+            now: Instant::START,
+            answers: [0, 50, 100, 130, 400][case as usize % 5],
+            waiting: 0,
+            echo: case % 2 == 0,
+            last: 0x80,
+        };
+        let mut counting = Hostile { ..line };
+        let _any = count_drives(&mut counting, 0);
+        assert!(counting.now < Instant::START + Span::from_millis(2_000));
+        let drives = 1 + case % 7;
+        let Ok(bus) = Bus::open(Box::new(line), &[size(drives)], Options::default()) else {
+            continue;
+        };
+        for _ in 0..5 {
+            let _any = bus.read_word(axis(0), ram::NIST);
+            let _any = bus.write_byte(axis(0), ram::NSOLL, 1);
+        }
+        bus.close();
+    }
 }
