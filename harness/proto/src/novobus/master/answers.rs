@@ -10,7 +10,7 @@ use super::recovery::Stumble;
 use crate::line::Received;
 use crate::time::Instant;
 
-/// Data that have come back and have no check of their own: they count when the byte behind them has come
+/// Data that have come back and have no check of their own, or one that may be something else: they count when the byte behind them has come
 /// back right, and says something. 00 does not: a drive in the error mode sends it. A byte that is the same
 /// as the last of the data does not: had one been lost, it would stand in its place.
 #[derive(Clone, Debug, Default)]
@@ -117,7 +117,8 @@ impl Master {
             return false;
         }
         if entry.is_answered() {
-            if entry.is_checked() {
+            // A checking byte that is SYNCO as well may be a SYNCO behind an answer that was lost.
+            if entry.is_checked() && byte != SYNCO {
                 self.finish(slot);
             } else {
                 if let Some((before, _)) = self.unconfirmed.read.replace((slot, byte)) {
