@@ -34,6 +34,11 @@ enum Doubt {
 }
 
 impl Unconfirmed {
+    #[inline]
+    fn is_some(&self) -> bool {
+        self.exchange.is_some() || self.read.is_some()
+    }
+
     /// The exchange that is settled by a byte that has come back right. Behind process data the sync byte
     /// of any telegram is good enough: telegrams may follow that hold nothing else that is known.
     fn settled_exchange(&mut self, composed: &Composed) -> Option<(u8, u16)> {
@@ -88,7 +93,9 @@ impl Master {
         let byte = received.byte;
         let mut right = received.error.is_none() && composed.back.is_none_or(|back| back == byte);
         if right {
-            self.confirm(&composed);
+            if self.unconfirmed.is_some() {
+                self.confirm(&composed);
+            }
             match (composed.place, composed.owner) {
                 (Place::Parameter, Owner::Job(slot)) => right = self.take_answer(slot, byte),
                 (Place::ProcessHigh, _) => self.unconfirmed.high = byte,

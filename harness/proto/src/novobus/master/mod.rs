@@ -321,8 +321,7 @@ impl Master {
                 composed,
                 due: now + self.patience,
             });
-        }
-        if let State::Locating { evidence, .. } = &mut self.state {
+        } else if let State::Locating { evidence, .. } = &mut self.state {
             evidence.expect(composed.back);
         }
         self.counters.sent += 1;
