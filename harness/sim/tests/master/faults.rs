@@ -33,11 +33,12 @@ fn constant(drive: u8, address: u16) -> u8 {
 }
 
 /// Whether faults leave something for the checks of the bus to notice: no other byte with good parity, no
-/// loss of power, no number of bytes lost at once.
+/// loss of power, no number of bytes lost at once, no byte too few or too many.
 struct Noticed {
     all: bool,
     power: bool,
     lost: bool,
+    shift: bool,
 }
 
 fn link_fault(random: &mut Random, noticed: &mut Noticed) -> LinkFault {
@@ -52,8 +53,14 @@ fn link_fault(random: &mut Random, noticed: &mut Noticed) -> LinkFault {
             data: byte,
             parity: false,
         }),
-        6 => LinkFault::Drop,
-        7 => LinkFault::Duplicate,
+        6 => {
+            noticed.shift = false;
+            LinkFault::Drop
+        }
+        7 => {
+            noticed.shift = false;
+            LinkFault::Duplicate
+        }
         8 => LinkFault::Delay(Span::from_micros(100 * random.below(400))),
         9 => LinkFault::Break(Span::from_micros(100 * random.below(100))),
         10 => LinkFault::Overrun,
@@ -199,6 +206,7 @@ fn mend(couple: &mut Couple<Counted>) {
 #[test]
 fn every_job_ends_with_the_truth_or_a_named_failure() {
     let (mut disturbed, mut stopped, mut unknown, mut done) = (0u64, 0, 0, 0);
+    let mut fooled = 0;
     for case in 0..CASES {
         let mut random = Random(seed().wrapping_mul(CASES).wrapping_add(case));
         let place = || format!("case {case}; {}", repeat("every_job_ends"));
@@ -208,6 +216,7 @@ fn every_job_ends_with_the_truth_or_a_named_failure() {
             all: true,
             power: true,
             lost: true,
+            shift: true,
         };
         let mut jobs = Vec::new();
         if random.below(3) == 0 {
@@ -255,13 +264,13 @@ fn every_job_ends_with_the_truth_or_a_named_failure() {
                         .map(|i| constant(job.drive, address + i))
                         .collect();
                     let lost_power = drive.starts > 0 && read.iter().all(|b| *b == 0);
-                    // ReadLong has no check of its own: a byte with good parity is believed.
-                    let believed = long && !(noticed.all && noticed.lost);
-                    assert!(
-                        read == there || lost_power || believed,
-                        "{read:?} {}",
-                        shown()
-                    );
+                    if read != there && !lost_power {
+                        // 8 bits of checking can be fooled by bytes with good parity and by runs of lost
+                        // ones; ReadLong, which has none, by a byte too few and one too many as well.
+                        let may_fool = !(noticed.all && noticed.lost) || long && !noticed.shift;
+                        assert!(may_fool, "{read:?} {}", shown());
+                        fooled += 1;
+                    }
                     done += 1;
                 }
                 Outcome::Done { perhaps_twice } => {
@@ -317,6 +326,7 @@ fn every_job_ends_with_the_truth_or_a_named_failure() {
         }
         ring_is_sound(couple, &place());
     }
+    assert!(fooled <= CASES / 100, "{fooled}");
     // Cases that are too tame, or too wild, would show little.
     assert!(disturbed > CASES && disturbed < 20 * CASES, "{disturbed}");
     assert!(done > 10 * CASES, "{done}");

@@ -170,6 +170,24 @@ fn another_number_of_drives_is_counted_before_any_job() {
     }
 }
 
+/// A drive that is bridged in the middle of work: the first address byte that comes back wrong stops it.
+#[test]
+fn another_number_of_drives_is_noticed_at_work() {
+    let mut couple = counted(5, false);
+    let mut ring = Ring::new(size(4), Rate::Baud38400, |_| Counted::new(false));
+    ring.run_until(couple.ring.now());
+    couple.ring = ring;
+    let id = couple.submit(Job::new(3, READ));
+    couple.steps(2_000);
+    let fault = Fault::WrongRingSize {
+        counted: 4,
+        ring: size(5),
+    };
+    let stop = stop(&couple).expect("the end");
+    assert_eq!(stop.fault, fault);
+    assert_eq!(couple.outcome(id), Some(&Outcome::Failed(stop)));
+}
+
 #[test]
 fn late_lost_and_doubled_bytes_have_names() {
     // After the start 3 + N + 3 bytes have been sent; the telegram is what comes next.

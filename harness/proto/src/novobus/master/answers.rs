@@ -10,7 +10,7 @@ use super::recovery::Stumble;
 use crate::line::Received;
 use crate::time::Instant;
 
-/// Data that have come back and have no check of their own: they count when the byte behind them has come
+/// Data that have come back and have no check of their own, or one that may be something else: they count when the byte behind them has come
 /// back right, and says something. 00 does not: a drive in the error mode sends it. A byte that is the same
 /// as the last of the data does not: had one been lost, it would stand in its place.
 #[derive(Clone, Debug, Default)]
@@ -34,6 +34,11 @@ enum Doubt {
 }
 
 impl Unconfirmed {
+    #[inline]
+    fn is_some(&self) -> bool {
+        self.exchange.is_some() || self.read.is_some()
+    }
+
     /// The exchange that is settled by a byte that has come back right. Behind process data the sync byte
     /// of any telegram is good enough: telegrams may follow that hold nothing else that is known.
     fn settled_exchange(&mut self, composed: &Composed) -> Option<(u8, u16)> {
@@ -88,7 +93,9 @@ impl Master {
         let byte = received.byte;
         let mut right = received.error.is_none() && composed.back.is_none_or(|back| back == byte);
         if right {
-            self.confirm(&composed);
+            if self.unconfirmed.is_some() {
+                self.confirm(&composed);
+            }
             match (composed.place, composed.owner) {
                 (Place::Parameter, Owner::Job(slot)) => right = self.take_answer(slot, byte),
                 (Place::ProcessHigh, _) => self.unconfirmed.high = byte,
@@ -117,7 +124,8 @@ impl Master {
             return false;
         }
         if entry.is_answered() {
-            if entry.is_checked() {
+            // A checking byte that is SYNCO as well may be a SYNCO behind an answer that was lost.
+            if entry.is_checked() && byte != SYNCO {
                 self.finish(slot);
             } else {
                 if let Some((before, _)) = self.unconfirmed.read.replace((slot, byte)) {

@@ -36,7 +36,8 @@
 //! # What is known of a job that was under way
 //!
 //! * It *ran* when every byte up to the drive's own -checksum has come back right: the address says who
-//!   answered, and only a drive whose check of the command was right sends that byte.
+//!   answered, and only a drive whose check of the command was right sends that byte. (For two sums of
+//!   256 both checking bytes are the same; then the address alone says it.)
 //! * It *did not run* when its checking byte was never sent: until then a drive changes nothing (9.6).
 //! * In between nobody can say. That the ring names a drive does not prove that the byte had not reached
 //!   those behind it: the named one is the first *in the ring* that is in the error mode, and may have
@@ -49,6 +50,14 @@
 //! Data without a check of their own (process data, the four data bytes of `ReadLong`) count only when a
 //! byte other than 00 has come back right behind them: a drive in the error mode answers 00. Where they
 //! end with 80, and only SYNCO follows, a lost byte would look the same; then the drives are counted.
+//!
+//! # What cannot be noticed
+//!
+//! The bus checks a byte by its parity and a command by 8 bits. Whoever loses whole runs of bytes without a
+//! trace (a plug pulled and put back) can fool both: a telegram to the "next" drive then means the one
+//! before, until the next address byte, and process data, which no check guards, are taken for a
+//! neighbour's. Where that matters, [`Packing`] switches the short addresses off: every telegram then
+//! brings back the number of the drive that answered.
 
 mod answers;
 mod compose;
@@ -312,8 +321,7 @@ impl Master {
                 composed,
                 due: now + self.patience,
             });
-        }
-        if let State::Locating { evidence, .. } = &mut self.state {
+        } else if let State::Locating { evidence, .. } = &mut self.state {
             evidence.expect(composed.back);
         }
         self.counters.sent += 1;
