@@ -14,6 +14,7 @@ pub mod cells;
 pub mod device;
 pub mod drive;
 pub mod fault;
+pub mod fuzz;
 pub mod link;
 pub mod nd21;
 pub mod node;
