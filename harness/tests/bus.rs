@@ -328,7 +328,7 @@ impl Line for Hostile {
 
     fn receive(&mut self, _ring: usize) -> Option<(Instant, Received)> {
         self.waiting = self.waiting.checked_sub(100)?;
-        let byte = if self.echo && self.random() % 50 > 0 {
+        let byte = if self.echo && !self.random().is_multiple_of(50) {
             self.last
         } else {
             self.random().to_le_bytes()[0]
