@@ -39,6 +39,9 @@ use harness_proto::time::{Instant, Span};
 const CYCLE: Span = Span::from_micros(CYCLE_US as u64);
 /// The clock of the oscilloscope (14.10.6.2): four scans to a cycle.
 const SCAN: Span = Span::from_micros(CYCLE_US as u64 / 4);
+/// The settings of the current regulator that can be read in the ASIC, and where the EEPROM has them; they
+/// become active at reset (14.6.1).
+const ASIC: [(u8, u16); 2] = [(ee::A_MPR1, 0xFF80), (ee::A_MPR98, 0xFF82)];
 
 /// How many whole cycles a time is.
 fn cycles(time: Span) -> u32 {
@@ -248,6 +251,9 @@ impl Program {
                 cells.put(link.ram + u16::from(i), byte);
             }
         }
+        for (eeprom, asic) in ASIC {
+            cells.put(asic, cells.eeprom()[usize::from(eeprom)]);
+        }
         let first = usize::from(ee::IMPULSZAHL);
         self.impulses = u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]]);
         self.pole_pairs = u16::from(cells.eeprom()[usize::from(ee::POLE)] / 2);
@@ -301,6 +307,11 @@ impl Program {
             && let Some(error) = monitor::error(&self.world, switches, &self.cells)
         {
             error_state::raise(error.code(), &mut self.cells);
+        }
+        if let Some(warning) = monitor::warning(&self.world, &self.cells)
+            && self.cells.word(ram::ERRORCODE) == 0
+        {
+            error_state::note(warning.code(), &mut self.cells);
         }
         self.mode = self.work_out_mode();
         let orders = self.plc(now);
