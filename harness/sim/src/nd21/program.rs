@@ -286,8 +286,17 @@ impl Program {
 
     /// The power has come back. What was being written to the EEPROM when it failed is damaged, which the
     /// self-test finds (14.11.2).
-    pub(super) fn power_on(&mut self) {
+    pub(super) fn power_on(&mut self, now: Instant) {
         self.eeprom_controller.damage(&mut self.cells);
+        // Meanwhile the motor has run out.
+        let load = f64::from(self.world.load) / 1_000.0;
+        while self.next_cycle <= now && (self.plant.speed != 0.0 || load != 0.0) {
+            self.plant.step(0.0, load, self.world.jammed);
+            self.next_cycle += CYCLE;
+        }
+        self.now = now;
+        self.next_cycle = now + CYCLE;
+        self.due = Instant::START;
         self.encoder_zero = self.plant.increments();
         self.start();
     }
