@@ -22,7 +22,7 @@ pub trait Device {
     }
 
     /// The power has come back after it had been off: everything but the EEPROM is lost.
-    fn power_on(&mut self);
+    fn power_on(&mut self, now: Instant);
 
     /// Whether the device is in the bus's error mode.
     fn in_error(&self) -> bool;

@@ -114,8 +114,8 @@ impl Device for Drive {
         each!(self, drive => drive.advance(now));
     }
 
-    fn power_on(&mut self) {
-        each!(self, drive => drive.power_on());
+    fn power_on(&mut self, now: Instant) {
+        each!(self, drive => drive.power_on(now));
     }
 
     fn in_error(&self) -> bool {

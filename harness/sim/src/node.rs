@@ -71,7 +71,7 @@ impl<D: Device> Node<D> {
             }
             DriveFault::On => {
                 if !self.powered {
-                    self.device.power_on();
+                    self.device.power_on(now);
                 }
                 self.powered = true;
             }

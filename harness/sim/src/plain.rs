@@ -68,7 +68,7 @@ impl Device for PlainDrive {
         self.bus_end.handle_deadline(now, &mut self.memory)
     }
 
-    fn power_on(&mut self) {
+    fn power_on(&mut self, _now: Instant) {
         self.memory.start();
         self.bus_end = BusEnd::new(self.properties);
     }

@@ -92,8 +92,8 @@ impl Device for Nd21Drive {
         self.program.advance(now);
     }
 
-    fn power_on(&mut self) {
-        self.program.power_on();
+    fn power_on(&mut self, now: Instant) {
+        self.program.power_on(now);
         self.bus_end = BusEnd::new(self.properties);
     }
 

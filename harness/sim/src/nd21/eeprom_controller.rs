@@ -127,7 +127,10 @@ impl EepromController {
                 put(memory, CONTROL, READ);
             }
             Command::WriteByte => {
-                memory.eeprom_mut()[address] = memory.peek(DATA);
+                // 14.3.5: this byte is a read only byte.
+                if address != usize::from(ee::VERSION) {
+                    memory.eeprom_mut()[address] = memory.peek(DATA);
+                }
                 // Whoever writes the test byte itself means it.
                 if address != usize::from(ee::PARITY) {
                     set_parity(memory.eeprom_mut());

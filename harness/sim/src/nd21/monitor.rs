@@ -3,7 +3,8 @@
 //!
 //! Choices: both end switches at once are error 314; the motor's sensor is too hot above its limit if it
 //! is a PTC or an opener, below it if it is an NTC; a limit of the cooler's temperature is passed
-//! downwards, since `TempKK` falls as it gets hotter (E114).
+//! downwards, since `TempKK` falls as it gets hotter (E114); a warning stands in `errorcode` and the history,
+//! without the error mode (E132).
 
 use super::world::World;
 use crate::cells::Cells;
@@ -89,13 +90,25 @@ pub(super) fn error(world: &World, switches: EndSwitches, cells: &Cells) -> Opti
     if hot {
         return Some(ErrorCode::OverTempMot);
     }
-    let impulses = cells.byte(ram::SW_VERSION) & sw_version::SOURCE == sw_version::SOURCE_FREQUENCY
-        && cells.byte(ram::SW_VERSION2) & sw_version2::IMPULSE_ERROR != 0;
-    if impulses && world.frequency > super::source::FASTEST_IMPULSES {
+    if impulses_too_fast(world, cells)
+        && cells.byte(ram::SW_VERSION2) & sw_version2::IMPULSE_ERROR != 0
+    {
         return Some(ErrorCode::ImpulsEingang);
     }
     if hardware & hw_version::END_SWITCH_BLOCKS != 0 {
         return switches.error();
     }
     None
+}
+
+/// The warning that the present situation is: an error at the impulse input, which does not switch off the
+/// power stage (14.3.2 bit 6 = 0).
+pub(super) fn warning(world: &World, cells: &Cells) -> Option<ErrorCode> {
+    let only_warned = cells.byte(ram::SW_VERSION2) & sw_version2::IMPULSE_ERROR == 0;
+    (only_warned && impulses_too_fast(world, cells)).then_some(ErrorCode::ImpulsEingang)
+}
+
+fn impulses_too_fast(world: &World, cells: &Cells) -> bool {
+    cells.byte(ram::SW_VERSION) & sw_version::SOURCE == sw_version::SOURCE_FREQUENCY
+        && world.frequency > super::source::FASTEST_IMPULSES
 }

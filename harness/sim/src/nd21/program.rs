@@ -39,6 +39,9 @@ use harness_proto::time::{Instant, Span};
 const CYCLE: Span = Span::from_micros(CYCLE_US as u64);
 /// The clock of the oscilloscope (14.10.6.2): four scans to a cycle.
 const SCAN: Span = Span::from_micros(CYCLE_US as u64 / 4);
+/// The settings of the current regulator that can be read in the ASIC, and where the EEPROM has them; they
+/// become active at reset (14.6.1).
+const ASIC: [(u8, u16); 2] = [(ee::A_MPR1, 0xFF80), (ee::A_MPR98, 0xFF82)];
 
 /// How many whole cycles a time is.
 fn cycles(time: Span) -> u32 {
@@ -257,6 +260,9 @@ impl Program {
                 cells.put(link.ram + u16::from(i), byte);
             }
         }
+        for (eeprom, asic) in ASIC {
+            cells.put(asic, cells.eeprom()[usize::from(eeprom)]);
+        }
         let first = usize::from(ee::IMPULSZAHL);
         self.impulses = u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]]);
         self.pole_pairs = u16::from(cells.eeprom()[usize::from(ee::POLE)] / 2);
@@ -289,8 +295,17 @@ impl Program {
 
     /// The power has come back. What was being written to the EEPROM when it failed is damaged, which the
     /// self-test finds (14.11.2).
-    pub(super) fn power_on(&mut self) {
+    pub(super) fn power_on(&mut self, now: Instant) {
         self.eeprom_controller.damage(&mut self.cells);
+        // Meanwhile the motor has run out.
+        let load = f64::from(self.world.load) / 1_000.0;
+        while self.next_cycle <= now && (self.plant.speed != 0.0 || load != 0.0) {
+            self.plant.step(0.0, load, self.world.jammed);
+            self.next_cycle += CYCLE;
+        }
+        self.now = now;
+        self.next_cycle = now + CYCLE;
+        self.due = Instant::START;
         self.encoder_zero = self.plant.increments();
         self.start();
     }
@@ -311,6 +326,12 @@ impl Program {
             && let Some(error) = monitor::error(&self.world, switches, &self.cells)
         {
             error_state::raise(error.code(), &mut self.cells);
+        }
+        if self.stirred
+            && let Some(warning) = monitor::warning(&self.world, &self.cells)
+            && self.cells.word(ram::ERRORCODE) == 0
+        {
+            error_state::note(warning.code(), &mut self.cells);
         }
         self.stirred = self.mode == Mode::Reset;
         self.mode = self.work_out_mode();

@@ -224,7 +224,7 @@ fn play(properties: Nd21Properties, seeded: Option<u8>, operations: &[Operation]
                     drive.advance(now);
                 }
             }
-            Operation::PowerFailure => drive.power_on(),
+            Operation::PowerFailure => drive.power_on(now),
             Operation::Reset => drive.program_mut().reset(),
         }
         for address in 0..=u16::MAX {
