@@ -40,7 +40,8 @@ impl Source {
         }
     }
 
-    /// The nominal speed of this cycle, limited to `nMax`; `nsoll` shows where it comes from an input.
+    /// The nominal speed of this cycle, limited to `nMax`; `nsoll` shows it where it comes from an input for good,
+    /// and not where `RdPos` (`analogue`) asks for that of the analogue input.
     pub(super) fn cycle(&mut self, world: &World, analogue: bool, cells: &mut Cells) -> i16 {
         let software = cells.byte(ram::SW_VERSION);
         let narrow = cells.byte(ram::SW_VERSION2) & sw_version2::TO_8000 != 0;
@@ -59,11 +60,18 @@ impl Source {
             }
             _ => Some(0),
         };
-        if let Some(speed) = from_input {
-            cells.put_word(ram::NSOLL, speed.cast_unsigned());
-        }
+        let nominal = match from_input {
+            // `RdPos` switches over as long as it is held; then the digital nominal value holds again
+            // (13.1.4, 13.1.9.5).
+            Some(speed) if analogue => speed,
+            Some(speed) => {
+                cells.put_word(ram::NSOLL, speed.cast_unsigned());
+                speed
+            }
+            None => cells.signed(ram::NSOLL),
+        };
         let most = cells.word(ram::N_MAX).min(0x7FFF).cast_signed();
-        let speed = cells.signed(ram::NSOLL).clamp(-most, most);
+        let speed = nominal.clamp(-most, most);
         if software & sw_version::REVERSING == 0 {
             return speed;
         }
