@@ -42,7 +42,7 @@ pub fn drive(data: &[u8]) {
                 now += Span::from_micros(287);
             }
             5 => drive.program_mut().reset(),
-            6 => drive.power_on(),
+            6 => drive.power_on(now),
             7 => drive.stimulate(match a % 4 {
                 0 => Stimulus::Load(i32::from(i16::from_be_bytes([b, c])) * 10),
                 1 => Stimulus::Rail(u32::from(b) * 4),

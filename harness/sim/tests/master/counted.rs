@@ -112,7 +112,7 @@ impl Device for Counted {
         self.bus_end.handle_deadline(now, &mut self.memory)
     }
 
-    fn power_on(&mut self) {
+    fn power_on(&mut self, _now: Instant) {
         self.starts += 1;
         self.memory.cells.reset();
         self.bus_end = BusEnd::new(Properties::default());
