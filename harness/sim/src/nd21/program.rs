@@ -315,7 +315,6 @@ impl Program {
         if self.world.has_cams() {
             self.stirred |= self.world.turn_to(self.plant.increments());
         }
-        self.show_inputs();
         let switches = EndSwitches::new(&self.world, &self.cells);
         if self.mode == Mode::Reset && now >= self.self_test_until {
             self.end_self_test();
@@ -360,6 +359,7 @@ impl Program {
             error_state::raise(ErrorCode::Schleppfehler.code(), &mut self.cells);
             self.mode = self.work_out_mode();
         }
+        self.show_inputs();
         self.show_flags(switches, moved.flags);
         outputs::show_gpo2(&self.positioning, &mut self.cells);
         self.clock.pass(1, self.released(), &mut self.cells);
