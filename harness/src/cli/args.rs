@@ -85,6 +85,9 @@ pub struct RunArguments {
     /// Play on a ring of this many drives, where a scenario allows it.
     #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
     pub ring: Option<u8>,
+    /// Show what scenarios recorded, also where several are played.
+    #[arg(long)]
+    pub records: bool,
     /// Count a skipped scenario as missing (exit code 5).
     #[arg(long)]
     pub require_all: bool,

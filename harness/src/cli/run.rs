@@ -73,7 +73,9 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
         let mut line = line(entry, outcome, output);
-        line.push_str(&records(outcome));
+        if arguments.records || entries.len() == 1 {
+            line.push_str(&records(outcome));
+        }
         bar.suspend(|| output.result(&line))?;
         let details = details(entry, &played);
         bar.suspend(|| output.say(&details));
