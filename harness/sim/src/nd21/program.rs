@@ -349,6 +349,10 @@ impl Program {
             self.mode = self.work_out_mode();
         }
         self.show_flags(switches, moved.flags);
+        if error_state::is_set(&self.cells) {
+            // 14.7.1: the code of an error that this cycle has found.
+            self.show_inputs();
+        }
         outputs::show_gpo2(&self.positioning, &mut self.cells);
         self.clock.pass(1, self.released(), &mut self.cells);
         self.quiet = moved.at_rest
