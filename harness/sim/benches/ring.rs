@@ -113,7 +113,7 @@ impl Device for Repeater {
         Step::default()
     }
 
-    fn power_on(&mut self) {}
+    fn power_on(&mut self, _now: Instant) {}
 
     fn in_error(&self) -> bool {
         false

@@ -331,16 +331,16 @@ fn power_failure_in_mid_write() {
     transmit(&mut rig, 32, 0x000A_4000, POSITION);
     begin(&mut rig, Function::WrEe);
     rig.run(Span::from_millis(20));
-    harness_sim::device::Device::power_on(&mut rig.drive);
+    harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(
         (rig.word(ram::ERRORCODE), eeprom(&rig, 0x60)),
         (0x0102, 0xFFFF_FFFF)
     );
-    harness_sim::device::Device::power_on(&mut rig.drive);
+    harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(rig.word(ram::ERRORCODE), 0x0102);
     rig.write_word(ram::EEPROM_BUFFER, 0x6000);
     rig.write(ram::EEPROM_CONTROL, 0x82);
     rig.run(Span::from_millis(20));
-    harness_sim::device::Device::power_on(&mut rig.drive);
+    harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(rig.word(ram::ERRORCODE), 0);
 }
