@@ -151,11 +151,12 @@ fn citations_resolve() {
             erratum.id, erratum.shown_by
         );
     }
-    // Chapters 8 to 10 are the bus: every table and example of them is pinned.
-    for table in tables
-        .values()
-        .filter(|t| ["8.", "9.", "10."].iter().any(|c| t.section.starts_with(c)))
-    {
+    // Chapters 8 to 10 are the bus, 14 is what its cells mean: every table and example of them is pinned. The
+    // drive is one of the newer versions, so the old `HwVersion` cannot be seen.
+    for table in tables.values().filter(|t| {
+        let pinned_chapters = ["8.", "9.", "10.", "14."];
+        pinned_chapters.iter().any(|c| t.section.starts_with(c)) && t.id != "nd21 14.3.3 old"
+    }) {
         assert!(
             pinned.contains(&table.id),
             "no scenario pins `{}` ({})",

@@ -2,7 +2,7 @@
 //! 5.3, 14.7).
 //!
 //! Choice: the motor idles when `nist` is less than `Window` in either direction; the manual compares only
-//! the lower byte (14.7.5.4), which would call a motor at 256 units idle too.
+//! the lower byte (14.7.5.4, E133), which would call a motor at 256 units idle too.
 
 use super::positioning::Positioning;
 use super::world::Mode;

@@ -361,6 +361,10 @@ impl Program {
         }
         self.show_inputs();
         self.show_flags(switches, moved.flags);
+        if error_state::is_set(&self.cells) {
+            // 14.7.1: the code of an error that this cycle has found.
+            self.show_inputs();
+        }
         outputs::show_gpo2(&self.positioning, &mut self.cells);
         self.clock.pass(1, self.released(), &mut self.cells);
         self.quiet = moved.at_rest
