@@ -228,7 +228,7 @@ impl Positioning {
         }
         match self.phase {
             Phase::Running(trapezoid, cycle) => {
-                return Ok(Some(self.run(trapezoid, cycle + 1, cells)));
+                return Ok(self.run(trapezoid, cycle + 1, cells));
             }
             Phase::Calculating(left) => self.calculate(left, situation, cells)?,
             Phase::Idle | Phase::Ready(_) => self.begin(situation, cells)?,
@@ -238,7 +238,7 @@ impl Positioning {
             Phase::Ready(trapezoid)
                 if status & ps_status::START != 0 && situation.mode == Mode::Go =>
             {
-                Ok(Some(self.run(trapezoid, 1, cells)))
+                Ok(self.run(trapezoid, 1, cells))
             }
             _ => Ok(None),
         }
@@ -353,9 +353,17 @@ impl Positioning {
         Ok(())
     }
 
-    /// A cycle of the run: its speed; the phase stands in `ps_status`.
-    fn run(&mut self, trapezoid: Trapezoid, cycle: u64, cells: &mut Cells) -> i16 {
-        let direction = cells.byte(ram::PS_STATUS) & ps_status::NEGATIVE;
+    /// A cycle of the run: its speed; the phase stands in `ps_status`. None where the bus has taken the phase
+    /// back, as the last step of `NB_InitPS` does in the target braking (13.2.1.3): the drive then brakes on its
+    /// ramp.
+    fn run(&mut self, trapezoid: Trapezoid, cycle: u64, cells: &mut Cells) -> Option<i16> {
+        const PHASES: u8 = ps_status::CONSTANT | ps_status::BRAKING | ps_status::TARGET_BRAKING;
+        let status = cells.byte(ram::PS_STATUS);
+        if cycle > 1 && status & PHASES == 0 {
+            self.phase = Phase::Idle;
+            return None;
+        }
+        let direction = status & ps_status::NEGATIVE;
         if cycle == 1 {
             let way = cells.long(ram::PS_UMDREHUNG);
             let way = if direction == 0 {
@@ -369,13 +377,13 @@ impl Positioning {
             self.phase = Phase::Idle;
             cells.put(ram::PS_STATUS, ps_status::FINISHED);
             cells.set_bits(ram::FLAGS2, flags2::CALCULATE, false);
-            return 0;
+            return Some(0);
         }
         self.phase = Phase::Running(trapezoid, cycle);
         let (speed, phase) = trapezoid.speed(cycle);
         cells.put(ram::PS_STATUS, direction | phase);
         let speed = i16::try_from(speed).unwrap_or(i16::MAX);
-        if direction == 0 { speed } else { -speed }
+        Some(if direction == 0 { speed } else { -speed })
     }
 }
 
