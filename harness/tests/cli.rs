@@ -395,7 +395,8 @@ fn the_manual_shows_what_is_pinned_and_what_is_not() {
             .to_owned()
     };
     assert!(line("nd21 9.7 ").contains(" 9.7-parity-error"));
-    assert!(line("nd21 13.1.9").ends_with("not yet"));
+    // A connection diagram: no scenario can show it.
+    assert!(line("nd21 13.1.5.1 ").ends_with("not yet"));
     assert!(shown.contains("prints \"286,46 ms\", meant is 286.46 us"));
     assert!(
         stdout(&drivebench(&["manual", "--missing"]))
