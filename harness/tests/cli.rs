@@ -339,12 +339,12 @@ fn a_cell_that_is_otherwise_is_shown_in_its_unit() {
     let path = file(
         "otherwise",
         "b.scn",
-        "title b\nring 1\ndrive 0 model plain\ndrive 0 rail 850V\n> 80\n",
+        "title b\nring 1\ndrive 0 rail 850V\n> 80\n",
     );
     let output = drivebench(&["run", text(&path)]);
     assert_eq!(code(&output), 2);
     for part in [
-        "b.scn:4:1",
+        "b.scn:3:1",
         "drive 0 has no plugs",
         "add `drive 0 model nd21`",
     ] {
@@ -395,7 +395,8 @@ fn the_manual_shows_what_is_pinned_and_what_is_not() {
             .to_owned()
     };
     assert!(line("nd21 9.7 ").contains(" 9.7-parity-error"));
-    assert!(line("nd21 5.1 pinning").ends_with("not yet"));
+    // A connection diagram: no scenario can show it.
+    assert!(line("nd21 13.1.5.1 ").ends_with("not yet"));
     assert!(shown.contains("prints \"286,46 ms\", meant is 286.46 us"));
     assert!(
         stdout(&drivebench(&["manual", "--missing"]))

@@ -13,6 +13,8 @@
 //!   initialised since reset (13.2.1), position regulator off, or nominal value not from NOVOBUS (13.1.4).
 //! * Stop and block in mid-run end the positioning: `ps_status` 00, `Flags2` bit 3 = 0. The target is
 //!   reloaded to complete the remaining track (13.1.13).
+//! * A run whose phase the bus takes back (`NB_InitPS` in the target braking, 13.2.1.3) ends too; the drive brakes
+//!   on its ramp.
 
 use super::world::Mode;
 use crate::cells::Cells;
