@@ -339,12 +339,12 @@ fn a_cell_that_is_otherwise_is_shown_in_its_unit() {
     let path = file(
         "otherwise",
         "b.scn",
-        "title b\nring 1\ndrive 0 rail 850V\n> 80\n",
+        "title b\nring 1\ndrive 0 model plain\ndrive 0 rail 850V\n> 80\n",
     );
     let output = drivebench(&["run", text(&path)]);
     assert_eq!(code(&output), 2);
     for part in [
-        "b.scn:3:1",
+        "b.scn:4:1",
         "drive 0 has no plugs",
         "add `drive 0 model nd21`",
     ] {

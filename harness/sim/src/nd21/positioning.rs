@@ -211,10 +211,13 @@ impl Positioning {
             self.initialised = true;
             self.target = cells.long(ram::UMDRSOLL);
         }
-        if matches!(self.phase, Phase::Idle)
-            && status & ps_status::CALCULATED == 0
-            && self.at_rest(cells)
-        {
+        let asked =
+            status & ps_status::CALCULATE != 0 || cells.byte(ram::FLAGS2) & flags2::CALCULATE != 0;
+        if self.phase == Phase::Idle && status & ps_status::START != 0 && !asked {
+            // There is nothing to be started (13.3.2.3): it must not start the next run by itself.
+            cells.set_bits(ram::PS_STATUS, ps_status::START, false);
+        }
+        if self.phase == Phase::Idle && status & ps_status::CALCULATED == 0 && self.at_rest(cells) {
             return Ok(None);
         }
         match situation.mode {

@@ -47,9 +47,10 @@ const JOBS: [&[(u16, u8)]; 4] = [
     &[
         (ram::SW_VERSION, 0x43),
         (ram::NSOLL, 0),
-        (ram::PS_STATUS, 0x11),
+        (ram::PS_STATUS, 0x01),
         (ram::PS_POSITION_H, 0),
         (ram::FLAGS2, 0x08),
+        (ram::PS_STATUS, 0x50),
     ],
     &[(ram::SW_VERSION, 0x43), (ram::FLAGS2, 0x80)],
     &[(ram::SW_VERSION, 0x43), (ram::PS_STATUS, 0x51)],

@@ -217,6 +217,19 @@ fn start_waits_for_the_drive() {
     assert_eq!(rig.long(ram::UMDRSOLL), 0x0001_0000);
 }
 
+/// 13.3.2.3: the start bit without a finished calculation starts nothing, then or later.
+#[test]
+fn a_start_without_a_result_is_dropped() {
+    let mut rig = initialised();
+    rig.set(ram::PS_STATUS, ps_status::START);
+    rig.cycles(1);
+    assert_eq!(rig.byte(ram::PS_STATUS), ps_status::FINISHED);
+    write_ps(&mut rig, 0x0001_0000);
+    rig.run(Span::from_millis(500));
+    assert_eq!(rig.byte(ram::PS_STATUS), ps_status::CALCULATED);
+    assert_eq!(rig.long(ram::UMDRIST), 0);
+}
+
 /// 13.2.1: with bit 1 of HwVersion2 = 0 the controller is initialised after switching on.
 #[test]
 fn automatic_initialisation() {
