@@ -1,6 +1,6 @@
 //! The EEPROM of an ND21 that nobody has set up: one that can be switched on and turned.
 //!
-//! The manual prints no parameter set. This one is for a 5610 with the motor of [`super::plant`]: nominal
+//! The manual prints no parameter set. This one is for a 5610 with the motor of [`super::PlantParameters`]: nominal
 //! value from NOVOBUS, position regulator on (`SwVersion` 43), GPO2 shows "in position" (`HwVersion` C4), end
 //! switches active high, so that none is needed. With nothing in plug X3 such a drive is blocked.
 
