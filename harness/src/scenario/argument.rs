@@ -54,6 +54,15 @@ impl Location {
         }
     }
 
+    /// The same bytes in another place.
+    #[must_use]
+    pub fn moved(&self, memory: Memory, address: u16) -> Self {
+        let mut moved = self.clone();
+        moved.memory = memory;
+        moved.place.address = address;
+        moved
+    }
+
     /// The name or the address as written; what is reached through the EEPROM has `EE_` or `ee:` in front.
     #[must_use]
     pub fn name(&self) -> String {
@@ -119,16 +128,17 @@ impl Location {
         if bytes.len() == usize::from(self.size) || bytes.len() == cell {
             return Ok(bytes);
         }
-        let s = if self.size == 1 { "" } else { "s" };
+        let s = |n: usize| if n == 1 { "" } else { "s" };
         Err(Problem::new(
             pattern.span,
             format!(
-                "{} bytes where `{}` has {}",
+                "{} byte{} where `{}` has {}",
                 bytes.len(),
+                s(bytes.len()),
                 self.name(),
                 self.size
             ),
-            format!("{} byte{s} expected here", self.size),
+            format!("{} byte{} expected here", self.size, s(self.size.into())),
         ))
     }
 }
