@@ -3,9 +3,13 @@
 use super::error::in_words;
 use super::{Axis, Bus, Error};
 use crate::link::Line;
+use crate::locate::locate;
+use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::errors::display_digits;
-use harness_proto::nd21::units::{Date, operating_hours_from_bytes, serial_number_from_bytes};
+use harness_proto::nd21::units::{
+    Date, SpeedRange, operating_hours_from_bytes, serial_number_from_bytes,
+};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, ZEROS};
@@ -22,39 +26,102 @@ const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 /// # Errors
 /// [`Error::TimeOut`] where no ring answers.
 pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error> {
-    let mut zeros = vec![0; usize::from(ZEROS)];
-    zeros.extend(CHECK_SEQUENCE);
-    for before in [&[] as &[u8], &zeros] {
-        while link.receive(ring).is_some() {}
-        link.send(ring, before);
-        link.send(ring, &[SYNCO, SYNCO]);
-        let sent = link.send(ring, &COUNT);
-        let end = sent + link.byte_time() * (u64::from(MAX_DRIVES) + 8) + Span::from_millis(50);
-        let mut heard = Vec::new();
-        while link.now() < end {
-            if !link.wait(end) && link.now() < end {
-                continue;
-            }
-            while let Some((_, received)) = link.receive(ring) {
-                heard.push(if received.error.is_none() {
-                    received.byte
-                } else {
-                    0
-                });
-                if let [.., sync, drives, net] = heard[..]
-                    && (sync, net) == (COUNT[0], COUNT[2])
-                    && let Ok(size) = RingSize::new(u64::from(drives))
-                {
-                    return Ok(size);
-                }
-            }
-        }
-    }
-    Err(Error::TimeOut {
+    let counted = count_behind(link, ring, &[]);
+    counted
+        .or_else(|| count_behind(link, ring, &repair()))
+        .ok_or_else(no_answer)
+}
+
+/// What brings a ring back that can be brought back: 17 zeros and the check sequence (9.8).
+fn repair() -> Vec<u8> {
+    let mut bytes = vec![0; usize::from(ZEROS)];
+    bytes.extend(CHECK_SEQUENCE);
+    bytes
+}
+
+fn no_answer() -> Error {
+    Error::TimeOut {
         waited: Span::from_millis(50),
         what: "a ring to answer: it is broken, or a drive is not ready for operation (ND21 9.9)"
             .to_owned(),
+    }
+}
+
+/// Sends some bytes and then the telegram that counts; `None` where nothing sensible comes back.
+fn count_behind(link: &mut dyn Line, ring: usize, before: &[u8]) -> Option<RingSize> {
+    let mut bytes = before.to_vec();
+    bytes.extend([SYNCO, SYNCO]);
+    bytes.extend(COUNT);
+    let mut heard = Vec::new();
+    listen(link, ring, &bytes, |received| {
+        heard.push(if received.error.is_none() {
+            received.byte
+        } else {
+            0
+        });
+        match heard[..] {
+            [.., sync, drives, net] if (sync, net) == (COUNT[0], COUNT[2]) => {
+                RingSize::new(drives.into()).ok()
+            }
+            _ => None,
+        }
     })
+}
+
+/// Sends bytes and shows what comes, until one of them says something or all must have come round.
+fn listen<T>(
+    link: &mut dyn Line,
+    ring: usize,
+    bytes: &[u8],
+    mut heard: impl FnMut(Received) -> Option<T>,
+) -> Option<T> {
+    while link.receive(ring).is_some() {}
+    let sent = link.send(ring, bytes);
+    let end = sent + link.byte_time() * (u64::from(MAX_DRIVES) + 8) + Span::from_millis(50);
+    while link.now() < end {
+        link.wait(end);
+        while let Some((_, received)) = link.receive(ring) {
+            if let Some(found) = heard(received) {
+                return Some(found);
+            }
+        }
+    }
+    None
+}
+
+/// What a ring said when it was brought back (9.7, 9.8).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Recovery {
+    /// The drive that spelled out its address before: the fault was in front of it.
+    pub before: Option<u8>,
+    /// The drive that does so behind the check sequence: the ring is not back.
+    pub after: Option<u8>,
+    /// How many drives answer; `None` where the ring is not back.
+    pub drives: Option<RingSize>,
+}
+
+/// Listens to what a ring reports, sends 17 zeros and the check sequence (9.8), and counts the drives.
+#[must_use]
+pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
+    let before = reported(link, ring);
+    let drives = count_behind(link, ring, &repair());
+    let after = drives.map_or_else(|| reported(link, ring), |_| None);
+    Recovery {
+        before,
+        after,
+        drives,
+    }
+}
+
+/// The drive that spells out its address while the master sends SYNCO (9.7, 9.9).
+fn reported(link: &mut dyn Line, ring: usize) -> Option<u8> {
+    // Once round the largest ring, and the zeros in front of the address.
+    let mut heard = Vec::new();
+    let _all: Option<()> = listen(link, ring, &[SYNCO; 300], |received| {
+        heard.push(received);
+        None
+    });
+    locate(&heard, u8::try_from(MAX_DRIVES).unwrap_or(u8::MAX)).map(|location| location.drive)
 }
 
 /// What a drive says of itself (14.3.5, 14.8).
@@ -123,6 +190,15 @@ impl Bus<'_> {
             flags2: self.read_byte(axis, ram::FLAGS2)?,
             error: self.read_word(axis, ram::ERRORCODE)?,
         })
+    }
+
+    /// Reads the range of speeds, on which the scale of every speed and ramp depends (14.3.2).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn speed_range(&self, axis: Axis) -> Result<SpeedRange, Error> {
+        let byte = self.read_byte(axis, ram::SW_VERSION2)?;
+        Ok(SpeedRange::from_sw_version2(byte))
     }
 
     /// Reads what a drive says of itself, from its EEPROM.

@@ -16,16 +16,18 @@ mod error;
 mod positioning;
 mod pump;
 mod s_ramp;
+mod scope;
 
 pub use axis::Axis;
-pub use discovery::{Identity, State, count_drives};
+pub use discovery::{Identity, Recovery, State, count_drives, recover};
 pub use error::Error;
 pub use s_ramp::SkStatus;
+pub use scope::{Measurement, Scope, Trigger};
 
 use crate::link::Line;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{self, Counters, Job, JobId, Outcome, Phase, Refused};
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
 use pump::Pump;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -159,6 +161,12 @@ impl<'l> Bus<'l> {
             .enumerate()
             .flat_map(|(ring, size)| (0..size.drives()).filter_map(move |k| Axis::new(ring, k)))
             .collect()
+    }
+
+    /// The time on the clock of the link.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.lock().now()
     }
 
     /// Lets the bus work for this long: what a program does while it waits for something else.

@@ -27,6 +27,14 @@ impl Bus<'_> {
     /// before; others see [`Error`].
     #[doc(alias = "NB_Referenzfahrt")]
     pub fn reference(&self, axis: Axis) -> Result<(), Error> {
+        self.reference_showing(axis, |_| {})
+    }
+
+    /// The same, and shows each `Flags2` that was read on the way: its bits 7 to 5 say that the run is on.
+    ///
+    /// # Errors
+    /// As of [`Self::reference`].
+    pub fn reference_showing(&self, axis: Axis, seen: impl FnMut(u8)) -> Result<(), Error> {
         // Step 1.
         let speed = self.read_word(axis, ram::PS_V0)?;
         // Step 2.
@@ -40,16 +48,17 @@ impl Bus<'_> {
         self.write_word(axis, ram::NSOLL, 0)?;
         // Step 6.
         self.or(axis, ram::FLAGS2, start)?;
-        let end = self.follow_reference(axis);
+        let end = self.follow_reference(axis, seen);
         // Step 9 (E68), on every way out.
         self.write_word(axis, ram::PS_V0, speed)?;
         end
     }
 
-    fn follow_reference(&self, axis: Axis) -> Result<(), Error> {
+    fn follow_reference(&self, axis: Axis, mut seen: impl FnMut(u8)) -> Result<(), Error> {
         let patience = self.options.motion_patience;
         // Step 7.
         self.poll_byte(axis, ram::FLAGS2, patience, "the referencing run", |byte| {
+            seen(byte);
             self.check_not_interrupted(axis)?;
             Ok(byte & flags2::REFERENCING == 0)
         })?;
@@ -194,9 +203,18 @@ impl Bus<'_> {
     /// # Errors
     /// [`Error::Interrupted`] where a stop or a block has ended it; others see [`Error`].
     pub fn wait_for_end(&self, axis: Axis) -> Result<(), Error> {
+        self.wait_for_end_showing(axis, |_| {})
+    }
+
+    /// The same, and shows each `ps_status` that was read on the way (13.3.1).
+    ///
+    /// # Errors
+    /// As of [`Self::wait_for_end`].
+    pub fn wait_for_end_showing(&self, axis: Axis, mut seen: impl FnMut(u8)) -> Result<(), Error> {
         let patience = self.options.motion_patience;
         let what = "the positioning";
         self.poll_byte(axis, ram::PS_STATUS, patience, what, |byte| {
+            seen(byte);
             if byte == 0 {
                 self.check_ready(axis)?;
                 let by = "stop or block";

@@ -1,5 +1,6 @@
 //! The command line.
 
+use super::drive::DriveCommand;
 use super::exit::Exit;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -32,7 +33,11 @@ Examples:
   drivebench trace my.scn --format json      every byte on every link, for tools
   drivebench check my.scn                    look for mistakes, play nothing
   drivebench manual                          which tables of the manual are pinned
-  drivebench cells ps_                       the cells of the positioning controller";
+  drivebench cells ps_                       the cells of the positioning controller
+  drivebench info --rig sim:5                the drives of a bench, here a simulated ring of five
+  drivebench read all nist Status            cells of drives by name, with units and bits
+  drivebench position 0 --to 10turns --init --move
+                                             the motor turns only with --move";
 
 fn after_long_help() -> String {
     format!("{EXAMPLES}\n\n{}", Exit::HELP)
@@ -53,6 +58,9 @@ pub enum Command {
     Manual(ManualArguments),
     /// Show the drive's cells: address, size, access, unit, meaning and section of the manual.
     Cells(CellsArguments),
+    /// Commands on a bus.
+    #[command(flatten)]
+    Drive(DriveCommand),
     /// Print a completion script for a shell.
     Completions {
         /// For which shell.

@@ -9,9 +9,9 @@ use std::process::ExitCode;
 pub enum Exit {
     /// Everything passed.
     Passed = 0,
-    /// A drive behaved otherwise than the scenario says.
+    /// A drive behaved otherwise than the scenario or the command says, or differs from a file.
     Failed = 1,
-    /// Wrong usage, or a scenario with mistakes.
+    /// Wrong usage, a file with mistakes, or a motion or a change without the leave for it.
     Usage = 2,
     /// The bench itself failed.
     RigError = 3,
@@ -26,8 +26,9 @@ impl Exit {
     pub const HELP: &str = "\
 Exit codes:
   0  everything passed
-  1  a drive behaved otherwise than a scenario says
-  2  wrong usage, or a scenario with mistakes or that could not be played to its end (aborted)
+  1  a drive behaved otherwise than a scenario or a command says, or differs from a file
+  2  wrong usage, a file with mistakes, a scenario that could not be played to its end (aborted), or something
+     that needs --move or --yes
   3  the bench itself failed
   4  nothing was selected
   5  passed but incomplete (skipped scenarios under --require-all, or inconclusive ones)";

@@ -12,6 +12,8 @@ pub(super) struct Output {
     colour_out: bool,
     colour_err: bool,
     pub(super) progress: bool,
+    /// Standard output is a terminal.
+    pub(super) terminal: bool,
 }
 
 impl Output {
@@ -23,14 +25,16 @@ impl Output {
             When::Auto => terminal && !no_color,
         };
         let err = std::io::stderr().is_terminal();
+        let terminal = std::io::stdout().is_terminal();
         Self {
-            colour_out: colour(std::io::stdout().is_terminal()),
+            colour_out: colour(terminal),
             colour_err: colour(err),
             progress: match progress {
                 Progress::Auto => err,
                 Progress::Bar => true,
                 Progress::None => false,
             },
+            terminal,
         }
     }
 

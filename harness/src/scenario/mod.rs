@@ -5,6 +5,7 @@
 //! and refuses what cannot be, and [`run`] plays it on a [`Link`](crate::link::Link). The language is
 //! described in `LANGUAGE.md` beside this file.
 
+pub mod argument;
 pub mod expression;
 pub mod parse;
 pub mod pattern;

@@ -2,7 +2,7 @@
 
 use super::problem::{Problem, Span};
 use super::scanner::Scanner;
-use harness_proto::nd21::units::{Ratio, Scale};
+use harness_proto::nd21::units::{Ratio, Scale, Value};
 use std::fmt;
 
 /// Digits behind the point that are shown of turns: one increment is 0.000015 turns.
@@ -138,6 +138,22 @@ pub fn figures(value: f64, unit: &str) -> String {
         _ => DIGITS - 1 - [1e1, 1e2, 1e3, 1e4].map(before).iter().sum::<usize>(),
     };
     trimmed(value, decimals)
+}
+
+/// The value of a cell as text, in the unit of its scale: `1500.1 rpm`, `off`, `1996-01-31`.
+#[must_use]
+pub fn shown(value: Value, scale: Scale) -> String {
+    let number = match value {
+        Value::Exact(ratio) => ratio.to_f64(),
+        Value::Approximate(number) => number,
+        Value::Off => return "off".to_owned(),
+        Value::Date(date) => {
+            return format!("{}-{:02}-{:02}", date.year(), date.month(), date.day());
+        }
+    };
+    let unit = scale.unit();
+    let text = format!("{} {unit}", figures(number, unit));
+    text.trim_end().to_owned()
 }
 
 /// A number with at most so many decimals, and no zeros behind the last that says something.

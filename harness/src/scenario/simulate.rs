@@ -26,6 +26,16 @@ pub fn simulated(plan: &Plan) -> SimulatedLink {
     SimulatedLink::new(bench)
 }
 
+/// The same with everything done that the header lets happen from outside the bus.
+#[must_use]
+pub fn bench(plan: &Plan) -> SimulatedLink {
+    let mut link = simulated(plan);
+    for (ring, drives, influence) in plan.influences() {
+        influence.act(&mut link, ring, drives);
+    }
+    link
+}
+
 /// Drive `k`: the EEPROM first, since RAM is filled from it at power-up, then the cells.
 fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
     let mut properties = Properties::default();

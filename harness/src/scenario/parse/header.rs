@@ -24,7 +24,31 @@ const HEADER_WORDS: [&str; 8] = [
 /// # Errors
 /// Every line that is no line of the language, or a header that is not complete.
 pub fn parse(source: &Source) -> Result<Scenario, Problems> {
-    let mut reader = Reader::default();
+    read(source, Reader::default())
+}
+
+/// Reads the header of a scenario: what drives are before anything is sent. Its steps are left out, once it
+/// is sure that they are steps; it needs none, and no `ring` line where `rings` are given.
+///
+/// # Errors
+/// As of [`parse`].
+pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
+    let range = |drives: &u8| RingRange {
+        smallest: *drives,
+        largest: *drives,
+        default: *drives,
+        span: Span::default(),
+    };
+    let reader = Reader {
+        setup: Some(rings.iter().map(range).collect()),
+        ..Reader::default()
+    };
+    let mut scenario = read(source, reader)?;
+    scenario.steps.clear();
+    Ok(scenario)
+}
+
+fn read(source: &Source, mut reader: Reader) -> Result<Scenario, Problems> {
     let mut offset = 0;
     for (number, line) in source.text.split('\n').enumerate() {
         if number == MAX_LINES {
@@ -62,6 +86,8 @@ struct Reader {
     deadline: Option<times::Duration>,
     steps: Vec<Step>,
     problems: Vec<Problem>,
+    /// Only the header is wanted; these are its rings where it does not say.
+    setup: Option<Vec<RingRange>>,
 }
 
 impl Reader {
@@ -163,7 +189,10 @@ impl Reader {
     }
 
     fn finish(mut self) -> Result<Scenario, Vec<Problem>> {
-        let rings = self.rings.take();
+        let setup = self.setup.take();
+        let needs_steps = setup.is_none();
+        let given = setup.filter(|rings| !rings.is_empty());
+        let rings = self.rings.take().or(given);
         let bus = self.bus.unwrap_or(Bus::Novobus);
         let rings = match rings {
             Some(rings) => rings,
@@ -180,7 +209,7 @@ impl Reader {
             }
             None => Vec::new(),
         };
-        if bus == Bus::Novobus && self.steps.is_empty() && self.problems.is_empty() {
+        if needs_steps && bus == Bus::Novobus && self.steps.is_empty() && self.problems.is_empty() {
             let place = Span::default();
             let problem = Problem::new(place, "the scenario has no step", "a step expected");
             let help = "add a line such as `> 80`: the master sends SYNCO";

@@ -9,4 +9,5 @@ mod step;
 mod value;
 mod words;
 
-pub use header::parse;
+pub use header::{parse, parse_setup};
+pub(super) use value::{assigned, eeprom_place, place, value};

@@ -56,7 +56,7 @@ fn named(
 }
 
 /// A cell: four hexadecimal digits, or its printed name.
-pub(super) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
+pub(in crate::scenario) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
     if let Some(place) = cell_by_name(scanner) {
         return Ok(place);
     }
@@ -85,7 +85,7 @@ pub(super) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
 
 /// An EEPROM cell: two hexadecimal digits, its printed name, or the name of the RAM cell that is loaded
 /// from it (ND21 14.2.2).
-pub(super) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
+pub(in crate::scenario) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
     let own = eeprom::EEPROM.iter().map(|cell| (cell.printed, cell));
     if let Some(place) = named(scanner, own) {
         return Ok(place);
@@ -140,9 +140,12 @@ pub(super) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> 
 }
 
 /// `= VALUE`
-pub(super) fn assigned(scanner: &mut Scanner<'_>, place: &Place) -> Result<Written, Problem> {
+pub(in crate::scenario) fn assigned(
+    scanner: &mut Scanner<'_>,
+    place: &Place,
+) -> Result<Written, Problem> {
     equals(scanner)?;
-    value(scanner, place)
+    value(scanner, place.scale(), place)
 }
 
 /// Bytes up to what may stand behind a value.
@@ -154,8 +157,11 @@ pub(super) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
 }
 
 /// Bytes, a number with a unit, or `off`, as it fits the cell.
-fn value(scanner: &mut Scanner<'_>, place: &Place) -> Result<Written, Problem> {
-    let scale = place.scale();
+pub(in crate::scenario) fn value(
+    scanner: &mut Scanner<'_>,
+    scale: Option<Scale>,
+    place: &Place,
+) -> Result<Written, Problem> {
     let here = scanner.here();
     if matches!(scale, Some(Scale::Ramp | Scale::SlippingError)) && scanner.eat_word("off") {
         return Ok(Written::Off(scanner.since(here)));
@@ -239,7 +245,7 @@ pub(super) fn cell_check(scanner: &mut Scanner<'_>, place: Place) -> Result<Cell
     }
     let value = match &mask {
         Some(_) => Written::Bytes(bytes(scanner)?),
-        None => value(scanner, &place)?,
+        None => value(scanner, place.scale(), &place)?,
     };
     if let Written::Off(span) = value
         && relation != Relation::Equal

@@ -261,7 +261,7 @@ fn has_number(setup: &Setup) -> bool {
 }
 
 /// The bytes of a number with a unit.
-pub(super) fn number_bytes(
+pub(in crate::scenario) fn number_bytes(
     scale: Option<Scale>,
     value: &Written,
     units: units::Drive,
@@ -283,7 +283,7 @@ pub(super) fn number_bytes(
     }
 }
 
-pub(super) fn in_memory(place: &Place, length: usize) -> Result<(), Problem> {
+pub(in crate::scenario) fn in_memory(place: &Place, length: usize) -> Result<(), Problem> {
     let last = usize::from(place.address) + length.max(1) - 1;
     let inside = |range: &RangeInclusive<u16>| {
         range.contains(&place.address) && last <= usize::from(*range.end())

@@ -2,37 +2,39 @@
 
 use super::look::{Miss, judge};
 use super::player::{Runner, Stop};
-use crate::link::{DriveFault, Moment, PlacedFault};
+use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::plan::{LOOK, PlannedDriveCheck, Reading};
 use crate::scenario::problem::Span;
 use crate::scenario::syntax::Influence;
 use harness_proto::time;
 use std::ops::RangeInclusive;
 
-impl Runner<'_> {
-    /// Lets something happen to drives from outside the bus.
-    pub(super) fn influence(
-        &mut self,
+impl Influence {
+    /// Lets it happen to drives, now.
+    pub(in crate::scenario) fn act(
+        &self,
+        link: &mut dyn Link,
         ring: usize,
         drives: RangeInclusive<u8>,
-        influence: &Influence,
     ) {
         for drive in drives {
-            match influence {
-                Influence::Stimuli(stimuli) => {
+            match self {
+                Self::Stimuli(stimuli) => {
                     for stimulus in stimuli {
-                        self.link.stimulate(ring, drive, *stimulus);
+                        link.stimulate(ring, drive, *stimulus);
                     }
                 }
-                Influence::Power(on) => {
+                Self::Power(on) => {
                     let fault = if *on { DriveFault::On } else { DriveFault::Off };
                     let fault = PlacedFault::Drive(drive, fault);
-                    self.link.inject(ring, fault, Moment::Now);
+                    link.inject(ring, fault, Moment::Now);
                 }
             }
         }
     }
+}
 
+impl Runner<'_> {
     /// Lets time pass until a check holds. What was sent before goes on its way meanwhile.
     pub(super) fn until(
         &mut self,

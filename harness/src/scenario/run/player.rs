@@ -225,7 +225,7 @@ impl Runner<'_> {
     fn play(&mut self) -> Result<(), Stop> {
         let plan = self.plan;
         for (ring, drives, influence) in plan.influences() {
-            self.influence(ring, drives, influence);
+            influence.act(self.link, ring, drives);
         }
         // A fault at a byte is armed from the start, wherever its line stands: its byte is counted
         // from the start too.
@@ -302,7 +302,7 @@ impl Runner<'_> {
             }
             PlannedAction::Fault(..) | PlannedAction::Receive(..) => Ok(()),
             PlannedAction::Influence(ring, drives, influence) => {
-                self.influence(*ring, drives.clone(), influence);
+                influence.act(self.link, *ring, drives.clone());
                 Ok(())
             }
             PlannedAction::Record(record) => {

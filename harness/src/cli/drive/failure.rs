@@ -1,0 +1,91 @@
+//! Why a command on a bus came to no good end, and which exit code that is.
+
+use super::super::exit::Exit;
+use super::super::output::Output;
+use crate::bus;
+use crate::library::LibraryError;
+use crate::scenario::problem::Problems;
+
+/// Why a command ended early.
+#[derive(Debug)]
+pub(super) enum Failure {
+    /// Standard output cannot be written to.
+    Output(std::io::Error),
+    /// What is wrong, in a sentence, with the exit code for it.
+    Said(Exit, String),
+    /// There is no file, or it has mistakes.
+    File(LibraryError),
+    /// The driver gave up.
+    Bus(bus::Error),
+}
+
+impl Failure {
+    /// Something was asked for that cannot be, or that needs a leave that was not given.
+    pub(super) fn refused(message: impl Into<String>) -> Self {
+        Self::Said(Exit::Usage, message.into())
+    }
+
+    /// A drive is or did otherwise than asked.
+    pub(super) fn drive(message: impl Into<String>) -> Self {
+        Self::Said(Exit::Failed, message.into())
+    }
+
+    /// Says what is wrong and gives the exit code for it.
+    pub(super) fn tell(&self, output: &mut Output) -> Exit {
+        match self {
+            Self::Output(error) => {
+                output.complain(&format!("failed to write: {error}"));
+                Exit::RigError
+            }
+            Self::Said(exit, message) => {
+                output.complain(message);
+                *exit
+            }
+            Self::File(error) => {
+                output.library_error(error);
+                Exit::Usage
+            }
+            Self::Bus(error) => {
+                output.complain(&error.to_string());
+                exit(error)
+            }
+        }
+    }
+}
+
+/// A drive's fault, the bench's, or that of whoever asked.
+fn exit(error: &bus::Error) -> Exit {
+    match error {
+        bus::Error::DriveError { .. }
+        | bus::Error::InReset { .. }
+        | bus::Error::Interrupted { .. }
+        | bus::Error::NotSet { .. }
+        | bus::Error::TimeOut { .. } => Exit::Failed,
+        bus::Error::Refused(_) | bus::Error::Value(_) | bus::Error::Open(_) => Exit::Usage,
+        bus::Error::Unknown(_) | bus::Error::Stopped(_) | bus::Error::NoSuchOrder => Exit::RigError,
+    }
+}
+
+impl From<bus::Error> for Failure {
+    fn from(error: bus::Error) -> Self {
+        Self::Bus(error)
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+impl From<Problems> for Failure {
+    fn from(problems: Problems) -> Self {
+        Self::File(Box::new(problems).into())
+    }
+}
+
+impl From<LibraryError> for Failure {
+    fn from(error: LibraryError) -> Self {
+        Self::File(error)
+    }
+}
