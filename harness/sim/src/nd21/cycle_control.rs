@@ -9,9 +9,9 @@
 //! * `AS_Command` shows the code of the function while it is selected by GPIN3. Codes without a function
 //!   do nothing, GPO1 stays low.
 //! * The marker `PZ` goes from 39 to 0 and back; what the bus writes to it counts modulo 40.
-//! * A transmission that another function interrupts is forgotten, and `WrPS` and `WrEE` do nothing while one
-//!   is incomplete ("must not be interrupted", 13.1.9.2). Without a new one they use the last position again
-//!   (13.1.13). `BZ` counts the bits.
+//! * A transmission that another function interrupts is forgotten ("must not be interrupted", 13.1.9.2).
+//!   `WrPS`, `WrEE` and the functions that use the parameter do nothing without a whole one; they use the last
+//!   whole one again (13.1.13). `BZ` counts the bits.
 //! * Bits of parameters are sent highest first, as those of positions are; bits of the error code are read
 //!   lowest first, as those of the position are. GPO1 shows the bit as long as GPIN3 is high. The position is
 //!   latched at the first bit.
@@ -80,7 +80,12 @@ pub(super) struct CycleControl {
     /// The position and the parameter that were transmitted, the position that is read.
     position: u32,
     parameter: u16,
+    /// A whole position, a whole parameter has been transmitted.
+    has_position: bool,
+    has_parameter: bool,
     read: u32,
+    /// The error code that is being read.
+    error: u16,
     /// A position is being stored.
     storing: bool,
     /// Nothing happened in the last cycle.
@@ -137,7 +142,18 @@ impl CycleControl {
         self.at_rest = start == self.started && self.running.is_none();
         self.started = start;
         if !start {
+            if let Some((Function::StartPs, Course::Working)) = self.running {
+                // The function is ended (13.1.6): a start that has not begun is none.
+                reach
+                    .cells
+                    .set_bits(ram::PS_STATUS, ps_status::START, false);
+            }
             self.running = None;
+        } else if mode == Mode::Error && self.running.is_some_and(goes_on) {
+            // It does not go on when the error is confirmed.
+            self.running = self
+                .running
+                .map(|(function, _)| (function, Course::Refused));
         } else if edge {
             let gpin8 = reach.cells.byte(ram::SW_VERSION2) & sw_version2::NO_GPIN8 == 0
                 && reach.cells.byte(ram::HW_VERSION) & hw_version::ANALOGUE == 0;
@@ -172,13 +188,17 @@ impl CycleControl {
             Function::RdError => Some(Serial::ReadError),
             _ => None,
         };
-        let complete = self.complete(reach.cells);
         if serial.is_none() || serial != self.serial {
             reach.cells.put(ram::BZ, 0);
             self.serial = serial;
         }
         let cells = &mut *reach.cells;
         match function {
+            Function::WrNMax | Function::WrVtippen | Function::WrNRampe | Function::WrI
+                if !self.has_parameter =>
+            {
+                return Course::Refused;
+            }
             Function::ClrPz => cells.put(ram::PZ, 0),
             Function::IncPz => move_marker(1, cells),
             Function::DecPz => move_marker(POSITIONS - 1, cells),
@@ -206,8 +226,8 @@ impl CycleControl {
             }
             Function::Leitungstest => orders.error = Some(LINE_TEST),
             Function::RdPos => return self.read_position(cells),
-            Function::RdError => return read_error(orders, cells),
-            Function::WrPs | Function::WrEe if !complete => return Course::Refused,
+            Function::RdError => return self.read_error(orders, cells),
+            Function::WrPs | Function::WrEe if !self.has_position => return Course::Refused,
             Function::WrPs => load(self.position, cells),
             Function::RdEeWrPs => {
                 let position = stored_position(cells);
@@ -299,23 +319,22 @@ impl CycleControl {
         }
     }
 
-    /// All bits of a position have come, or none since it was last used.
-    fn complete(&self, cells: &Cells) -> bool {
-        self.serial != Some(Serial::Position) || cells.byte(ram::BZ) == 32
-    }
-
     fn shift_position(&mut self, bit: u32, cells: &mut Cells) {
-        if count(32, cells) == 1 {
+        let bits = count(32, cells);
+        if bits == 1 {
             self.position = 0;
         }
         self.position = self.position << 1 | bit;
+        self.has_position = bits == 32;
     }
 
     fn shift_parameter(&mut self, bit: u16, cells: &mut Cells) {
-        if count(16, cells) == 1 {
+        let bits = count(16, cells);
+        if bits == 1 {
             self.parameter = 0;
         }
         self.parameter = self.parameter << 1 | bit;
+        self.has_parameter = bits == 16;
     }
 
     /// Bit 0 first (13.1.9.5).
@@ -329,6 +348,31 @@ impl CycleControl {
         }
         Course::Done(self.read >> bit & 1 != 0)
     }
+}
+
+impl CycleControl {
+    /// The 12 bits of the error code as it stood at the first of them, and the 13th read, which confirms that
+    /// error (13.1.7.4).
+    fn read_error(&mut self, orders: &mut Orders, cells: &mut Cells) -> Course {
+        let bit = count(ERROR_BITS + 1, cells) - 1;
+        if bit == 0 {
+            self.error = cells.word(ram::ERRORCODE);
+        }
+        if bit == ERROR_BITS {
+            orders.confirm = cells.word(ram::ERRORCODE) == self.error;
+            return Course::Done(true);
+        }
+        Course::Done(self.error >> bit & 1 != 0)
+    }
+}
+
+/// Whether a function does something as long as GPIN3 is high.
+fn goes_on((function, course): (Function, Course)) -> bool {
+    let holds = matches!(
+        function,
+        Function::TippenMinus | Function::TippenPlus | Function::RdPos
+    );
+    holds || course == Course::Working
 }
 
 /// What a function asks for as long as GPIN3 is high.
@@ -355,16 +399,6 @@ fn count(bits: u8, cells: &mut Cells) -> u8 {
     let now = if before >= bits { 1 } else { before + 1 };
     cells.put(ram::BZ, now);
     now
-}
-
-/// The 12 bits of the error code, and the 13th read (13.1.7.4).
-fn read_error(orders: &mut Orders, cells: &mut Cells) -> Course {
-    let bit = count(ERROR_BITS + 1, cells) - 1;
-    if bit == ERROR_BITS {
-        orders.confirm = true;
-        return Course::Done(true);
-    }
-    Course::Done(cells.word(ram::ERRORCODE) >> bit & 1 != 0)
 }
 
 fn marker(cells: &Cells) -> u8 {

@@ -40,10 +40,19 @@ impl Command {
     }
 }
 
+/// A command that is being done: with the address and the byte that stood in the buffer when it was given.
+#[derive(Clone, Copy, Debug)]
+struct Job {
+    command: Command,
+    address: u8,
+    data: u8,
+    until: Instant,
+}
+
 /// The EEPROM controller.
 #[derive(Clone, Debug, Default)]
 pub(super) struct EepromController {
-    busy: Option<(Command, Instant)>,
+    busy: Option<Job>,
     /// Where a position is being stored, which, and until when.
     storing: Option<(u8, [u8; 4], Instant)>,
 }
@@ -75,13 +84,18 @@ impl EepromController {
                     properties.eeprom_write_time * u64::from(nd21::PARAMETER_COUNT)
                 }
             };
-            (command, now + time)
+            Job {
+                command,
+                address: memory.peek(BUFFER),
+                data: memory.peek(DATA),
+                until: now + time,
+            }
         });
     }
 
     /// When something that is being done is done.
     pub(super) fn busy_until(&self) -> Option<Instant> {
-        let bus = self.busy.map(|(_, until)| until);
+        let bus = self.busy.map(|job| job.until);
         let own = self.storing.map(|(_, _, until)| until);
         bus.into_iter().chain(own).min()
     }
@@ -115,12 +129,12 @@ impl EepromController {
             memory.eeprom_mut()[first..first + position.len()].copy_from_slice(&position);
             set_parity(memory.eeprom_mut());
         }
-        let Some((command, _)) = self.busy.filter(|(_, until)| *until <= now) else {
+        let Some(job) = self.busy.filter(|job| job.until <= now) else {
             return;
         };
         self.busy = None;
-        let address = usize::from(memory.peek(BUFFER));
-        match command {
+        let address = usize::from(job.address);
+        match job.command {
             Command::ReadByte => {
                 let byte = memory.eeprom()[address];
                 put(memory, BUFFER, byte);
@@ -129,7 +143,7 @@ impl EepromController {
             Command::WriteByte => {
                 // 14.3.5: this byte is a read only byte.
                 if address != usize::from(ee::VERSION) {
-                    memory.eeprom_mut()[address] = memory.peek(DATA);
+                    memory.eeprom_mut()[address] = job.data;
                 }
                 // Whoever writes the test byte itself means it.
                 if address != usize::from(ee::PARITY) {
@@ -148,27 +162,34 @@ impl EepromController {
         }
     }
 
-    /// The power fails: bytes that are being written are lost (they read FF).
-    pub(super) fn damage(&mut self, memory: &mut Cells) {
-        let position = self.storing.take().map(|(address, position, _)| {
-            let first = usize::from(address);
-            first..first + position.len()
-        });
-        let bus = match self.busy.take() {
-            Some((Command::WriteByte, _)) => {
-                let address = usize::from(memory.peek(BUFFER));
-                Some(address..address + 1)
-            }
-            Some((Command::ProgParam, _)) => {
-                let first = usize::from(nd21::EE_PARAMETERS);
-                Some(first..first + usize::from(nd21::PARAMETER_COUNT))
-            }
-            _ => None,
+    /// The power fails: what has been written stays, the byte that is being written is lost (it reads FF),
+    /// and the test byte is wrong.
+    pub(super) fn damage(&mut self, now: Instant, properties: &Nd21Properties, memory: &mut Cells) {
+        let parameters = |memory: &Cells| {
+            let cells = nd21::PARAMETERS..nd21::PARAMETERS + nd21::PARAMETER_COUNT;
+            cells.map(|cell| memory.peek(cell)).collect::<Vec<_>>()
         };
-        for written in position.into_iter().chain(bus) {
-            memory.eeprom_mut()[written].fill(0xFF);
-            let right = parity(memory.eeprom());
-            memory.eeprom_mut()[usize::from(ee::PARITY)] = !right;
+        let own = self.storing.take();
+        let own = own.map(|(address, position, until)| (address, position.to_vec(), until));
+        let bus = self.busy.take().and_then(|job| match job.command {
+            Command::ReadByte => None,
+            Command::WriteByte => Some((job.address, vec![job.data], job.until)),
+            Command::ProgParam => Some((nd21::EE_PARAMETERS, parameters(memory), job.until)),
+        });
+        for (address, bytes, until) in own.into_iter().chain(bus) {
+            let left = if until > now {
+                until.since(now).units()
+            } else {
+                0
+            };
+            let byte_time = properties.eeprom_write_time.units().max(1);
+            let left = usize::try_from(left.div_ceil(byte_time)).unwrap_or(bytes.len());
+            let written = bytes.len().saturating_sub(left.max(1));
+            let first = usize::from(address);
+            let eeprom = memory.eeprom_mut();
+            eeprom[first..first + written].copy_from_slice(&bytes[..written]);
+            eeprom[first + written] = 0xFF;
+            eeprom[usize::from(ee::PARITY)] = !parity(eeprom);
         }
     }
 }

@@ -45,6 +45,16 @@ fn round(x: f64) -> (f64, i32) {
     (sum - BIG, i32::from_le_bytes([a, b, c, d]))
 }
 
+/// 1, or -1 where `SwVersion` bit 3 turns the direction round (14.3.1).
+#[inline]
+fn direction(cells: &Cells) -> f64 {
+    if cells.byte(ram::SW_VERSION) & sw_version::REVERSED == 0 {
+        1.0
+    } else {
+        -1.0
+    }
+}
+
 /// The nearest whole number, for |x| < 2^15.
 #[inline]
 #[expect(clippy::cast_possible_truncation, reason = "clamped by every caller")]
@@ -67,6 +77,8 @@ pub(super) struct Motion {
     old: u16,
     limited: bool,
     i2t: bool,
+    /// The regulator was blocked in the cycle before.
+    free: bool,
 }
 
 /// What the caller has to know of a cycle.
@@ -83,6 +95,8 @@ pub(super) struct Moved {
 /// What stands between the drive and its motor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outside {
+    /// The greatest current limit of the device (14.5.1.2).
+    pub(super) most: u8,
     /// Aeff for one unit of `msoll` (14.5.2).
     pub(super) amperes: f64,
     /// The load in Aeff.
@@ -100,10 +114,11 @@ pub(super) struct Outside {
 impl Motion {
     /// As after power-up or reset: the position is that of the resolver, less than a turn (13.1.1).
     pub(super) fn start(&mut self, plant: &Plant, cells: &mut Cells) {
-        let turn = plant.position.rem_euclid(65_536.0);
+        let sign = direction(cells);
         *self = Self {
-            seen: turn,
-            filtered: plant.speed,
+            seen: (plant.position * sign).rem_euclid(65_536.0),
+            filtered: plant.speed * sign,
+            free: true,
             ..Self::default()
         };
         self.old = self.angle().0.wrapping_add(cells.word(ram::D_LAGE));
@@ -150,6 +165,11 @@ impl Motion {
         };
         let slipped = Self::too_far(slip, cells);
         let demand = if slipped { Demand::Free } else { demand };
+        if self.free && demand != Demand::Free {
+            // A motor that still turns is taken over at its speed: from there it is led on the ramps (11.8).
+            cells.put_word(ram::NSOLLRAMPE, cells.word(ram::NIST));
+        }
+        self.free = demand == Demand::Free;
         let nominal = Self::ramp(demand, cells);
         let limit = self.limit(outside, cells);
         let torque = if demand == Demand::Free {
@@ -257,7 +277,7 @@ impl Motion {
         let sum = sum.clamp(0, full.clamp(0, i64::from(u32::MAX)));
         cells.put_long(ram::I2, u32::try_from(sum).unwrap_or(u32::MAX));
         self.i2t = full > 0 && (sum >= full || self.i2t && sum > full / 2);
-        let limit = if self.i2t { i0.min(imax) } else { imax }.min(0x7F);
+        let limit = if self.i2t { i0.min(imax) } else { imax }.min(outside.most);
         let share = u16::from(limit) * outside.torque_share / 256;
         let limit = u8::try_from(share).unwrap_or(limit);
         cells.put(ram::MMAX, limit);
@@ -285,11 +305,7 @@ impl Motion {
 
     /// The motor turns, and the resolver sees it.
     fn turn(&mut self, torque: f64, outside: Outside, plant: &mut Plant, cells: &mut Cells) {
-        let sign = if cells.byte(ram::SW_VERSION) & sw_version::REVERSED == 0 {
-            1.0
-        } else {
-            -1.0
-        };
+        let sign = direction(cells);
         let current = torque * (outside.amperes * sign);
         let way = plant.step(current, outside.load * sign, outside.jammed);
         self.seen += way * sign;

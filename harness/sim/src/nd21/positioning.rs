@@ -136,8 +136,10 @@ enum Phase {
     Idle,
     /// The calculation is done after so many cycles.
     Calculating(u32),
-    Ready(Trapezoid),
-    Running(Trapezoid, u64),
+    /// Calculated, for a start at this nominal position.
+    Ready(Trapezoid, u32),
+    /// On the way: the cycle, and whether it goes backwards.
+    Running(Trapezoid, u64, bool),
 }
 
 /// The positioning controller.
@@ -147,6 +149,8 @@ pub(super) struct Positioning {
     initialised: bool,
     /// Where the last positioning is to end.
     target: u32,
+    /// `Flags2` bit 3 has asked for the present calculation or run.
+    asked: bool,
 }
 
 /// What the drive tells the controller in each cycle.
@@ -172,12 +176,13 @@ impl Positioning {
         if automatic {
             cells.put(ram::PS_STATUS, ps_status::FINISHED);
             self.initialised = true;
+            self.target = cells.long(ram::UMDRSOLL);
         }
     }
 
     /// Nothing is under way.
     pub(super) fn at_rest(&self, cells: &Cells) -> bool {
-        matches!(self.phase, Phase::Idle | Phase::Ready(_))
+        matches!(self.phase, Phase::Idle | Phase::Ready(..))
             && cells.byte(ram::FLAGS2) & flags2::CALCULATE == 0
             && cells.byte(ram::PS_STATUS) & (ps_status::CALCULATE | ps_status::START) == 0
     }
@@ -198,6 +203,22 @@ impl Positioning {
     /// The count of the position has been shifted: here the rotor now is.
     pub(super) fn set_target(&mut self, position: u32) {
         self.target = position;
+    }
+
+    /// `ps_status` has been written: with 01, where nothing is under way, the present place is the target
+    /// (13.2.1.2, 13.2.1.3).
+    pub(super) fn status_written(&mut self, byte: u8, cells: &Cells) {
+        if byte & ps_status::FINISHED != 0 && !self.running() {
+            self.target = cells.long(ram::UMDRSOLL);
+        }
+    }
+
+    /// What `Flags2` bit 3 asked for is done; a request that has come since is not (13.2.2).
+    fn answer(&mut self, cells: &mut Cells) {
+        if self.asked {
+            cells.set_bits(ram::FLAGS2, flags2::CALCULATE, false);
+        }
+        self.asked = false;
     }
 
     /// One cycle: the speed to have, if a run is under way.
@@ -232,18 +253,28 @@ impl Positioning {
             Mode::Stop | Mode::Go => {}
         }
         match self.phase {
-            Phase::Running(trapezoid, cycle) => {
-                return Ok(self.run(trapezoid, cycle + 1, cells));
+            Phase::Running(trapezoid, cycle, backwards) => {
+                return Ok(self.run(trapezoid, cycle + 1, backwards, cells));
             }
             Phase::Calculating(left) => self.calculate(left, situation, cells)?,
-            Phase::Idle | Phase::Ready(_) => self.begin(situation, cells)?,
+            Phase::Idle | Phase::Ready(..) => self.begin(situation, cells)?,
         }
         let status = cells.byte(ram::PS_STATUS);
         match self.phase {
-            Phase::Ready(trapezoid)
-                if status & ps_status::START != 0 && situation.mode == Mode::Go =>
+            // It starts from a standstill only (13.1.2).
+            Phase::Ready(trapezoid, from)
+                if status & ps_status::START != 0
+                    && situation.mode == Mode::Go
+                    && situation.standing =>
             {
-                Ok(self.run(trapezoid, 1, cells))
+                if self.asked && from != cells.long(ram::UMDRSOLL) {
+                    // "The start position is not correct any more" (13.1.2): the way to the target is another.
+                    cells.set_bits(ram::PS_STATUS, ps_status::CALCULATED, false);
+                    self.phase = Phase::Idle;
+                    return Ok(None);
+                }
+                let backwards = status & ps_status::NEGATIVE != 0;
+                Ok(self.run(trapezoid, 1, backwards, cells))
             }
             _ => Ok(None),
         }
@@ -271,7 +302,7 @@ impl Positioning {
     fn begin(&mut self, situation: Situation, cells: &mut Cells) -> Result<(), ErrorCode> {
         let status = cells.byte(ram::PS_STATUS);
         let target = cells.byte(ram::FLAGS2) & flags2::CALCULATE != 0;
-        let ready = matches!(self.phase, Phase::Ready(_)) && status & ps_status::CALCULATED != 0;
+        let ready = matches!(self.phase, Phase::Ready(..)) && status & ps_status::CALCULATED != 0;
         if status & ps_status::CALCULATE == 0 && (!target || ready) {
             if !ready {
                 // Somebody has taken the result back (13.2.1.3).
@@ -290,7 +321,8 @@ impl Positioning {
         if !situation.standing {
             return Ok(());
         }
-        if status & ps_status::CALCULATE == 0 {
+        self.asked = status & ps_status::CALCULATE == 0;
+        if self.asked {
             self.direction(situation, cells);
         }
         self.phase = Phase::Calculating(situation.calculation);
@@ -354,41 +386,44 @@ impl Positioning {
         cells.put(ram::PS_DELTA, 0);
         let kept = status & (ps_status::NEGATIVE | ps_status::START);
         cells.put(ram::PS_STATUS, kept | ps_status::CALCULATED);
-        self.phase = Phase::Ready(trapezoid);
+        self.phase = Phase::Ready(trapezoid, cells.long(ram::UMDRSOLL));
         Ok(())
     }
 
     /// A cycle of the run: its speed; the phase stands in `ps_status`. None where the bus has taken the phase
     /// back, as the last step of `NB_InitPS` does in the target braking (13.2.1.3): the drive then brakes on its
     /// ramp.
-    fn run(&mut self, trapezoid: Trapezoid, cycle: u64, cells: &mut Cells) -> Option<i16> {
+    fn run(
+        &mut self,
+        trapezoid: Trapezoid,
+        cycle: u64,
+        backwards: bool,
+        cells: &mut Cells,
+    ) -> Option<i16> {
         const PHASES: u8 = ps_status::CONSTANT | ps_status::BRAKING | ps_status::TARGET_BRAKING;
         let status = cells.byte(ram::PS_STATUS);
         if cycle > 1 && status & PHASES == 0 {
             self.phase = Phase::Idle;
+            self.answer(cells);
             return None;
         }
-        let direction = status & ps_status::NEGATIVE;
+        let direction = if backwards { ps_status::NEGATIVE } else { 0 };
         if cycle == 1 {
             let way = cells.long(ram::PS_UMDREHUNG);
-            let way = if direction == 0 {
-                way
-            } else {
-                way.wrapping_neg()
-            };
+            let way = if backwards { way.wrapping_neg() } else { way };
             self.target = cells.long(ram::UMDRSOLL).wrapping_add(way);
         }
         if cycle > trapezoid.cycles() {
             self.phase = Phase::Idle;
             cells.put(ram::PS_STATUS, ps_status::FINISHED);
-            cells.set_bits(ram::FLAGS2, flags2::CALCULATE, false);
+            self.answer(cells);
             return Some(0);
         }
-        self.phase = Phase::Running(trapezoid, cycle);
+        self.phase = Phase::Running(trapezoid, cycle, backwards);
         let (speed, phase) = trapezoid.speed(cycle);
         cells.put(ram::PS_STATUS, direction | phase);
         let speed = i16::try_from(speed).unwrap_or(i16::MAX);
-        Some(if direction == 0 { speed } else { -speed })
+        Some(if backwards { -speed } else { speed })
     }
 }
 

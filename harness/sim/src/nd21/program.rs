@@ -28,11 +28,11 @@ use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::{GPO1, GPO2, Input, Inputs, OUTPUTS};
 use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
-use harness_proto::nd21::units::{CYCLE_US, SpeedRange, torque_from_raw};
+use harness_proto::nd21::units::{CYCLE_US, SpeedRange, limit_maximum_raw, torque_from_raw};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
-use harness_proto::novobus::output::OutputChange;
+use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::time::{Instant, Span};
 
 /// The cycle of the regulators (4.1).
@@ -265,6 +265,10 @@ impl Program {
         }
         let first = usize::from(ee::IMPULSZAHL);
         self.impulses = u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]]);
+        // Outside the range of 14.7.1.1 there is no emulation: a choice.
+        if !(1..=0x400).contains(&self.impulses) {
+            self.impulses = 0;
+        }
         self.pole_pairs = u16::from(cells.eeprom()[usize::from(ee::POLE)] / 2);
         let hardware = cells.byte(ram::HW_VERSION);
         self.source = Source::new(hardware & hw_version::ANALOGUE != 0);
@@ -296,7 +300,8 @@ impl Program {
     /// The power has come back. What was being written to the EEPROM when it failed is damaged, which the
     /// self-test finds (14.11.2).
     pub(super) fn power_on(&mut self, now: Instant) {
-        self.eeprom_controller.damage(&mut self.cells);
+        self.eeprom_controller
+            .damage(self.now, &self.properties, &mut self.cells);
         // Meanwhile the motor has run out.
         let load = f64::from(self.world.load) / 1_000.0;
         while self.next_cycle <= now && (self.plant.speed != 0.0 || load != 0.0) {
@@ -345,6 +350,7 @@ impl Program {
         let moved = self.motion.cycle(
             demand,
             Outside {
+                most: limit_maximum_raw(self.properties.device),
                 amperes: self.amperes,
                 load: f64::from(self.world.load) / 1_000.0,
                 jammed: self.world.jammed,
@@ -512,11 +518,12 @@ impl Program {
                         self.positioning.cancel(cells);
                     }
                 }
+                let most = cells.word(ram::N_MAX).min(0x7FFF).cast_signed();
                 let speed = match run {
-                    Run::Speed(speed) => speed,
+                    Run::Speed(speed) => speed.clamp(-most, most),
                     Run::Positioning => 0,
                     Run::Off => match orders.jog {
-                        Some(speed) => speed,
+                        Some(speed) => speed.clamp(-most, most),
                         None => self.source.cycle(&self.world, orders.analogue, cells),
                     },
                 };
@@ -594,15 +601,21 @@ impl Memory for Program {
                     self.cells.put(address, byte);
                     self.stir();
                 }
-                if address == ram::SCOPE_STATUS {
-                    self.align_scan();
+                match address {
+                    ram::SCOPE_STATUS => self.align_scan(),
+                    ram::PS_STATUS => self.positioning.status_written(byte, &self.cells),
+                    _ => {}
                 }
             }
         }
     }
 
+    /// With the analogue output active GPO1 is no digital output (14.3.4).
     fn write_output(&mut self, change: OutputChange) {
-        self.cells.write_output(change);
+        let analogue = self.cells.byte(ram::HW_VERSION2) & hw_version2::NO_ANALOGUE_OUTPUT == 0;
+        if change.output != Output::Gpo1 || !analogue {
+            self.cells.write_output(change);
+        }
         self.stir();
     }
 
