@@ -1,12 +1,14 @@
 //! The driver over a simulated ring of three ND21 (ND21 chapters 11, 12, 13.2).
 
-use harness::bus::{Axis, Bus, Error, Options, SkStatus, count_drives};
+use harness::bus::{
+    Axis, Bus, Error, Options, Recovery, Scope, SkStatus, Trigger, count_drives, recover,
+};
 use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink, Stimulus};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::s_ramp::Direction;
-use harness_proto::nd21::units::Ratio;
+use harness_proto::nd21::units::{Ratio, trigger_delay, trigger_level_to_raw};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
@@ -252,6 +254,82 @@ fn discovery() {
     let identity = bus().identity(axis(2)).expect("an identity");
     assert_eq!(identity.serial_number, Some(2));
     assert_eq!(identity.start_up.map(|date| date.year()), Some(1996));
+}
+
+/// ND21 9.7, 9.8: a ring says who saw the fault, and is brought back if it can be.
+#[test]
+fn recovery_of_9_8() {
+    let mut link = SimulatedLink::new(Bench::one(ring(4, Nd21Properties::default())));
+    let fine = Recovery {
+        before: None,
+        after: None,
+        drives: Some(size(4)),
+    };
+    assert_eq!(recover(&mut link, 0), fine);
+    // The second link ends at drive 2.
+    link.inject(
+        0,
+        PlacedFault::Link(1, LinkFault::Replace(0x11)),
+        Moment::Now,
+    );
+    link.send(0, &[0x80]);
+    let damaged = Recovery {
+        before: Some(2),
+        ..fine
+    };
+    assert_eq!(recover(&mut link, 0), damaged);
+    assert_eq!(recover(&mut link, 0), fine);
+    link.inject(0, PlacedFault::Link(1, LinkFault::Cut), Moment::Now);
+    assert_eq!(recover(&mut link, 0).drives, None);
+}
+
+/// ND21 14.10.6: a recording with a trigger, one without, and one that never triggers.
+#[test]
+fn oscilloscope_of_14_10_6() {
+    let bus = bus();
+    let [_, nist] = ram::NIST.to_be_bytes();
+    let level = trigger_level_to_raw(2);
+    let delay = trigger_delay(-5_000, 0).expect("a delay");
+    let scope = Scope {
+        signals: [nist; 2],
+        timer0: 0,
+        trigger: Some(Trigger {
+            signal: nist,
+            level,
+            positive: true,
+            delay,
+        }),
+    };
+    bus.start_scope(axis(1), &scope).expect("started");
+    bus.write_word(axis(1), ram::NSOLL, 0x1000)
+        .expect("written");
+    let found = bus
+        .finish_scope(axis(1), &scope, Span::from_millis(1_000))
+        .expect("triggered");
+    let bytes: Vec<_> = found.iter().map(|found| found.byte).collect();
+    assert_eq!(bytes.len(), 256);
+    assert!(bytes.is_sorted(), "a run-up in time order: {bytes:?}");
+    assert_eq!((bytes[45], bytes[46]), (1, 2), "46 before the trigger");
+    assert_eq!(found[0].signal + found[1].signal, 3, "in turn");
+    bus.write_word(axis(1), ram::NSOLL, 0).expect("written");
+    bus.run(Span::from_millis(1_000));
+    let again = bus.start_scope(axis(1), &scope);
+    again.expect("started");
+    let waited = bus.finish_scope(axis(1), &scope, Span::from_millis(100));
+    assert!(matches!(waited, Err(Error::TimeOut { .. })), "{waited:?}");
+    assert_eq!(
+        bus.read_byte(axis(1), ram::SCOPE_STATUS).map(|s| s & 0x80),
+        Ok(0x80)
+    );
+    let at_once = Scope {
+        trigger: None,
+        ..scope
+    };
+    bus.start_scope(axis(1), &at_once).expect("started");
+    let found = bus
+        .finish_scope(axis(1), &at_once, Span::ZERO)
+        .expect("recorded");
+    assert!(found.iter().all(|found| found.byte == 0));
 }
 
 /// ND21 11.4, 11.5: a ring of another size is not opened; disturbances are corrected and counted.

@@ -60,7 +60,7 @@ pub enum Command {
     Cells(CellsArguments),
     /// Commands on a bus.
     #[command(flatten)]
-    Drive(DriveCommand),
+    Drive(Box<DriveCommand>),
     /// Print a completion script for a shell.
     Completions {
         /// For which shell.

@@ -16,10 +16,10 @@ pub(super) fn read(bus: &Bus<'_>, axis: Axis, location: &Location) -> Result<Vec
         return bus.read_eeprom_bytes(axis, low(address), location.size);
     }
     match location.size {
-        2 if whole(Kind::ReadWord, address, 2) => {
+        2 if whole(Kind::ReadWord, address) => {
             Ok(bus.read_word(axis, address)?.to_be_bytes().to_vec())
         }
-        4 if whole(Kind::ReadLong, address, 4) => match bus.read_long(axis, address) {
+        4 if whole(Kind::ReadLong, address) => match bus.read_long(axis, address) {
             // Some drives answer with three bytes (10.1).
             Err(Error::Open(_)) => bus.read_bytes(axis, address, 4),
             long => Ok(long?.to_be_bytes().to_vec()),
@@ -45,7 +45,7 @@ pub(super) fn write(
     let mut rest = bytes;
     while let [first, behind @ ..] = rest {
         match behind {
-            [second, behind @ ..] if whole(Kind::WriteWord, address, 2) => {
+            [second, behind @ ..] if whole(Kind::WriteWord, address) => {
                 bus.write_word(axis, address, u16::from_be_bytes([*first, *second]))?;
                 rest = behind;
                 address = address.saturating_add(2);
@@ -60,8 +60,9 @@ pub(super) fn write(
     Ok(())
 }
 
-fn whole(kind: Kind, address: u16, size: u16) -> bool {
-    address % 2 == 0 && in_range(kind, address) && in_range(Kind::ReadByte, address + (size - 1))
+/// Whether a command takes all of its bytes from this address on; the H8 has words at even ones only.
+fn whole(kind: Kind, address: u16) -> bool {
+    address.is_multiple_of(2) && in_range(kind, address)
 }
 
 fn low(address: u16) -> u8 {

@@ -240,7 +240,7 @@ fn store(comparison: &Comparison) -> Result<(), Failure> {
             bench.bus.write_eeprom(axis, address, byte)?;
         }
     }
-    verify(bench, axis, &written, "the EEPROM", |entry| home(entry))
+    verify(bench, axis, &written, "the EEPROM", home)
 }
 
 /// Where a parameter is in the EEPROM.

@@ -113,7 +113,7 @@ pub(in crate::scenario) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Pla
         Some((2, Ok(address))) => {
             let cell = eeprom::cell_at(address);
             Ok(Place {
-                name: before.clone().chunk().value.to_owned(),
+                name: format!("{address:02X}"),
                 address: u16::from(address),
                 cell: cell.filter(|cell| cell.address == u16::from(address)),
                 named: false,

@@ -1,0 +1,661 @@
+//! The commands on a bus as somebody at a machine uses them: output, refusals, exit codes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Exit code, standard output and standard error.
+type End = (i32, String, String);
+
+fn drivebench_in(folder: &Path, arguments: &[&str]) -> End {
+    let output = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts");
+    (
+        output.status.code().expect("the program ended by itself"),
+        String::from_utf8(output.stdout).expect("text"),
+        String::from_utf8(output.stderr).expect("text"),
+    )
+}
+
+fn drivebench(line: &str) -> End {
+    let arguments: Vec<_> = line.split_whitespace().collect();
+    drivebench_in(&std::env::temp_dir(), &arguments)
+}
+
+/// The output of a command that does its work and has nothing to remark.
+fn shown(line: &str) -> String {
+    let (code, stdout, stderr) = drivebench(line);
+    assert_eq!((code, stderr.as_str()), (0, ""), "{line}\n{stdout}");
+    stdout
+}
+
+/// A command that does not do it: its exit code and what it says; nothing but that.
+#[track_caller]
+fn refused(line: &str, code: i32, parts: &[&str]) {
+    let (found, stdout, stderr) = drivebench(line);
+    assert_eq!((found, stdout.as_str()), (code, ""), "{line}\n{stderr}");
+    for part in parts {
+        assert!(stderr.contains(part), "{line}\n{part}\n{stderr}");
+    }
+}
+
+/// A folder of this test's own, empty.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+    // From an earlier run.
+    let _gone = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+fn json(line: &str) -> serde_json::Value {
+    serde_json::from_str(&shown(line)).expect("JSON")
+}
+
+#[test]
+fn read_shows_cells_with_units_and_bits() {
+    assert_eq!(
+        shown("read 1 nMax SwVersion2 Flags2 position EE_Seriennummer FF0C FF68:2 ee:44:2 ee:nMax"),
+        "\
+drive  cell             address  raw       value                   section   meaning
+1      nMax             FF68     2C3D      3000.1 rpm              14.5.3.2  maximum speed
+1      SwVersion2       FF63     FF                                14.3.2    configuration byte
+1      Flags2           FF57     02        NOVOBUS OK              14.4.3    status byte
+1      position         FF16     00000000  0 turns                 14.5.5    rotation, actual value
+1      EE_Seriennummer  ee:01    000001    1                       14.8.1    serial number
+1      FF0C             FF0C     00                                14.5.3.1  spin speed, actual value
+1      FF68             FF68     2C3D      3000.1 rpm              14.5.3.2  maximum speed
+1      ee:44            ee:44    0400      1024 impulses per turn  14.7.1.1  encoder emulation
+1      ee:nMax          ee:28    2C3D      3000.1 rpm              14.5.3.2  maximum speed
+"
+    );
+    let found = json("read 0..1 nist Flags2 EE_InitDatum --format json");
+    assert_eq!(found["schema"], 1);
+    assert_eq!(found["cells"].as_array().map(Vec::len), Some(6));
+    assert_eq!(found["cells"][0]["value"], 0.0);
+    assert_eq!(found["cells"][0]["unit"], "rpm");
+    assert_eq!(found["cells"][1]["bits"][0], "NOVOBUS OK");
+    assert_eq!(found["cells"][2]["memory"], "eeprom");
+    assert_eq!(found["cells"][2]["value"], "1996-01-01");
+    assert_eq!(found["cells"][3]["axis"], "1");
+}
+
+#[test]
+fn all_mistakes_in_cells_are_shown_at_once() {
+    refused(
+        "read 0 nits EE_Pole ABCD ee:FF:9 FF0C:0 FF0C:999999999999999999999",
+        2,
+        &[
+            "did you mean `nist`?",
+            "did you mean `EE_pole`?",
+            "no memory at ABCD",
+            "beyond the EEPROM",
+            "1 to 256 expected here",
+            "command line: 6 mistakes",
+        ],
+    );
+    refused(
+        "write 0 nist=5rpm Flags=00 EE_BetriebStd=0000 FF80=00 nsoll=07 nMax=99999rpm nMax=5A",
+        2,
+        &[
+            "`nist` is read only (ND21 14.5.3.1)",
+            "`Flags` is read only (ND21 14.4.2)",
+            "`EE_BetriebStd` is read only (ND21 14.8.2)",
+            "`FF80` cannot be written",
+            "command line: 4 mistakes",
+        ],
+    );
+    refused(
+        "write 0 nsoll=07 nMax=99999rpm",
+        2,
+        &[
+            "1 byte where `nsoll` has 2",
+            "at most 8000 expected (ND21 14.5.3.2)",
+        ],
+    );
+    refused("write 0 nMax", 2, &["the line ends where `=` is expected"]);
+}
+
+#[test]
+fn benches_and_drives_that_are_not_there_are_refused() {
+    for (line, part) in [
+        (
+            "read 0 nist --rig cabinet",
+            "benches with real drives come later",
+        ),
+        ("read 0 nist --rig cabinet", "sim:3"),
+        ("read 0 nist --rig sim:", "no number of drives"),
+        ("read 0 nist --rig sim:251", "1 to 250 (ND21 8.4)"),
+        ("read 0 nist --rig sim:1,2,3", "one ring or two (ND21 12.2)"),
+        (
+            "read 3 nist",
+            "no drive 3 in a ring of 3: 0 to 2 expected (ND21 8.5)",
+        ),
+        ("read 2:0 nist", "the bus has no ring 2"),
+        ("read 2..1 nist", "ends before it begins"),
+        ("read -1 nist", "unexpected argument"),
+        ("read 1..x nist", "`1..x` is no drive"),
+        ("read 3:0 nist", "`3:0` is no drive"),
+        ("position 0..1 --by 1turn", "one drive expected"),
+        (
+            "info --setup no-such-file.scn",
+            "failed to read no-such-file.scn",
+        ),
+    ] {
+        refused(line, 2, &[part]);
+    }
+}
+
+#[test]
+fn write_shows_before_and_after() {
+    assert_eq!(
+        shown("write 0..1 nRampe+=off VCOlin=44 EE_pole=08 Status=80"),
+        "\
+drive 0 nRampe+: 0010 (9811.5 rpm/s) -> 7FFF (off)
+drive 0 VCOlin: 32 (3000 rpm) -> 44 (4080 rpm)
+drive 0 EE_pole: 06 (6) -> 08 (8)
+drive 0 Status: 00 -> 80 (stop)
+drive 1 nRampe+: 0010 (9811.5 rpm/s) -> 7FFF (off)
+drive 1 VCOlin: 32 (3000 rpm) -> 44 (4080 rpm)
+drive 1 EE_pole: 06 (6) -> 08 (8)
+drive 1 Status: 00 -> 80 (stop)
+"
+    );
+    // The error code is taken as an order (14.10.1), and the drive says so.
+    let (code, stdout, stderr) = drivebench("write 0 errorcode=00AF");
+    assert_eq!(code, 0, "{stdout}{stderr}");
+}
+
+#[test]
+fn what_can_turn_a_motor_needs_leave_and_says_so_first() {
+    for (line, part) in [
+        (
+            "write 2 nsoll=1500rpm",
+            "drive 2 is in go, and nsoll orders a motion",
+        ),
+        ("write 2 FF08:2=1000", "FF08 orders a motion"),
+        ("write 2 Flags2=80", "Flags2 orders a motion"),
+        ("write 2 umdrsoll=10turns", "umdrsoll orders a motion"),
+        ("write 2 Status=00", "Status releases it"),
+        ("scope 2 nist --then nsoll=1rpm", "nsoll orders a motion"),
+        ("go 0 2", "go: drives 0, 2: their motors may turn"),
+        ("reset 1", "reset: drive 1: its motor may turn"),
+        (
+            "position 1 --by -50deg --init",
+            "drive 1 stands at 0 turns and will turn: by -50 deg",
+        ),
+        (
+            "position 1 --reference",
+            "a referencing run, at most at 3000.1 rpm",
+        ),
+    ] {
+        refused(line, 2, &[part, "nothing was", "add --move to allow it"]);
+    }
+    let (code, stdout, stderr) = drivebench("write 2 nsoll=1500rpm --move");
+    assert_eq!(code, 0);
+    assert_eq!(stdout, "drive 2 nsoll: 0000 (0 rpm) -> 161E (1499.9 rpm)\n");
+    let said = "drive 2 is in go, and nsoll orders a motion: its motor can turn\n";
+    assert_eq!(stderr, said);
+    // A blocked drive may be given a speed, and nothing keeps a drive from being stopped.
+    let folder = folder("blocked");
+    std::fs::write(folder.join("a.scn"), "drive 0 input GPIN3 low\n").expect("a file");
+    let line = ["write", "0", "nsoll=1500rpm", "--setup", "a.scn"];
+    assert_eq!(drivebench_in(&folder, &line).0, 0);
+    shown("write 0 Status=81");
+}
+
+#[test]
+fn info_shows_every_drive() {
+    assert_eq!(
+        shown("info --rig sim:2,1"),
+        "\
+drive  serial  mode  speed  position  cooler     motor       hours  blocked  started     changed     EE_Version  error
+0      000001  go    0 rpm  0 turns   24.755 °C  998.67 ohm  0 h    0 h      1996-01-01  1996-01-01  00          -
+1      000001  go    0 rpm  0 turns   24.755 °C  998.67 ohm  0 h    0 h      1996-01-01  1996-01-01  00          -
+2:0    000001  go    0 rpm  0 turns   24.755 °C  998.67 ohm  0 h    0 h      1996-01-01  1996-01-01  00          -
+3 drives on the bus, 0 errors corrected
+"
+    );
+    let folder = folder("info");
+    let setup = "ring 2..5 default 4\ndrive 1 eeprom EE_Seriennummer = 004711\ndrive 1 cooler 95C\n\
+        drive 3 input GPIN3 GPIN5 high\nread-byte 0 nist = 00\n";
+    std::fs::write(folder.join("a.scn"), setup).expect("a file");
+    let info = |more: &[&str]| {
+        let line = [&["info", "--setup", "a.scn"], more].concat();
+        drivebench_in(&folder, &line)
+    };
+    let (code, stdout, stderr) = info(&["--format", "json"]);
+    assert_eq!((code, stderr.as_str()), (0, ""), "{stdout}");
+    let found: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
+    assert_eq!(found["drives"].as_array().map(Vec::len), Some(4));
+    assert_eq!(found["drives"][1]["serial_number"], 4711);
+    assert_eq!(found["drives"][1]["mode"], "error");
+    assert_eq!(found["drives"][1]["error"]["code"], "0400");
+    assert_eq!(found["drives"][2]["mode"], "block");
+    assert_eq!(found["drives"][3]["mode"], "go");
+    assert_eq!(found["drives"][3]["error"], serde_json::Value::Null);
+    let (code, stdout, _) = info(&["--rig", "sim:5"]);
+    assert_eq!(code, 0);
+    assert!(stdout.contains("0400 "), "{stdout}");
+    assert!(stdout.contains("5 drives on the bus"), "{stdout}");
+    // What the header does not allow.
+    for rig in ["sim:2", "sim:6", "sim:4,2"] {
+        assert_eq!(info(&["--rig", rig]).0, 2, "{rig}");
+    }
+    std::fs::write(folder.join("a.scn"), "drvie 0 model nd21\n").expect("a file");
+    let (code, _, stderr) = info(&[]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("drvie"), "{stderr}");
+}
+
+#[test]
+fn watch_shows_values_again_and_again() {
+    assert_eq!(
+        shown("watch 0 nist ps_status --every 50ms --for 100ms"),
+        "    0.000 ms  drive 0  nist 0 rpm  ps_status 00\n   50.000 ms  drive 0  nist 0 rpm  ps_status 00\n  \
+         100.000 ms  drive 0  nist 0 rpm  ps_status 00\n"
+    );
+    assert_eq!(
+        shown("watch 0..1 nist Status --format csv --for 100ms"),
+        "time_ms,0 nist rpm,0 Status,1 nist rpm,1 Status\n0.000,0.0,00,0.0,00\n100.000,0.0,00,0.0,00\n"
+    );
+    let folder = folder("watch");
+    let setup = "drive 0..last input GPIN3 GPIN5 high\ndrive 0 memory nsoll = 100rpm\n";
+    std::fs::write(folder.join("a.scn"), setup).expect("a file");
+    let line = ["watch", "0", "nist", "--for", "0s", "--setup", "a.scn"];
+    let (_, stdout, _) = drivebench_in(&folder, &line);
+    assert!(
+        stdout.contains("nist 99.") || stdout.contains("nist 100"),
+        "{stdout}"
+    );
+    refused("watch 0 nist --every 0ms", 2, &["--every must be longer"]);
+    refused("watch 0 nist --every 1ns", 2, &["at most 1000000 times"]);
+    refused(
+        "watch 0 nist --every 1rpm",
+        2,
+        &["`rpm` is no unit of time"],
+    );
+}
+
+#[test]
+fn parameters_are_saved_loaded_and_compared() {
+    let folder = folder("params");
+    let run = |line: &str| {
+        let arguments: Vec<_> = line.split_whitespace().collect();
+        drivebench_in(&folder, &arguments)
+    };
+    let ok = |line: &str| {
+        let (code, stdout, stderr) = run(line);
+        assert_eq!((code, stderr.as_str()), (0, ""), "{line}\n{stdout}");
+        stdout
+    };
+    assert_eq!(
+        ok("params save 0 p.toml"),
+        "drive 0, serial number 000001: 32 parameters saved in p.toml\n"
+    );
+    let text = std::fs::read_to_string(folder.join("p.toml")).expect("a file");
+    for line in [
+        "[nd21]",
+        "nMax             = \"3000.1 rpm\"     # FF68 14.5.3.2 maximum speed",
+        "\"nRampe+\"        = \"9811.5 rpm/s\"   # FF6C 14.5.4   acceleration ramp",
+        "emk0             = \"181.18 V\"       # FF7A 14.6.2   compensation of the back EMF",
+        "RefLage0         = \"0.5 turns\"      # FD92 13.1.4   rotor position after a referencing run",
+    ] {
+        assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+    }
+    let files: Vec<_> = std::fs::read_dir(&folder).expect("a folder").collect();
+    assert_eq!(files.len(), 1, "nothing is left beside the file");
+    assert_eq!(
+        ok("params diff 0 p.toml"),
+        "drive 0 and p.toml are equal (32 parameters)\n"
+    );
+    assert_eq!(
+        ok("params load 0 p.toml --yes"),
+        "drive 0: nothing to change\n"
+    );
+    let other = text
+        .replace("3000.1 rpm", "1500rpm")
+        .replace("\"0 turns\"        # FD90", "\"7turns\" # FD90")
+        .replace("85.048", "60");
+    std::fs::write(folder.join("q.toml"), other).expect("a file");
+    let (code, stdout, _) = run("params diff 0 q.toml");
+    assert_eq!(code, 1);
+    assert_eq!(
+        stdout,
+        "\
+MaxTempKK: drive 0 54 (85.048 °C), file 83 (59.776 °C)
+nMax: drive 0 2C3D (3000.1 rpm), file 161E (1499.9 rpm)
+RefUmdr0: drive 0 0000 (0 turns), file 0007 (7 turns)
+drive 0 and q.toml differ in 3 (32 parameters)
+"
+    );
+    let changes = "nMax: 2C3D (3000.1 rpm) -> 161E (1499.9 rpm)\nRefUmdr0: 0000 (0 turns) -> 0007 (7 turns)\n";
+    let fixed = "note: MaxTempKK is read only (ND21 14.5.7.1) and stays 54 (85.048 °C)";
+    let (code, stdout, stderr) = run("params load 0 q.toml");
+    assert_eq!((code, stdout.as_str()), (2, changes));
+    assert!(stderr.contains(fixed), "{stderr}");
+    assert!(stderr.contains("2 parameters would change; nothing was written, add --yes"));
+    let (code, stdout, stderr) = run("params load 0 q.toml --yes");
+    let written = "drive 0: 2 parameters written and read back\n";
+    assert_eq!((code, stdout), (0, format!("{changes}{written}")));
+    assert!(
+        stderr.contains("drive 0 is in go: its motor can turn"),
+        "{stderr}"
+    );
+    let (code, stdout, _) = run("params load 0 q.toml --yes --store");
+    assert_eq!(code, 0);
+    assert!(
+        stdout.ends_with("read back, all stored in the EEPROM\n"),
+        "{stdout}"
+    );
+}
+
+/// What the range of speeds of the file makes of its own numbers (14.3.2).
+#[test]
+fn a_file_with_another_range_of_speeds_is_loaded_in_its_own_scale() {
+    let folder = folder("range");
+    let text = "[nd21]\nSwVersion2 = \"7F\"\nnMax = \"3000 rpm\"\n";
+    std::fs::write(folder.join("p.toml"), text).expect("a file");
+    let line = ["params", "load", "0", "p.toml", "--yes"];
+    let (code, stdout, stderr) = drivebench_in(&folder, &line);
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    assert!(stderr.contains("p.toml has 2 of 32 parameters"), "{stderr}");
+    assert!(stdout.contains("-> 161E (2999.8 rpm)"), "{stdout}");
+}
+
+#[test]
+fn all_mistakes_of_a_file_of_parameters_are_shown_at_once() {
+    let folder = folder("bad_params");
+    let text = "[nd21]\nnMaxx = \"1 rpm\"\nnMax = 5\nimax = \"99A\"\nnKp = \"5\"\nnKi = \"0505\"\n\
+        nist = \"5 rpm\"\ni0 = \"\\u0035A\"\n[other]\nx = 1\n";
+    std::fs::write(folder.join("bad.toml"), text).expect("a file");
+    let (code, stdout, stderr) = drivebench_in(&folder, &["params", "load", "0", "bad.toml"]);
+    assert_eq!((code, stdout.as_str()), (2, ""));
+    for part in [
+        "bad.toml:2:1",
+        "did you mean `nMax`?",
+        "bad.toml:3:8",
+        "a value of `nMax` is a text",
+        "bad.toml:4:9",
+        "at most 19.952 expected (ND21 14.5.1.2)",
+        "`5` has an odd number of digits",
+        "2 bytes where `nKi` has 1",
+        "`nist` is no parameter",
+        "`5A` can be bytes or a number with a unit",
+        "`other` is not the table of the parameters",
+        "bad.toml: 8 mistakes",
+    ] {
+        assert!(stderr.contains(part), "{part}\n{stderr}");
+    }
+    for text in [
+        "",
+        "nd21 = 1\n",
+        "x",
+        "[nd21]\nnMax = \"1 rpm\"\nnMax = \"2 rpm\"\n",
+        "[nd21\n",
+    ] {
+        std::fs::write(folder.join("bad.toml"), text).expect("a file");
+        let (code, _, stderr) = drivebench_in(&folder, &["params", "diff", "0", "bad.toml"]);
+        assert_eq!(code, 2, "{text:?}\n{stderr}");
+        assert!(stderr.contains("bad.toml: 1 mistake"), "{text:?}\n{stderr}");
+    }
+    refused("params diff 0 no-such-file.toml", 2, &["failed to read"]);
+    refused(
+        "params save 0 /no/such/folder/p.toml",
+        3,
+        &["failed to write"],
+    );
+    refused("params save 0 /", 2, &["is not the name of a file"]);
+}
+
+/// ND21 14.10.6: the run-up of a drive, in time order and in its units.
+#[test]
+fn scope_of_a_run_up() {
+    let folder = folder("scope");
+    let arguments: Vec<_> =
+        "scope 0 nist nsollrampe --trigger nist --level 100rpm --time-base 864us \
+        --delay -5ms --then nsoll=1500rpm --move --csv s.csv"
+            .split_whitespace()
+            .collect();
+    let (code, stdout, stderr) = drivebench_in(&folder, &arguments);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(
+        stderr.starts_with("drive 0 is in go, and nsoll orders a motion"),
+        "{stderr}"
+    );
+    for part in [
+        "drive 0 nist, every 1.728 ms\n  1492 rpm |",
+        "drive 0 nsollrampe, every 1.728 ms\n",
+        "\nthe trigger is at 5.184 ms\n",
+    ] {
+        assert!(stdout.contains(part), "{part}\n{stdout}");
+    }
+    let csv = std::fs::read_to_string(folder.join("s.csv")).expect("a file");
+    let lines: Vec<_> = csv.lines().collect();
+    assert_eq!(lines.len(), 257);
+    assert_eq!(lines[0], "time_us,signal,name,raw,value,unit");
+    assert!(lines[1].starts_with("-5184,"), "{}", lines[1]);
+    let values = |name: &str| -> Vec<f64> {
+        let of = lines.iter().filter(|line| line.contains(name));
+        of.map(|line| {
+            line.split(',')
+                .nth(4)
+                .and_then(|value| value.parse().ok())
+                .expect("a number")
+        })
+        .collect()
+    };
+    let nist = values(",nist,");
+    assert_eq!(nist.len(), 128);
+    assert!(
+        nist.windows(2).all(|pair| pair[0] <= pair[1]),
+        "a run-up: {nist:?}"
+    );
+    assert!(nist[0] < 100.0 && nist[127] > 1400.0, "{nist:?}");
+}
+
+#[test]
+fn scope_without_a_trigger_and_its_mistakes() {
+    let flat = shown("scope 0 nist --time-base 1ms");
+    assert!(
+        flat.starts_with("drive 0 nist, every 0.972 ms\n  0 rpm |**"),
+        "{flat}"
+    );
+    assert!(
+        flat.ends_with("recorded at once, without a trigger\n"),
+        "{flat}"
+    );
+    for (line, part) in [
+        ("scope 0 RefV1", "`RefV1` is no signal of the oscilloscope"),
+        (
+            "scope 0 EE_pole",
+            "`EE_pole` is no signal of the oscilloscope",
+        ),
+        ("scope 0 nist --level 3rpm", "--trigger"),
+        (
+            "scope 0 nist --trigger nist --level 9999rpm",
+            "at most 8000",
+        ),
+        (
+            "scope 0 nist --time-base 50us",
+            "at least 108 expected (ND21 14.10.6.2)",
+        ),
+        ("scope 0 nist --time-base 1rpm", "us or ms or s"),
+        (
+            "scope 0 nist --trigger nist --level 5rpm --delay -9s",
+            "14.10.6.4",
+        ),
+        ("scope 0 nist --delay 5ms", "--trigger"),
+    ] {
+        refused(line, 2, &[part]);
+    }
+    refused(
+        "scope 0 nist --trigger nist --level 100rpm --wait 100ms",
+        1,
+        &["drive 0: the trigger did not come within 100.000 ms; the recording was stopped"],
+    );
+}
+
+/// ND21 13.2: a referencing run, a position, a path.
+#[test]
+fn positions() {
+    let folder = folder("position");
+    let setup = "drive 0..last input GPIN3 GPIN5 high\ndrive 0..last cam GPIN4 3turns..3.5turns\n";
+    std::fs::write(folder.join("cam.scn"), setup).expect("a file");
+    let line = "position 0 --reference --to 10.25turns --speed 500rpm --move --setup cam.scn";
+    let arguments: Vec<_> = line.split_whitespace().collect();
+    let (code, stdout, stderr) = drivebench_in(&folder, &arguments);
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(
+        stderr,
+        "drive 0 stands at 0 turns and will turn: a referencing run, then to 10.25 turns, at most at 500 rpm (ps_v0)\n"
+    );
+    assert!(stdout.starts_with("drive 0 stands at 10.2"), "{stdout}");
+    let (code, stdout, _) = drivebench("position 1 --by -50deg --init --move");
+    assert_eq!(code, 0);
+    assert!(stdout.starts_with("drive 1 stands at -0.138"), "{stdout}");
+    refused(
+        "position 0 --to 1turn --move",
+        1,
+        &["not initialised (ps_status 00)", "--reference"],
+    );
+    refused("position 0 --to 99999turns", 2, &["13.1.9"]);
+    refused("position 0 --by 5rpm", 2, &["turns or deg"]);
+    refused("position 0 --by 5deg --speed 0rpm", 2, &["more than 0 rpm"]);
+    refused("position 0", 2, &["--to"]);
+    // There is no reference switch: the search ends, and the drive with it.
+    let (code, stdout, stderr) = drivebench("position 0 --reference --move");
+    assert_eq!((code, stdout.as_str()), (1, ""));
+    assert!(
+        stderr.contains("for the referencing run of drive 0"),
+        "{stderr}"
+    );
+    assert!(
+        stderr.ends_with("drive 0 was stopped (software stop)\n"),
+        "{stderr}"
+    );
+    std::fs::write(folder.join("a.scn"), "drive 0 input GPIN3 low\n").expect("a file");
+    let line = [
+        "position", "0", "--by", "1turn", "--init", "--move", "--setup", "a.scn",
+    ];
+    let (code, _, stderr) = drivebench_in(&folder, &line);
+    assert_eq!(code, 1);
+    assert!(
+        stderr.contains("drive 0 is in block; it must be in go"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn modes_of_drives() {
+    assert_eq!(
+        shown("stop all"),
+        "drive 0 is in stop\ndrive 1 is in stop\ndrive 2 is in stop\n"
+    );
+    assert_eq!(
+        shown("block 2:0 1 --rig sim:2,1"),
+        "drive 2:0 is in block\ndrive 1 is in block\n"
+    );
+    assert_eq!(
+        shown("delete-error 0 0..1"),
+        "drive 0 is in go\ndrive 1 is in go\n"
+    );
+    let (code, stdout, stderr) = drivebench("go 0..1 --move");
+    assert_eq!(
+        (code, stdout.as_str()),
+        (0, "drive 0 is in go\ndrive 1 is in go\n")
+    );
+    assert_eq!(stderr, "go: drives 0, 1: their motors may turn\n");
+    let (code, stdout, stderr) = drivebench("reset 1 --move");
+    assert_eq!((code, stdout.as_str()), (0, "drive 1 is in go\n"));
+    assert_eq!(stderr, "reset: drive 1: its motor may turn\n");
+    refused("stop", 2, &["DRIVE"]);
+}
+
+#[test]
+fn recover_counts_the_drives() {
+    assert_eq!(
+        shown("recover"),
+        "ring 1: no fault reported; behind the check sequence 3 drives answer\n"
+    );
+    assert_eq!(
+        json("recover --rig sim:250,1 --format json")["rings"],
+        serde_json::json!([
+            {"reported": null, "drives": 250, "still": null},
+            {"reported": null, "drives": 1, "still": null},
+        ])
+    );
+    let folder = folder("recover");
+    std::fs::write(folder.join("off.scn"), "drive 1 power off\n").expect("a file");
+    let (code, stdout, _) = drivebench_in(&folder, &["recover", "--setup", "off.scn"]);
+    assert_eq!(code, 3);
+    assert!(
+        stdout.contains("nothing comes back behind the check sequence"),
+        "{stdout}"
+    );
+    let (code, stdout, stderr) = drivebench_in(&folder, &["info", "--setup", "off.scn"]);
+    assert_eq!((code, stdout.as_str()), (3, ""));
+    assert!(
+        stderr.contains("a drive is not ready for operation"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn every_command_explains_itself() {
+    for command in [
+        "read",
+        "write",
+        "info",
+        "watch",
+        "params",
+        "params save",
+        "params load",
+        "params diff",
+        "scope",
+        "position",
+        "go",
+        "stop",
+        "block",
+        "reset",
+        "delete-error",
+        "recover",
+    ] {
+        let help = shown(&format!("{command} --help"));
+        assert!(help.contains("Usage: drivebench"), "{command}");
+    }
+    for command in ["read", "info", "recover"] {
+        assert!(
+            shown(&format!("{command} --help")).contains("\"schema\": 1"),
+            "{command}"
+        );
+    }
+}
+
+/// The README's commands at a machine do what they say.
+#[test]
+fn the_commands_of_the_readme_work() {
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md"))
+        .expect("the README");
+    let section = readme
+        .split("## At the machine")
+        .nth(1)
+        .expect("the section");
+    let block = section.split("```").nth(1).expect("the commands");
+    let folder = folder("readme");
+    let mut count = 0;
+    for line in block.lines() {
+        let line = line.split('#').next().unwrap_or_default();
+        let Some(arguments) = line.strip_prefix("drivebench ") else {
+            continue;
+        };
+        let arguments: Vec<_> = arguments.split_whitespace().collect();
+        let (code, stdout, stderr) = drivebench_in(&folder, &arguments);
+        assert_eq!(code, 0, "{line}\n{stdout}{stderr}");
+        count += 1;
+    }
+    assert!(count > 8, "{count} commands");
+}
