@@ -330,11 +330,12 @@ fn power_failure_in_mid_write() {
     let mut rig = plc();
     transmit(&mut rig, 32, 0x000A_4000, POSITION);
     begin(&mut rig, Function::WrEe);
-    rig.run(Span::from_millis(20));
+    // Two bytes of 10 ms are written, the third is lost, the fourth is as it was.
+    rig.run(Span::from_millis(25));
     harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(
         (rig.word(ram::ERRORCODE), eeprom(&rig, 0x60)),
-        (0x0102, 0xFFFF_FFFF)
+        (0x0102, 0x000A_FF00)
     );
     harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(rig.word(ram::ERRORCODE), 0x0102);
@@ -343,4 +344,42 @@ fn power_failure_in_mid_write() {
     rig.run(Span::from_millis(20));
     harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(rig.word(ram::ERRORCODE), 0);
+}
+
+/// 13.1.9.2, 13.1.9.4: nothing is loaded, stored or written without a whole transmission, be it interrupted or
+/// never begun.
+#[test]
+fn without_a_whole_transmission() {
+    let mut rig = plc();
+    for refused in [
+        Function::WrPs,
+        Function::WrEe,
+        Function::WrNMax,
+        Function::WrI,
+    ] {
+        let before = (rig.word(ram::N_MAX), rig.byte(ram::IMAX));
+        begin(&mut rig, refused);
+        rig.cycles(1_000);
+        assert!(!gpo1(&rig), "{refused:?}");
+        end(&mut rig);
+        assert_eq!((rig.word(ram::N_MAX), rig.byte(ram::IMAX)), before);
+    }
+    assert_eq!((eeprom(&rig, 0x60), rig.byte(ram::PZ)), (0, 0));
+}
+
+/// 13.1.7.4: the 13th read confirms the error whose code has been read, not one that has come since.
+#[test]
+fn another_error_while_one_is_read() {
+    let mut rig = plc();
+    function(&mut rig, Function::Leitungstest);
+    let mut code = 0_u16;
+    for bit in 0..12 {
+        code |= u16::from(read(&mut rig, Function::RdError)) << bit;
+        if bit == 5 {
+            rig.write_word(ram::ERRORCODE, 0x0600);
+        }
+    }
+    assert_eq!(code, 0x0602);
+    read(&mut rig, Function::RdError);
+    assert_ne!(rig.byte(ram::STATUS) & status::ERROR, 0);
 }

@@ -299,3 +299,34 @@ fn an_idle_drive_costs_nothing() {
     rig.cycles(10);
     assert_eq!(rig.signed(ram::NSOLLRAMPE), 160);
 }
+
+/// ND21 11.8, 14.5.4: released while the motor still turns, the drive leads it on the ramp from the speed that
+/// it has; it does not brake it to 0 at once.
+#[test]
+fn a_turning_motor_is_taken_over_at_its_speed() {
+    let mut rig = Rig::started();
+    rig.write_word(ram::NSOLL, RPM_1500);
+    rig.run(Span::from_millis(500));
+    rig.set(ram::STATUS, status::BLOCK);
+    rig.cycles(20);
+    let coasting = rig.signed(ram::NIST);
+    assert!(coasting > 4_000, "{coasting}");
+    rig.clear(ram::STATUS, status::BLOCK);
+    rig.cycles(1);
+    let taken = rig.signed(ram::NSOLLRAMPE);
+    assert!((taken - coasting).abs() <= 32, "{taken} {coasting}");
+    rig.cycles(10);
+    let led = (taken + 10 * 16).min(5_662);
+    assert_eq!(rig.signed(ram::NSOLLRAMPE), led);
+}
+
+/// ND21 14.5.1.2: no more current than the device gives, whatever is written to `imax`.
+#[test]
+fn imax_beyond_the_device() {
+    let mut rig = Rig::started();
+    let most = rig.byte(ram::IMAX);
+    rig.write(ram::IMAX, 0xFF);
+    rig.cycles(1);
+    let limit = rig.byte(ram::MMAX);
+    assert!(limit >= most && limit < 0x80, "{limit}");
+}

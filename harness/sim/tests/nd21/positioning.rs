@@ -230,6 +230,42 @@ fn a_start_without_a_result_is_dropped() {
     assert_eq!(rig.long(ram::UMDRIST), 0);
 }
 
+/// 13.1.2: it starts from a standstill only.
+#[test]
+fn a_start_in_motion_waits() {
+    let mut rig = initialised();
+    write_ps(&mut rig, 0x0004_0000);
+    rig.write_word(ram::NSOLL, 800);
+    rig.run(Span::from_millis(100));
+    rig.set(ram::PS_STATUS, ps_status::START);
+    rig.run(Span::from_millis(100));
+    assert_eq!(
+        rig.byte(ram::PS_STATUS),
+        ps_status::CALCULATED | ps_status::START
+    );
+    // It has moved: the way to the absolute target is another, and is calculated again.
+    rig.write_word(ram::NSOLL, 0);
+    rig.until(10_000, |rig| {
+        rig.byte(ram::PS_STATUS) == ps_status::FINISHED
+    });
+    assert_eq!(rig.long(ram::UMDRSOLL), 0x0004_0000);
+}
+
+/// 13.3.2.3: the direction of a run is that of its start, whatever is written to `ps_status` meanwhile.
+#[test]
+fn the_direction_is_latched_at_the_start() {
+    let mut rig = initialised();
+    write_ps(&mut rig, 0x7FF5_C000);
+    rig.set(ram::PS_STATUS, ps_status::START);
+    rig.run(Span::from_millis(200));
+    assert_ne!(rig.byte(ram::PS_STATUS) & ps_status::NEGATIVE, 0);
+    rig.clear(ram::PS_STATUS, ps_status::NEGATIVE);
+    rig.until(20_000, |rig| {
+        rig.byte(ram::PS_STATUS) == ps_status::FINISHED
+    });
+    assert_eq!(rig.long(ram::UMDRSOLL), -0x000A_4000);
+}
+
 /// 13.2.1: with bit 1 of HwVersion2 = 0 the controller is initialised after switching on.
 #[test]
 fn automatic_initialisation() {
