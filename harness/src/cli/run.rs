@@ -202,7 +202,7 @@ fn summary(verdicts: &[Verdict], took: Span) -> String {
     text
 }
 
-fn progress_bar(length: usize, shown: bool) -> ProgressBar {
+pub(super) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
     let target = if shown && length > 1 {
         ProgressDrawTarget::stderr()
     } else {

@@ -9,6 +9,7 @@ use super::{axes, rig};
 use crate::bus::{Axis, Identity, State};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::cli::run::progress_bar;
 use crate::scenario::argument::{Location, cells};
 use crate::scenario::quantity::shown;
 use harness_proto::nd21::units::{Date, Scale, Value};
@@ -29,10 +30,15 @@ pub(super) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exi
     let bench = rig::open(&arguments.rig)?;
     let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let locations = cells(&CELLS.map(str::to_owned))?;
-    let drives = axes
-        .into_iter()
-        .map(|axis| drive(&bench, axis, &locations))
-        .collect::<Result<Vec<_>, _>>()?;
+    // A long ring answers slowly: a drive is asked for a dozen bytes of its EEPROM, one after another.
+    let bar = progress_bar(axes.len(), output.progress);
+    let mut drives = Vec::new();
+    for axis in axes {
+        bar.set_message(format!("drive {axis}"));
+        drives.push(drive(&bench, axis, &locations)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
     let corrected = bench.bus.corrected_errors();
     match arguments.format {
         Form::Text => {
