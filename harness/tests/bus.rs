@@ -29,7 +29,7 @@ fn size(drives: u64) -> RingSize {
 fn ring(drives: u64, properties: Nd21Properties) -> Ring<Drive> {
     Ring::new(size(drives), Rate::Baud38400, |k| {
         let mut eeprom = factory::eeprom();
-        eeprom[usize::from(ee::SERIENNUMMER) + 2] = k;
+        eeprom[usize::from(ee::SERIENNUMMER) + 2] = k / 10 % 10 * 16 + k % 10;
         eeprom[0x23] = 0xFB;
         harness_sim::nd21::set_parity(&mut eeprom);
         let mut drive = Nd21Drive::new(Properties::default(), properties, eeprom);
@@ -254,6 +254,13 @@ fn discovery() {
     let identity = bus().identity(axis(2)).expect("an identity");
     assert_eq!(identity.serial_number, Some(2));
     assert_eq!(identity.start_up.map(|date| date.year()), Some(1996));
+    // More jobs than the master holds, all of them answered in order.
+    let bus = bus_of(ring(100, Nd21Properties::default()), Options::default());
+    let identities = bus.identities(&bus.axes()).expect("identities");
+    let numbers: Vec<_> = identities.iter().map(|i| i.serial_number).collect();
+    assert_eq!(numbers, (0..100).map(Some).collect::<Vec<_>>());
+    let all = bus.read_bytes(axis(7), 0x2F00, 256).expect("bytes");
+    assert_eq!(all[..8], identities[7].rom);
 }
 
 /// ND21 9.7, 9.8: a ring says who saw the fault, and is brought back if it can be.

@@ -2,11 +2,12 @@
 
 use super::{Axis, Bus, Error, Order};
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::Job;
+use harness_proto::novobus::master::{Job, Refused};
 use harness_proto::time::Span;
+use std::collections::VecDeque;
 
 /// The numbers that a read brings have the width of the cell.
-fn narrow<T: TryFrom<u32>>(value: Option<u32>) -> Result<T, Error> {
+pub(super) fn narrow<T: TryFrom<u32>>(value: Option<u32>) -> Result<T, Error> {
     value
         .and_then(|value| T::try_from(value).ok())
         .ok_or(Error::Open(
@@ -58,18 +59,46 @@ impl Bus<'_> {
     /// # Errors
     /// See [`Error`]; the first one where several reads fail.
     pub fn read_bytes(&self, axis: Axis, address: u16, count: u16) -> Result<Vec<u8>, Error> {
-        let mut orders: Vec<Order> = Vec::new();
-        let mut bytes = Vec::new();
-        for offset in 0..count {
-            let Some(address) = address.checked_add(offset) else {
-                break;
-            };
-            orders.push(self.start(axis, |drive| Job::new(drive, Command::ReadByte { address }))?);
+        let addresses = (0..count).map_while(|offset| address.checked_add(offset));
+        let reads = addresses.map(|address| (axis, Command::ReadByte { address }));
+        self.run_commands(reads)?.into_iter().map(narrow).collect()
+    }
+
+    /// Runs commands, of one drive or of many, without waiting for an answer before the next is sent; what
+    /// they read, in their order.
+    pub(super) fn run_commands(
+        &self,
+        commands: impl IntoIterator<Item = (Axis, Command)>,
+    ) -> Result<Vec<Option<u32>>, Error> {
+        let mut orders = VecDeque::new();
+        let mut read = Vec::new();
+        let end = commands
+            .into_iter()
+            .try_for_each(|(axis, command)| {
+                loop {
+                    match self.start(axis, |drive| Job::new(drive, command)) {
+                        Ok(order) => {
+                            orders.push_back(order);
+                            return Ok(());
+                        }
+                        // The master holds no more: the oldest comes home first.
+                        Err(full @ Error::Refused(Refused::Full { .. })) => {
+                            read.push(self.result(orders.pop_front().ok_or(full)?)?);
+                        }
+                        Err(error) => return Err(error),
+                    }
+                }
+            })
+            .and_then(|()| {
+                while let Some(order) = orders.pop_front() {
+                    read.push(self.result(order)?);
+                }
+                Ok(())
+            });
+        for Order { ring, id } in orders {
+            self.lock().forget(ring, id);
         }
-        for order in orders {
-            bytes.push(narrow(self.result(order)?)?);
-        }
-        Ok(bytes)
+        end.map(|()| read)
     }
 
     /// Writes a byte of RAM (12.2).

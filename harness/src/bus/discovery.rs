@@ -206,31 +206,57 @@ impl Bus<'_> {
     /// # Errors
     /// See [`Error`].
     pub fn identity(&self, axis: Axis) -> Result<Identity, Error> {
-        let word = |address: u8| -> Result<[u8; 2], Error> {
-            Ok([
-                self.read_eeprom(axis, address)?,
-                self.read_eeprom(axis, address + 1)?,
-            ])
-        };
-        let mut serial = [0; 3];
-        for (address, byte) in (ee::SERIENNUMMER..).zip(&mut serial) {
-            *byte = self.read_eeprom(axis, address)?;
+        let mut identities = self.identities(&[axis])?;
+        identities.pop().ok_or(Error::NoSuchOrder)
+    }
+
+    /// Reads what drives say of themselves, side by side: on a ring of 250 drives an answer takes 75 ms, and
+    /// many can be under way.
+    ///
+    /// # Errors
+    /// See [`Error`]; the first one where several drives fail.
+    pub fn identities(&self, axes: &[Axis]) -> Result<Vec<Identity>, Error> {
+        let mut eeproms = vec![[0; 256]; axes.len()];
+        let words = [
+            ee::BETRIEB_STD,
+            ee::SPERRE_STD,
+            ee::INIT_DATUM,
+            ee::PROG_DATUM,
+        ];
+        let serial_number = ee::SERIENNUMMER..ee::SERIENNUMMER + 3;
+        let addresses = words.iter().flat_map(|word| [*word, word + 1]);
+        for address in addresses.chain(serial_number).chain([ee::VERSION]) {
+            let bytes = self.read_eeprom_of(axes, address)?;
+            for (eeprom, byte) in eeproms.iter_mut().zip(bytes) {
+                eeprom[usize::from(address)] = byte;
+            }
         }
-        let mut rom = [0; 8];
-        for (address, byte) in (0x2F00..).zip(&mut rom) {
-            *byte = self.read_byte(axis, address)?;
+        let mut identities = Vec::new();
+        for (axis, eeprom) in axes.iter().zip(&eeproms) {
+            let mut rom = [0; 8];
+            rom.copy_from_slice(&self.read_bytes(*axis, 0x2F00, 8)?);
+            identities.push(Identity::new(eeprom, rom));
         }
-        let date = |bytes| Date::from_raw(u16::from_be_bytes(bytes)).ok();
-        Ok(Identity {
+        Ok(identities)
+    }
+}
+
+impl Identity {
+    fn new(eeprom: &[u8; 256], rom: [u8; 8]) -> Self {
+        let byte = |address: u8| eeprom[usize::from(address)];
+        let word = |address: u8| [byte(address), byte(address + 1)];
+        let date = |address| Date::from_raw(u16::from_be_bytes(word(address))).ok();
+        let serial = [0, 1, 2].map(|offset| byte(ee::SERIENNUMMER + offset));
+        Self {
             serial_number: serial_number_from_bytes(serial).ok(),
-            ee_version: self.read_eeprom(axis, ee::VERSION)?,
+            ee_version: byte(ee::VERSION),
             hours: (
-                operating_hours_from_bytes(word(ee::BETRIEB_STD)?),
-                operating_hours_from_bytes(word(ee::SPERRE_STD)?),
+                operating_hours_from_bytes(word(ee::BETRIEB_STD)),
+                operating_hours_from_bytes(word(ee::SPERRE_STD)),
             ),
-            start_up: date(word(ee::INIT_DATUM)?),
-            changed: date(word(ee::PROG_DATUM)?),
+            start_up: date(ee::INIT_DATUM),
+            changed: date(ee::PROG_DATUM),
             rom,
-        })
+        }
     }
 }

@@ -1,7 +1,9 @@
 //! Reading and writing the EEPROM (ND21 12.5), by the steps of 14.10.5.
 
+use super::access::narrow;
 use super::{Axis, Bus, Error};
 use harness_proto::nd21::ram;
+use harness_proto::novobus::command::Command;
 
 /// The commands of 14.10.5.1.
 const READ_BYTE: u8 = 0x81;
@@ -20,12 +22,33 @@ impl Bus<'_> {
     /// See [`Error`].
     #[doc(alias = "NB_ReadEEPROM")]
     pub fn read_eeprom(&self, axis: Axis, address: u8) -> Result<u8, Error> {
-        self.write_byte(axis, ram::EEPROM_BUFFER, address)?;
-        self.write_byte(axis, ram::EEPROM_CONTROL, READ_BYTE)?;
-        self.wait_for_eeprom(axis, READ)?;
-        let byte = self.read_byte(axis, ram::EEPROM_BUFFER)?;
-        self.write_byte(axis, ram::EEPROM_CONTROL, READ_DONE)?;
-        Ok(byte)
+        let bytes = self.read_eeprom_of(&[axis], address)?;
+        bytes.first().copied().ok_or(Error::NoSuchOrder)
+    }
+
+    /// Reads the same byte of the EEPROM of many drives, each step of all of them before the next.
+    ///
+    /// # Errors
+    /// See [`Error`]; the first one where several drives fail.
+    pub fn read_eeprom_of(&self, axes: &[Axis], address: u8) -> Result<Vec<u8>, Error> {
+        let all = |command| self.run_commands(axes.iter().map(|axis| (*axis, command)));
+        let write = |address, data| all(Command::WriteByte { address, data });
+        write(ram::EEPROM_BUFFER, address)?;
+        write(ram::EEPROM_CONTROL, READ_BYTE)?;
+        // Most have it by now, as many telegrams have passed; those that do not are asked again.
+        let control = all(Command::ReadByte {
+            address: ram::EEPROM_CONTROL,
+        })?;
+        for (axis, control) in axes.iter().zip(control) {
+            if narrow::<u8>(control)? & READ == 0 {
+                self.wait_for_eeprom(*axis, READ)?;
+            }
+        }
+        let bytes = all(Command::ReadByte {
+            address: ram::EEPROM_BUFFER,
+        })?;
+        write(ram::EEPROM_CONTROL, READ_DONE)?;
+        bytes.into_iter().map(narrow).collect()
     }
 
     /// Reads bytes of the EEPROM from `address` on; those beyond FF are left out.

@@ -18,6 +18,9 @@ use serde_json::json;
 /// Cells that say how a drive is.
 const CELLS: [&str; 4] = ["nist", "position", "TempKK", "TempMot"];
 
+/// Drives that are asked for their EEPROM at a time.
+const SIDE_BY_SIDE: usize = 25;
+
 struct Drive<'a> {
     axis: Axis,
     identity: Identity,
@@ -30,13 +33,16 @@ pub(super) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exi
     let bench = rig::open(&arguments.rig)?;
     let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let locations = cells(&CELLS.map(str::to_owned))?;
-    // A long ring answers slowly: a drive is asked for a dozen bytes of its EEPROM, one after another.
+    // A long ring answers slowly, and people want to see that something happens.
     let bar = progress_bar(axes.len(), output.progress);
     let mut drives = Vec::new();
-    for axis in axes {
-        bar.set_message(format!("drive {axis}"));
-        drives.push(drive(&bench, axis, &locations)?);
-        bar.inc(1);
+    for some in axes.chunks(SIDE_BY_SIDE) {
+        let identities = bench.bus.identities(some)?;
+        for (axis, identity) in some.iter().zip(identities) {
+            bar.set_message(format!("drive {axis}"));
+            drives.push(drive(&bench, *axis, identity, &locations)?);
+            bar.inc(1);
+        }
     }
     bar.finish_and_clear();
     let corrected = bench.bus.corrected_errors();
@@ -60,14 +66,19 @@ pub(super) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exi
     Ok(Exit::Passed)
 }
 
-fn drive<'a>(bench: &Bench, axis: Axis, locations: &'a [Location]) -> Result<Drive<'a>, Failure> {
+fn drive<'a>(
+    bench: &Bench,
+    axis: Axis,
+    identity: Identity,
+    locations: &'a [Location],
+) -> Result<Drive<'a>, Failure> {
     let units = bench.units(axis)?;
     let found = locations
         .iter()
         .map(|location| find(&bench.bus, (axis, units), location));
     Ok(Drive {
         axis,
-        identity: bench.bus.identity(axis)?,
+        identity,
         state: bench.bus.state(axis)?,
         cells: found.collect::<Result<_, _>>()?,
     })

@@ -113,7 +113,8 @@ pub(super) fn link(arguments: &RigArguments) -> Result<(Plan, SimulatedLink), Fa
         }
     }
     let plan = plan(&scenario, &source, None)?;
-    let link = simulate::bench(&plan);
+    let mut link = simulate::bench(&plan);
+    link.stop_recording();
     Ok((plan, link))
 }
 
