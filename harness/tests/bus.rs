@@ -259,8 +259,12 @@ fn discovery() {
     let identities = bus.identities(&bus.axes()).expect("identities");
     let numbers: Vec<_> = identities.iter().map(|i| i.serial_number).collect();
     assert_eq!(numbers, (0..100).map(Some).collect::<Vec<_>>());
-    let all = bus.read_bytes(axis(7), 0x2F00, 256).expect("bytes");
-    assert_eq!(all[..8], identities[7].rom);
+    let ram = bus.read_bytes(axis(7), 0xFD80, 0x200).expect("bytes");
+    let n_max = usize::from(ram::N_MAX - 0xFD80);
+    assert_eq!(
+        (ram.len(), &ram[n_max..n_max + 2]),
+        (0x200, &[0x2C, 0x3D][..])
+    );
 }
 
 /// ND21 9.7, 9.8: a ring says who saw the fault, and is brought back if it can be.
