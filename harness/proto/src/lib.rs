@@ -7,6 +7,7 @@
 //!
 //! * [`time`]: virtual time, exact for every rate of every line;
 //! * [`line`](mod@line): an asynchronous serial line: its rate, and what a receiver reads from it;
+//! * [`marks`]: how a stream of bytes carries line errors;
 //! * [`novobus`]: the ring of the Novotron ND21;
 //! * [`nd21`]: the cells of that drive that its bus end itself needs.
 #![no_std]
@@ -17,6 +18,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod line;
+pub mod marks;
 pub mod nd21;
 pub mod novobus;
 pub mod time;
