@@ -7,9 +7,13 @@
 
 pub mod bus;
 pub mod cli;
+pub mod guard;
 pub mod library;
 pub mod link;
 pub mod locate;
 pub mod manual;
+pub mod port;
 pub mod report;
+pub mod rig;
 pub mod scenario;
+pub mod serve;

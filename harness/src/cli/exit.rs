@@ -19,6 +19,14 @@ pub enum Exit {
     NothingSelected = 4,
     /// Everything passed, but not everything could be shown.
     Incomplete = 5,
+    /// An interlock tripped; the safe state was reached.
+    Interlock = 6,
+    /// The safe state could not be confirmed.
+    NotSafe = 7,
+    /// Somebody else holds the bench.
+    Busy = 75,
+    /// Interrupted (Ctrl-C, SIGTERM); the safe state was reached.
+    Interrupted = 130,
 }
 
 impl Exit {
@@ -31,7 +39,11 @@ Exit codes:
      that needs --move or --yes
   3  the bench itself failed
   4  nothing was selected
-  5  passed but incomplete (skipped scenarios under --require-all, or inconclusive ones)";
+  5  passed but incomplete (skipped scenarios under --require-all, or inconclusive or flaky ones)
+  6  an interlock of the bench tripped; the safe state was reached
+  7  the safe state could not be confirmed: look at the machine
+  75 somebody else holds the bench
+  130 interrupted; the safe state was reached";
 
     /// The code for the verdicts of a run; `require_all` counts skipped scenarios as missing.
     #[must_use]
@@ -39,11 +51,16 @@ Exit codes:
         let any = |verdict| verdicts.contains(&verdict);
         if verdicts.is_empty() {
             Self::NothingSelected
+        } else if any(Verdict::RigError) {
+            Self::RigError
         } else if any(Verdict::Aborted) {
             Self::Usage
         } else if any(Verdict::Failed) {
             Self::Failed
-        } else if any(Verdict::Inconclusive) || require_all && any(Verdict::Skipped) {
+        } else if any(Verdict::Inconclusive)
+            || any(Verdict::Flaky)
+            || require_all && any(Verdict::Skipped)
+        {
             Self::Incomplete
         } else {
             Self::Passed

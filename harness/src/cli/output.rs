@@ -84,9 +84,9 @@ impl Output {
     pub(super) fn verdict(&self, verdict: Verdict) -> String {
         let colour = match verdict {
             Verdict::Passed => "32",
-            Verdict::Skipped => "33",
-            Verdict::Inconclusive => "35",
-            Verdict::Failed | Verdict::Aborted => "1;31",
+            Verdict::Skipped | Verdict::Marginal => "33",
+            Verdict::Flaky | Verdict::Inconclusive => "35",
+            Verdict::Failed | Verdict::Aborted | Verdict::RigError => "1;31",
         };
         paint(&format!("{verdict:12}"), colour, self.colour_out)
     }

@@ -193,7 +193,7 @@ fn summary(verdicts: &[Verdict], took: Span) -> String {
         count(Verdict::Passed),
         count(Verdict::Failed)
     );
-    for verdict in [Verdict::Skipped, Verdict::Inconclusive, Verdict::Aborted] {
+    for verdict in Verdict::REST {
         if count(verdict) > 0 {
             let _infallible = write!(text, ", {} {verdict}", count(verdict));
         }

@@ -13,6 +13,7 @@ use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
+use std::fmt;
 
 /// What a rig can be asked to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -83,6 +84,29 @@ pub enum Moment {
     At(Instant),
 }
 
+/// Why a link carries nothing more. It stays so: what is sent from then on is dropped.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// The guard let a byte not pass: what the bench does not allow never reaches a wire. The text says which
+    /// command of which drive, and what would allow it.
+    Denied(String),
+    /// The port is gone, or the other end has closed the connection.
+    Lost(String),
+    /// What came over the port is no stream of this kind: the other end does not mark, or marks were cut.
+    Garbled(String),
+    /// Somebody wants the program to end.
+    Interrupted,
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Denied(text) | Self::Lost(text) | Self::Garbled(text) => f.write_str(text),
+            Self::Interrupted => f.write_str("interrupted"),
+        }
+    }
+}
+
 /// One or two rings as the master sees them: bytes and time, and nothing else.
 pub trait Line: Send {
     /// How long a byte takes.
@@ -101,6 +125,11 @@ pub trait Line: Send {
     /// Lets time pass until something happens, at most until `until`. False where nothing ever will
     /// unless the master sends.
     fn wait(&mut self, until: Instant) -> bool;
+
+    /// Why nothing more is carried; `None` while all is well. A simulated link has no trouble.
+    fn trouble(&self) -> Option<&Trouble> {
+        None
+    }
 }
 
 /// One or two rings as a scenario sees them.

@@ -9,24 +9,43 @@ pub enum Verdict {
     Skipped,
     /// Everything was as the scenario says.
     Passed,
+    /// As the scenario says, but only just.
+    Marginal,
+    /// One attempt of several was as the scenario says.
+    Flaky,
     /// The transport could not have shown the opposite.
     Inconclusive,
     /// The drive behaved otherwise.
     Failed,
     /// It could not be played to its end.
     Aborted,
+    /// The bench failed, not the drive.
+    RigError,
 }
 
 impl Verdict {
+    /// All but passed and failed, in order of gravity.
+    pub const REST: [Self; 6] = [
+        Self::Skipped,
+        Self::Marginal,
+        Self::Flaky,
+        Self::Inconclusive,
+        Self::Aborted,
+        Self::RigError,
+    ];
+
     /// The word in records and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Skipped => "skipped",
             Self::Passed => "passed",
+            Self::Marginal => "marginal",
+            Self::Flaky => "flaky",
             Self::Inconclusive => "inconclusive",
             Self::Failed => "failed",
             Self::Aborted => "aborted",
+            Self::RigError => "rig-error",
         }
     }
 }

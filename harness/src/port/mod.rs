@@ -1,0 +1,1 @@
+//! Streams of bytes that the operating system gives: serial ports, pseudo terminals, sockets.
