@@ -264,15 +264,32 @@ fn play_blind(lines: &str) -> Outcome {
     run(&plan, &mut Blind(simulated(&plan)))
 }
 
+/// ND21 10.1: cells can be read by telegrams, beside the conversation.
+#[test]
+fn cells_are_read_over_the_bus() {
+    for check in [
+        "? drive 0 memory FE13 = 00",
+        "? drive 0..1 nist = 0rpm",
+        "until drive 0 nist = 0rpm within 1s",
+    ] {
+        let outcome = play_blind(&format!("{check}\n? received 0 bytes"));
+        let message = outcome.finding.map(|finding| finding.message);
+        assert_eq!(outcome.verdict, Verdict::Passed, "{check}: {message:?}");
+        let silent = play_blind(&format!("! master->1: cut\n{check}"));
+        assert_eq!(silent.verdict, Verdict::Inconclusive, "{check}");
+        let message = silent.finding.expect("a finding").message;
+        assert!(message.contains("this link does not show"), "{message}");
+    }
+    let outcome = play_blind("? drive 1 memory FE13 = 01");
+    assert_eq!(outcome.verdict, Verdict::Failed);
+}
+
 #[test]
 fn what_cannot_be_seen_is_inconclusive() {
     for check in [
-        "? drive 0 memory FE13 = 00",
-        "? drive 0 nist = 0rpm",
         "? drives 0..1 normal",
         "? error 0502 at 0",
         "? drive 0 GPO1 low",
-        "until drive 0 nist = 0rpm within 1s",
     ] {
         let outcome = play_blind(check);
         assert_eq!(outcome.verdict, Verdict::Inconclusive, "{check}");

@@ -22,6 +22,23 @@ pub struct LineByte {
 }
 
 impl LineByte {
+    /// A byte as somebody else has seen it: for traces of rings that are not simulated.
+    #[must_use]
+    pub fn seen(
+        at: Instant,
+        sent: Option<u8>,
+        received: Option<u8>,
+        error: Option<LineError>,
+    ) -> Self {
+        Self {
+            at,
+            sent,
+            received,
+            error,
+            solicited: true,
+        }
+    }
+
     /// What arrives at the receiver, if anything does.
     #[must_use]
     pub fn arrival(&self) -> Option<Received> {

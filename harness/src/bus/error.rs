@@ -1,6 +1,7 @@
 //! Why a call of the driver failed.
 
 use super::axis::Axis;
+use crate::link::Trouble;
 use harness_proto::nd21::errors::{ErrorCode, display_digits};
 use harness_proto::novobus::master::{Fault, Refused, Stop};
 use harness_proto::time::Span;
@@ -18,6 +19,9 @@ pub enum Error {
     /// The bus has been stopped (11.5).
     #[error("{0}")]
     Stopped(Stop),
+    /// The link carries nothing more.
+    #[error("{0}")]
+    Link(Trouble),
     /// What was waited for did not come.
     #[error("waited {waited} for {what}")]
     TimeOut {

@@ -99,8 +99,8 @@ impl<'l> Bus<'l> {
         let mut pump = self.lock();
         let end = pump.now() + self.options.patience;
         loop {
-            if let Some(stop) = pump.stopped() {
-                return Err(Error::Stopped(stop));
+            if let Some(halt) = pump.halt() {
+                return Err(halt);
             }
             if pump.phases().all(|phase| phase == Phase::Running) {
                 return Ok(());
@@ -173,7 +173,7 @@ impl<'l> Bus<'l> {
     pub fn run(&self, span: Span) {
         let mut pump = self.lock();
         let end = pump.now() + span;
-        while pump.now() < end && pump.stopped().is_none() {
+        while pump.now() < end && pump.halt().is_none() {
             pump.step(end);
         }
     }
@@ -231,6 +231,10 @@ impl<'l> Bus<'l> {
             }
             if !pump.knows(order.ring, order.id) {
                 return Err(Error::NoSuchOrder);
+            }
+            if let Some(trouble) = pump.trouble() {
+                pump.forget(order.ring, order.id);
+                return Err(Error::Link(trouble));
             }
             if pump.now() >= end {
                 pump.forget(order.ring, order.id);

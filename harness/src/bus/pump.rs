@@ -1,12 +1,13 @@
 //! Masters and their link, coupled: bytes out when the line is free, bytes in as they come.
 
-use crate::link::Line;
+use super::Error;
+use crate::link::{Line, Trouble};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{
     Counters, Event, Job, JobId, Master, Options, Outcome, Phase, Refused, Stop,
 };
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 use std::collections::BTreeMap;
 
 /// The most lines of the log that wait to be fetched.
@@ -66,9 +67,16 @@ impl<'l> Pump<'l> {
             .collect()
     }
 
-    /// Why a ring has been stopped, if one has.
-    pub(super) fn stopped(&self) -> Option<Stop> {
-        self.rings.iter().find_map(|ring| ring.stopped)
+    /// Why nothing goes on any more, if so: a ring has been stopped, or the link carries nothing.
+    pub(super) fn halt(&self) -> Option<Error> {
+        let stop = self.rings.iter().find_map(|ring| ring.stopped);
+        let trouble = || self.trouble().map(Error::Link);
+        stop.map(Error::Stopped).or_else(trouble)
+    }
+
+    /// Why the link carries nothing, if so.
+    pub(super) fn trouble(&self) -> Option<Trouble> {
+        self.link.trouble().cloned()
     }
 
     /// Takes a job; `None` where there is no such ring.
@@ -160,17 +168,28 @@ impl<'l> Pump<'l> {
         self.poll();
         let now = self.link.now();
         let byte_time = self.link.byte_time();
+        let lead = self.link.lead();
         let mut until = end;
         for (index, ring) in self.rings.iter_mut().enumerate() {
-            if ring.free <= now {
-                ring.free = match ring.master.poll_transmit(now) {
+            let mut idle = false;
+            while ring.free <= now + lead && !idle {
+                // The time at which the byte leaves, not that at which it is handed over.
+                let start = ring.free.max(now);
+                ring.free = match ring.master.poll_transmit(start) {
                     Some(byte) => self.link.send(index, &[byte]),
-                    None => now + byte_time,
+                    None => {
+                        idle = true;
+                        now + byte_time
+                    }
                 };
+                idle |= lead == Span::ZERO;
             }
-            until = until.min(ring.free);
+            // Where bytes are handed over ahead, the next are before the line has run dry.
+            let ahead = if idle { Span::ZERO } else { lead };
+            let next = Instant::START + ring.free.since_start().saturating_sub(ahead);
+            until = until.min(next.max(now + byte_time.min(lead)));
         }
-        while self.link.now() < until {
+        while self.link.now() < until && self.link.trouble().is_none() {
             self.link.wait(until);
             self.poll();
         }
@@ -180,8 +199,7 @@ impl<'l> Pump<'l> {
     pub(super) fn drain(&mut self, end: Instant) {
         let under_way = |ring: &Ring| ring.master.under_way() > 0;
         self.poll();
-        while self.stopped().is_none() && self.rings.iter().any(under_way) && self.link.now() < end
-        {
+        while self.halt().is_none() && self.rings.iter().any(under_way) && self.link.now() < end {
             let until = self.link.now() + self.link.byte_time();
             self.link.wait(until.min(end));
             self.poll();

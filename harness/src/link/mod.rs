@@ -4,10 +4,14 @@
 //! cannot makes a scenario that needs it skipped, never wrong.
 
 mod sim;
+mod stream;
+mod tamper;
 
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use sim::SimulatedLink;
+pub use stream::{StreamLink, TOLERANCE};
+pub use tamper::{needs_line_errors, only_simulated};
 
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
@@ -32,6 +36,8 @@ pub enum Capability {
     Eeprom,
     /// Drives may be reset.
     Reset,
+    /// Line errors can be sent, and are shown at their byte.
+    LineErrors,
     /// Two rings.
     TwoRings,
     /// Simulated drives: for what must not be tried on a machine.
@@ -40,7 +46,7 @@ pub enum Capability {
 
 impl Capability {
     /// The names in a scenario.
-    pub const NAMES: [(&'static str, Self); 9] = [
+    pub const NAMES: [(&'static str, Self); 10] = [
         ("interposer", Self::Interposer),
         ("tap", Self::Tap),
         ("memory", Self::Memory),
@@ -48,6 +54,7 @@ impl Capability {
         ("motion", Self::Motion),
         ("eeprom", Self::Eeprom),
         ("reset", Self::Reset),
+        ("line-errors", Self::LineErrors),
         ("two-rings", Self::TwoRings),
         ("simulator", Self::Simulator),
     ];
@@ -71,6 +78,17 @@ pub enum PlacedFault {
     Drive(u8, DriveFault),
     /// To a drive, from outside the bus; at a time only.
     Stimulus(u8, Stimulus),
+}
+
+/// A link as a scenario writes it: `98->97`, `2:0->master`; `place` counts from the master's outgoing link.
+#[must_use]
+pub fn link_name(ring: usize, drives: u8, place: usize) -> String {
+    let prefix = if ring == 0 { "" } else { "2:" };
+    let end = |place: usize| match usize::from(drives).checked_sub(place) {
+        Some(drive) if place > 0 => drive.to_string(),
+        _ => "master".to_owned(),
+    };
+    format!("{prefix}{}->{}", end(place), end(place + 1))
 }
 
 /// When a fault happens.
@@ -130,6 +148,12 @@ pub trait Line: Send {
     fn trouble(&self) -> Option<&Trouble> {
         None
     }
+
+    /// How far ahead of the line a driver may hand over its bytes: where time is real, a busy computer would leave
+    /// gaps between them.
+    fn lead(&self) -> Span {
+        Span::ZERO
+    }
 }
 
 /// One or two rings as a scenario sees them.
@@ -142,6 +166,17 @@ pub trait Link: Line {
 
     /// Lets a fault happen.
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment);
+
+    /// Whether a fault can be put on a link of a ring: 0 is the master's outgoing one.
+    fn reaches(&self, ring: usize, link: usize) -> bool {
+        let _any = (ring, link);
+        true
+    }
+
+    /// How exact its times are: zero where time is virtual.
+    fn time_tolerance(&self) -> Span {
+        Span::ZERO
+    }
 
     /// What the master receives when it goes on with `count` SYNCO, so that a ring in the error mode
     /// can spell out its address. Where a link can, it leaves no trace of this.

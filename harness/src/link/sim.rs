@@ -1,6 +1,6 @@
 //! A link to simulated rings, in virtual time.
 
-use super::{Capability, Line, Link, Mode, Moment, PlacedFault, Shown, Stimulus};
+use super::{Capability, Line, Link, Mode, Moment, PlacedFault, Shown, Stimulus, link_name};
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::sync::SYNCO;
@@ -21,7 +21,7 @@ pub struct SimulatedLink {
     scheduled: VecDeque<(Instant, usize, PlacedFault)>,
 }
 
-const CAPABILITIES: [Capability; 9] = [
+const CAPABILITIES: [Capability; 10] = [
     Capability::Interposer,
     Capability::Tap,
     Capability::Memory,
@@ -29,6 +29,7 @@ const CAPABILITIES: [Capability; 9] = [
     Capability::Motion,
     Capability::Eeprom,
     Capability::Reset,
+    Capability::LineErrors,
     Capability::TwoRings,
     Capability::Simulator,
 ];
@@ -72,15 +73,10 @@ impl SimulatedLink {
 
     /// Where a fault happens, as a scenario writes it: `98->97`, `drive 2:3`.
     fn place(&self, ring: usize, fault: PlacedFault) -> String {
-        let prefix = if ring == 0 { "" } else { "2:" };
-        let size = usize::from(self.drives(ring));
-        let end = |place: usize| match size.checked_sub(place) {
-            Some(drive) if place > 0 => drive.to_string(),
-            _ => "master".to_owned(),
-        };
         match fault {
-            PlacedFault::Link(link, _) => format!("{prefix}{}->{}", end(link), end(link + 1)),
+            PlacedFault::Link(link, _) => link_name(ring, self.drives(ring), link),
             PlacedFault::Drive(drive, _) | PlacedFault::Stimulus(drive, _) => {
+                let prefix = if ring == 0 { "" } else { "2:" };
                 format!("drive {prefix}{drive}")
             }
         }

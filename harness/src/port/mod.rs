@@ -1,1 +1,22 @@
 //! Streams of bytes that the operating system gives: serial ports, pseudo terminals, sockets.
+//!
+//! A [`Wire`] is one of them with its coding: bytes with their line errors come out of it, and bytes,
+//! deliberate line errors among them, go into it. It never blocks but where a byte with a wrong parity bit is sent
+//! on a serial port, which has to be drained before and behind it.
+//!
+//! What each carries:
+//!
+//! | transport | line errors received | wrong parity sent | breaks sent |
+//! |---|---|---|---|
+//! | `serial` | each at its byte (`INPCK` and `PARMRK`) | yes, between drained bytes | yes |
+//! | `pty`, `tcp` with in-band marks | each at its byte | yes | yes |
+//! | `pty`, `tcp` with plain bytes | none | no | no |
+//! | `rfc2217` | that there was one, not at which byte | no | no |
+
+mod open;
+mod rfc2217;
+mod serial;
+mod wire;
+
+pub use open::{Endpoint, OpenError, PortSettings, open};
+pub use wire::{Abilities, Outgoing, Wire};

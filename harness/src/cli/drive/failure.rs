@@ -4,6 +4,7 @@ use super::super::exit::Exit;
 use super::super::output::Output;
 use crate::bus;
 use crate::library::LibraryError;
+use crate::link::Trouble;
 use crate::scenario::problem::Problems;
 
 /// Why a command ended early.
@@ -62,7 +63,12 @@ fn exit(error: &bus::Error) -> Exit {
         | bus::Error::NotSet { .. }
         | bus::Error::TimeOut { .. } => Exit::Failed,
         bus::Error::Refused(_) | bus::Error::Value(_) | bus::Error::Open(_) => Exit::Usage,
-        bus::Error::Unknown(_) | bus::Error::Stopped(_) | bus::Error::NoSuchOrder => Exit::RigError,
+        bus::Error::Link(Trouble::Interrupted) => Exit::Interrupted,
+        bus::Error::Link(Trouble::Denied(_)) => Exit::Usage,
+        bus::Error::Link(_)
+        | bus::Error::Unknown(_)
+        | bus::Error::Stopped(_)
+        | bus::Error::NoSuchOrder => Exit::RigError,
     }
 }
 

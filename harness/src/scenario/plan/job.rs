@@ -8,6 +8,7 @@ use crate::scenario::problem::{Problem, Span};
 use crate::scenario::syntax::{Job, JobKind, Place, Relation, Written};
 use harness_proto::nd21;
 use harness_proto::nd21::units::Scale;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, Kind, PAGE, Reply};
 use harness_proto::novobus::memory;
 use harness_proto::novobus::output::OutputChange;
@@ -269,6 +270,38 @@ impl Planner {
         let mut expected = vec![Expected::Byte(bytes[0]), Expected::Byte(drive)];
         expected.extend(answer);
         Ok(PlannedAction::Telegram(ring, bytes, expected, None))
+    }
+}
+
+/// A telegram with one command for one drive, and the answer that it must get.
+pub(in crate::scenario) struct Exchange {
+    /// What is sent.
+    pub(in crate::scenario) bytes: Vec<u8>,
+    /// What must come back.
+    pub(in crate::scenario) expected: Vec<Expected>,
+    /// Where in it the data stand that are read, in memory order.
+    pub(in crate::scenario) data: Vec<usize>,
+}
+
+impl Exchange {
+    /// For a ring of `drives`; `None` where there is no such drive.
+    pub(in crate::scenario) fn new(drives: u8, drive: u8, command: Command) -> Option<Self> {
+        let form = ReadLongAnswer::default();
+        let ring = RingSize::new(u64::from(drives)).ok()?;
+        let address = Address::Byte(ring.address_byte(drive).ok()?);
+        let telegram = Telegram::new(address, None, &command.encode()).ok()?;
+        let bytes = telegram.encode();
+        let mut expected = vec![Expected::Byte(bytes[0]), Expected::Byte(drive)];
+        expected.extend(expected_answer(&command, &[Expected::Any; 4], form));
+        let width = match command.kind().reads() {
+            true => usize::from(command.kind().width()),
+            false => 0,
+        };
+        Some(Self {
+            bytes,
+            expected,
+            data: data_places(&command, width, form),
+        })
     }
 }
 

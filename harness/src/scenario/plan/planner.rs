@@ -5,7 +5,7 @@ use super::setup::model_unless_said;
 use super::types::{
     Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedStep, PlannedWhen, PlannedWindow,
 };
-use crate::link::{Capability, Moment, PlacedFault, Stimulus};
+use crate::link::{Capability, Moment, PlacedFault, Stimulus, needs_line_errors, only_simulated};
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::MAX_BYTES;
 use crate::scenario::problem::{Problem, Problems, Span};
@@ -275,8 +275,19 @@ impl Planner {
         let placed = match &fault.what {
             FaultKind::Link(place, ends, kind) => {
                 let link = self.link(fault.ring, place.span, ends)?;
-                needs.push(Capability::Interposer);
-                PlacedFault::Link(link, self.link_fault(*kind)?)
+                let fault = self.link_fault(*kind)?;
+                let last = usize::try_from(size).unwrap_or(usize::MAX);
+                // The master's own two links begin and end in the bench.
+                if link > 0 && link < last {
+                    needs.push(Capability::Interposer);
+                }
+                if needs_line_errors(fault) {
+                    needs.push(Capability::LineErrors);
+                }
+                if only_simulated(fault) {
+                    needs.push(Capability::Simulator);
+                }
+                PlacedFault::Link(link, fault)
             }
             FaultKind::Drive(drive, kind) => {
                 needs.push(Capability::Power);

@@ -361,6 +361,33 @@ impl Plan {
         })
     }
 
+    /// Cells that drives are to hold before anything is sent, in order of the lines.
+    pub(in crate::scenario) fn memory_setups(
+        &self,
+    ) -> impl Iterator<Item = (usize, RangeInclusive<u8>, u16, &[u8])> + '_ {
+        self.setups.iter().filter_map(|setup| match &setup.what {
+            PlannedSetupKind::Memory(address, bytes) => {
+                Some((setup.ring, setup.drives.clone(), *address, &bytes[..]))
+            }
+            _ => None,
+        })
+    }
+
+    /// The links on which faults are put, by ring and place.
+    pub(in crate::scenario) fn fault_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.steps.iter().filter_map(|step| match step.action {
+            PlannedAction::Fault(ring, PlacedFault::Link(link, _), _) => Some((ring, link)),
+            _ => None,
+        })
+    }
+
+    /// A link as a scenario writes it: `98->97`, `2:0->master`.
+    #[must_use]
+    pub fn link_name(&self, ring: usize, link: usize) -> String {
+        let drives = self.rings.get(ring).map_or(0, |ring| ring.drives());
+        crate::link::link_name(ring, drives, link)
+    }
+
     /// What drive `drive` is set to hold and how to behave, in order of the lines.
     pub(in crate::scenario) fn setups_of(
         &self,

@@ -1,7 +1,8 @@
 //! Checks.
 
 use super::look::Miss;
-use super::player::{Runner, Stop};
+use super::outcome::Stop;
+use super::player::Runner;
 use crate::locate::{self, Location};
 use crate::scenario::plan::PlannedCheck;
 use crate::scenario::problem::Span;
@@ -29,6 +30,7 @@ impl Runner<'_> {
                 None => failed("the ring spells out no address".to_owned()),
             },
             PlannedCheck::Drive(check) => {
+                self.read_for(check);
                 let seen = self.look(check);
                 self.judged(seen, span)
             }
@@ -60,9 +62,10 @@ impl Runner<'_> {
                     ));
                 }
                 let took = self.sent_to.since(self.sent_from);
+                let own = self.link.time_tolerance();
                 match time {
                     Some((time, tolerance))
-                        if took + *tolerance < *time || *time + *tolerance < took =>
+                        if took + *tolerance + own < *time || *time + *tolerance + own < took =>
                     {
                         failed(format!("the {bytes} bytes took {took}, expected is {time}"))
                     }

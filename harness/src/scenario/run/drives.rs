@@ -1,7 +1,8 @@
 //! What a step does to drives, and what it waits for or reads of them.
 
 use super::look::{Miss, judge};
-use super::player::{Runner, Stop};
+use super::outcome::Stop;
+use super::player::Runner;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::plan::{LOOK, PlannedDriveCheck, Reading};
 use crate::scenario::problem::Span;
@@ -46,6 +47,7 @@ impl Runner<'_> {
         loop {
             let now = self.link.now();
             self.line_before = now;
+            self.read_for(check);
             let seen = if now < end {
                 self.glance(check)
             } else {

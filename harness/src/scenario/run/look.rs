@@ -104,7 +104,7 @@ impl Runner<'_> {
             PlannedCondition::InError(_) => Ok(()),
             PlannedCondition::Memory(address, bytes) => {
                 for (cell, expected) in (*address..=u16::MAX).zip(bytes) {
-                    let found = self.link.peek(ring, drive, cell);
+                    let found = self.peek(ring, drive, cell);
                     let found = found.ok_or_else(|| unseen(&format!("cell {cell:04X}")))?;
                     if !matches(*expected, Received::good(found)) {
                         return Err(Miss::Otherwise(format!(
@@ -131,6 +131,12 @@ impl Runner<'_> {
         }
     }
 
+    /// A byte as the link shows it, or as it was read over the bus for this look.
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
+        let read = || self.seen.get(&(ring, drive, address)).copied();
+        self.link.peek(ring, drive, address).or_else(read)
+    }
+
     /// The bytes of a cell; `None` where the link does not show them.
     pub(super) fn bytes(
         &self,
@@ -141,7 +147,7 @@ impl Runner<'_> {
     ) -> Option<Vec<u8>> {
         (address..=u16::MAX)
             .take(size)
-            .map(|address| self.link.peek(ring, drive, address))
+            .map(|address| self.peek(ring, drive, address))
             .collect()
     }
 }

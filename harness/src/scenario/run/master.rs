@@ -1,7 +1,8 @@
 //! The driver's part of a scenario: calls over the same line that the scenario plays on, so that what is
 //! recorded, limited and shown is all the same.
 
-use super::player::{Runner, Stop};
+use super::outcome::Stop;
+use super::player::Runner;
 use crate::bus::{Axis, Bus, Error, Options, count_drives};
 use crate::link::Line;
 use crate::scenario::pattern::Expected;

@@ -5,9 +5,13 @@ mod check;
 mod drives;
 mod look;
 mod master;
+mod outcome;
+mod over_bus;
 mod player;
 mod record;
 
 pub use bytes::{Shown, show};
-pub use player::{AtFinding, Difference, Finding, Outcome, needs, play, run};
+pub use outcome::{Difference, Finding, Outcome};
+pub use over_bus::set_up;
+pub use player::{AtFinding, needs, play, run};
 pub use record::{MAX_SAMPLES, Record, Sample};

@@ -1,8 +1,9 @@
 //! Step by step.
 
 use super::bytes::{Shown, matches, resolve, show};
-use super::record::{Record, Recorder};
-use crate::link::{Capability, Link, Moment};
+use super::outcome::{Difference, Finding, Outcome, Stop};
+use super::record::Recorder;
+use crate::link::{Capability, Link, Moment, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{
     MAX_CARRIED, Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow,
@@ -12,6 +13,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::time::{self, Instant};
+use std::collections::BTreeMap;
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
@@ -22,64 +24,6 @@ const UNASKED: usize = 16;
 
 /// Drives in the error mode named at most.
 const NAMED: usize = 6;
-
-/// What came of a scenario.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// The verdict.
-    pub verdict: Verdict,
-    /// The first thing that was otherwise; playing stops there.
-    pub finding: Option<Finding>,
-    /// What is worth saying although nothing failed.
-    pub remarks: Vec<String>,
-    /// How long it took, on the line's clock.
-    pub took: time::Span,
-    /// The cells that it recorded.
-    pub records: Vec<Record>,
-}
-
-impl Outcome {
-    /// A scenario that is not played, and why.
-    #[must_use]
-    pub fn skipped(remark: String) -> Self {
-        Self {
-            verdict: Verdict::Skipped,
-            finding: None,
-            remarks: vec![remark],
-            took: time::Span::ZERO,
-            records: Vec::new(),
-        }
-    }
-}
-
-/// Something that was otherwise than a step says.
-#[derive(Clone, Debug)]
-pub struct Finding {
-    /// The step.
-    pub span: Span,
-    /// What is wrong, in a sentence.
-    pub message: String,
-    /// Where the bytes differ, if bytes are what differs.
-    pub difference: Option<Difference>,
-    /// The drives that were in the error mode then, in words; empty where none was or where this cannot
-    /// be seen.
-    pub in_error: String,
-}
-
-/// Bytes that differ.
-#[derive(Clone, Debug)]
-pub struct Difference {
-    /// Which ring, counted from 0.
-    pub ring: usize,
-    /// Which byte that the master received, counted from 1.
-    pub byte: usize,
-    /// Which byte of the line, counted from 0.
-    pub index: usize,
-    /// What the line says.
-    pub expected: Vec<Expected>,
-    /// What was received, as far as it came.
-    pub received: Vec<Received>,
-}
 
 /// What to do at a line that is not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,6 +50,13 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
     if !missing.is_empty() {
         return Outcome::skipped(format!("the rig has no {}", missing.join(", no ")));
     }
+    if let Some((ring, place)) = plan
+        .fault_links()
+        .find(|(ring, place)| !link.reaches(*ring, *place))
+    {
+        let place = plan.link_name(ring, place);
+        return Outcome::skipped(format!("the rig has no interposer at {place}"));
+    }
     let mut runner = Runner {
         rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
         line_before: link.now(),
@@ -121,6 +72,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         full: None,
         unseen: None,
         recorder: Recorder::default(),
+        seen: BTreeMap::new(),
     };
     let mut result = runner.play();
     if let (Ok(()), Some(unseen)) = (&result, runner.unseen.take()) {
@@ -152,43 +104,13 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
     }
 }
 
-/// Why playing stops.
-pub(super) struct Stop {
-    verdict: Verdict,
-    finding: Box<Finding>,
-}
-
-impl Stop {
-    pub(super) fn failed(span: Span, message: impl Into<String>) -> Self {
-        Self {
-            verdict: Verdict::Failed,
-            finding: Box::new(Finding {
-                span,
-                message: message.into(),
-                difference: None,
-                in_error: String::new(),
-            }),
-        }
-    }
-
-    pub(super) fn inconclusive(span: Span, message: impl Into<String>) -> Self {
-        Self {
-            verdict: Verdict::Inconclusive,
-            ..Self::failed(span, message)
-        }
-    }
-
-    fn aborted(span: Span, message: impl Into<String>) -> Self {
-        Self {
-            verdict: Verdict::Aborted,
-            ..Self::failed(span, message)
-        }
-    }
-
-    fn differs(mut self, difference: Difference) -> Self {
-        self.finding.difference = Some(difference);
-        self
-    }
+/// Why a scenario cannot go on.
+#[derive(Clone, Debug)]
+pub(super) enum Halt {
+    /// It has grown too long.
+    Full(String),
+    /// The link carries nothing more.
+    Trouble(Trouble),
 }
 
 /// What the master has received from one ring.
@@ -206,11 +128,13 @@ pub(super) struct Runner<'a> {
     pub(super) plan: &'a Plan,
     at_finding: AtFinding,
     strict: bool,
-    /// Why there is no room for more in what is recorded.
-    pub(super) full: Option<String>,
+    /// Why nothing more can be played: no room for more in what is recorded, or trouble on the link.
+    pub(super) full: Option<Halt>,
     /// The first check on something that the link does not show.
     pub(super) unseen: Option<Stop>,
     pub(super) recorder: Recorder,
+    /// Cells that were read over the bus, where the link does not show them.
+    pub(super) seen: BTreeMap<(usize, u8, u16), u8>,
     pub(super) rings: Vec<RingRecord>,
     /// When the line before was done.
     pub(super) line_before: Instant,
@@ -255,7 +179,8 @@ impl Runner<'_> {
     /// Whether the record has room for more.
     fn room(&self, span: Span) -> Result<(), Stop> {
         match &self.full {
-            Some(why) => Err(Stop::aborted(span, why.clone())),
+            Some(Halt::Full(why)) => Err(Stop::aborted(span, why.clone())),
+            Some(Halt::Trouble(trouble)) => Err(Stop::trouble(span, trouble)),
             None => Ok(()),
         }
     }
@@ -279,7 +204,7 @@ impl Runner<'_> {
             PlannedWhen::At(window) => Instant::START + window.from,
         };
         let now = self.link.now();
-        if at < now {
+        if at + self.link.time_tolerance() < now {
             return Err(Stop::aborted(
                 step.span,
                 format!("this line is for {at}, but the lines before it took until {now}"),
@@ -380,9 +305,11 @@ impl Runner<'_> {
         loop {
             if self.link.carried() > MAX_CARRIED {
                 let why = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
-                self.full = Some(why);
+                self.full = Some(Halt::Full(why));
             }
-            self.full = self.full.take().or_else(|| self.recorder.too_much());
+            let too_much = || self.recorder.too_much().map(Halt::Full);
+            let trouble = || self.link.trouble().cloned().map(Halt::Trouble);
+            self.full = self.full.take().or_else(too_much).or_else(trouble);
             if self.full.is_some() {
                 self.fetch();
                 return false;
@@ -437,9 +364,12 @@ impl Runner<'_> {
         window: Option<(Instant, PlannedWindow)>,
     ) -> Result<(), Stop> {
         let first = self.rings[ring].next;
+        let tolerance = self.link.time_tolerance();
         for index in 0..expected.len() {
             let until = match window {
-                Some((base, window)) if index == 0 => base + window.to + window.tolerance,
+                Some((base, window)) if index == 0 => {
+                    base + window.to + window.tolerance + tolerance
+                }
                 _ => self.link.now().max(self.line_before) + self.deadline,
             };
             let arrived = self.next_byte(ring, first + index, until);
@@ -485,7 +415,7 @@ impl Runner<'_> {
             }
             if let Some((base, window)) = window.filter(|_| index == 0) {
                 let earliest = base + window.from - window.tolerance;
-                if at < earliest {
+                if at + tolerance < earliest {
                     let message = format!(
                         "{} came at {at}, expected at {} at the earliest",
                         show(byte),

@@ -1,0 +1,546 @@
+//! A link over streams of bytes: real rings, or simulated ones in another process.
+//!
+//! Time is the computer's monotonic clock. A byte received is stamped with the time at which it was read; of several
+//! read at once each is taken to have come a byte time before the next. What is sent goes to the operating system
+//! a little ahead of the line, so that a busy computer leaves no gaps in a telegram.
+
+use super::tamper::Tamper;
+use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Shown, Trouble, link_name};
+use crate::port::{Outgoing, Wire};
+use harness_proto::line::{LineError, Rate, Received};
+use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::sync::SYNCO;
+use harness_proto::time::{Instant, Span};
+use harness_sim::link::LineByte;
+use harness_sim::trace::{LinkTrace, Trace};
+use rustix::event::{Timespec, poll};
+use rustix::io::Errno;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time;
+
+/// How far ahead of the line bytes are given to the operating system.
+const AHEAD: Span = Span::from_millis(100);
+
+/// How far ahead of the line a driver may hand over its bytes: more than a busy computer is late, less than a person
+/// notices.
+const LEAD: Span = Span::from_millis(16);
+
+/// How much later than the ring itself needs a byte may come back: adapters, a busy computer.
+pub(super) const SLACK: Span = Span::from_millis(30);
+
+/// How exact times are where the rig's file says nothing.
+pub const TOLERANCE: Span = Span::from_millis(5);
+
+/// The longest sleep, so that a request to end is seen.
+const NAP: Span = Span::from_millis(50);
+
+/// Bytes of a conversation that are recorded on each link; more are counted only.
+const MOST_RECORDED: usize = 4_000_000;
+
+/// One or two rings over streams.
+#[derive(Debug)]
+pub struct StreamLink {
+    rings: Vec<Ring>,
+    rate: Rate,
+    /// The time that is the conversation's start.
+    start: time::Instant,
+    capabilities: Vec<Capability>,
+    /// Faults that wait for their time, in order of it.
+    scheduled: VecDeque<(Instant, usize, usize, LinkFault)>,
+    interrupt: Arc<AtomicBool>,
+    trouble: Option<Trouble>,
+    recording: bool,
+    tolerance: Span,
+}
+
+/// One ring's two ends at the master.
+#[derive(Debug)]
+struct Ring {
+    wire: Wire,
+    drives: u8,
+    /// What has not been given to the operating system, with the time at which its start bit is due, and whether
+    /// it must not be sooner.
+    queue: VecDeque<(Instant, bool, Outgoing)>,
+    /// When the line is free for the next byte.
+    free: Instant,
+    received: VecDeque<(Instant, Received)>,
+    last_arrival: Instant,
+    /// Bytes sent and received since the ring was last at rest.
+    sent: u64,
+    came: u64,
+    outgoing: Tamper,
+    incoming: Tamper,
+    log: [Vec<LineByte>; 2],
+    carried: u64,
+    unplaced: u64,
+}
+
+impl StreamLink {
+    /// A link over one wire a ring, one ring or two, each with its number of drives. `interrupt` is set by whoever
+    /// wants the program to end.
+    #[must_use]
+    pub fn new(wires: Vec<(Wire, u8)>, rate: Rate, interrupt: Arc<AtomicBool>) -> Self {
+        let mut capabilities = vec![
+            Capability::Memory,
+            Capability::Motion,
+            Capability::Eeprom,
+            Capability::Reset,
+        ];
+        if wires.len() > 1 {
+            capabilities.push(Capability::TwoRings);
+        }
+        if wires.iter().all(|(wire, _)| wire.abilities().shows_errors) {
+            capabilities.push(Capability::LineErrors);
+        }
+        let rings = wires
+            .into_iter()
+            .map(|(wire, drives)| Ring::new(wire, drives));
+        Self {
+            rings: rings.collect(),
+            rate,
+            start: time::Instant::now(),
+            capabilities,
+            scheduled: VecDeque::new(),
+            interrupt,
+            trouble: None,
+            recording: true,
+            tolerance: TOLERANCE,
+        }
+    }
+
+    /// Sets how exact times are taken to be.
+    pub fn set_time_tolerance(&mut self, tolerance: Span) {
+        self.tolerance = tolerance;
+    }
+
+    /// Keeps no record of what the links carry from now on.
+    pub fn stop_recording(&mut self) {
+        self.recording = false;
+    }
+
+    /// Begins a conversation: time and bytes are counted anew, faults that have not happened are forgotten, and what
+    /// was received before is dropped. Trouble stays.
+    pub fn begin(&mut self) {
+        self.pump();
+        self.start = time::Instant::now();
+        self.scheduled.clear();
+        for ring in &mut self.rings {
+            ring.begin();
+        }
+    }
+
+    /// After an interruption: what is needed for a safe state may be sent. Other trouble stays.
+    pub fn resume(&mut self) {
+        if self.trouble == Some(Trouble::Interrupted) {
+            self.trouble = None;
+            self.interrupt = Arc::default();
+        }
+    }
+
+    /// Line errors that the transport has told of without saying at which byte, since the last call.
+    pub fn take_unplaced(&mut self) -> u64 {
+        let rings = self.rings.iter_mut();
+        rings.map(|ring| std::mem::take(&mut ring.unplaced)).sum()
+    }
+
+    /// How long sending was held up around bytes with a wrong parity bit, each time.
+    pub fn take_gaps(&mut self) -> Vec<time::Duration> {
+        let rings = self.rings.iter_mut();
+        rings.flat_map(|ring| ring.wire.take_gaps()).collect()
+    }
+
+    fn at(&self, time: time::Instant) -> Instant {
+        let since = time.saturating_duration_since(self.start);
+        Instant::START + Span::from_nanos(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
+    }
+
+    /// How long a byte may take to come back.
+    fn round(&self, ring: &Ring) -> Span {
+        self.rate.byte_time() * (2 * u64::from(ring.drives) + 4) + SLACK
+    }
+
+    /// Lets due faults happen, gives the operating system what is due, and takes what has come.
+    fn pump(&mut self) {
+        let now = self.now();
+        while let Some(&(at, ring, link, fault)) = self.scheduled.front()
+            && at <= now
+        {
+            self.scheduled.pop_front();
+            if let Some(tamper) = self.tamper(ring, link) {
+                tamper.suffer(fault);
+            }
+        }
+        if self.interrupt.load(Ordering::Relaxed) && self.trouble.is_none() {
+            self.trouble = Some(Trouble::Interrupted);
+        }
+        for ring in &mut self.rings {
+            let done = match self.trouble {
+                None => ring
+                    .transmit(now)
+                    .and_then(|()| ring.collect(now, self.rate.byte_time(), self.recording)),
+                Some(_) => {
+                    ring.queue.clear();
+                    Ok(())
+                }
+            };
+            if let Err(trouble) = done {
+                self.trouble.get_or_insert(trouble);
+            }
+        }
+    }
+
+    fn tamper(&mut self, ring: usize, link: usize) -> Option<&mut Tamper> {
+        let ring = self.rings.get_mut(ring)?;
+        match link {
+            0 => Some(&mut ring.outgoing),
+            link if link == usize::from(ring.drives) => Some(&mut ring.incoming),
+            _ => None,
+        }
+    }
+
+    /// When something has to be done although nothing comes.
+    fn due(&self) -> Option<Instant> {
+        let queues = self.rings.iter().filter_map(|ring| {
+            let (start, exact, _) = ring.queue.front()?;
+            let lead = if *exact { Span::ZERO } else { AHEAD };
+            Some(Instant::START + start.since_start().saturating_sub(lead))
+        });
+        let faults = self.scheduled.front().map(|(at, ..)| *at);
+        queues.chain(faults).min()
+    }
+
+    fn sleep(&mut self, span: Span) {
+        let span = span.min(NAP).as_nanos();
+        let timeout = Timespec {
+            tv_sec: 0,
+            tv_nsec: i64::try_from(span).unwrap_or(0).min(999_999_999),
+        };
+        let mut fds: Vec<_> = self.rings.iter().map(|ring| ring.wire.poll_fd()).collect();
+        match poll(&mut fds, Some(&timeout)) {
+            Ok(_) | Err(Errno::INTR | Errno::AGAIN) => {}
+            Err(error) => {
+                let text = format!("failed to wait for the ports: {error}");
+                self.trouble.get_or_insert(Trouble::Lost(text));
+            }
+        }
+    }
+}
+
+impl Ring {
+    fn new(wire: Wire, drives: u8) -> Self {
+        Self {
+            wire,
+            drives,
+            queue: VecDeque::new(),
+            free: Instant::START,
+            received: VecDeque::new(),
+            last_arrival: Instant::START,
+            sent: 0,
+            came: 0,
+            outgoing: Tamper::default(),
+            incoming: Tamper::default(),
+            log: [Vec::new(), Vec::new()],
+            carried: 0,
+            unplaced: 0,
+        }
+    }
+
+    fn begin(&mut self) {
+        self.queue.clear();
+        self.free = Instant::START;
+        self.received.clear();
+        self.last_arrival = Instant::START;
+        (self.sent, self.came, self.carried) = (0, 0, 0);
+        self.outgoing = Tamper::default();
+        self.incoming = Tamper::default();
+        self.log = [Vec::new(), Vec::new()];
+    }
+
+    /// Queues a byte of the master's.
+    fn send(&mut self, now: Instant, byte: u8, byte_time: Span, recording: bool) {
+        let start = self.free.max(now);
+        let passed = self.outgoing.pass(Received::good(byte), start);
+        let begun = start + passed.delay;
+        let mut exact = passed.delay > Span::ZERO;
+        let mut free = begun;
+        let mut queue = |outgoing, length: Span| {
+            self.queue
+                .push_back((free, std::mem::take(&mut exact), outgoing));
+            free += length;
+            self.sent += 1;
+        };
+        for received in &passed.bytes {
+            let outgoing = match received.error {
+                None => Outgoing::Byte(received.byte),
+                Some(_) => Outgoing::WrongParity(received.byte),
+            };
+            queue(outgoing, byte_time);
+        }
+        if let Some(span) = passed.hold {
+            queue(Outgoing::Break(span), span.max(byte_time));
+        }
+        // A byte that is lost takes its time all the same.
+        self.free = free.max(begun + byte_time);
+        self.carried += 1;
+        if recording && self.log[0].len() < MOST_RECORDED {
+            let arrives = passed.bytes.last();
+            let (received, error) = match (arrives, passed.hold) {
+                (Some(b), _) => (Some(b.byte), b.error),
+                (None, Some(_)) => (Some(0), Some(LineError::Break)),
+                (None, None) => (None, None),
+            };
+            self.log[0].push(LineByte::seen(self.free, Some(byte), received, error));
+        }
+    }
+
+    /// Gives the operating system what is due.
+    fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {
+        while let Some(&(start, exact, outgoing)) = self.queue.front() {
+            let lead = if exact { Span::ZERO } else { AHEAD };
+            if start > now + lead {
+                break;
+            }
+            self.queue.pop_front();
+            self.wire.send(outgoing)?;
+        }
+        self.wire.flush()
+    }
+
+    /// Takes what has come.
+    fn collect(&mut self, now: Instant, byte_time: Span, recording: bool) -> Result<(), Trouble> {
+        let mut bytes = Vec::new();
+        let result = self.wire.receive(&mut bytes);
+        self.unplaced += self.wire.take_unplaced();
+        let mut left = bytes.len() as u64;
+        for byte in bytes {
+            left -= 1;
+            let before = now.since_start().saturating_sub(byte_time * left);
+            let at = (Instant::START + before).max(self.last_arrival);
+            self.last_arrival = at;
+            self.came += 1;
+            self.carried += 1;
+            let passed = self.incoming.pass(byte, at);
+            let arrived = match passed.hold {
+                Some(_) => vec![Received::bad(0, LineError::Break)],
+                None => passed.bytes,
+            };
+            for received in &arrived {
+                self.received.push_back((at + passed.delay, *received));
+            }
+            if recording && self.log[1].len() < MOST_RECORDED {
+                let last = arrived.last();
+                let error = last.and_then(|b| b.error);
+                let seen = LineByte::seen(at, Some(byte.byte), last.map(|b| b.byte), error);
+                self.log[1].push(seen);
+            }
+        }
+        result
+    }
+}
+
+impl Line for StreamLink {
+    fn byte_time(&self) -> Span {
+        self.rate.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.at(time::Instant::now())
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        let now = self.now();
+        let rest = !self.ring_busy(ring, now);
+        let byte_time = self.byte_time();
+        let recording = self.recording;
+        let sound = self.trouble.is_none();
+        let Some(own) = self.rings.get_mut(ring).filter(|_| sound) else {
+            return now;
+        };
+        if rest {
+            (own.sent, own.came) = (0, 0);
+        }
+        for byte in bytes {
+            own.send(now, *byte, byte_time, recording);
+        }
+        let free = own.free;
+        self.pump();
+        free
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        let now = self.now();
+        let ring = self.rings.get_mut(ring)?;
+        // What is delayed on the last link has not come yet.
+        let (at, _) = ring.received.front()?;
+        if *at > now {
+            return None;
+        }
+        ring.received.pop_front()
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.pump();
+        let ready = |link: &Self| link.rings.iter().any(|ring| !ring.received.is_empty());
+        if !ready(self) && self.trouble.is_none() {
+            let until = self.due().map_or(until, |due| due.min(until));
+            let left = until.since(self.now());
+            if left > Span::ZERO {
+                self.sleep(left);
+            }
+            self.pump();
+        }
+        self.trouble.is_none()
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.trouble.as_ref()
+    }
+
+    fn lead(&self) -> Span {
+        LEAD
+    }
+}
+
+impl StreamLink {
+    fn ring_busy(&self, ring: usize, now: Instant) -> bool {
+        let Some(ring) = self.rings.get(ring) else {
+            return false;
+        };
+        if !ring.queue.is_empty() || ring.wire.waiting() > 0 || now < ring.free {
+            return true;
+        }
+        // More than was sent comes after a time-out (ND21 9.9): then only silence tells.
+        let home = ring.came == ring.sent;
+        let quiet = ring.free.max(ring.last_arrival) + self.round(ring);
+        !home && now < quiet
+    }
+}
+
+impl Link for StreamLink {
+    fn capabilities(&self) -> &[Capability] {
+        &self.capabilities
+    }
+
+    fn busy(&self) -> bool {
+        let now = self.now();
+        self.trouble.is_none() && (0..self.rings.len()).any(|ring| self.ring_busy(ring, now))
+    }
+
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        // Planning has refused, and the rig's capabilities have excluded, what happens elsewhere.
+        let PlacedFault::Link(link, fault) = fault else {
+            return;
+        };
+        match moment {
+            Moment::At(at) => {
+                let place = self.scheduled.partition_point(|(other, ..)| *other <= at);
+                self.scheduled.insert(place, (at, ring, link, fault));
+            }
+            Moment::Now => {
+                if let Some(tamper) = self.tamper(ring, link) {
+                    tamper.suffer(fault);
+                }
+            }
+            Moment::Byte(byte) => {
+                if let Some(tamper) = self.tamper(ring, link) {
+                    tamper.arm(byte, fault);
+                }
+            }
+        }
+    }
+
+    fn reaches(&self, ring: usize, link: usize) -> bool {
+        self.rings
+            .get(ring)
+            .is_some_and(|ring| link == 0 || link == usize::from(ring.drives))
+    }
+
+    fn time_tolerance(&self) -> Span {
+        self.tolerance
+    }
+
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+        let end = self.send(ring, &vec![SYNCO; count]);
+        let end = end + self.rings.get(ring).map_or(Span::ZERO, |r| self.round(r));
+        let mut bytes = Vec::new();
+        while self.busy() && self.now() < end && self.wait(end) {
+            while let Some((_, byte)) = self.receive(ring) {
+                bytes.push(byte);
+            }
+        }
+        while let Some((_, byte)) = self.receive(ring) {
+            bytes.push(byte);
+        }
+        bytes
+    }
+
+    fn error_of(&self, _ring: usize, _drive: u8) -> Option<Option<BusError>> {
+        None
+    }
+
+    fn shown(&self, _ring: usize, _drive: u8) -> Option<Shown> {
+        None
+    }
+
+    fn peek(&self, _ring: usize, _drive: u8, _address: u16) -> Option<u8> {
+        None
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        let mut unused = Vec::new();
+        for (index, ring) in self.rings.iter().enumerate() {
+            let ends = [(0, &ring.outgoing), (ring.drives, &ring.incoming)];
+            for (place, tamper) in ends {
+                let place = link_name(index, ring.drives, usize::from(place));
+                let faults = tamper.unused();
+                unused.extend(faults.map(|(byte, fault)| format!("{place} byte {byte}: {fault}")));
+            }
+        }
+        unused
+    }
+
+    fn carried(&self) -> u64 {
+        self.rings.iter().map(|ring| ring.carried).sum()
+    }
+
+    fn drives(&self, ring: usize) -> u8 {
+        self.rings.get(ring).map_or(0, |ring| ring.drives)
+    }
+
+    fn trace(&self, ring: usize) -> Trace {
+        let Some(ring) = self.rings.get(ring) else {
+            return Trace {
+                drives: 0,
+                links: Vec::new(),
+                marks: Vec::new(),
+            };
+        };
+        let last = usize::from(ring.drives);
+        let link = |place: usize| LinkTrace {
+            from: drive_before(place, last),
+            to: drive_before(place + 1, last),
+            bytes: match place {
+                0 => ring.log[0].clone(),
+                place if place == last => ring.log[1].clone(),
+                _ => Vec::new(),
+            },
+        };
+        Trace {
+            drives: ring.drives,
+            links: (0..=last).map(link).collect(),
+            marks: Vec::new(),
+        }
+    }
+}
+
+/// The drive in front of the `place`-th link of a ring of `drives`; `None` for the master.
+fn drive_before(place: usize, drives: usize) -> Option<u8> {
+    match place {
+        0 => None,
+        place => drives
+            .checked_sub(place)
+            .and_then(|drive| u8::try_from(drive).ok()),
+    }
+}

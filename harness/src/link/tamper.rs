@@ -1,0 +1,190 @@
+//! Faults on a link whose bytes pass through this program: the master's own two links, and those with an
+//! interposer.
+//!
+//! The rules are those of the simulated wire: bytes are counted from 1 as they are transmitted, and several faults at
+//! one byte act one after the other.
+
+use super::LinkFault;
+use harness_proto::line::{LineError, Received};
+use harness_proto::time::{Instant, Span};
+use harness_sim::fault::Flips;
+use std::collections::BTreeMap;
+
+/// What becomes of a byte.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Passed {
+    /// What goes on, in order; empty where it is lost.
+    pub(super) bytes: Vec<Received>,
+    /// How long the first of them is held back.
+    pub(super) delay: Span,
+    /// How long the line is held at 0 in place of the byte.
+    pub(super) hold: Option<Span>,
+}
+
+/// One link's faults.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tamper {
+    count: u64,
+    armed: BTreeMap<u64, Vec<LinkFault>>,
+    cut: bool,
+    held_until: Option<Instant>,
+}
+
+impl Tamper {
+    /// Arms a fault for the `byte`-th byte.
+    pub(super) fn arm(&mut self, byte: u64, fault: LinkFault) {
+        self.armed.entry(byte).or_default().push(fault);
+    }
+
+    /// Lets a fault happen now; what needs a byte takes the next one.
+    pub(super) fn suffer(&mut self, fault: LinkFault) {
+        match fault {
+            LinkFault::Cut => self.cut = true,
+            LinkFault::Join => self.cut = false,
+            fault => self.arm(self.count + 1, fault),
+        }
+    }
+
+    /// Faults whose byte has not come.
+    pub(super) fn unused(&self) -> impl Iterator<Item = (u64, LinkFault)> + '_ {
+        let each = |(byte, faults): (&u64, &Vec<LinkFault>)| {
+            let byte = *byte;
+            let faults: Vec<_> = faults.iter().map(|fault| (byte, *fault)).collect();
+            faults
+        };
+        self.armed.iter().flat_map(each)
+    }
+
+    /// A byte that goes on at `start`.
+    pub(super) fn pass(&mut self, byte: Received, start: Instant) -> Passed {
+        self.count += 1;
+        let mut passed = Passed::default();
+        let mut before = Vec::new();
+        let mut whole = Some(byte);
+        let mut flips = Flips::default();
+        let mut copies = 1;
+        for fault in self.armed.remove(&self.count).unwrap_or_default() {
+            match fault {
+                LinkFault::Flip(more) => {
+                    flips = flips.and(more);
+                    whole = whole.map(|b| Received {
+                        byte: b.byte ^ more.data,
+                        ..b
+                    });
+                }
+                LinkFault::Replace(data) => {
+                    flips = Flips::default();
+                    whole = whole.map(|_| Received::good(data));
+                }
+                LinkFault::Drop => whole = None,
+                LinkFault::Duplicate => copies = 2,
+                LinkFault::Insert(data) => before.push(Received::good(data)),
+                LinkFault::Delay(span) => passed.delay = passed.delay + span,
+                LinkFault::Break(span) => passed.hold = Some(span),
+                LinkFault::Overrun => {}
+                LinkFault::Cut => self.cut = true,
+                LinkFault::Join => self.cut = false,
+            }
+        }
+        let held = self.held_until.is_some_and(|until| start < until);
+        if let Some(span) = passed.hold {
+            self.held_until = Some(start + span);
+        }
+        if self.cut || held {
+            passed.hold = None;
+            return passed;
+        }
+        passed.bytes = before;
+        if passed.hold.is_some() {
+            return passed;
+        }
+        let arrives = whole.map(|b| Received {
+            error: b.error.or(flips.noticed()),
+            ..b
+        });
+        for _ in 0..copies {
+            passed.bytes.extend(arrives);
+        }
+        passed
+    }
+}
+
+/// Whether a fault needs bytes with a wrong parity bit or breaks on the wire.
+#[must_use]
+pub fn needs_line_errors(fault: LinkFault) -> bool {
+    match fault {
+        LinkFault::Flip(flips) => flips.noticed() == Some(LineError::Parity),
+        LinkFault::Break(_) => true,
+        _ => false,
+    }
+}
+
+/// Whether no UART can be made to do it: a wrong stop bit, an overrun.
+#[must_use]
+pub fn only_simulated(fault: LinkFault) -> bool {
+    match fault {
+        LinkFault::Flip(flips) => flips.noticed() == Some(LineError::Framing),
+        LinkFault::Overrun => true,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pass(tamper: &mut Tamper, bytes: &[u8]) -> Vec<(u8, bool)> {
+        let all = bytes.iter().flat_map(|byte| {
+            let passed = tamper.pass(Received::good(*byte), Instant::START);
+            passed.bytes
+        });
+        all.map(|b| (b.byte, b.error.is_some())).collect()
+    }
+
+    #[test]
+    fn each_fault_at_its_byte() {
+        let mut tamper = Tamper::default();
+        let odd = Flips {
+            data: 1,
+            ..Flips::default()
+        };
+        let even = Flips { data: 3, ..odd };
+        tamper.arm(1, LinkFault::Flip(odd));
+        tamper.arm(2, LinkFault::Flip(even));
+        tamper.arm(3, LinkFault::Drop);
+        tamper.arm(4, LinkFault::Duplicate);
+        tamper.arm(5, LinkFault::Insert(0x55));
+        tamper.arm(6, LinkFault::Replace(0x66));
+        let seen = pass(&mut tamper, &[0x10; 6]);
+        let expected = [0x11, 0x13, 0x10, 0x10, 0x55, 0x10, 0x66].map(|byte| (byte, byte == 0x11));
+        assert_eq!(seen, expected);
+        assert_eq!(tamper.unused().count(), 0);
+    }
+
+    #[test]
+    fn cut_and_joined() {
+        let mut tamper = Tamper::default();
+        tamper.arm(2, LinkFault::Cut);
+        tamper.arm(4, LinkFault::Join);
+        let seen = pass(&mut tamper, &[1, 2, 3, 4]);
+        assert_eq!(seen, [(1, false), (4, false)]);
+        tamper.suffer(LinkFault::Drop);
+        assert_eq!(pass(&mut tamper, &[5, 6]), [(6, false)]);
+        tamper.arm(99, LinkFault::Drop);
+        assert_eq!(tamper.unused().collect::<Vec<_>>(), [(99, LinkFault::Drop)]);
+    }
+
+    #[test]
+    fn a_break_swallows_what_is_sent_meanwhile() {
+        let mut tamper = Tamper::default();
+        tamper.arm(1, LinkFault::Break(Span::from_millis(5)));
+        let at = |ms| Instant::START + Span::from_millis(ms);
+        let passed = tamper.pass(Received::good(1), at(0));
+        assert_eq!(
+            (passed.bytes.len(), passed.hold),
+            (0, Some(Span::from_millis(5)))
+        );
+        assert_eq!(tamper.pass(Received::good(2), at(4)).bytes, []);
+        assert_eq!(tamper.pass(Received::good(3), at(5)).bytes.len(), 1);
+    }
+}

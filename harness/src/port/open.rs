@@ -1,0 +1,192 @@
+//! Opening, with an error of its own for everything that can be wrong.
+
+use super::rfc2217::{self, NegotiationError};
+use super::serial;
+use super::wire::{Coding, Wire};
+use harness_proto::line::Rate;
+use harness_proto::marks::Unmark;
+use rustix::fs::{Mode, OFlags};
+use rustix::termios::{OptionalActions, QueueSelector};
+use std::io;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How long a connection may take.
+const CONNECT: Duration = Duration::from_secs(5);
+
+/// Where a stream is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Endpoint {
+    /// A serial port: `/dev/ttyUSB0`.
+    Serial(PathBuf),
+    /// A pseudo terminal: its slave end.
+    Pty(PathBuf),
+    /// A socket: `host:port`.
+    Tcp(String),
+    /// A serial port behind a socket: `host:port`.
+    Rfc2217(String),
+}
+
+impl std::fmt::Display for Endpoint {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Serial(path) | Self::Pty(path) => write!(f, "{}", path.display()),
+            Self::Tcp(address) | Self::Rfc2217(address) => f.write_str(address),
+        }
+    }
+}
+
+/// What to open, and how.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PortSettings {
+    /// Where.
+    pub endpoint: Endpoint,
+    /// The rate of a serial line; always 8O1.
+    pub rate: Rate,
+    /// Whether a pty or a socket carries line errors as in-band marks.
+    pub marks: bool,
+    /// Whether to ask a USB adapter for its lowest latency; that it cannot is no error.
+    pub low_latency: bool,
+}
+
+/// Why a port cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// Nothing there.
+    #[error("there is no port {0}: is the adapter plugged in?")]
+    Missing(String),
+    /// No rights.
+    #[error("no right to open {0}: on most systems its group is `dialout` (ls -l {0})")]
+    Denied(String),
+    /// Somebody has it.
+    #[error("{0} is in use by another program")]
+    InUse(String),
+    /// Something else stands there.
+    #[error("{0} is no {1}")]
+    NotA(String, &'static str),
+    /// A pty where a serial port should be.
+    #[error("{0} is a pseudo terminal, which has no parity: say transport = \"pty\"")]
+    PseudoTerminal(String),
+    /// The port does not take the settings.
+    #[error("{port}: {what} was not taken: a line of a NOVOBUS is 8O1 (ND21 8.3)")]
+    Setting {
+        /// The port.
+        port: String,
+        /// What it does not do.
+        what: String,
+    },
+    /// No host, or it refuses.
+    #[error("failed to connect to {address}: {error}")]
+    Connect {
+        /// Where to.
+        address: String,
+        /// Why not.
+        error: io::Error,
+    },
+    /// The other end is no RFC 2217 server, or cannot do 8O1.
+    #[error("{address}: {error}")]
+    Negotiation {
+        /// Which server.
+        address: String,
+        /// What was refused.
+        error: NegotiationError,
+    },
+    /// Anything else.
+    #[error("failed to open {port}: {error}")]
+    Other {
+        /// The port.
+        port: String,
+        /// Why not.
+        error: io::Error,
+    },
+}
+
+impl OpenError {
+    pub(super) fn of(port: &Path, error: &io::Error) -> Self {
+        let name = port.display().to_string();
+        match error.kind() {
+            io::ErrorKind::NotFound => Self::Missing(name),
+            io::ErrorKind::PermissionDenied => Self::Denied(name),
+            io::ErrorKind::ResourceBusy => Self::InUse(name),
+            _ if error.raw_os_error() == Some(rustix::io::Errno::NODEV.raw_os_error()) => {
+                Self::Missing(name)
+            }
+            kind => Self::Other {
+                port: name,
+                error: error
+                    .raw_os_error()
+                    .map_or_else(|| kind.into(), io::Error::from_raw_os_error),
+            },
+        }
+    }
+}
+
+/// Opens a stream: raw, with nothing sent, and what was received before dropped.
+///
+/// # Errors
+/// [`OpenError`]; the port is left as it was.
+pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
+    let name = settings.endpoint.to_string();
+    let plain = || match settings.marks {
+        true => Coding::Marked(Unmark::default()),
+        false => Coding::Plain,
+    };
+    match &settings.endpoint {
+        Endpoint::Serial(path) => {
+            let (fd, serial) = serial::open(path, settings.rate, settings.low_latency)?;
+            let coding = Coding::Serial(Unmark::default(), Box::new(serial));
+            Ok(Wire::new(fd, name, coding))
+        }
+        Endpoint::Pty(path) => Ok(Wire::new(pty(path)?, name, plain())),
+        Endpoint::Tcp(address) => Ok(Wire::new(connect(address)?.into(), name, plain())),
+        Endpoint::Rfc2217(address) => {
+            let stream = connect(address)?;
+            let telnet = rfc2217::negotiate(&stream, settings.rate).map_err(|error| {
+                OpenError::Negotiation {
+                    address: address.clone(),
+                    error,
+                }
+            })?;
+            Ok(Wire::new(
+                stream.into(),
+                name,
+                Coding::Telnet(Box::new(telnet)),
+            ))
+        }
+    }
+}
+
+fn pty(path: &Path) -> Result<rustix::fd::OwnedFd, OpenError> {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    let fd = rustix::fs::open(path, flags, Mode::empty())
+        .map_err(|error| OpenError::of(path, &error.into()))?;
+    let other = |error: rustix::io::Errno| match error {
+        rustix::io::Errno::NOTTY => OpenError::NotA(path.display().to_string(), "terminal"),
+        error => OpenError::of(path, &error.into()),
+    };
+    let mut termios = rustix::termios::tcgetattr(&fd).map_err(other)?;
+    termios.make_raw();
+    rustix::termios::tcsetattr(&fd, OptionalActions::Now, &termios).map_err(other)?;
+    rustix::termios::tcflush(&fd, QueueSelector::IFlush).map_err(other)?;
+    Ok(fd)
+}
+
+fn connect(address: &str) -> Result<TcpStream, OpenError> {
+    let failed = |error| OpenError::Connect {
+        address: address.to_owned(),
+        error,
+    };
+    let mut last = io::ErrorKind::AddrNotAvailable.into();
+    for address in address.to_socket_addrs().map_err(failed)? {
+        match TcpStream::connect_timeout(&address, CONNECT) {
+            Ok(stream) => {
+                stream.set_nodelay(true).map_err(failed)?;
+                stream.set_nonblocking(true).map_err(failed)?;
+                return Ok(stream);
+            }
+            Err(error) => last = error,
+        }
+    }
+    Err(failed(last))
+}

@@ -1,0 +1,199 @@
+//! A serial port: 8O1, every line error marked by the kernel, bytes with a wrong parity bit on demand.
+//!
+//! The crate `serialport` opens the port and sets rate and format. The marks of POSIX termios (`INPCK` and `PARMRK`
+//! without `IGNPAR` and `ISTRIP`) are set behind it on the same terminal.
+
+use super::open::OpenError;
+use harness_proto::line::Rate;
+use harness_proto::time::Span;
+use rustix::fd::{AsFd, OwnedFd};
+use rustix::io::Errno;
+use rustix::process::{Pid, PidfdFlags, PidfdGetfdFlags};
+use rustix::termios::{ControlModes, InputModes, OptionalActions, QueueSelector, Termios};
+use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits, TTYPort};
+use std::io;
+use std::os::fd::AsRawFd;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Gaps that are remembered until they are asked for.
+const MOST_GAPS: usize = 10_000;
+
+/// How long a drained port may take to take a byte.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What belongs to a serial port beside its stream.
+#[derive(Debug)]
+pub(super) struct Serial {
+    port: TTYPort,
+    /// The settings with which it was found.
+    before: Termios,
+    fd: OwnedFd,
+    gaps: Vec<Duration>,
+}
+
+impl Drop for Serial {
+    /// Leaves the port as it was.
+    fn drop(&mut self) {
+        // A port that is gone has no settings any more.
+        let _gone = rustix::termios::tcsetattr(&self.fd, OptionalActions::Now, &self.before);
+        let _gone = rustix::termios::ioctl_tiocnxcl(&self.fd);
+    }
+}
+
+/// Opens a serial port.
+pub(super) fn open(
+    path: &Path,
+    rate: Rate,
+    low_latency: bool,
+) -> Result<(OwnedFd, Serial), OpenError> {
+    let name = path.display().to_string();
+    let before = look(path)?;
+    let wrong = |error: &serialport::Error| OpenError::Setting {
+        port: name.clone(),
+        what: format!("{} 8O1 ({error})", rate.bits_per_second()),
+    };
+    let port = serialport::new(name.as_str(), rate.bits_per_second())
+        .data_bits(DataBits::Eight)
+        .parity(Parity::Odd)
+        .stop_bits(StopBits::One)
+        .flow_control(FlowControl::None)
+        .exclusive(false)
+        .open_native()
+        .map_err(|error| wrong(&error))?;
+    let other = |error: Errno| OpenError::of(path, &error.into());
+    let fd = duplicate(&port).map_err(other)?;
+    // From here on the port is put back when `serial` is dropped.
+    let serial = Serial {
+        port,
+        before,
+        fd: fd
+            .try_clone()
+            .map_err(|error| OpenError::of(path, &error))?,
+        gaps: Vec::new(),
+    };
+    rustix::termios::ioctl_tiocexcl(&fd).map_err(other)?;
+    set_marks(&fd, rate).map_err(|what| OpenError::Setting {
+        port: name.clone(),
+        what,
+    })?;
+    rustix::io::ioctl_fionbio(&fd, true).map_err(other)?;
+    rustix::termios::tcflush(&fd, QueueSelector::IOFlush).map_err(other)?;
+    if low_latency {
+        lower_latency(path);
+    }
+    Ok((fd, serial))
+}
+
+/// The settings with which a port is found, read before anything is set.
+fn look(path: &Path) -> Result<Termios, OpenError> {
+    use rustix::fs::{Mode, OFlags};
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    let fd = rustix::fs::open(path, flags, Mode::empty())
+        .map_err(|error| OpenError::of(path, &error.into()))?;
+    let name = path.display().to_string();
+    let device = rustix::fs::fstat(&fd).map_err(|error| OpenError::of(path, &error.into()))?;
+    // Major numbers 136 to 143 are the slave ends of pseudo terminals (Documentation/admin-guide/devices.txt).
+    if (136..=143).contains(&rustix::fs::major(device.st_rdev)) {
+        return Err(OpenError::PseudoTerminal(name));
+    }
+    rustix::termios::tcgetattr(&fd).map_err(|_| OpenError::NotA(name, "serial port"))
+}
+
+/// A second descriptor of the same open port, owned here: the crate gives its own only as a number.
+fn duplicate(port: &TTYPort) -> Result<OwnedFd, Errno> {
+    let process: Pid = rustix::process::getpid();
+    let process = rustix::process::pidfd_open(process, PidfdFlags::empty())?;
+    rustix::process::pidfd_getfd(&process, port.as_raw_fd(), PidfdGetfdFlags::empty())
+}
+
+/// Lets the kernel mark every line error, and reads back whether the port does what it must.
+fn set_marks(fd: impl AsFd, rate: Rate) -> Result<(), String> {
+    let failed = |error: Errno| error.to_string();
+    let mut termios = rustix::termios::tcgetattr(&fd).map_err(failed)?;
+    termios.input_modes |= InputModes::INPCK | InputModes::PARMRK;
+    termios.input_modes -= InputModes::IGNPAR | InputModes::ISTRIP | InputModes::IGNBRK;
+    termios.input_modes -= InputModes::BRKINT;
+    rustix::termios::tcsetattr(&fd, OptionalActions::Now, &termios).map_err(failed)?;
+    let now = rustix::termios::tcgetattr(&fd).map_err(failed)?;
+    let control = ControlModes::PARENB | ControlModes::PARODD | ControlModes::CS8;
+    let input = InputModes::INPCK | InputModes::PARMRK;
+    if !now.control_modes.contains(control) || now.control_modes.contains(ControlModes::CSTOPB) {
+        return Err("8O1".to_owned());
+    }
+    if !now.input_modes.contains(input) {
+        return Err("the marking of line errors (INPCK and PARMRK)".to_owned());
+    }
+    if now.output_speed() != rate.bits_per_second() {
+        return Err(format!("{} bit/s", rate.bits_per_second()));
+    }
+    Ok(())
+}
+
+/// A USB adapter collects bytes for up to 16 ms unless it is told not to.
+fn lower_latency(path: &Path) {
+    let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if let Some(name) = path.file_name() {
+        let timer = Path::new("/sys/bus/usb-serial/devices")
+            .join(name)
+            .join("latency_timer");
+        // Not every adapter has one, and not everybody may set it: bytes then come later, which the rig's
+        // check measures.
+        let _as_it_is = std::fs::write(timer, "1");
+    }
+}
+
+impl Serial {
+    pub(super) fn take_gaps(&mut self) -> Vec<Duration> {
+        std::mem::take(&mut self.gaps)
+    }
+
+    /// Sends a byte with a wrong parity bit: the parity is switched between drained bytes.
+    pub(super) fn send_wrong_parity(&mut self, fd: &OwnedFd, byte: u8) -> io::Result<()> {
+        rustix::termios::tcdrain(fd)?;
+        let start = Instant::now();
+        switch_parity(fd, false)?;
+        let written = write_all(fd, byte).and_then(|()| Ok(rustix::termios::tcdrain(fd)?));
+        // Whatever happened, what comes next has the right parity.
+        switch_parity(fd, true)?;
+        if self.gaps.len() < MOST_GAPS {
+            self.gaps.push(start.elapsed());
+        }
+        written
+    }
+
+    /// Holds the line at 0.
+    pub(super) fn send_break(&mut self, fd: &OwnedFd, span: Span) -> io::Result<()> {
+        rustix::termios::tcdrain(fd)?;
+        self.port.set_break().map_err(io::Error::from)?;
+        std::thread::sleep(Duration::from_nanos(span.as_nanos()));
+        self.port.clear_break().map_err(io::Error::from)
+    }
+}
+
+fn write_all(fd: &OwnedFd, byte: u8) -> io::Result<()> {
+    let end = Instant::now() + PATIENCE;
+    while Instant::now() < end {
+        match rustix::io::write(fd, &[byte]) {
+            Ok(1) => return Ok(()),
+            // The port has just been drained: there is room in a moment.
+            Ok(_) | Err(Errno::AGAIN | Errno::INTR) => std::thread::yield_now(),
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Err(io::ErrorKind::TimedOut.into())
+}
+
+/// Sets the parity and reads it back: some drivers of USB adapters ignore it.
+pub(super) fn switch_parity(fd: impl AsFd, odd: bool) -> io::Result<()> {
+    let mut termios = rustix::termios::tcgetattr(&fd)?;
+    termios.control_modes.set(ControlModes::PARODD, odd);
+    rustix::termios::tcsetattr(&fd, OptionalActions::Now, &termios)?;
+    let now = rustix::termios::tcgetattr(&fd)?;
+    if now.control_modes.contains(ControlModes::PARODD) == odd {
+        return Ok(());
+    }
+    Err(io::Error::other(
+        "the driver of this port does not switch the parity",
+    ))
+}

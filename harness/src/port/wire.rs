@@ -1,0 +1,285 @@
+//! One stream with its coding.
+
+use super::rfc2217::Telnet;
+use super::serial::Serial;
+use crate::link::Trouble;
+use harness_proto::line::{LineError, Received};
+use harness_proto::marks::{Unmark, mark};
+use harness_proto::time::Span;
+use rustix::event::{PollFd, PollFlags};
+use rustix::io::Errno;
+use std::collections::VecDeque;
+use std::os::fd::{AsFd, OwnedFd};
+
+/// What is read from the operating system at a time.
+const CHUNK: usize = 4096;
+
+/// What may wait to be taken by the operating system.
+pub(super) const MOST_WAITING: usize = 65_536;
+
+/// What a wire shows and does beside carrying bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Abilities {
+    /// A line error received is shown at its byte.
+    pub shows_errors: bool,
+    /// A byte can be sent with a wrong parity bit.
+    pub sends_wrong_parity: bool,
+    /// A break can be sent.
+    pub sends_break: bool,
+}
+
+/// What can be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outgoing {
+    /// A byte.
+    Byte(u8),
+    /// A byte whose parity bit is wrong.
+    WrongParity(u8),
+    /// The line at 0 for this long.
+    Break(Span),
+}
+
+/// How bytes and line errors are written into the stream.
+#[derive(Debug)]
+pub(super) enum Coding {
+    /// Bytes alone.
+    Plain,
+    /// In-band marks both ways.
+    Marked(Unmark),
+    /// A serial port: marks from the kernel, bytes to it.
+    Serial(Unmark, Box<Serial>),
+    /// Telnet with the COM port options of RFC 2217.
+    Telnet(Box<Telnet>),
+}
+
+/// An open stream with its coding.
+#[derive(Debug)]
+pub struct Wire {
+    fd: OwnedFd,
+    name: String,
+    coding: Coding,
+    waiting: VecDeque<Waiting>,
+    /// Bytes in `waiting`.
+    bytes_waiting: usize,
+    /// Line errors of which it is not known at which byte they were.
+    unplaced: u64,
+}
+
+#[derive(Debug)]
+enum Waiting {
+    /// Coded bytes.
+    Bytes(VecDeque<u8>),
+    WrongParity(u8),
+    Break(Span),
+}
+
+impl Wire {
+    pub(super) fn new(fd: OwnedFd, name: String, coding: Coding) -> Self {
+        Self {
+            fd,
+            name,
+            coding,
+            waiting: VecDeque::new(),
+            bytes_waiting: 0,
+            unplaced: 0,
+        }
+    }
+
+    /// Where it leads, as the rig's file says it.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What it shows and does.
+    #[must_use]
+    pub fn abilities(&self) -> Abilities {
+        match self.coding {
+            Coding::Plain | Coding::Telnet(_) => Abilities::default(),
+            Coding::Marked(_) | Coding::Serial(..) => Abilities {
+                shows_errors: true,
+                sends_wrong_parity: true,
+                sends_break: true,
+            },
+        }
+    }
+
+    /// Line errors that the other end has told of without saying at which byte; counted since the last call.
+    pub fn take_unplaced(&mut self) -> u64 {
+        std::mem::take(&mut self.unplaced)
+    }
+
+    /// How long sending has been held up by draining around bytes with a wrong parity bit, each time.
+    pub fn take_gaps(&mut self) -> Vec<std::time::Duration> {
+        match &mut self.coding {
+            Coding::Serial(_, serial) => serial.take_gaps(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// For waiting on several wires at once; also for room to send, where something waits.
+    #[must_use]
+    pub fn poll_fd(&self) -> PollFd<'_> {
+        let mut flags = PollFlags::IN;
+        if !self.waiting.is_empty() {
+            flags |= PollFlags::OUT;
+        }
+        PollFd::from_borrowed_fd(self.fd.as_fd(), flags)
+    }
+
+    /// Bytes that the operating system has not taken yet, as coded.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.bytes_waiting
+    }
+
+    /// Takes something to be sent, behind what waits.
+    ///
+    /// # Errors
+    /// [`Trouble::Lost`] where the other end has not taken anything for so long that too much waits.
+    pub fn send(&mut self, outgoing: Outgoing) -> Result<(), Trouble> {
+        if self.bytes_waiting > MOST_WAITING {
+            return Err(Trouble::Lost(format!(
+                "{}: the other end takes no bytes ({} wait)",
+                self.name, self.bytes_waiting
+            )));
+        }
+        let waiting = match (&mut self.coding, outgoing) {
+            (Coding::Serial(..), Outgoing::WrongParity(byte)) => Waiting::WrongParity(byte),
+            (Coding::Serial(..), Outgoing::Break(span)) => Waiting::Break(span),
+            (Coding::Marked(_), Outgoing::WrongParity(byte)) => {
+                return self.queue(mark(Received::bad(byte, LineError::Parity)).as_bytes());
+            }
+            (Coding::Marked(_), Outgoing::Break(_)) => {
+                return self.queue(mark(Received::bad(0, LineError::Break)).as_bytes());
+            }
+            (Coding::Marked(_), Outgoing::Byte(byte)) => {
+                return self.queue(mark(Received::good(byte)).as_bytes());
+            }
+            (Coding::Telnet(telnet), Outgoing::Byte(byte)) => {
+                let (bytes, length) = telnet.escape(byte);
+                return self.queue(&bytes[..length]);
+            }
+            // What a wire cannot send is sent as a good byte; whoever sends has asked what it can.
+            (_, Outgoing::Byte(byte) | Outgoing::WrongParity(byte)) => {
+                return self.queue(&[byte]);
+            }
+            (Coding::Plain | Coding::Telnet(_), Outgoing::Break(_)) => return Ok(()),
+        };
+        self.bytes_waiting += 1;
+        self.waiting.push_back(waiting);
+        Ok(())
+    }
+
+    fn queue(&mut self, bytes: &[u8]) -> Result<(), Trouble> {
+        self.bytes_waiting += bytes.len();
+        if let Some(Waiting::Bytes(queue)) = self.waiting.back_mut() {
+            queue.extend(bytes);
+        } else {
+            let queue = bytes.iter().copied().collect();
+            self.waiting.push_back(Waiting::Bytes(queue));
+        }
+        Ok(())
+    }
+
+    /// Gives the operating system as much as it takes.
+    ///
+    /// # Errors
+    /// [`Trouble::Lost`]: the port is gone or the connection closed.
+    pub fn flush(&mut self) -> Result<(), Trouble> {
+        while let Some(first) = self.waiting.front_mut() {
+            match first {
+                Waiting::Bytes(queue) => match rustix::io::write(&self.fd, queue.as_slices().0) {
+                    Ok(taken) => {
+                        queue.drain(..taken);
+                        self.bytes_waiting -= taken;
+                        if !queue.is_empty() {
+                            continue;
+                        }
+                    }
+                    Err(Errno::AGAIN) => return Ok(()),
+                    Err(Errno::INTR) => continue,
+                    Err(error) => return Err(self.lost(error)),
+                },
+                Waiting::WrongParity(byte) => {
+                    let byte = *byte;
+                    let sent = match &mut self.coding {
+                        Coding::Serial(_, serial) => serial.send_wrong_parity(&self.fd, byte),
+                        _ => Ok(()),
+                    };
+                    sent.map_err(|error| self.lost(error))?;
+                    self.bytes_waiting -= 1;
+                }
+                Waiting::Break(span) => {
+                    let span = *span;
+                    let sent = match &mut self.coding {
+                        Coding::Serial(_, serial) => serial.send_break(&self.fd, span),
+                        _ => Ok(()),
+                    };
+                    sent.map_err(|error| self.lost(error))?;
+                    self.bytes_waiting -= 1;
+                }
+            }
+            self.waiting.pop_front();
+        }
+        Ok(())
+    }
+
+    fn lost(&self, error: impl std::fmt::Display) -> Trouble {
+        Trouble::Lost(format!("{}: the port is lost: {error}", self.name))
+    }
+
+    /// Reads what has come.
+    ///
+    /// # Errors
+    /// [`Trouble::Lost`] where the port is gone or the other end has closed the connection,
+    /// [`Trouble::Garbled`] where what came is not coded as it must be. What came before is in `into`.
+    pub fn receive(&mut self, into: &mut Vec<Received>) -> Result<(), Trouble> {
+        let mut buffer = [0; CHUNK];
+        loop {
+            let length = match rustix::io::read(&self.fd, &mut buffer) {
+                Ok(0) => {
+                    return Err(Trouble::Lost(format!(
+                        "{}: the other end has closed the connection",
+                        self.name
+                    )));
+                }
+                Ok(length) => length,
+                Err(Errno::AGAIN) => return Ok(()),
+                Err(Errno::INTR) => continue,
+                Err(error) => return Err(self.lost(error)),
+            };
+            self.decode(&buffer[..length], into)?;
+            if length < CHUNK {
+                return Ok(());
+            }
+        }
+    }
+
+    fn decode(&mut self, bytes: &[u8], into: &mut Vec<Received>) -> Result<(), Trouble> {
+        match &mut self.coding {
+            Coding::Plain => into.extend(bytes.iter().map(|byte| Received::good(*byte))),
+            Coding::Marked(unmark) | Coding::Serial(unmark, _) => {
+                for byte in bytes {
+                    match unmark.push(*byte) {
+                        None => {}
+                        Some(Ok(received)) => into.push(received),
+                        Some(Err(bad)) => {
+                            return Err(Trouble::Garbled(format!("{}: {bad}", self.name)));
+                        }
+                    }
+                }
+            }
+            Coding::Telnet(telnet) => {
+                for byte in bytes {
+                    into.extend(telnet.push(*byte).map(Received::good));
+                }
+                self.unplaced += telnet.take_errors();
+                let replies = telnet.take_replies();
+                self.queue(&replies)?;
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+}

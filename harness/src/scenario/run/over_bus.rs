@@ -1,0 +1,108 @@
+//! Cells of drives that stand behind nothing but their bus: read and set by telegrams.
+//!
+//! What is read to answer a check stands beside the conversation: its bytes are not counted, and no line asks for
+//! them.
+
+use super::bytes::{matches, resolve};
+use super::player::Runner;
+use crate::link::Link;
+use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
+use harness_proto::line::Received;
+use harness_proto::novobus::command::Command;
+use harness_proto::time::{Instant, Span};
+
+/// How long an answer may take, beside what the ring itself needs.
+const PATIENCE: Span = Span::from_millis(200);
+
+impl Runner<'_> {
+    /// Where the link shows no cells, reads those that a check is about. What does not answer stays unseen.
+    pub(super) fn read_for(&mut self, check: &PlannedDriveCheck) {
+        let (address, size) = match &check.condition {
+            PlannedCondition::Memory(address, bytes) => (*address, bytes.len()),
+            PlannedCondition::Cell(cell) => (cell.address, cell.size),
+            PlannedCondition::InError(_) | PlannedCondition::Shows(_) => return,
+        };
+        let ring = check.ring;
+        let shown = |drive| self.link.peek(ring, drive, address).is_some();
+        if check.drives.clone().all(shown) {
+            return;
+        }
+        self.settle();
+        let received = self.rings[ring].received.len();
+        let line_before = self.line_before;
+        for drive in check.drives.clone() {
+            let cells = (address..=u16::MAX).take(size);
+            for address in cells {
+                let read = exchange(self.link, ring, drive, Command::ReadByte { address });
+                match read.as_deref() {
+                    Some([byte]) => self.seen.insert((ring, drive, address), *byte),
+                    _ => self.seen.remove(&(ring, drive, address)),
+                };
+            }
+        }
+        self.rings[ring].received.truncate(received);
+        self.line_before = line_before;
+    }
+}
+
+/// Sends a command to a drive and gives the data of its answer; `None` where it does not answer as ND21 10.1 and 10.2
+/// say.
+fn exchange(link: &mut dyn Link, ring: usize, drive: u8, command: Command) -> Option<Vec<u8>> {
+    let exchange = Exchange::new(link.drives(ring), drive, command)?;
+    while link.receive(ring).is_some() {}
+    let sent = link.send(ring, &exchange.bytes);
+    let end = sent + link.byte_time() * (2 * u64::from(link.drives(ring)) + 4) + PATIENCE;
+    let mut received: Vec<(Instant, Received)> = Vec::new();
+    while received.len() < exchange.expected.len() {
+        match link.receive(ring) {
+            Some(byte) => received.push(byte),
+            None if link.now() < end && link.trouble().is_none() => {
+                link.wait(end);
+            }
+            None => return None,
+        }
+    }
+    let all = exchange.expected.iter().zip(&received).enumerate();
+    for (index, (expected, (_, byte))) in all {
+        if !matches(resolve(*expected, &received[..index]), *byte) {
+            return None;
+        }
+    }
+    let data = exchange.data.iter().map(|place| received[*place].1.byte);
+    Some(data.collect())
+}
+
+/// Sets the cells that a plan's header asks for, by telegrams, and reads them back.
+///
+/// # Errors
+/// The first cell that does not hold what it must, in a sentence.
+pub fn set_up(plan: &Plan, link: &mut dyn Link) -> Result<(), String> {
+    for (ring, drives, address, bytes) in plan.memory_setups() {
+        for drive in drives {
+            for (address, data) in (address..=u16::MAX).zip(bytes) {
+                let data = *data;
+                let done = exchange(link, ring, drive, Command::WriteByte { address, data });
+                let held =
+                    done.and_then(|_| exchange(link, ring, drive, Command::ReadByte { address }));
+                let prefix = if ring == 0 { "" } else { "2:" };
+                match held.as_deref() {
+                    Some([held]) if *held == data => {}
+                    Some([held]) => {
+                        return Err(format!(
+                            "cell {address:04X} of drive {prefix}{drive} cannot be set: {data:02X} was written, {held:02X} is read"
+                        ));
+                    }
+                    _ => {
+                        if let Some(trouble) = link.trouble() {
+                            return Err(trouble.to_string());
+                        }
+                        return Err(format!(
+                            "cell {address:04X} of drive {prefix}{drive} cannot be set: no answer"
+                        ));
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
