@@ -3,12 +3,14 @@
 //! A scenario sees a link and nothing behind it. Each link says what it can observe and inject; what it
 //! cannot makes a scenario that needs it skipped, never wrong.
 
+mod inner;
 mod sim;
 mod stream;
 mod tamper;
 
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
+pub use inner::{Delay, InnerLink, Ports};
 pub use sim::SimulatedLink;
 pub use stream::{StreamLink, TOLERANCE};
 pub use tamper::{needs_line_errors, only_simulated};

@@ -4,6 +4,7 @@
 //! read at once each is taken to have come a byte time before the next. What is sent goes to the operating system
 //! a little ahead of the line, so that a busy computer leaves no gaps in a telegram.
 
+use super::inner::InnerLink;
 use super::tamper::Tamper;
 use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Shown, Trouble, link_name};
 use crate::port::{Outgoing, Wire};
@@ -43,6 +44,7 @@ const MOST_RECORDED: usize = 4_000_000;
 #[derive(Debug)]
 pub struct StreamLink {
     rings: Vec<Ring>,
+    inner: Vec<InnerLink>,
     rate: Rate,
     /// The time that is the conversation's start.
     start: time::Instant,
@@ -81,7 +83,12 @@ impl StreamLink {
     /// A link over one wire a ring, one ring or two, each with its number of drives. `interrupt` is set by whoever
     /// wants the program to end.
     #[must_use]
-    pub fn new(wires: Vec<(Wire, u8)>, rate: Rate, interrupt: Arc<AtomicBool>) -> Self {
+    pub fn new(
+        wires: Vec<(Wire, u8)>,
+        inner: Vec<InnerLink>,
+        rate: Rate,
+        interrupt: Arc<AtomicBool>,
+    ) -> Self {
         let mut capabilities = vec![
             Capability::Memory,
             Capability::Motion,
@@ -91,7 +98,11 @@ impl StreamLink {
         if wires.len() > 1 {
             capabilities.push(Capability::TwoRings);
         }
-        if wires.iter().all(|(wire, _)| wire.abilities().shows_errors) {
+        if inner.iter().any(InnerLink::passes) {
+            capabilities.push(Capability::Interposer);
+        }
+        let shows = |(wire, _): &(Wire, u8)| wire.abilities().shows_errors;
+        if wires.iter().all(shows) && inner.iter().all(InnerLink::shows_errors) {
             capabilities.push(Capability::LineErrors);
         }
         let rings = wires
@@ -99,6 +110,7 @@ impl StreamLink {
             .map(|(wire, drives)| Ring::new(wire, drives));
         Self {
             rings: rings.collect(),
+            inner,
             rate,
             start: time::Instant::now(),
             capabilities,
@@ -129,6 +141,7 @@ impl StreamLink {
         for ring in &mut self.rings {
             ring.begin();
         }
+        self.inner.iter_mut().for_each(InnerLink::begin);
     }
 
     /// After an interruption: what is needed for a safe state may be sent. Other trouble stays.
@@ -149,6 +162,12 @@ impl StreamLink {
     pub fn take_gaps(&mut self) -> Vec<time::Duration> {
         let rings = self.rings.iter_mut();
         rings.flat_map(|ring| ring.wire.take_gaps()).collect()
+    }
+
+    /// The inner links that the bench has a port at.
+    #[must_use]
+    pub fn inner_links(&self) -> &[InnerLink] {
+        &self.inner
     }
 
     fn at(&self, time: time::Instant) -> Instant {
@@ -189,9 +208,25 @@ impl StreamLink {
                 self.trouble.get_or_insert(trouble);
             }
         }
+        // Between two drives bytes are passed on whatever happens to the conversation.
+        let most = if self.recording { MOST_RECORDED } else { 0 };
+        for inner in &mut self.inner {
+            if let Err(trouble) = inner.pump(now, self.rate.byte_time(), most) {
+                self.trouble.get_or_insert(trouble);
+            }
+        }
     }
 
     fn tamper(&mut self, ring: usize, link: usize) -> Option<&mut Tamper> {
+        let at = |inner: &&mut InnerLink| (inner.ring, inner.place) == (ring, link);
+        if let Some(inner) = self
+            .inner
+            .iter_mut()
+            .filter(|inner| inner.passes())
+            .find(at)
+        {
+            return Some(&mut inner.tamper);
+        }
         let ring = self.rings.get_mut(ring)?;
         match link {
             0 => Some(&mut ring.outgoing),
@@ -208,7 +243,11 @@ impl StreamLink {
             Some(Instant::START + start.since_start().saturating_sub(lead))
         });
         let faults = self.scheduled.front().map(|(at, ..)| *at);
-        queues.chain(faults).min()
+        // What is delayed on the last link.
+        let fronts = self.rings.iter().filter_map(|ring| ring.received.front());
+        let queues = queues.chain(fronts.map(|(at, _)| *at));
+        let relays = self.inner.iter().filter_map(InnerLink::due);
+        queues.chain(faults).chain(relays).min()
     }
 
     fn sleep(&mut self, span: Span) {
@@ -218,6 +257,7 @@ impl StreamLink {
             tv_nsec: i64::try_from(span).unwrap_or(0).min(999_999_999),
         };
         let mut fds: Vec<_> = self.rings.iter().map(|ring| ring.wire.poll_fd()).collect();
+        fds.extend(self.inner.iter().flat_map(InnerLink::poll_fds));
         match poll(&mut fds, Some(&timeout)) {
             Ok(_) | Err(Errno::INTR | Errno::AGAIN) => {}
             Err(error) => {
@@ -382,8 +422,10 @@ impl Line for StreamLink {
 
     fn wait(&mut self, until: Instant) -> bool {
         self.pump();
-        let ready = |link: &Self| link.rings.iter().any(|ring| !ring.received.is_empty());
-        if !ready(self) && self.trouble.is_none() {
+        let now = self.now();
+        let mut fronts = self.rings.iter().filter_map(|ring| ring.received.front());
+        let ready = fronts.any(|(at, _)| *at <= now);
+        if !ready && self.trouble.is_none() {
             let until = self.due().map_or(until, |due| due.min(until));
             let left = until.since(self.now());
             if left > Span::ZERO {
@@ -425,7 +467,9 @@ impl Link for StreamLink {
 
     fn busy(&self) -> bool {
         let now = self.now();
-        self.trouble.is_none() && (0..self.rings.len()).any(|ring| self.ring_busy(ring, now))
+        let relays = self.inner.iter().any(InnerLink::busy);
+        let rings = (0..self.rings.len()).any(|ring| self.ring_busy(ring, now));
+        self.trouble.is_none() && (relays || rings)
     }
 
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
@@ -452,9 +496,9 @@ impl Link for StreamLink {
     }
 
     fn reaches(&self, ring: usize, link: usize) -> bool {
-        self.rings
-            .get(ring)
-            .is_some_and(|ring| link == 0 || link == usize::from(ring.drives))
+        let drives = self.rings.get(ring).map(|ring| usize::from(ring.drives));
+        let inner = |inner: &InnerLink| inner.passes() && (inner.ring, inner.place) == (ring, link);
+        drives.is_some_and(|drives| link == 0 || link == drives) || self.inner.iter().any(inner)
     }
 
     fn time_tolerance(&self) -> Span {
@@ -498,11 +542,17 @@ impl Link for StreamLink {
                 unused.extend(faults.map(|(byte, fault)| format!("{place} byte {byte}: {fault}")));
             }
         }
+        for inner in &self.inner {
+            let place = link_name(inner.ring, self.drives(inner.ring), inner.place);
+            let faults = inner.tamper.unused();
+            unused.extend(faults.map(|(byte, fault)| format!("{place} byte {byte}: {fault}")));
+        }
         unused
     }
 
     fn carried(&self) -> u64 {
-        self.rings.iter().map(|ring| ring.carried).sum()
+        let rings: u64 = self.rings.iter().map(|ring| ring.carried).sum();
+        rings + self.inner.iter().map(|inner| inner.carried).sum::<u64>()
     }
 
     fn drives(&self, ring: usize) -> u8 {
@@ -510,6 +560,7 @@ impl Link for StreamLink {
     }
 
     fn trace(&self, ring: usize) -> Trace {
+        let index = ring;
         let Some(ring) = self.rings.get(ring) else {
             return Trace {
                 drives: 0,
@@ -524,7 +575,11 @@ impl Link for StreamLink {
             bytes: match place {
                 0 => ring.log[0].clone(),
                 place if place == last => ring.log[1].clone(),
-                _ => Vec::new(),
+                place => {
+                    let at = |inner: &&InnerLink| (inner.ring, inner.place) == (index, place);
+                    let inner = self.inner.iter().find(at);
+                    inner.map(|inner| inner.log.clone()).unwrap_or_default()
+                }
             },
         };
         Trace {

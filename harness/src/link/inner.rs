@@ -1,0 +1,227 @@
+//! Inner links of a real ring: taps that listen, interposers that pass every byte on, with faults where a scenario
+//! puts them.
+//!
+//! An interposer stands between two drives with its own two line ends: it reads a byte whole before it passes it on,
+//! so it delays the ring by one byte time and by what the computer needs; [`Delay`] measures the latter.
+
+use super::Trouble;
+use super::tamper::Tamper;
+use crate::port::{Outgoing, Wire};
+use harness_proto::line::{LineError, Received};
+use harness_proto::time::{Instant, Span};
+use harness_sim::link::LineByte;
+use rustix::event::PollFd;
+use std::collections::VecDeque;
+use std::time;
+
+/// Where an inner link is listened to or cut open.
+#[derive(Debug)]
+pub enum Ports {
+    /// A receiver beside the link.
+    Tap(Wire),
+    /// One port: its receiver hears the drive in front, its transmitter feeds the drive behind.
+    Interposer(Wire),
+    /// Two ports: the first hears the drive in front, the second feeds the drive behind.
+    TwoPortInterposer(Wire, Wire),
+}
+
+/// How long bytes were inside the program on their way through an interposer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Delay {
+    /// How many bytes were passed on.
+    pub bytes: u64,
+    /// All their times together.
+    pub total: time::Duration,
+    /// The longest.
+    pub longest: time::Duration,
+}
+
+impl Delay {
+    fn note(&mut self, delay: time::Duration) {
+        self.bytes += 1;
+        self.total += delay;
+        self.longest = self.longest.max(delay);
+    }
+
+    /// The mean; zero where nothing was passed on.
+    #[must_use]
+    pub fn mean(&self) -> time::Duration {
+        let bytes = u32::try_from(self.bytes).unwrap_or(u32::MAX);
+        self.total.checked_div(bytes).unwrap_or_default()
+    }
+}
+
+/// What is passed on: when, whether a gap in front is wanted, what, and when it was read.
+type Waiting = (Instant, Outgoing, time::Instant);
+
+/// An inner link that the bench has a port at.
+#[derive(Debug)]
+pub struct InnerLink {
+    pub(super) ring: usize,
+    /// Counted from the master's outgoing link.
+    pub(super) place: usize,
+    ports: Ports,
+    pub(super) tamper: Tamper,
+    queue: VecDeque<Waiting>,
+    free: Instant,
+    last_arrival: Instant,
+    pub(super) log: Vec<LineByte>,
+    pub(super) carried: u64,
+    delay: Delay,
+}
+
+impl InnerLink {
+    /// The `place`-th link of a ring, counted from the master's outgoing one.
+    #[must_use]
+    pub fn new(ring: usize, place: usize, ports: Ports) -> Self {
+        Self {
+            ring,
+            place,
+            ports,
+            tamper: Tamper::default(),
+            queue: VecDeque::new(),
+            free: Instant::START,
+            last_arrival: Instant::START,
+            log: Vec::new(),
+            carried: 0,
+            delay: Delay::default(),
+        }
+    }
+
+    /// Whether bytes pass through, so that they can be changed.
+    #[must_use]
+    pub fn passes(&self) -> bool {
+        !matches!(self.ports, Ports::Tap(_))
+    }
+
+    /// What passing bytes on has cost.
+    #[must_use]
+    pub fn delay(&self) -> Delay {
+        self.delay
+    }
+
+    pub(super) fn shows_errors(&self) -> bool {
+        match &self.ports {
+            Ports::Tap(wire) | Ports::Interposer(wire) => wire.abilities().shows_errors,
+            Ports::TwoPortInterposer(up, down) => {
+                up.abilities().shows_errors && down.abilities().sends_wrong_parity
+            }
+        }
+    }
+
+    pub(super) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
+        let (first, second) = match &self.ports {
+            Ports::Tap(wire) | Ports::Interposer(wire) => (wire, None),
+            Ports::TwoPortInterposer(up, down) => (up, Some(down)),
+        };
+        std::iter::once(first).chain(second).map(Wire::poll_fd)
+    }
+
+    pub(super) fn begin(&mut self) {
+        self.tamper = Tamper::default();
+        self.queue.clear();
+        self.free = Instant::START;
+        self.last_arrival = Instant::START;
+        self.log.clear();
+        self.carried = 0;
+    }
+
+    /// When something waits to be passed on.
+    pub(super) fn due(&self) -> Option<Instant> {
+        self.queue.front().map(|(start, ..)| *start)
+    }
+
+    pub(super) fn busy(&self) -> bool {
+        !self.queue.is_empty()
+    }
+
+    /// Takes what has come and passes on what is due.
+    pub(super) fn pump(
+        &mut self,
+        now: Instant,
+        byte_time: Span,
+        most_recorded: usize,
+    ) -> Result<(), Trouble> {
+        let mut bytes = Vec::new();
+        let (up, passes) = match &mut self.ports {
+            Ports::Tap(wire) => (wire, false),
+            Ports::Interposer(wire) | Ports::TwoPortInterposer(wire, _) => (wire, true),
+        };
+        let result = up.receive(&mut bytes);
+        let read = time::Instant::now();
+        let mut left = bytes.len() as u64;
+        for byte in bytes {
+            left -= 1;
+            let before = now.since_start().saturating_sub(byte_time * left);
+            let at = (Instant::START + before).max(self.last_arrival);
+            self.last_arrival = at;
+            self.carried += 1;
+            let seen = if passes {
+                self.pass(at, byte, byte_time, read)
+            } else {
+                LineByte::seen(at, Some(byte.byte), Some(byte.byte), byte.error)
+            };
+            if self.log.len() < most_recorded {
+                self.log.push(seen);
+            }
+        }
+        result.and_then(|()| self.transmit(now))
+    }
+
+    fn pass(
+        &mut self,
+        at: Instant,
+        byte: Received,
+        byte_time: Span,
+        read: time::Instant,
+    ) -> LineByte {
+        let start = at.max(self.free);
+        let passed = self.tamper.pass(byte, start);
+        let mut free = start + passed.delay;
+        for received in &passed.bytes {
+            let outgoing = match received.error {
+                None | Some(LineError::Overrun) => Outgoing::Byte(received.byte),
+                Some(LineError::Break) => Outgoing::Break(byte_time * 2),
+                Some(_) => Outgoing::WrongParity(received.byte),
+            };
+            self.queue.push_back((free, outgoing, read));
+            // The next byte is not held back: the line itself takes them one after another.
+        }
+        if let Some(span) = passed.hold {
+            self.queue.push_back((free, Outgoing::Break(span), read));
+            free += span;
+        }
+        if passed.delay > Span::ZERO || passed.hold.is_some() {
+            self.free = free;
+        }
+        let last = passed.bytes.last();
+        match passed.hold {
+            Some(_) => LineByte::seen(at, Some(byte.byte), Some(0), Some(LineError::Break)),
+            None => {
+                let error = last.and_then(|b| b.error);
+                LineByte::seen(at, Some(byte.byte), last.map(|b| b.byte), error)
+            }
+        }
+    }
+
+    fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {
+        let down = match &mut self.ports {
+            Ports::Tap(_) => return Ok(()),
+            Ports::Interposer(wire) | Ports::TwoPortInterposer(_, wire) => wire,
+        };
+        let mut gone = Vec::new();
+        while let Some(&(start, outgoing, read)) = self.queue.front() {
+            if start > now {
+                break;
+            }
+            self.queue.pop_front();
+            down.send(outgoing)?;
+            gone.push(read);
+        }
+        down.flush()?;
+        for read in gone {
+            self.delay.note(read.elapsed());
+        }
+        Ok(())
+    }
+}
