@@ -226,6 +226,9 @@ impl<L: Link> Link for Blind<L> {
     fn capabilities(&self) -> &[Capability] {
         self.0.capabilities()
     }
+    fn begin(&mut self) {
+        self.0.begin();
+    }
     fn busy(&self) -> bool {
         self.0.busy()
     }

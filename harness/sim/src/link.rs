@@ -164,6 +164,17 @@ impl Link {
         self.log = None;
     }
 
+    /// Forgets what it has carried and the faults whose byte has not come; what is under way counts as the first
+    /// bytes.
+    pub(crate) fn begin(&mut self) {
+        self.plan = Plan::default();
+        self.transmitted = self.under_way.len() as u64;
+        self.arrived = 0;
+        if let Some(log) = &mut self.log {
+            log.clear();
+        }
+    }
+
     /// When the transmitter can start its next byte.
     pub(crate) fn line_free(&self) -> Instant {
         self.line_free

@@ -52,6 +52,12 @@ impl<D: Device> Node<D> {
         self.recording = false;
     }
 
+    /// Forgets its marks, and the faults whose byte has not come.
+    pub(crate) fn begin(&mut self) {
+        self.plan = Plan::default();
+        self.marks.clear();
+    }
+
     /// Arms a fault for the `byte`-th byte on this drive's inbound link, lost ones included, counted from 1.
     pub(crate) fn arm(&mut self, byte: u64, fault: DriveFault) {
         self.plan.add(byte, fault);

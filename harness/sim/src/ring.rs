@@ -56,6 +56,14 @@ impl<D: Device> Ring<D> {
         self.nodes.iter_mut().for_each(Node::stop_recording);
     }
 
+    /// Begins another conversation: bytes are counted anew, what was recorded and the faults whose byte has not come
+    /// are forgotten, and so is what was received and not fetched. Time and drives go on.
+    pub fn begin(&mut self) {
+        self.links.iter_mut().for_each(Link::begin);
+        self.nodes.iter_mut().for_each(Node::begin);
+        self.inbox.clear();
+    }
+
     /// How many drives there are.
     #[must_use]
     pub fn size(&self) -> RingSize {

@@ -159,10 +159,11 @@ impl InnerLink {
             let seen = if passes {
                 self.pass(at, byte, byte_time, read)
             } else {
-                LineByte::seen(at, Some(byte.byte), Some(byte.byte), byte.error)
+                let (own, error) = (Some(byte.byte), byte.error);
+                vec![LineByte::seen(at, own, own, error)]
             };
             if self.log.len() < most_recorded {
-                self.log.push(seen);
+                self.log.extend(seen);
             }
         }
         result.and_then(|()| self.transmit(now))
@@ -174,7 +175,7 @@ impl InnerLink {
         byte: Received,
         byte_time: Span,
         read: time::Instant,
-    ) -> LineByte {
+    ) -> Vec<LineByte> {
         let start = at.max(self.free);
         let passed = self.tamper.pass(byte, start);
         let mut free = start + passed.delay;
@@ -194,14 +195,7 @@ impl InnerLink {
         if passed.delay > Span::ZERO || passed.hold.is_some() {
             self.free = free;
         }
-        let last = passed.bytes.last();
-        match passed.hold {
-            Some(_) => LineByte::seen(at, Some(byte.byte), Some(0), Some(LineError::Break)),
-            None => {
-                let error = last.and_then(|b| b.error);
-                LineByte::seen(at, Some(byte.byte), last.map(|b| b.byte), error)
-            }
-        }
+        passed.seen(byte.byte, at, byte_time)
     }
 
     fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {

@@ -163,6 +163,10 @@ pub trait Link: Line {
     /// What this link can do beside sending and receiving.
     fn capabilities(&self) -> &[Capability];
 
+    /// Begins a conversation: time and bytes are counted anew, faults that have not happened are forgotten, and so is
+    /// what was received and not fetched. The drives go on as they are.
+    fn begin(&mut self);
+
     /// Whether bytes of the master's are still on their way round.
     fn busy(&self) -> bool;
 

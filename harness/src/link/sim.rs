@@ -17,6 +17,8 @@ use std::collections::VecDeque;
 pub struct SimulatedLink {
     bench: Bench<Drive>,
     byte_time: Span,
+    /// When the conversation began, on the bench's clock.
+    origin: Instant,
     /// Faults that wait for their time, in order of it.
     scheduled: VecDeque<(Instant, usize, PlacedFault)>,
 }
@@ -53,6 +55,7 @@ impl SimulatedLink {
         Self {
             bench,
             byte_time,
+            origin: Instant::START,
             scheduled: VecDeque::new(),
         }
     }
@@ -65,6 +68,16 @@ impl SimulatedLink {
                 ring.stop_recording();
             }
         }
+    }
+
+    /// A time on the bench's clock as one of the conversation.
+    fn since_origin(&self, at: Instant) -> Instant {
+        Instant::START + at.since(self.origin)
+    }
+
+    /// A time of the conversation on the bench's clock.
+    fn on_bench(&self, at: Instant) -> Instant {
+        self.origin + at.since_start()
     }
 
     fn ring(&self, ring: usize) -> Option<&Ring<Drive>> {
@@ -105,23 +118,24 @@ impl Line for SimulatedLink {
     }
 
     fn now(&self) -> Instant {
-        self.bench.now()
+        self.since_origin(self.bench.now())
     }
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        let now = self.now();
-        self.bench.ring_mut(ring).map_or(now, |ring| {
+        let now = self.bench.now();
+        let sent_by = self.bench.ring_mut(ring).map_or(now, |ring| {
             ring.send(now, bytes);
             ring.sent_by()
-        })
+        });
+        self.since_origin(sent_by)
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        let ring = self.bench.ring_mut(ring)?;
+        let own = self.bench.ring_mut(ring)?;
         loop {
-            let byte = ring.receive()?;
+            let byte = own.receive()?;
             if let Some(received) = byte.arrival() {
-                return Some((byte.at, received));
+                return Some((self.since_origin(byte.at), received));
             }
         }
     }
@@ -130,9 +144,10 @@ impl Line for SimulatedLink {
         let event = self.bench.next_event();
         let fault = self.scheduled.front().map(|(at, ..)| *at);
         let next = event.into_iter().chain(fault).min();
+        let until = self.on_bench(until);
         self.bench.run_until(next.unwrap_or(until).min(until));
         while let Some(&(at, ring, fault)) = self.scheduled.front()
-            && at <= self.now()
+            && at <= self.bench.now()
         {
             self.scheduled.pop_front();
             self.suffer(ring, fault);
@@ -146,6 +161,16 @@ impl Link for SimulatedLink {
         &CAPABILITIES
     }
 
+    fn begin(&mut self) {
+        self.origin = self.bench.now();
+        self.scheduled.clear();
+        for ring in 0..self.bench.rings().len() {
+            if let Some(ring) = self.bench.ring_mut(ring) {
+                ring.begin();
+            }
+        }
+    }
+
     fn busy(&self) -> bool {
         self.bench.busy()
     }
@@ -154,6 +179,7 @@ impl Link for SimulatedLink {
         match moment {
             Moment::Now => self.suffer(ring, fault),
             Moment::At(at) => {
+                let at = self.on_bench(at);
                 let place = self.scheduled.partition_point(|(other, ..)| *other <= at);
                 self.scheduled.insert(place, (at, ring, fault));
             }
@@ -223,6 +249,7 @@ impl Link for SimulatedLink {
         }
         for (at, ring, fault) in &self.scheduled {
             let place = self.place(*ring, *fault);
+            let at = self.since_origin(*at);
             unused.push(match fault {
                 PlacedFault::Link(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Drive(_, fault) => format!("{place} at {at}: {fault}"),
@@ -244,13 +271,20 @@ impl Link for SimulatedLink {
     }
 
     fn trace(&self, ring: usize) -> Trace {
-        self.ring(ring).map_or(
+        let mut trace = self.ring(ring).map_or(
             Trace {
                 drives: 0,
                 links: Vec::new(),
                 marks: Vec::new(),
             },
             Ring::trace,
-        )
+        );
+        if self.origin > Instant::START {
+            let bytes = trace.links.iter_mut().flat_map(|link| &mut link.bytes);
+            bytes.for_each(|byte| byte.at = self.since_origin(byte.at));
+            let marks = trace.marks.iter_mut();
+            marks.for_each(|mark| mark.at = self.since_origin(mark.at));
+        }
+        trace
     }
 }

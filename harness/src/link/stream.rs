@@ -8,7 +8,7 @@ use super::inner::InnerLink;
 use super::tamper::Tamper;
 use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Shown, Trouble, link_name};
 use crate::port::{Outgoing, Wire};
-use harness_proto::line::{LineError, Rate, Received};
+use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
@@ -130,18 +130,6 @@ impl StreamLink {
     /// Keeps no record of what the links carry from now on.
     pub fn stop_recording(&mut self) {
         self.recording = false;
-    }
-
-    /// Begins a conversation: time and bytes are counted anew, faults that have not happened are forgotten, and what
-    /// was received before is dropped. Trouble stays.
-    pub fn begin(&mut self) {
-        self.pump();
-        self.start = time::Instant::now();
-        self.scheduled.clear();
-        for ring in &mut self.rings {
-            ring.begin();
-        }
-        self.inner.iter_mut().for_each(InnerLink::begin);
     }
 
     /// After an interruption: what is needed for a safe state may be sent. Other trouble stays.
@@ -325,13 +313,7 @@ impl Ring {
         self.free = free.max(begun + byte_time);
         self.carried += 1;
         if recording && self.log[0].len() < MOST_RECORDED {
-            let arrives = passed.bytes.last();
-            let (received, error) = match (arrives, passed.hold) {
-                (Some(b), _) => (Some(b.byte), b.error),
-                (None, Some(_)) => (Some(0), Some(LineError::Break)),
-                (None, None) => (None, None),
-            };
-            self.log[0].push(LineByte::seen(self.free, Some(byte), received, error));
+            self.log[0].extend(passed.seen(byte, begun + byte_time, byte_time));
         }
     }
 
@@ -362,18 +344,13 @@ impl Ring {
             self.came += 1;
             self.carried += 1;
             let passed = self.incoming.pass(byte, at);
-            let arrived = match passed.hold {
-                Some(_) => vec![Received::bad(0, LineError::Break)],
-                None => passed.bytes,
-            };
-            for received in &arrived {
-                self.received.push_back((at + passed.delay, *received));
+            let seen = passed.seen(byte.byte, at + passed.delay, byte_time);
+            for byte in &seen {
+                let arrival = byte.arrival().map(|received| (byte.at, received));
+                self.received.extend(arrival);
             }
             if recording && self.log[1].len() < MOST_RECORDED {
-                let last = arrived.last();
-                let error = last.and_then(|b| b.error);
-                let seen = LineByte::seen(at, Some(byte.byte), last.map(|b| b.byte), error);
-                self.log[1].push(seen);
+                self.log[1].extend(seen);
             }
         }
         result
@@ -463,6 +440,14 @@ impl StreamLink {
 impl Link for StreamLink {
     fn capabilities(&self) -> &[Capability] {
         &self.capabilities
+    }
+
+    fn begin(&mut self) {
+        self.pump();
+        self.start = time::Instant::now();
+        self.scheduled.clear();
+        self.rings.iter_mut().for_each(Ring::begin);
+        self.inner.iter_mut().for_each(InnerLink::begin);
     }
 
     fn busy(&self) -> bool {

@@ -8,6 +8,7 @@ use super::LinkFault;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
+use harness_sim::link::LineByte;
 use std::collections::BTreeMap;
 
 /// What becomes of a byte.
@@ -15,10 +16,31 @@ use std::collections::BTreeMap;
 pub(super) struct Passed {
     /// What goes on, in order; empty where it is lost.
     pub(super) bytes: Vec<Received>,
+    /// How many of them were put in front of the byte itself.
+    pub(super) inserted: usize,
     /// How long the first of them is held back.
     pub(super) delay: Span,
     /// How long the line is held at 0 in place of the byte.
     pub(super) hold: Option<Span>,
+}
+
+impl Passed {
+    /// The wire's bytes for a record, the first of which ends at `at`: what was sent, and what arrives.
+    pub(super) fn seen(&self, sent: u8, at: Instant, byte_time: Span) -> Vec<LineByte> {
+        if self.hold.is_some() {
+            let error = Some(LineError::Break);
+            return vec![LineByte::seen(at, Some(sent), Some(0), error)];
+        }
+        if self.bytes.len() == self.inserted {
+            return vec![LineByte::seen(at, Some(sent), None, None)];
+        }
+        let each = self.bytes.iter().enumerate().map(|(index, byte)| {
+            let own = (index == self.inserted).then_some(sent);
+            let at = at + byte_time * index as u64;
+            LineByte::seen(at, own, Some(byte.byte), byte.error)
+        });
+        each.collect()
+    }
 }
 
 /// One link's faults.
@@ -94,6 +116,7 @@ impl Tamper {
             passed.hold = None;
             return passed;
         }
+        passed.inserted = before.len();
         passed.bytes = before;
         if passed.hold.is_some() {
             return passed;
