@@ -17,3 +17,4 @@ pub mod report;
 pub mod rig;
 pub mod scenario;
 pub mod serve;
+pub mod twin;

@@ -1,0 +1,301 @@
+//! Byte for byte: what a ring sent back, and what its twin says.
+
+use super::follow::Conversation;
+use super::role::{Role, roles};
+use crate::locate::locate;
+use harness_proto::line::Received;
+use harness_proto::nd21::cells::{Access, cell_at};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::checksum::Checksum;
+use harness_proto::time::{Instant, Span};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+/// How exactly is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Exactness {
+    /// How far times may be apart.
+    pub tolerance: Span,
+    /// Whether the link shows line errors at their bytes.
+    pub line_errors: bool,
+    /// Whether the twin knows what every cell holds: a rig whose drives are simulated too.
+    pub knows_cells: bool,
+}
+
+/// How two bytes differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum What {
+    /// Another value.
+    Value,
+    /// The same value, with or without a line error.
+    LineStatus,
+    /// The model expects a byte that did not come.
+    Missing,
+    /// A byte came that the model does not expect.
+    Surplus,
+    /// The right byte, at another time.
+    Time,
+}
+
+/// The first byte that is otherwise than the model says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Divergence {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// Which byte received in this conversation, counted from 1.
+    pub byte: usize,
+    /// How it differs.
+    pub what: What,
+    /// What the model says, and when.
+    pub expected: Option<(Instant, Received)>,
+    /// What came, and when.
+    pub received: Option<(Instant, Received)>,
+    /// What the byte is for.
+    pub role: Role,
+    /// The drive that is meant by the telegram, or that the ring spells out.
+    pub drive: Option<u8>,
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let show = |byte: &Option<(Instant, Received)>| match byte {
+            None => "nothing".to_owned(),
+            Some((at, byte)) => match byte.error {
+                None => format!("{:02X} at {at}", byte.byte),
+                Some(error) => format!("{:02X} ({error}) at {at}", byte.byte),
+            },
+        };
+        let (section, rule) = self.role.rule();
+        let what = match self.what {
+            What::Value => "another value",
+            What::LineStatus => "another line status",
+            What::Missing => "a byte is missing",
+            What::Surplus => "a byte too many",
+            What::Time => "another time",
+        };
+        let ring = if self.ring == 0 { "" } else { " of ring 2" };
+        write!(f, "byte {}{ring}", self.byte)?;
+        if let Some(drive) = self.drive {
+            write!(f, ", drive {drive}")?;
+        }
+        write!(
+            f,
+            ": {what}: received {}, the manual says {} (ND21 {section}, {rule})",
+            show(&self.received),
+            show(&self.expected)
+        )
+    }
+}
+
+/// A cell of which the model did not know what it holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Adopted {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// Of which drive.
+    pub drive: u8,
+    /// Which cell.
+    pub address: u16,
+    /// What it holds.
+    pub value: u8,
+}
+
+/// What came of a comparison.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Comparison {
+    /// How many bytes were compared.
+    pub compared: u64,
+    /// How many were data that the drive measures itself, and were not.
+    pub measured: u64,
+    /// What was taken over.
+    pub adopted: Vec<Adopted>,
+    /// The first byte that is otherwise, apart from its time.
+    pub divergence: Option<Divergence>,
+    /// The first byte at another time.
+    pub untimely: Option<Divergence>,
+    /// The largest difference of times.
+    pub latest: Span,
+}
+
+/// What is compared, ring by ring.
+pub(super) struct Comparer<'a> {
+    pub(super) exactness: Exactness,
+    /// Cells that were written in the rig's session: of these the model knows what they hold.
+    pub(super) written: &'a mut BTreeSet<(usize, u8, u16)>,
+    /// Cells taken over.
+    pub(super) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
+    pub(super) comparison: Comparison,
+}
+
+impl Comparer<'_> {
+    /// Compares what came from a ring with what its twin received.
+    pub(super) fn ring(
+        &mut self,
+        ring: usize,
+        size: RingSize,
+        conversation: &Conversation,
+        expected: &[(Instant, Received)],
+    ) {
+        let sent = conversation.sent_in(ring);
+        let received = &conversation.received_in(ring);
+        let roles = roles(size, &sent);
+        // A ring that gives back a byte for a byte (9.1) has each role at its place.
+        let aligned = received.len() == sent.len() && expected.len() == sent.len();
+        let role_at = |index: usize| roles.get(index).copied().unwrap_or(Role::Foreign);
+        for index in 0..received.len().max(expected.len()) {
+            let role = role_at(index);
+            let pair = (expected.get(index).copied(), received.get(index).copied());
+            let what = match pair {
+                (Some((due, wanted)), Some((at, found))) => {
+                    let found_good = found.error.is_none() || !self.exactness.line_errors;
+                    let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
+                    let same = wanted.byte == found.byte
+                        || aligned && self.may_differ(ring, role, received, index);
+                    self.note_write(ring, role);
+                    match (same, wanted_good == found_good) {
+                        (true, true) => self.time(ring, index, role, (due, wanted), (at, found)),
+                        (true, false) => Some(What::LineStatus),
+                        (false, _) => Some(what_of(expected, received, index)),
+                    }
+                }
+                (Some(_), None) => Some(What::Missing),
+                (None, _) => Some(What::Surplus),
+            };
+            self.comparison.compared += 1;
+            if let Some(what) = what {
+                let heard: Vec<_> = expected[..index.min(expected.len())]
+                    .iter()
+                    .map(|(_, byte)| *byte)
+                    .collect();
+                let spelled = locate(&heard, size.drives()).map(|location| location.drive);
+                let found = Divergence {
+                    ring,
+                    byte: index + 1,
+                    what,
+                    expected: pair.0,
+                    received: pair.1,
+                    role,
+                    drive: role.drive().or(spelled),
+                };
+                self.comparison.divergence.get_or_insert(found);
+                return;
+            }
+        }
+    }
+
+    /// Whether a byte may be another one than the model's: it is data that the model cannot know, or their checking
+    /// byte.
+    fn may_differ(
+        &mut self,
+        ring: usize,
+        role: Role,
+        received: &[(Instant, Received)],
+        index: usize,
+    ) -> bool {
+        let value = received[index].1.byte;
+        match role {
+            Role::Data {
+                drive: Some(drive),
+                address,
+            } => {
+                if measured(address) {
+                    self.comparison.measured += 1;
+                    return true;
+                }
+                let cell = (ring, drive, address);
+                if self.exactness.knows_cells || self.written.contains(&cell) {
+                    return false;
+                }
+                if let Some(held) = self.held.get(&cell) {
+                    return *held == value;
+                }
+                self.held.insert(cell, value);
+                self.comparison.adopted.push(Adopted {
+                    ring,
+                    drive,
+                    address,
+                    value,
+                });
+                true
+            }
+            Role::Check { length, .. } => {
+                let from = (index + 1).saturating_sub(usize::from(length));
+                let bytes = &received[from..index];
+                let sum = bytes
+                    .iter()
+                    .fold(Checksum::EMPTY, |sum, (_, byte)| sum.with(byte.byte));
+                sum.minus() == value
+            }
+            _ => false,
+        }
+    }
+
+    fn note_write(&mut self, ring: usize, role: Role) {
+        if let Role::Check {
+            drive: Some(drive),
+            writes: Some((address, width)),
+            ..
+        } = role
+        {
+            for offset in 0..u16::from(width) {
+                let cell = (ring, drive, address.wrapping_add(offset));
+                self.written.insert(cell);
+                self.held.remove(&cell);
+            }
+        }
+    }
+
+    /// Notes how far two times are apart; never ends the comparison.
+    fn time(
+        &mut self,
+        ring: usize,
+        index: usize,
+        role: Role,
+        expected: (Instant, Received),
+        received: (Instant, Received),
+    ) -> Option<What> {
+        let apart = expected
+            .0
+            .since(received.0)
+            .max(received.0.since(expected.0));
+        self.comparison.latest = self.comparison.latest.max(apart);
+        if apart > self.exactness.tolerance {
+            self.comparison.untimely.get_or_insert(Divergence {
+                ring,
+                byte: index + 1,
+                what: What::Time,
+                expected: Some(expected),
+                received: Some(received),
+                role,
+                drive: role.drive(),
+            });
+        }
+        None
+    }
+}
+
+/// Whether the drive itself writes a cell (14.2: read only), so that no model knows what it holds.
+fn measured(address: u16) -> bool {
+    cell_at(address).is_some_and(|cell| cell.access != Access::Write)
+}
+
+/// Whether a byte is another one, or one too many or too few.
+fn what_of(
+    expected: &[(Instant, Received)],
+    received: &[(Instant, Received)],
+    index: usize,
+) -> What {
+    const ALIKE: usize = 4;
+    let run = |a: &[(Instant, Received)], b: &[(Instant, Received)]| {
+        a.len() >= ALIKE
+            && b.len() >= ALIKE
+            && a[..ALIKE].iter().zip(b).all(|(a, b)| a.1.byte == b.1.byte)
+    };
+    if run(&expected[index + 1..], &received[index..]) {
+        What::Missing
+    } else if run(&expected[index..], &received[index + 1..]) {
+        What::Surplus
+    } else {
+        What::Value
+    }
+}

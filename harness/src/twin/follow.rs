@@ -1,0 +1,137 @@
+//! The twin itself, and what it is given.
+
+use super::compare::{Comparer, Comparison, Exactness};
+use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::{Instant, Span};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the bench did to a ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Done {
+    /// It sent a byte, whose start bit was due at this time.
+    Sent(Instant, u8),
+    /// It let a fault happen, at this time or at the moment given.
+    Fault(Instant, PlacedFault, Moment),
+}
+
+/// One conversation as the master's end of the rings saw it. Times are the conversation's own.
+#[derive(Clone, Debug, Default)]
+pub struct Conversation {
+    /// What the bench did, each with its ring, in order.
+    pub done: Vec<(usize, Done)>,
+    /// Bytes received: ring, when, and the byte.
+    pub received: Vec<(usize, Instant, Received)>,
+    /// When the next conversation began, or when this one was over.
+    pub end: Instant,
+}
+
+impl Conversation {
+    /// The bytes sent into a ring, and whether they went round whole.
+    pub(super) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
+        let mut damaged = BTreeSet::new();
+        let mut sent = Vec::new();
+        let own = self.done.iter().filter(|(at, _)| *at == ring);
+        for (_, done) in own {
+            let next = sent.len() as u64 + 1;
+            match done {
+                Done::Sent(_, byte) => sent.push(*byte),
+                Done::Fault(_, PlacedFault::Link(..), Moment::Byte(byte)) => {
+                    damaged.insert(*byte);
+                }
+                Done::Fault(..) => {
+                    damaged.insert(next);
+                }
+            }
+        }
+        let numbered = (1..).zip(sent);
+        numbered
+            .map(|(number, byte)| (byte, !damaged.contains(&number)))
+            .collect()
+    }
+
+    /// The bytes received from a ring.
+    pub(super) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
+        let own = self.received.iter().filter(|(at, ..)| *at == ring);
+        own.map(|(_, at, byte)| (*at, *byte)).collect()
+    }
+}
+
+/// A simulated ring that is given what a real one is given.
+#[derive(Clone, Debug)]
+pub struct Twin {
+    link: SimulatedLink,
+    sizes: Vec<RingSize>,
+    written: BTreeSet<(usize, u8, u16)>,
+    held: BTreeMap<(usize, u8, u16), u8>,
+}
+
+impl Twin {
+    /// A twin with these rings, which have just been switched on.
+    #[must_use]
+    pub fn new(link: SimulatedLink, sizes: &[RingSize]) -> Self {
+        Self {
+            link,
+            sizes: sizes.to_vec(),
+            written: BTreeSet::new(),
+            held: BTreeMap::new(),
+        }
+    }
+
+    /// Lives through a conversation, and says how what was received compares with what it received itself.
+    pub fn follow(&mut self, conversation: &Conversation, exactness: Exactness) -> Comparison {
+        let received = self.answer(conversation);
+        let mut comparer = Comparer {
+            exactness,
+            written: &mut self.written,
+            held: &mut self.held,
+            comparison: Comparison::default(),
+        };
+        for (ring, (size, expected)) in self.sizes.iter().zip(&received).enumerate() {
+            comparer.ring(ring, *size, conversation, expected);
+        }
+        comparer.comparison
+    }
+
+    /// Lives through a conversation and gives what it received, ring by ring.
+    pub fn answer(&mut self, conversation: &Conversation) -> Vec<Vec<(Instant, Received)>> {
+        self.link.begin();
+        for (ring, done) in &conversation.done {
+            match done {
+                Done::Sent(at, byte) => {
+                    self.pass_until(*at);
+                    self.link.send(*ring, &[*byte]);
+                }
+                Done::Fault(at, fault, moment) => {
+                    if *moment == Moment::Now {
+                        self.pass_until(*at);
+                    }
+                    // A byte that is due is on the wire before a fault that comes behind it.
+                    self.link.wait(self.link.now());
+                    self.link.inject(*ring, *fault, *moment);
+                }
+            }
+        }
+        self.pass_until(conversation.end);
+        let mut received = vec![Vec::new(); self.sizes.len()];
+        for (ring, received) in received.iter_mut().enumerate() {
+            while let Some(byte) = self.link.receive(ring) {
+                received.push(byte);
+            }
+        }
+        received
+    }
+
+    fn pass_until(&mut self, until: Instant) {
+        while self.link.now() < until {
+            self.link.wait(until);
+        }
+    }
+
+    /// Lets time pass in which nothing is sent.
+    pub fn rest(&mut self, span: Span) {
+        let end = self.link.now() + span;
+        self.pass_until(end);
+    }
+}

@@ -1,0 +1,14 @@
+//! The differential verdict: a simulated ring, the twin, is given what a real one is given, and every byte received is
+//! compared with what the twin says.
+//!
+//! The twin is the model of the manual. Where a real drive answers with data that the model cannot know (what it
+//! measures itself, what was set before the bench came), the data are not compared, or are taken over; all else is:
+//! value, order, line status and, within the rig's tolerance, time.
+
+mod compare;
+mod follow;
+mod role;
+
+pub use compare::{Adopted, Comparison, Divergence, Exactness, What};
+pub use follow::{Conversation, Done, Twin};
+pub use role::{Role, roles};
