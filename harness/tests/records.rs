@@ -274,6 +274,7 @@ fn cells_are_read_over_the_bus() {
         "? drive 0 memory FE13 = 00",
         "? drive 0..1 nist = 0rpm",
         "until drive 0 nist = 0rpm within 1s",
+        "? drives 0..1 normal",
     ] {
         let outcome = play_blind(&format!("{check}\n? received 0 bytes"));
         let message = outcome.finding.map(|finding| finding.message);
@@ -285,12 +286,18 @@ fn cells_are_read_over_the_bus() {
     }
     let outcome = play_blind("? drive 1 memory FE13 = 01");
     assert_eq!(outcome.verdict, Verdict::Failed);
+    // In the middle of a telegram nothing is asked.
+    let outcome =
+        play_blind("> 88 FF C0\n? drive 1 memory FE13 = 00\n> 13 FE D1\n< 88 01 C0 13 00 2D");
+    assert_eq!(outcome.verdict, Verdict::Inconclusive);
+    let message = outcome.finding.expect("a finding").message;
+    assert!(message.contains("cell FE13"), "{message}");
 }
 
 #[test]
 fn what_cannot_be_seen_is_inconclusive() {
     for check in [
-        "? drives 0..1 normal",
+        "? drive 0 in error",
         "? error 0502 at 0",
         "? drive 0 GPO1 low",
     ] {

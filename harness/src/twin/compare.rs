@@ -1,12 +1,12 @@
 //! Byte for byte: what a ring sent back, and what its twin says.
 
 use super::follow::Conversation;
-use super::role::{Role, roles};
 use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
+use harness_proto::novobus::role::{Role, roles};
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

@@ -7,8 +7,6 @@
 
 mod compare;
 mod follow;
-mod role;
 
 pub use compare::{Adopted, Comparison, Divergence, Exactness, What};
 pub use follow::{Conversation, Done, Twin};
-pub use role::{Role, roles};

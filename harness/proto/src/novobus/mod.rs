@@ -34,6 +34,7 @@ pub mod memory;
 pub mod output;
 mod parameter_channel;
 pub mod properties;
+pub mod role;
 pub mod sync;
 pub mod telegram;
 pub mod timing;

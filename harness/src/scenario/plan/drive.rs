@@ -30,7 +30,10 @@ impl Planner {
         let ring = check.drives.ring;
         let condition = match &check.condition {
             Condition::InError(expected) => {
-                needs.push(Capability::Tap);
+                // That a drive is not in the error mode shows in a telegram that comes back from it.
+                if *expected {
+                    needs.push(Capability::Tap);
+                }
                 PlannedCondition::InError(*expected)
             }
             Condition::Memory(place, pattern) => {

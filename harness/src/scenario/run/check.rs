@@ -30,7 +30,7 @@ impl Runner<'_> {
                 None => failed("the ring spells out no address".to_owned()),
             },
             PlannedCheck::Drive(check) => {
-                self.read_for(check);
+                self.ask_for(check);
                 let seen = self.look(check);
                 self.judged(seen, span)
             }

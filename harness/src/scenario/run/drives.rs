@@ -47,7 +47,7 @@ impl Runner<'_> {
         loop {
             let now = self.link.now();
             self.line_before = now;
-            self.read_for(check);
+            self.ask_for(check);
             let seen = if now < end {
                 self.glance(check)
             } else {

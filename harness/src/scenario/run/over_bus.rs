@@ -8,19 +8,25 @@ use super::player::Runner;
 use crate::link::Link;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use harness_proto::line::Received;
+use harness_proto::nd21;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
+use harness_proto::novobus::role::at_rest;
 use harness_proto::time::{Instant, Span};
 
 /// How long an answer may take, beside what the ring itself needs.
 const PATIENCE: Span = Span::from_millis(200);
 
 impl Runner<'_> {
-    /// Where the link shows no cells, reads those that a check is about. What does not answer stays unseen.
-    pub(super) fn read_for(&mut self, check: &PlannedDriveCheck) {
+    /// Where the link shows neither cells nor the error mode, asks the drives that a check is about. What does not
+    /// answer stays unseen, and nothing is asked in the middle of a telegram or behind an error.
+    pub(super) fn ask_for(&mut self, check: &PlannedDriveCheck) {
+        let status = nd21::ram::STATUS;
         let (address, size) = match &check.condition {
             PlannedCondition::Memory(address, bytes) => (*address, bytes.len()),
             PlannedCondition::Cell(cell) => (cell.address, cell.size),
-            PlannedCondition::InError(_) | PlannedCondition::Shows(_) => return,
+            PlannedCondition::InError(false) => (status, 1),
+            PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return,
         };
         let ring = check.ring;
         let shown = |drive| self.link.peek(ring, drive, address).is_some();
@@ -28,16 +34,24 @@ impl Runner<'_> {
             return;
         }
         self.settle();
+        self.seen.clear();
+        self.answers.clear();
+        let Ok(size_of_ring) = RingSize::new(u64::from(self.link.drives(ring))) else {
+            return;
+        };
+        let damaged = self.plan.fault_links().next().is_some() && self.corrected == 0;
+        if damaged || !at_rest(size_of_ring, &self.rings[ring].sent) {
+            return;
+        }
         let received = self.rings[ring].received.len();
         let line_before = self.line_before;
         for drive in check.drives.clone() {
-            let cells = (address..=u16::MAX).take(size);
-            for address in cells {
+            for address in (address..=u16::MAX).take(size) {
                 let read = exchange(self.link, ring, drive, Command::ReadByte { address });
-                match read.as_deref() {
-                    Some([byte]) => self.seen.insert((ring, drive, address), *byte),
-                    _ => self.seen.remove(&(ring, drive, address)),
-                };
+                if let Some([byte]) = read.as_deref() {
+                    self.seen.insert((ring, drive, address), *byte);
+                    self.answers.insert((ring, drive));
+                }
             }
         }
         self.rings[ring].received.truncate(received);

@@ -13,7 +13,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::time::{self, Instant};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
@@ -73,6 +73,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         unseen: None,
         recorder: Recorder::default(),
         seen: BTreeMap::new(),
+        answers: BTreeSet::new(),
     };
     let mut result = runner.play();
     if let (Ok(()), Some(unseen)) = (&result, runner.unseen.take()) {
@@ -121,6 +122,8 @@ pub(super) struct RingRecord {
     pub(super) next: usize,
     /// The first byte behind the last check sequence.
     pub(super) since_recovery: usize,
+    /// What was sent, and whether no fault was put on it at the master's end.
+    pub(super) sent: Vec<(u8, bool)>,
 }
 
 pub(super) struct Runner<'a> {
@@ -135,6 +138,8 @@ pub(super) struct Runner<'a> {
     pub(super) recorder: Recorder,
     /// Cells that were read over the bus, where the link does not show them.
     pub(super) seen: BTreeMap<(usize, u8, u16), u8>,
+    /// Drives that have just answered a telegram, where the link does not show the error mode.
+    pub(super) answers: BTreeSet<(usize, u8)>,
     pub(super) rings: Vec<RingRecord>,
     /// When the line before was done.
     pub(super) line_before: Instant,
@@ -272,6 +277,10 @@ impl Runner<'_> {
             self.sent_from = self.link.now().max(self.sent_to);
         }
         self.sent += bytes.len() as u64;
+        let good = |byte| (byte, true);
+        if let Some(record) = self.rings.get_mut(ring) {
+            record.sent.extend(bytes.iter().copied().map(good));
+        }
         self.line_before = self.link.send(ring, bytes);
         self.sent_to = self.line_before;
         self.sent_to

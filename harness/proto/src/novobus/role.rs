@@ -1,11 +1,12 @@
 //! What each byte of the master's is for, and the answer to it, by ND21 9.1 to 9.8 and 10.
 
-use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::{Progress, Watch};
-use harness_proto::novobus::command::{Field, Layout, Reply, layout};
-use harness_proto::novobus::properties::ReadLongAnswer;
-use harness_proto::novobus::sync::{Addressing, SyncByte};
-use std::collections::BTreeMap;
+use super::address::RingSize;
+use super::check_sequence::{Progress, SEQUENCE, Watch};
+use super::command::{Field, Layout, Reply, layout};
+use super::properties::ReadLongAnswer;
+use super::sync::{Addressing, SyncByte};
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
 /// What a byte is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +102,18 @@ struct Reader {
 /// The role of every byte of a conversation; `good` is false for a byte with a line error.
 #[must_use]
 pub fn roles(ring: RingSize, sent: &[(u8, bool)]) -> Vec<Role> {
+    read(ring, sent).0
+}
+
+/// Whether a telegram may begin behind these bytes: none is under way, no drive has a begun command (9.5), and
+/// none is in the error mode (9.7) as far as the bytes tell.
+#[must_use]
+pub fn at_rest(ring: RingSize, sent: &[(u8, bool)]) -> bool {
+    let reader = read(ring, sent).1;
+    !reader.foreign && !reader.address_next && reader.net == 0 && reader.commands.is_empty()
+}
+
+fn read(ring: RingSize, sent: &[(u8, bool)]) -> (Vec<Role>, Reader) {
     let mut reader = Reader {
         ring: ring.drives(),
         ..Reader::default()
@@ -110,7 +123,7 @@ pub fn roles(ring: RingSize, sent: &[(u8, bool)]) -> Vec<Role> {
         let role = reader.read(*byte, *good);
         roles.push(role);
         if reader.watch.see(*byte, *good) == Progress::Complete {
-            let from = roles.len().saturating_sub(5);
+            let from = roles.len().saturating_sub(SEQUENCE.len());
             roles[from..].fill(Role::CheckSequence);
             reader = Reader {
                 ring: reader.ring,
@@ -118,7 +131,7 @@ pub fn roles(ring: RingSize, sent: &[(u8, bool)]) -> Vec<Role> {
             };
         }
     }
-    roles
+    (roles, reader)
 }
 
 impl Reader {
@@ -249,6 +262,9 @@ mod tests {
     /// ND21 9.8: everything behind an error is foreign until the check sequence.
     #[test]
     fn behind_an_error() {
+        let sent = [0, 0xFF, 0x44, 0x72, 0x4C, 0x41].map(|byte| (byte, true));
+        let ring = RingSize::new(3).expect("a size");
+        assert!(!at_rest(ring, &sent[..1]) && at_rest(ring, &sent));
         let roles = of(&[0, 0xFF, 0x44, 0x72, 0x4C, 0x41, 0x80]);
         assert_eq!(roles[0], Role::Foreign);
         assert_eq!(roles[1..6], [Role::CheckSequence; 5]);
