@@ -13,6 +13,7 @@ pub mod link;
 pub mod locate;
 pub mod manual;
 pub mod port;
+pub mod qualify;
 pub mod report;
 pub mod rig;
 pub mod scenario;

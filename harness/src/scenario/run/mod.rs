@@ -12,6 +12,6 @@ mod record;
 
 pub use bytes::{Shown, show};
 pub use outcome::{Difference, Finding, Outcome};
-pub use over_bus::set_up;
+pub use over_bus::{Before, restore, set_up};
 pub use player::{AtFinding, needs, play, run};
 pub use record::{MAX_SAMPLES, Record, Sample};

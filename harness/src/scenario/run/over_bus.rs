@@ -86,37 +86,89 @@ fn exchange(link: &mut dyn Link, ring: usize, drive: u8, command: Command) -> Op
     Some(data.collect())
 }
 
-/// Sets the cells that a plan's header asks for, by telegrams, and reads them back.
+/// What a cell held before [`set_up`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Before {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// Of which drive.
+    pub drive: u8,
+    /// Which cell.
+    pub address: u16,
+    /// What it held.
+    pub data: u8,
+}
+
+/// Sets the cells that a plan's header asks for, by telegrams, and reads them back. What they held before is added to
+/// `before`, also where it fails on the way.
 ///
 /// # Errors
 /// The first cell that does not hold what it must, in a sentence.
-pub fn set_up(plan: &Plan, link: &mut dyn Link) -> Result<(), String> {
+pub fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
     for (ring, drives, address, bytes) in plan.memory_setups() {
         for drive in drives {
             for (address, data) in (address..=u16::MAX).zip(bytes) {
-                let data = *data;
-                let done = exchange(link, ring, drive, Command::WriteByte { address, data });
-                let held =
-                    done.and_then(|_| exchange(link, ring, drive, Command::ReadByte { address }));
-                let prefix = if ring == 0 { "" } else { "2:" };
-                match held.as_deref() {
-                    Some([held]) if *held == data => {}
-                    Some([held]) => {
-                        return Err(format!(
-                            "cell {address:04X} of drive {prefix}{drive} cannot be set: {data:02X} was written, {held:02X} is read"
-                        ));
-                    }
-                    _ => {
-                        if let Some(trouble) = link.trouble() {
-                            return Err(trouble.to_string());
-                        }
-                        return Err(format!(
-                            "cell {address:04X} of drive {prefix}{drive} cannot be set: no answer"
-                        ));
-                    }
+                let cell = Before {
+                    ring,
+                    drive,
+                    address,
+                    data: *data,
+                };
+                let old = read(link, cell)?;
+                if old != *data {
+                    before.push(Before { data: old, ..cell });
+                    write(link, cell)?;
                 }
             }
         }
     }
     Ok(())
+}
+
+/// Sets cells to what they held before, the last one first.
+///
+/// # Errors
+/// The first cell that does not hold it, in a sentence.
+pub fn restore(link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
+    while let Some(cell) = before.pop() {
+        write(link, cell)?;
+    }
+    Ok(())
+}
+
+fn read(link: &mut dyn Link, cell: Before) -> Result<u8, String> {
+    let command = Command::ReadByte {
+        address: cell.address,
+    };
+    match exchange(link, cell.ring, cell.drive, command).as_deref() {
+        Some([byte]) => Ok(*byte),
+        _ => Err(wrong(link, cell, "no answer")),
+    }
+}
+
+fn write(link: &mut dyn Link, cell: Before) -> Result<(), String> {
+    let command = Command::WriteByte {
+        address: cell.address,
+        data: cell.data,
+    };
+    if exchange(link, cell.ring, cell.drive, command).is_none() {
+        return Err(wrong(link, cell, "no answer"));
+    }
+    let held = read(link, cell)?;
+    if held == cell.data {
+        return Ok(());
+    }
+    let why = format!("{:02X} was written, {held:02X} is read", cell.data);
+    Err(wrong(link, cell, &why))
+}
+
+fn wrong(link: &dyn Link, cell: Before, why: &str) -> String {
+    if let Some(trouble) = link.trouble() {
+        return trouble.to_string();
+    }
+    let prefix = if cell.ring == 0 { "" } else { "2:" };
+    format!(
+        "cell {:04X} of drive {prefix}{} cannot be set: {why}",
+        cell.address, cell.drive
+    )
 }

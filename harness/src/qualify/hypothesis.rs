@@ -1,0 +1,65 @@
+//! Hypotheses, judged by what their twins answer.
+
+use crate::twin::{Conversation, Exactness, Twin};
+use harness_proto::time::Span;
+
+/// A model with something changed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Hypothesis {
+    /// What is supposed, for people.
+    pub name: String,
+    /// The header lines of the scenario language that make it so.
+    pub lines: Vec<String>,
+}
+
+/// How well a hypothesis explains what came.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Evidence {
+    /// How many bytes were as it says.
+    pub bytes: u64,
+    /// The largest difference of times.
+    pub latest: Span,
+    /// Whether every byte also came when it says.
+    pub timely: bool,
+}
+
+/// The hypotheses under which every byte of all conversations is as it was, with how well; in the order given. Where
+/// one of them also explains the times, those that do not are left out.
+///
+/// # Errors
+/// What `twin` says of lines that make no ring.
+pub fn explaining<'h, E>(
+    hypotheses: &'h [Hypothesis],
+    conversations: &[Conversation],
+    exactness: Exactness,
+    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+) -> Result<Vec<(&'h Hypothesis, Evidence)>, E> {
+    let mut explaining = Vec::new();
+    for hypothesis in hypotheses {
+        let twin = twin(&hypothesis.lines)?;
+        if let Some(evidence) = judge(twin, conversations, exactness) {
+            explaining.push((hypothesis, evidence));
+        }
+    }
+    if explaining.iter().any(|(_, evidence)| evidence.timely) {
+        explaining.retain(|(_, evidence)| evidence.timely);
+    }
+    Ok(explaining)
+}
+
+fn judge(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -> Option<Evidence> {
+    let mut evidence = Evidence {
+        timely: true,
+        ..Evidence::default()
+    };
+    for conversation in conversations {
+        let comparison = twin.follow(conversation, exactness);
+        if comparison.divergence.is_some() {
+            return None;
+        }
+        evidence.bytes += comparison.compared;
+        evidence.latest = evidence.latest.max(comparison.latest);
+        evidence.timely &= comparison.untimely.is_none();
+    }
+    Some(evidence)
+}

@@ -1,0 +1,12 @@
+//! What a drive is, settled by its answers: which value an open property has, which known deviation explains what came.
+//!
+//! One idea does both: a hypothesis is a model with one thing changed, and it holds where its twin gives every byte
+//! that the real ring gave.
+
+mod hypothesis;
+mod probes;
+mod profile;
+
+pub use hypothesis::{Evidence, Hypothesis, explaining};
+pub use probes::{Probe, hypotheses, probes};
+pub use profile::{Profile, ProfileError, Settled};

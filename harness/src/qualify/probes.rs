@@ -1,0 +1,105 @@
+//! The probes: a conversation for each property of the bus that the manual leaves open, and its possible values.
+
+use super::hypothesis::Hypothesis;
+use crate::library::Entry;
+use crate::scenario::problem::Problems;
+use crate::scenario::source::Source;
+use harness_proto::novobus::properties::PROPERTIES;
+use include_dir::{Dir, include_dir};
+
+static FILES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/novobus");
+
+/// Times that a time-out may have, in milliseconds (ND21 9.9: 10 to 20).
+const TIME_OUTS: std::ops::RangeInclusive<u64> = 10..=20;
+
+/// A probe for a ring of a given size.
+#[derive(Clone, Debug)]
+pub struct Probe {
+    /// The property that it settles.
+    pub property: &'static str,
+    /// The section that leaves it open.
+    pub section: &'static str,
+    /// What the property decides.
+    pub about: &'static str,
+    /// The conversation; `None` where no conversation on the bus alone shows it.
+    pub entry: Option<Entry>,
+}
+
+/// The probes for a ring of `drives`, one for each property of the bus.
+///
+/// # Errors
+/// A probe has mistakes.
+pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
+    let mut probes = Vec::new();
+    for property in &PROPERTIES {
+        let file = FILES.get_file(format!("{}.scn", property.name));
+        let entry = match file.and_then(|file| file.contents_utf8()) {
+            None => None,
+            Some(text) => {
+                let source = Source {
+                    name: format!("probe {}", property.name),
+                    text: text.into(),
+                };
+                Some(Entry::new(source, Some(drives))?)
+            }
+        };
+        probes.push(Probe {
+            property: property.name,
+            section: property.section,
+            about: property.about,
+            entry,
+        });
+    }
+    Ok(probes)
+}
+
+/// What a property may be: every drive alike, and then one drive otherwise than the others.
+#[must_use]
+pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
+    let known = PROPERTIES.iter().find(|known| known.name == property);
+    let values: Vec<String> = match known.map(|known| known.values) {
+        None => return Vec::new(),
+        Some(["10ms", _]) => TIME_OUTS.map(|ms| format!("{ms}ms")).collect(),
+        Some(words) => words.iter().map(|&word| word.to_owned()).collect(),
+    };
+    let all = |value: &String| Hypothesis {
+        name: value.clone(),
+        lines: vec![format!("drive 0..last property {property} = {value}")],
+    };
+    let mut hypotheses: Vec<_> = values.iter().map(all).collect();
+    let differing = values.iter().flat_map(|value| {
+        let others = values.iter().filter(move |other| *other != value);
+        others.flat_map(move |other| {
+            (0..drives).map(move |drive| (value.clone(), other.clone(), drive))
+        })
+    });
+    // More than this tells nothing that a person would read.
+    let differing = differing.take(if drives > 1 { 1_000 } else { 0 });
+    hypotheses.extend(differing.map(|(value, other, drive)| Hypothesis {
+        name: format!("{value}, but drive {drive} {other}"),
+        lines: vec![
+            format!("drive 0..last property {property} = {value}"),
+            format!("drive {drive} property {property} = {other}"),
+        ],
+    }));
+    hypotheses
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_property_of_the_bus_has_a_probe_or_none_can_show_it() {
+        let probes = probes(3).expect("no mistakes");
+        let without: Vec<_> = probes
+            .iter()
+            .filter(|probe| probe.entry.is_none())
+            .map(|probe| probe.property)
+            .collect();
+        // The zeros tell time-out and wait together.
+        assert_eq!(without, ["time-out-wait"]);
+        assert_eq!(hypotheses("read-long", 3).len(), 2 + 2 * 3);
+        assert_eq!(hypotheses("read-long", 1).len(), 2);
+    }
+}

@@ -1,0 +1,67 @@
+//! What was found out about the drives of a rig, as a file that the simulator can load.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A drive profile (TOML).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// The version of this form: 1.
+    pub schema: u32,
+    /// Which rig was asked.
+    pub rig: String,
+    /// When, as a date and time of day in UTC.
+    pub date: String,
+    /// How many drives each ring has.
+    pub rings: Vec<u8>,
+    /// The properties that were settled, by name.
+    #[serde(default)]
+    pub property: BTreeMap<String, Settled>,
+    /// The properties that were not, with the reason.
+    #[serde(default)]
+    pub open: BTreeMap<String, String>,
+}
+
+/// A property that was settled.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settled {
+    /// What was found, for people.
+    pub value: String,
+    /// The section that leaves it open.
+    pub section: String,
+    /// The header lines of the scenario language that make a simulated drive behave so.
+    pub setup: Vec<String>,
+}
+
+/// Why a text is no profile.
+#[derive(Debug, thiserror::Error)]
+pub enum ProfileError {
+    /// It is no TOML, or has other keys than a profile.
+    #[error("{0}")]
+    Toml(#[from] toml::de::Error),
+    /// It is of another version.
+    #[error("a profile of schema {0}; this program knows schema 1")]
+    Schema(u32),
+}
+
+impl Profile {
+    /// Reads a profile.
+    ///
+    /// # Errors
+    /// [`ProfileError`], with line and column.
+    pub fn parse(text: &str) -> Result<Self, ProfileError> {
+        let profile: Self = toml::from_str(text)?;
+        match profile.schema {
+            1 => Ok(profile),
+            other => Err(ProfileError::Schema(other)),
+        }
+    }
+
+    /// The header lines that make simulated drives behave as was found.
+    pub fn lines(&self) -> impl Iterator<Item = &str> + '_ {
+        let settled = self.property.values();
+        settled.flat_map(|settled| settled.setup.iter().map(String::as_str))
+    }
+}
