@@ -66,6 +66,32 @@ impl SimulatedLink {
         }
     }
 
+    /// When something happens next on a ring or by a fault that waits for its time; `None` where nothing ever
+    /// will unless the master sends. What drives do behind their bus is not counted: they turn all the time.
+    #[must_use]
+    pub fn next_event(&self) -> Option<Instant> {
+        let fault = self.scheduled.front().map(|(at, ..)| *at);
+        self.bench.next_event().into_iter().chain(fault).min()
+    }
+
+    /// Lets everything happen up to and including `until`: the same as many waits, at less cost.
+    pub fn run_until(&mut self, until: Instant) {
+        while self.now() < until {
+            let fault = self.scheduled.front().map(|(at, ..)| *at);
+            self.bench.run_until(fault.unwrap_or(until).min(until));
+            self.suffer_what_is_due();
+        }
+    }
+
+    fn suffer_what_is_due(&mut self) {
+        while let Some(&(at, ring, fault)) = self.scheduled.front()
+            && at <= self.now()
+        {
+            self.scheduled.pop_front();
+            self.suffer(ring, fault);
+        }
+    }
+
     fn ring(&self, ring: usize) -> Option<&Ring<Drive>> {
         self.bench.rings().get(ring)
     }
@@ -131,16 +157,9 @@ impl Line for SimulatedLink {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        let event = self.bench.next_event();
-        let fault = self.scheduled.front().map(|(at, ..)| *at);
-        let next = event.into_iter().chain(fault).min();
+        let next = self.next_event();
         self.bench.run_until(next.unwrap_or(until).min(until));
-        while let Some(&(at, ring, fault)) = self.scheduled.front()
-            && at <= self.now()
-        {
-            self.scheduled.pop_front();
-            self.suffer(ring, fault);
-        }
+        self.suffer_what_is_due();
         next.is_some()
     }
 }

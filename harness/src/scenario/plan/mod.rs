@@ -10,7 +10,7 @@ mod types;
 
 pub(super) use drive::{MAX_LOOKS, number};
 pub(super) use planner::MAX_CARRIED;
-pub use planner::plan;
+pub use planner::{plan, plan_step};
 pub(super) use setup::{in_memory, number_bytes};
 pub(super) use types::PlannedSetupKind;
 pub use types::{
