@@ -80,6 +80,37 @@ impl SimulatedLink {
         self.origin + at.since_start()
     }
 
+    /// When something happens next on a ring or by a fault that waits for its time; `None` where nothing ever
+    /// will unless the master sends. What drives do behind their bus is not counted: they turn all the time.
+    #[must_use]
+    pub fn next_event(&self) -> Option<Instant> {
+        self.next_on_bench().map(|at| self.since_origin(at))
+    }
+
+    /// Lets everything happen up to and including `until`: the same as many waits, at less cost.
+    pub fn run_until(&mut self, until: Instant) {
+        let until = self.on_bench(until);
+        while self.bench.now() < until {
+            let fault = self.scheduled.front().map(|(at, ..)| *at);
+            self.bench.run_until(fault.unwrap_or(until).min(until));
+            self.suffer_what_is_due();
+        }
+    }
+
+    fn next_on_bench(&self) -> Option<Instant> {
+        let fault = self.scheduled.front().map(|(at, ..)| *at);
+        self.bench.next_event().into_iter().chain(fault).min()
+    }
+
+    fn suffer_what_is_due(&mut self) {
+        while let Some(&(at, ring, fault)) = self.scheduled.front()
+            && at <= self.bench.now()
+        {
+            self.scheduled.pop_front();
+            self.suffer(ring, fault);
+        }
+    }
+
     fn ring(&self, ring: usize) -> Option<&Ring<Drive>> {
         self.bench.rings().get(ring)
     }
@@ -141,17 +172,10 @@ impl Line for SimulatedLink {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        let event = self.bench.next_event();
-        let fault = self.scheduled.front().map(|(at, ..)| *at);
-        let next = event.into_iter().chain(fault).min();
+        let next = self.next_on_bench();
         let until = self.on_bench(until);
         self.bench.run_until(next.unwrap_or(until).min(until));
-        while let Some(&(at, ring, fault)) = self.scheduled.front()
-            && at <= self.bench.now()
-        {
-            self.scheduled.pop_front();
-            self.suffer(ring, fault);
-        }
+        self.suffer_what_is_due();
         next.is_some()
     }
 }

@@ -1,1 +1,17 @@
 //! Simulated rings served to anyone's master, over a pseudo terminal or a socket, in real time.
+//!
+//! [`Server`] is the whole of it without I/O: bytes of a client in, bytes of the ring out, the time an argument. [`serve`] is
+//! the shell around it: one thread that waits for pseudo terminals, sockets, signals and lines of control.
+
+mod control;
+mod lines;
+mod place;
+mod pty;
+mod server;
+mod shell;
+mod tcp;
+
+pub use control::Answer;
+pub use place::{ControlPlace, Place};
+pub use server::{Marks, Pace, Server};
+pub use shell::{End, Host, Job, ServeError, serve};

@@ -2,6 +2,7 @@
 
 use super::axes::Axes;
 use super::rig::RigName;
+use super::sim::{SIM_HELP, SimArguments};
 use crate::scenario::argument::{duration, number};
 use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};
@@ -69,6 +70,9 @@ pub enum DriveCommand {
     /// Bring a ring back from the error mode and count its drives (ND21 9.8, 9.3).
     #[command(after_help = RECOVER_JSON)]
     Recover(RecoverArguments),
+    /// Serve a simulated bench in real time, so that anyone's master can talk to it.
+    #[command(after_help = SIM_HELP)]
+    Sim(SimArguments),
 }
 
 /// Which bench.

@@ -15,6 +15,7 @@ mod recover;
 mod rig;
 mod scope;
 mod signal;
+mod sim;
 mod watch;
 mod write;
 
@@ -40,6 +41,7 @@ pub(super) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
         DriveCommand::Reset(arguments) => control::reset(arguments, output),
         DriveCommand::DeleteError(arguments) => control::delete_error(arguments, output),
         DriveCommand::Recover(arguments) => recover::recover(arguments, output),
+        DriveCommand::Sim(arguments) => sim::sim(arguments, output),
     };
     match end {
         Ok(exit) => Ok(exit),

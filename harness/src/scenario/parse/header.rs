@@ -48,6 +48,15 @@ pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> 
     Ok(scenario)
 }
 
+/// Reads one line as a step, whatever stands before it.
+///
+/// # Errors
+/// The line is no step.
+pub fn parse_step(source: &Source) -> Result<Step, Problems> {
+    step::step(&mut Scanner::new(&source.text, 0))
+        .map_err(|problem| Problems::new(&source.name, source.text.clone(), vec![problem]))
+}
+
 fn read(source: &Source, mut reader: Reader) -> Result<Scenario, Problems> {
     let mut offset = 0;
     for (number, line) in source.text.split('\n').enumerate() {

@@ -11,7 +11,7 @@ mod types;
 pub(super) use drive::{MAX_LOOKS, number};
 pub(in crate::scenario) use job::Exchange;
 pub(super) use planner::MAX_CARRIED;
-pub use planner::plan;
+pub use planner::{plan, plan_step};
 pub(super) use setup::{in_memory, number_bytes};
 pub(super) use types::PlannedSetupKind;
 pub use types::{

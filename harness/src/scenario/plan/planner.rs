@@ -117,6 +117,30 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
     })
 }
 
+/// Settles one more step for the rings and drives of a plan.
+///
+/// # Errors
+/// What cannot be in these rings.
+pub fn plan_step(plan: &Plan, step: &Step, source: &Source) -> Result<PlannedStep, Problems> {
+    let planner = Planner {
+        byte_time: plan.rate.byte_time(),
+        rings: plan.rings.clone(),
+        setups: plan.setups.clone(),
+        units: plan.units.clone(),
+        // The model of every drive is settled.
+        model: Model::default(),
+        models: plan.models.clone(),
+    };
+    let action = planner
+        .action(step, &mut Vec::new())
+        .map_err(|problem| Problems::new(&source.name, source.text.clone(), vec![problem]))?;
+    Ok(PlannedStep {
+        when: planner.when(step.when),
+        action,
+        span: step.span,
+    })
+}
+
 fn sizes(scenario: &Scenario, size: Option<u8>) -> Result<Vec<RingSize>, Problem> {
     let mut rings = Vec::new();
     for (index, range) in scenario.rings.iter().enumerate() {

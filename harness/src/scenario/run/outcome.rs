@@ -85,6 +85,11 @@ impl Stop {
         }
     }
 
+    /// What is wrong, in a sentence.
+    pub(super) fn into_message(self) -> String {
+        self.finding.message
+    }
+
     pub(super) fn inconclusive(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Inconclusive,

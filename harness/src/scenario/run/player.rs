@@ -57,24 +57,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         let place = plan.link_name(ring, place);
         return Outcome::skipped(format!("the rig has no interposer at {place}"));
     }
-    let mut runner = Runner {
-        rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
-        line_before: link.now(),
-        deadline: plan.deadline,
-        corrected: 0,
-        sent: 0,
-        sent_from: link.now(),
-        sent_to: link.now(),
-        link,
-        plan,
-        at_finding,
-        strict: plan.strict,
-        full: None,
-        unseen: None,
-        recorder: Recorder::default(),
-        seen: BTreeMap::new(),
-        answers: BTreeSet::new(),
-    };
+    let mut runner = Runner::new(plan, link, at_finding);
     let mut result = runner.play();
     if let (Ok(()), Some(unseen)) = (&result, runner.unseen.take()) {
         result = Err(unseen);
@@ -148,6 +131,29 @@ pub(super) struct Runner<'a> {
     pub(super) sent: u64,
     pub(super) sent_from: Instant,
     pub(super) sent_to: Instant,
+}
+
+impl<'a> Runner<'a> {
+    pub(super) fn new(plan: &'a Plan, link: &'a mut dyn Link, at_finding: AtFinding) -> Self {
+        Self {
+            rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
+            line_before: link.now(),
+            deadline: plan.deadline,
+            corrected: 0,
+            sent: 0,
+            sent_from: link.now(),
+            sent_to: link.now(),
+            link,
+            plan,
+            at_finding,
+            strict: plan.strict,
+            full: None,
+            unseen: None,
+            recorder: Recorder::default(),
+            seen: BTreeMap::new(),
+            answers: BTreeSet::new(),
+        }
+    }
 }
 
 impl Runner<'_> {

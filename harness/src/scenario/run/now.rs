@@ -1,0 +1,58 @@
+//! Steps that are done at once, beside a conversation that somebody else holds.
+
+use super::player::{AtFinding, Runner};
+use crate::link::Link;
+use crate::scenario::plan::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen};
+
+/// What came of a step that is done at once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Now {
+    /// It is done, or it holds.
+    Done,
+    /// The check does not hold: what was found, in a sentence.
+    Otherwise(String),
+    /// The step cannot be done at once: why, in a sentence.
+    Refused(&'static str),
+}
+
+/// Does a step at once. No time passes and nothing is sent: faults, what happens to drives from outside the bus,
+/// and checks that look at drives or at the error mode.
+pub fn now(plan: &Plan, link: &mut dyn Link, step: &PlannedStep) -> Now {
+    if step.when != PlannedWhen::Now {
+        return Now::Refused(
+            "a line is done at once: no time may stand in front of it (a fault may have one behind its place)",
+        );
+    }
+    match &step.action {
+        PlannedAction::Fault(ring, fault, moment) => {
+            link.inject(*ring, *fault, *moment);
+            Now::Done
+        }
+        PlannedAction::Influence(ring, drives, influence) => {
+            influence.act(link, *ring, drives.clone());
+            Now::Done
+        }
+        PlannedAction::Check(check) => look(plan, link, check, step),
+        _ => Now::Refused(
+            "only faults (`!`), checks (`?`) and what happens to drives (`drive ...`) can be done at once: \
+             the bytes are the master's",
+        ),
+    }
+}
+
+fn look(plan: &Plan, link: &mut dyn Link, check: &PlannedCheck, step: &PlannedStep) -> Now {
+    match check {
+        PlannedCheck::Drive(_) | PlannedCheck::Error(..) | PlannedCheck::Located(_, _, None) => {}
+        _ => {
+            return Now::Refused(
+                "this check counts the bytes of a scenario's own master, and here the master is another's",
+            );
+        }
+    }
+    let mut runner = Runner::new(plan, link, AtFinding::Stop);
+    let result = runner.check(check, step.span);
+    match (result, runner.unseen.take()) {
+        (Ok(()), None) => Now::Done,
+        (Err(stop), _) | (Ok(()), Some(stop)) => Now::Otherwise(stop.into_message()),
+    }
+}

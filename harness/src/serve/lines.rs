@@ -1,0 +1,60 @@
+//! Lines out of a stream of bytes.
+
+use crate::scenario::source::MAX_LINE;
+
+/// A line without its end, or how many bytes a line has that is too long.
+pub(super) type Line = Result<String, usize>;
+
+/// Bytes of which no line has come yet. A line that is too long is not kept.
+#[derive(Debug, Default)]
+pub(super) struct Lines {
+    begun: Vec<u8>,
+    length: usize,
+}
+
+impl Lines {
+    /// Takes bytes and gives the lines that they end. What is no UTF-8 is replaced, and no line of the language then.
+    pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<Line> {
+        let mut lines = Vec::new();
+        for &byte in bytes {
+            if byte == b'\n' {
+                lines.extend(self.end());
+            } else {
+                self.length = self.length.saturating_add(1);
+                if self.length <= MAX_LINE {
+                    self.begun.push(byte);
+                }
+            }
+        }
+        lines
+    }
+
+    /// The stream has ended: what was begun is a line too.
+    pub(super) fn end(&mut self) -> Option<Line> {
+        let length = std::mem::take(&mut self.length);
+        let begun = std::mem::take(&mut self.begun);
+        match length {
+            0 => None,
+            1..=MAX_LINE => Some(Ok(String::from_utf8_lossy(&begun).into_owned())),
+            _ => Some(Err(length)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_come_whole_and_long_ones_are_counted() {
+        let mut lines = Lines::default();
+        assert!(lines.push(b"ab").is_empty());
+        let both = lines.push(b"c\n\nde\nf");
+        assert_eq!(both, [Ok("abc".to_owned()), Ok("de".to_owned())]);
+        assert_eq!(lines.end(), Some(Ok("f".to_owned())));
+        let mut long = vec![b'x'; MAX_LINE + 5];
+        long.push(b'\n');
+        assert_eq!(lines.push(&long), [Err(MAX_LINE + 5)]);
+        assert_eq!(lines.end(), None);
+    }
+}

@@ -1,0 +1,288 @@
+//! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
+
+use crate::link::{Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
+use crate::scenario::plan::Plan;
+use harness_proto::line::LineError;
+use harness_proto::marks::{BadMark, Unmark, mark};
+use harness_proto::time::{Instant, Span};
+use harness_sim::fault::Flips;
+use std::collections::VecDeque;
+
+/// How much of a client's bytes waits for the line at most: the rest stays with the client.
+const WAITING: Span = Span::from_millis(500);
+
+/// While something happens on a ring: how long what reaches the master waits for company.
+const BATCH: Span = Span::from_millis(1);
+
+/// While nothing does: how often drives are let go on, so that it does not all come at once in front of the next byte.
+const IDLE: Span = Span::from_millis(20);
+
+/// The most time that is made up for at once. A program that was stopped for longer goes on where it was.
+const CATCH_UP: Span = Span::from_millis(1_000);
+
+/// The most that one leap covers, in byte times: then the time is asked for again.
+const LEAP: u64 = 2_000;
+
+/// How many byte times a leap goes on where the master has nothing more to send.
+const STRIDE: u64 = 4;
+
+/// The most bytes that wait for a client. What comes then is lost, as in a serial port that nobody reads.
+const UNREAD: usize = 64 << 10;
+
+/// How fast time passes in the rings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// As on the line: a byte takes its byte time.
+    #[default]
+    Line,
+    /// As fast as possible while bytes of the master's are under way; as on the line while none are, so that time-outs (ND21
+    /// 9.9) happen and motors turn.
+    Free,
+}
+
+/// How the stream of a client carries line errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Marks {
+    /// Not at all. Every byte of the client's is a good one; a byte that comes back damaged is given as it was read (a break as
+    /// 00), and that it was damaged is lost.
+    #[default]
+    None,
+    /// In-band, as of [`harness_proto::marks`]. A byte with an error of the client's reaches the first drive with a parity error, a
+    /// 00 with an error as a break; a byte that comes back damaged is marked.
+    InBand,
+}
+
+/// Simulated rings, each with a client at its master's place or none.
+#[derive(Clone, Debug)]
+pub struct Server {
+    pub(super) plan: Plan,
+    pub(super) link: SimulatedLink,
+    pace: Pace,
+    marks: Marks,
+    seats: Vec<Seat>,
+    /// The rings' time `base.1` is the clock's time `base.0`.
+    base: (Instant, Instant),
+    clock: Instant,
+}
+
+/// The master's place in a ring.
+#[derive(Clone, Debug, Default)]
+struct Seat {
+    taken: bool,
+    unmark: Unmark,
+    /// Bytes sent since the start, by all clients.
+    sent: u64,
+    /// When the line will have carried them.
+    sent_by: Instant,
+    /// For the client.
+    outbox: VecDeque<u8>,
+    lost: u64,
+}
+
+impl Server {
+    /// Serves the rings of a plan; nobody is there yet. The clock starts at [`Instant::START`].
+    #[must_use]
+    pub fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: Marks) -> Self {
+        link.stop_recording();
+        Self {
+            base: (Instant::START, link.now()),
+            seats: vec![Seat::default(); plan.rings.len()],
+            clock: Instant::START,
+            plan,
+            link,
+            pace,
+            marks,
+        }
+    }
+
+    /// How many rings there are: one or two.
+    #[must_use]
+    pub fn rings(&self) -> usize {
+        self.seats.len()
+    }
+
+    /// How many drives ring `ring` has, rings counted from 0.
+    #[must_use]
+    pub fn drives(&self, ring: usize) -> u8 {
+        self.link.drives(ring)
+    }
+
+    /// The time in the rings: ahead of the clock by what leaps have gained.
+    #[must_use]
+    pub fn time(&self) -> Instant {
+        self.link.now()
+    }
+
+    /// A client takes the master's place in a ring.
+    pub fn come(&mut self, ring: usize) {
+        if let Some(seat) = self.seats.get_mut(ring) {
+            seat.taken = true;
+            seat.unmark = Unmark::default();
+        }
+    }
+
+    /// The client has gone: what it has not fetched is dropped, and half a mark is forgotten. The ring lives on, and what is
+    /// under way there goes its way.
+    pub fn go(&mut self, ring: usize) {
+        if let Some(seat) = self.seats.get_mut(ring) {
+            seat.taken = false;
+            seat.outbox.clear();
+            seat.lost = 0;
+        }
+    }
+
+    /// How many bytes of its client's stream a ring takes now: none while half a second of them waits for the line.
+    #[must_use]
+    pub fn room(&self, ring: usize) -> usize {
+        let Some(seat) = self.seats.get(ring) else {
+            return 0;
+        };
+        let byte = self.link.byte_time().units().max(1);
+        let waiting = seat.sent_by.since(self.link.now());
+        let room = WAITING.saturating_sub(waiting).units() / byte;
+        usize::try_from(room).unwrap_or(usize::MAX)
+    }
+
+    /// Takes bytes of a client's stream, which leave one after another behind those still to be sent.
+    ///
+    /// # Errors
+    /// The first byte that is no mark where one must stand; it is dropped, and the others are taken.
+    pub fn receive(&mut self, ring: usize, bytes: &[u8]) -> Result<(), BadMark> {
+        let Some(seat) = self.seats.get_mut(ring) else {
+            return Ok(());
+        };
+        let mut good = Vec::with_capacity(bytes.len());
+        let mut wrong = Ok(());
+        for &byte in bytes {
+            let read = match self.marks {
+                Marks::None => Some(Ok(harness_proto::line::Received::good(byte))),
+                Marks::InBand => seat.unmark.push(byte),
+            };
+            match read {
+                None => {}
+                Some(Err(bad)) => wrong = wrong.and(Err(bad)),
+                Some(Ok(read)) => {
+                    good.push(read.byte);
+                    if let Some(error) = read.error {
+                        let number = seat.sent + good.len() as u64;
+                        let fault = damage(error, self.link.byte_time());
+                        let fault = PlacedFault::Link(0, fault);
+                        self.link.inject(ring, fault, Moment::Byte(number));
+                    }
+                }
+            }
+        }
+        if !good.is_empty() {
+            seat.sent += good.len() as u64;
+            seat.sent_by = self.link.send(ring, &good);
+        }
+        wrong
+    }
+
+    /// Lets time pass up to the clock's time `clock`, in the rings as their pace is.
+    pub fn advance(&mut self, clock: Instant) {
+        self.clock = self.clock.max(clock);
+        let (from, to) = self.base;
+        let due = to + self.clock.since(from);
+        let most = self.link.now() + CATCH_UP;
+        self.link.run_until(due.min(most));
+        if due > most {
+            self.base = (self.clock, self.link.now());
+        }
+        if self.pace == Pace::Free {
+            self.leap();
+        }
+        self.fetch();
+    }
+
+    /// Lets the rings go on until nothing of the masters' is under way.
+    fn leap(&mut self) {
+        let byte = self.link.byte_time();
+        let end = self.link.now() + byte * LEAP;
+        while self.link.busy() && self.link.now() < end {
+            // While the master sends, no drive is idle; behind that, a stride is far from a time-out.
+            let sent_by = self.seats.iter().map(|seat| seat.sent_by).max();
+            let stride = self.link.now() + byte * STRIDE;
+            let step = sent_by.map_or(stride, |sent_by| stride.max(sent_by));
+            self.link.run_until(step.min(end));
+            self.base = (self.clock, self.link.now());
+        }
+    }
+
+    fn fetch(&mut self) {
+        for (ring, seat) in self.seats.iter_mut().enumerate() {
+            while let Some((_, read)) = self.link.receive(ring) {
+                let marked = mark(read);
+                let bytes = match self.marks {
+                    Marks::None => std::slice::from_ref(&read.byte),
+                    Marks::InBand => marked.as_bytes(),
+                };
+                if !seat.taken {
+                    continue;
+                }
+                if seat.outbox.len() + bytes.len() > UNREAD {
+                    seat.lost += 1;
+                } else {
+                    seat.outbox.extend(bytes);
+                }
+            }
+        }
+    }
+
+    /// What a ring has for its client.
+    pub fn transmit(&mut self, ring: usize) -> &[u8] {
+        self.seats
+            .get_mut(ring)
+            .map_or(&[], |seat| seat.outbox.make_contiguous())
+    }
+
+    /// The first `count` bytes of that have been passed on.
+    pub fn transmitted(&mut self, ring: usize, count: usize) {
+        if let Some(seat) = self.seats.get_mut(ring) {
+            let count = count.min(seat.outbox.len());
+            seat.outbox.drain(..count);
+        }
+    }
+
+    /// How many bytes were lost since this was asked for last, because the client did not read.
+    pub fn take_lost(&mut self, ring: usize) -> u64 {
+        self.seats
+            .get_mut(ring)
+            .map_or(0, |seat| std::mem::take(&mut seat.lost))
+    }
+
+    /// When, by the clock, [`Self::advance`] is to be called again if nothing comes before.
+    #[must_use]
+    pub fn deadline(&self) -> Instant {
+        if self.pace == Pace::Free && self.link.busy() {
+            return self.clock;
+        }
+        let (from, to) = self.base;
+        let idle = self.clock + IDLE;
+        self.link.next_event().map_or(idle, |next| {
+            let next = from + next.since(to);
+            next.clamp(self.clock + BATCH, idle)
+        })
+    }
+}
+
+/// What makes a byte arrive with this error.
+fn damage(error: LineError, byte_time: Span) -> LinkFault {
+    match error {
+        LineError::Parity => LinkFault::Flip(Flips {
+            parity: true,
+            ..Flips::default()
+        }),
+        LineError::Framing => LinkFault::Flip(Flips {
+            stop: true,
+            ..Flips::default()
+        }),
+        LineError::Overrun => LinkFault::Overrun,
+        // No longer than the byte: the next one is whole.
+        LineError::Break => LinkFault::Break(byte_time),
+    }
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;

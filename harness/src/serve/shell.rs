@@ -1,0 +1,538 @@
+//! The shell around a [`Server`]: one thread that waits for sockets, pseudo terminals, signals and the next deadline.
+
+use super::control::Answer;
+use super::lines::{Line, Lines};
+use super::place::{ControlPlace, Place};
+use super::pty::{Change, Pty};
+use super::server::Server;
+use super::tcp::{Tcp, Visitor};
+use harness_proto::time::{Instant, Span};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::io::{self, Read};
+use std::net::SocketAddr;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+
+/// Bytes read at a time.
+const CHUNK: usize = 4096;
+
+/// Answers that wait for whoever sends lines of control; further lines wait meanwhile.
+const UNREAD: usize = 64 << 10;
+
+/// What is served where, and for how long.
+#[derive(Clone, Debug, Default)]
+pub struct Job {
+    /// Where each ring is served, in order.
+    pub places: Vec<Place>,
+    /// Where lines of control come from, if from anywhere.
+    pub control: Option<ControlPlace>,
+    /// Whether sockets may listen at addresses that other machines reach.
+    pub allow_remote: bool,
+    /// Whether the end comes when the clients have gone.
+    pub once: bool,
+    /// How long it goes on, if not until a signal comes.
+    pub length: Option<Span>,
+}
+
+/// Why serving has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// SIGINT or SIGTERM.
+    Interrupted,
+    /// The time is over.
+    TimeOver,
+    /// The clients have gone, and only they were waited for.
+    ClientsGone,
+}
+
+/// Why rings cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// As many places as rings are needed.
+    #[error(
+        "{given} place(s) given for {rings} ring(s): one --tcp or --pty for each ring expected, in their order"
+    )]
+    Places {
+        /// How many there are.
+        given: usize,
+        /// How many rings there are.
+        rings: usize,
+    },
+    /// Other machines could reach it.
+    #[error(
+        "{address} can be reached from other machines, and whoever connects is the master: a loopback address such as 127.0.0.1 \
+         expected, or --allow-remote"
+    )]
+    Remote {
+        /// The address.
+        address: SocketAddr,
+    },
+    /// The socket cannot listen.
+    #[error("failed to listen at {address}: {error}; HOST:PORT expected, port 0 for a free one")]
+    Listen {
+        /// As written.
+        address: String,
+        /// Why.
+        error: io::Error,
+    },
+    /// Something stands at the path already.
+    #[error("{} is there already: name another path, or remove it if no program serves there", path.display())]
+    Exists {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The pseudo terminal cannot be made.
+    #[error("failed to open a pseudo terminal at {}: {error}", path.display())]
+    Pty {
+        /// The path of the link.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// The system does not let the program wait or be told of signals.
+    #[error("failed to wait for clients: {0}")]
+    Wait(io::Error),
+    /// Results cannot be written.
+    #[error("failed to write: {0}")]
+    Output(io::Error),
+}
+
+/// Who is told.
+pub trait Host {
+    /// A line for tools, without its end: a ring is ready, or the answer to a line of control.
+    ///
+    /// # Errors
+    /// It cannot be written; serving ends.
+    fn tell(&mut self, line: &str) -> io::Result<()>;
+
+    /// A line for people, without its end.
+    fn say(&mut self, line: &str);
+}
+
+/// Serves rings until the job is done. Links to pseudo terminals are removed on every way out.
+///
+/// # Errors
+/// A place cannot be opened, or the system fails. Nothing is left behind then.
+pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, ServeError> {
+    if job.places.len() != server.rings() {
+        return Err(ServeError::Places {
+            given: job.places.len(),
+            rings: server.rings(),
+        });
+    }
+    let signals = Signals::new().map_err(ServeError::Wait)?;
+    let mut ends = Vec::new();
+    for place in &job.places {
+        ends.push(match place {
+            Place::Tcp(address) => Seat::Tcp(Tcp::listen(address, job.allow_remote)?),
+            Place::Pty(path) => Seat::Pty(Pty::open(path)?),
+        });
+    }
+    let control = match &job.control {
+        None => None,
+        Some(ControlPlace::Standard) => Some(Control::new(Source::Standard)),
+        Some(ControlPlace::Tcp(address)) => {
+            let tcp = Tcp::listen(address, job.allow_remote)?;
+            Some(Control::new(Source::Tcp(tcp)))
+        }
+    };
+    let mut shell = Shell {
+        garbled: vec![false; ends.len()],
+        server,
+        ends,
+        control,
+        host,
+        signals,
+        here: 0,
+        gone: false,
+    };
+    shell.announce()?;
+    shell.run(job)
+}
+
+/// The signals that end the program, as a stream.
+struct Signals {
+    read: UnixStream,
+    ids: Vec<signal_hook::SigId>,
+}
+
+impl Signals {
+    fn new() -> io::Result<Self> {
+        let (read, write) = UnixStream::pair()?;
+        read.set_nonblocking(true)?;
+        let mut ids = Vec::new();
+        for signal in [SIGINT, SIGTERM] {
+            let write = write.try_clone()?;
+            ids.push(signal_hook::low_level::pipe::register(signal, write)?);
+        }
+        Ok(Self { read, ids })
+    }
+}
+
+impl Drop for Signals {
+    fn drop(&mut self) {
+        for id in &self.ids {
+            signal_hook::low_level::unregister(*id);
+        }
+    }
+}
+
+/// The master's place of a ring.
+enum Seat {
+    Tcp(Tcp),
+    Pty(Pty),
+}
+
+/// Where lines of control come from, what of them has come, and what of the answers has not gone.
+struct Control {
+    source: Source,
+    lines: Lines,
+    answers: Vec<u8>,
+}
+
+enum Source {
+    Standard,
+    Tcp(Tcp),
+    /// Standard input has ended.
+    Ended,
+}
+
+impl Control {
+    fn new(source: Source) -> Self {
+        Self {
+            source,
+            lines: Lines::default(),
+            answers: Vec::new(),
+        }
+    }
+}
+
+struct Shell<'a> {
+    server: Server,
+    ends: Vec<Seat>,
+    control: Option<Control>,
+    host: &'a mut dyn Host,
+    signals: Signals,
+    /// Clients there are.
+    here: usize,
+    /// A client was there, and none is left.
+    gone: bool,
+    /// Whether the client's marks were wrong; it is said once.
+    garbled: Vec<bool>,
+}
+
+impl Shell<'_> {
+    /// One line for each place, once all of them are ready.
+    fn announce(&mut self) -> Result<(), ServeError> {
+        let mut lines = Vec::new();
+        for (ring, end) in self.ends.iter().enumerate() {
+            let drives = self.server.drives(ring);
+            let s = if drives == 1 { "" } else { "s" };
+            let place = match end {
+                Seat::Tcp(tcp) => tcp.address().to_string(),
+                Seat::Pty(pty) => pty.link().display().to_string(),
+            };
+            lines.push(format!("ring {}: {drives} drive{s} at {place}", ring + 1));
+        }
+        if let Some(Control {
+            source: Source::Tcp(tcp),
+            ..
+        }) = &self.control
+        {
+            lines.push(format!("control at {}", tcp.address()));
+        }
+        for line in lines {
+            self.host.tell(&line).map_err(ServeError::Output)?;
+        }
+        Ok(())
+    }
+
+    fn run(&mut self, job: &Job) -> Result<End, ServeError> {
+        let started = std::time::Instant::now();
+        let end = job.length.map(|length| Instant::START + length);
+        loop {
+            let clock = clock(started);
+            if end.is_some_and(|end| end <= clock) {
+                return Ok(End::TimeOver);
+            }
+            let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
+            self.wait(until.since(clock)).map_err(ServeError::Wait)?;
+            // What comes now comes at this time, not at that of the last look.
+            self.server.advance(self::clock(started));
+            if self.interrupted() {
+                return Ok(End::Interrupted);
+            }
+            for ring in 0..self.ends.len() {
+                self.attend(ring);
+            }
+            self.obey().map_err(ServeError::Output)?;
+            if job.once && self.gone {
+                return Ok(End::ClientsGone);
+            }
+        }
+    }
+
+    /// Waits until something can be read or written, at most so long.
+    fn wait(&mut self, longest: Span) -> io::Result<()> {
+        let mut fds = vec![PollFd::new(&self.signals.read, PollFlags::IN)];
+        for (ring, end) in self.ends.iter().enumerate() {
+            let mut stream = PollFlags::empty();
+            stream.set(PollFlags::IN, self.server.room(ring) > 0);
+            stream.set(PollFlags::OUT, !self.server.transmit(ring).is_empty());
+            match end {
+                Seat::Tcp(tcp) => {
+                    let (door, client) = tcp.polls(stream);
+                    fds.push(door);
+                    fds.extend(client);
+                }
+                Seat::Pty(pty) => {
+                    let (watch, stream) = pty.polls(stream);
+                    fds.extend([watch, stream]);
+                }
+            }
+        }
+        if let Some(control) = &self.control {
+            let mut stream = PollFlags::empty();
+            stream.set(PollFlags::IN, control.answers.len() < UNREAD);
+            stream.set(PollFlags::OUT, !control.answers.is_empty());
+            match &control.source {
+                Source::Standard => {
+                    fds.push(PollFd::from_borrowed_fd(rustix::stdio::stdin(), stream));
+                }
+                Source::Tcp(tcp) => {
+                    let (door, client) = tcp.polls(stream);
+                    fds.push(door);
+                    fds.extend(client);
+                }
+                Source::Ended => {}
+            }
+        }
+        let nanos = longest.as_nanos();
+        let longest = Timespec {
+            tv_sec: i64::try_from(nanos / 1_000_000_000).unwrap_or(i64::MAX),
+            tv_nsec: i64::try_from(nanos % 1_000_000_000).unwrap_or(0),
+        };
+        match poll(&mut fds, Some(&longest)) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn interrupted(&mut self) -> bool {
+        let mut byte = [0];
+        self.signals.read.read(&mut byte).is_ok_and(|read| read > 0)
+    }
+
+    /// Lets clients come, speak, hear and go.
+    fn attend(&mut self, ring: usize) {
+        let visitors = match &mut self.ends[ring] {
+            Seat::Tcp(tcp) => tcp.accept(),
+            Seat::Pty(_) => Vec::new(),
+        };
+        for visitor in visitors {
+            match visitor {
+                Visitor::Came(address) => self.come(ring, &format!("client {address} came")),
+                Visitor::TurnedAway(address) => self.say(
+                    ring,
+                    &format!("client {address} was turned away: another one is there"),
+                ),
+            }
+        }
+        let alive = self.hear(ring).and_then(|()| self.speak(ring));
+        let gone = match &mut self.ends[ring] {
+            Seat::Tcp(tcp) if tcp.taken() => alive.err(),
+            _ => None,
+        };
+        if let Some(error) = gone {
+            if let Seat::Tcp(tcp) = &mut self.ends[ring] {
+                tcp.close();
+            }
+            let why = match error.kind() {
+                io::ErrorKind::UnexpectedEof => String::new(),
+                _ => format!(" ({error})"),
+            };
+            self.go(ring, &format!("the client has gone{why}"));
+        }
+        let changes = match &mut self.ends[ring] {
+            Seat::Pty(pty) => pty.changes(),
+            Seat::Tcp(_) => Vec::new(),
+        };
+        for change in changes {
+            match change {
+                Change::Came => self.come(ring, "a client came"),
+                Change::Gone => {
+                    if let Seat::Pty(pty) = &self.ends[ring] {
+                        pty.drop_unread();
+                    }
+                    self.go(ring, "the client has gone");
+                }
+            }
+        }
+    }
+
+    fn come(&mut self, ring: usize, text: &str) {
+        self.here += 1;
+        self.gone = false;
+        self.garbled[ring] = false;
+        self.server.come(ring);
+        self.say(ring, text);
+    }
+
+    fn go(&mut self, ring: usize, text: &str) {
+        self.here = self.here.saturating_sub(1);
+        self.gone = self.here == 0;
+        self.server.go(ring);
+        self.say(ring, text);
+    }
+
+    fn say(&mut self, ring: usize, text: &str) {
+        self.host.say(&format!("ring {}: {text}", ring + 1));
+    }
+
+    /// Takes what a client has sent, as far as there is room for it.
+    fn hear(&mut self, ring: usize) -> io::Result<()> {
+        let mut buffer = [0; CHUNK];
+        loop {
+            let room = self.server.room(ring).min(CHUNK);
+            if room == 0 {
+                return Ok(());
+            }
+            let read = match &mut self.ends[ring] {
+                Seat::Tcp(tcp) => tcp.read(&mut buffer[..room]),
+                Seat::Pty(pty) => pty.read(&mut buffer[..room]),
+            };
+            let read = match read {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(read) => read,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            let news = match &mut self.ends[ring] {
+                Seat::Pty(pty) => pty.heard(),
+                Seat::Tcp(_) => false,
+            };
+            if news {
+                self.come(ring, "a client came");
+            }
+            if let Err(bad) = self.server.receive(ring, &buffer[..read])
+                && !std::mem::replace(&mut self.garbled[ring], true)
+            {
+                self.say(ring, &bad.to_string());
+            }
+        }
+    }
+
+    /// Gives a client what has come for it, as far as it takes it.
+    fn speak(&mut self, ring: usize) -> io::Result<()> {
+        let lost = self.server.take_lost(ring);
+        if lost > 0 {
+            self.say(
+                ring,
+                &format!("{lost} bytes lost: the client does not read"),
+            );
+        }
+        loop {
+            let bytes = self.server.transmit(ring);
+            if bytes.is_empty() {
+                return Ok(());
+            }
+            let written = match &mut self.ends[ring] {
+                Seat::Tcp(tcp) => tcp.write(bytes),
+                Seat::Pty(pty) => pty.write(bytes),
+            };
+            match written {
+                Ok(written) => self.server.transmitted(ring, written),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Does the lines of control that have come, and answers them.
+    fn obey(&mut self) -> io::Result<()> {
+        let Some(mut control) = self.control.take() else {
+            return Ok(());
+        };
+        if let Source::Tcp(tcp) = &mut control.source {
+            // Whoever comes second is turned away here too.
+            let _visitors = tcp.accept();
+        }
+        let mut buffer = [0; CHUNK];
+        while control.answers.len() < UNREAD {
+            let read = match &mut control.source {
+                Source::Standard => standard(&mut buffer),
+                Source::Tcp(tcp) => tcp.read(&mut buffer),
+                Source::Ended => break,
+            };
+            let (lines, ended) = match read {
+                Ok(read @ 1..) => (control.lines.push(&buffer[..read]), false),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Ok(0) | Err(_) => (control.lines.end().into_iter().collect(), true),
+            };
+            for line in lines {
+                let Some(answer) = self.answer(line) else {
+                    continue;
+                };
+                if matches!(control.source, Source::Standard) {
+                    self.host.tell(&answer.to_string())?;
+                } else {
+                    control.answers.extend(format!("{answer}\n").bytes());
+                }
+            }
+            pass_on(&mut control);
+            if ended {
+                match &mut control.source {
+                    Source::Tcp(tcp) => tcp.close(),
+                    other => *other = Source::Ended,
+                }
+                control.answers.clear();
+                break;
+            }
+        }
+        pass_on(&mut control);
+        self.control = Some(control);
+        Ok(())
+    }
+
+    fn answer(&mut self, line: Line) -> Option<Answer> {
+        match line {
+            Ok(line) => self.server.control(&line),
+            Err(length) => Some(Answer::Error(format!(
+                "a line of {length} bytes is too long for a line of control"
+            ))),
+        }
+    }
+}
+
+/// Writes answers as far as they are taken.
+fn pass_on(control: &mut Control) {
+    let Source::Tcp(tcp) = &mut control.source else {
+        return;
+    };
+    while !control.answers.is_empty() {
+        // A connection that is broken shows when it is read.
+        let Ok(written) = tcp.write(&control.answers) else {
+            return;
+        };
+        control.answers.drain(..written);
+    }
+}
+
+/// Reads standard input if something is there: it may be somebody else's too, so it is not made nonblocking.
+fn standard(buffer: &mut [u8]) -> io::Result<usize> {
+    let stdin = rustix::stdio::stdin();
+    let mut fds = [PollFd::from_borrowed_fd(stdin, PollFlags::IN)];
+    if poll(&mut fds, Some(&Timespec::default()))? == 0 {
+        return Err(io::ErrorKind::WouldBlock.into());
+    }
+    Ok(rustix::io::read(stdin, buffer)?)
+}
+
+fn clock(started: std::time::Instant) -> Instant {
+    let nanos = started.elapsed().as_nanos();
+    Instant::START + Span::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+}

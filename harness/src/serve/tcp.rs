@@ -1,0 +1,106 @@
+//! A socket that listens for one client at a time.
+
+use super::shell::ServeError;
+use rustix::event::{PollFd, PollFlags};
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+
+/// Second clients taken at a time, and turned away.
+const TURNED_AWAY: usize = 16;
+
+/// A socket, and the client that has come.
+#[derive(Debug)]
+pub(super) struct Tcp {
+    listener: TcpListener,
+    address: SocketAddr,
+    client: Option<(TcpStream, SocketAddr)>,
+}
+
+/// Somebody at the door.
+pub(super) enum Visitor {
+    /// It is the client now.
+    Came(SocketAddr),
+    /// Another one is there already; the connection is closed.
+    TurnedAway(SocketAddr),
+}
+
+impl Tcp {
+    /// Listens at an address of this machine's own, unless another one is allowed.
+    pub(super) fn listen(text: &str, allow_remote: bool) -> Result<Self, ServeError> {
+        let failed = |error| ServeError::Listen {
+            address: text.to_owned(),
+            error,
+        };
+        let mut addresses = text.to_socket_addrs().map_err(failed)?;
+        let address = addresses.next().ok_or_else(|| {
+            let error = "the name has no address";
+            failed(io::Error::new(io::ErrorKind::NotFound, error))
+        })?;
+        if !address.ip().is_loopback() && !allow_remote {
+            return Err(ServeError::Remote { address });
+        }
+        let listener = TcpListener::bind(address).map_err(failed)?;
+        listener.set_nonblocking(true).map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        Ok(Self {
+            listener,
+            address,
+            client: None,
+        })
+    }
+
+    pub(super) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    pub(super) fn taken(&self) -> bool {
+        self.client.is_some()
+    }
+
+    /// Takes those who wait at the door.
+    pub(super) fn accept(&mut self) -> Vec<Visitor> {
+        let mut visitors = Vec::new();
+        for _ in 0..TURNED_AWAY {
+            // What fails here has gone again, or comes again.
+            let Ok((stream, address)) = self.listener.accept() else {
+                break;
+            };
+            if self.client.is_some() {
+                visitors.push(Visitor::TurnedAway(address));
+            } else if stream.set_nonblocking(true).is_ok() {
+                // A byte is to be on its way at once; without this it comes late, and comes.
+                let _late = stream.set_nodelay(true);
+                self.client = Some((stream, address));
+                visitors.push(Visitor::Came(address));
+            }
+        }
+        visitors
+    }
+
+    /// Reads of the client; 0 bytes where it has gone.
+    pub(super) fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match &mut self.client {
+            Some((stream, _)) => stream.read(buffer),
+            None => Err(io::ErrorKind::WouldBlock.into()),
+        }
+    }
+
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.client {
+            Some((stream, _)) => stream.write(bytes),
+            None => Err(io::ErrorKind::WouldBlock.into()),
+        }
+    }
+
+    /// Closes the connection.
+    pub(super) fn close(&mut self) {
+        self.client = None;
+    }
+
+    /// What to wait for: the door, and the client where there is one.
+    pub(super) fn polls(&self, client: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
+        let door = PollFd::new(&self.listener, PollFlags::IN);
+        let stream = self.client.as_ref();
+        (door, stream.map(|(stream, _)| PollFd::new(stream, client)))
+    }
+}

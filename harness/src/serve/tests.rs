@@ -1,0 +1,1 @@
+//! Served rings in virtual time.
