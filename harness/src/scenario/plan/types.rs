@@ -334,7 +334,8 @@ pub enum PlannedCheck {
 
 impl Plan {
     /// The model of drive `drive`.
-    pub(in crate::scenario) fn model(&self, ring: usize, drive: u8) -> Model {
+    #[must_use]
+    pub fn model(&self, ring: usize, drive: u8) -> Model {
         let ring = self.models.get(ring);
         let model = ring.and_then(|ring| ring.get(usize::from(drive)));
         model.copied().unwrap_or_default()

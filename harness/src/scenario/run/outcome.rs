@@ -27,8 +27,18 @@ impl Outcome {
     /// A scenario that is not played, and why.
     #[must_use]
     pub fn skipped(remark: String) -> Self {
+        Self::not_played(Verdict::Skipped, remark)
+    }
+
+    /// A scenario that the bench could not play, and why.
+    #[must_use]
+    pub fn rig_error(remark: String) -> Self {
+        Self::not_played(Verdict::RigError, remark)
+    }
+
+    fn not_played(verdict: Verdict, remark: String) -> Self {
         Self {
-            verdict: Verdict::Skipped,
+            verdict,
             finding: None,
             remarks: vec![remark],
             took: time::Span::ZERO,

@@ -4,12 +4,14 @@
 //! them.
 
 use super::bytes::{matches, resolve};
-use super::player::Runner;
+use super::outcome::Outcome;
+use super::player::{AtFinding, Runner, lacks, play};
 use crate::link::Link;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use harness_proto::line::Received;
 use harness_proto::nd21;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::at_rest;
 use harness_proto::time::{Instant, Span};
@@ -86,17 +88,55 @@ fn exchange(link: &mut dyn Link, ring: usize, drive: u8, command: Command) -> Op
     Some(data.collect())
 }
 
+/// Plays a plan on drives that only their bus leads to: cells of the header are set before, and set back behind it.
+pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome {
+    if let Some(lacks) = lacks(plan, link) {
+        return Outcome::skipped(lacks);
+    }
+    let mut before = Vec::new();
+    let outcome = match set_up(plan, link, &mut before) {
+        Ok(()) => {
+            link.begin();
+            play(plan, link, at_finding)
+        }
+        Err(why) => match link.trouble() {
+            Some(trouble) => Outcome::rig_error(trouble.to_string()),
+            None => Outcome::skipped(why),
+        },
+    };
+    if before.is_empty() || link.trouble().is_some() {
+        return outcome;
+    }
+    link.begin();
+    let restored = restore(link, &mut before).or_else(|_| {
+        // A scenario may leave the ring in the error mode, or in the middle of a telegram (9.8).
+        for ring in 0..plan.rings.len() {
+            link.send(ring, &CHECK_SEQUENCE);
+        }
+        let end = link.now() + PATIENCE;
+        while link.busy() && link.now() < end && link.wait(end) {}
+        restore(link, &mut before)
+    });
+    match restored {
+        Ok(()) => outcome,
+        Err(why) => Outcome {
+            remarks: [outcome.remarks, vec![format!("not set back: {why}")]].concat(),
+            ..outcome
+        },
+    }
+}
+
 /// What a cell held before [`set_up`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Before {
+struct Before {
     /// In which ring, counted from 0.
-    pub ring: usize,
+    ring: usize,
     /// Of which drive.
-    pub drive: u8,
+    drive: u8,
     /// Which cell.
-    pub address: u16,
+    address: u16,
     /// What it held.
-    pub data: u8,
+    data: u8,
 }
 
 /// Sets the cells that a plan's header asks for, by telegrams, and reads them back. What they held before is added to
@@ -104,7 +144,7 @@ pub struct Before {
 ///
 /// # Errors
 /// The first cell that does not hold what it must, in a sentence.
-pub fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
+fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
     for (ring, drives, address, bytes) in plan.memory_setups() {
         for drive in drives {
             for (address, data) in (address..=u16::MAX).zip(bytes) {
@@ -129,9 +169,10 @@ pub fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Res
 ///
 /// # Errors
 /// The first cell that does not hold it, in a sentence.
-pub fn restore(link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
-    while let Some(cell) = before.pop() {
+fn restore(link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
+    while let Some(cell) = before.last().copied() {
         write(link, cell)?;
+        before.pop();
     }
     Ok(())
 }

@@ -39,8 +39,9 @@ pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
     play(plan, link, AtFinding::Stop)
 }
 
-/// Plays a plan on a link. The outcome tells of the first line that was not met.
-pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome {
+/// What a link lacks for a plan, in a sentence; `None` where the plan can be played.
+#[must_use]
+pub fn lacks(plan: &Plan, link: &dyn Link) -> Option<String> {
     let missing: Vec<_> = plan
         .needs
         .iter()
@@ -48,14 +49,22 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         .map(|need| need.name())
         .collect();
     if !missing.is_empty() {
-        return Outcome::skipped(format!("the rig has no {}", missing.join(", no ")));
+        return Some(format!("the rig has no {}", missing.join(", no ")));
     }
     if let Some((ring, place)) = plan
         .fault_links()
         .find(|(ring, place)| !link.reaches(*ring, *place))
     {
         let place = plan.link_name(ring, place);
-        return Outcome::skipped(format!("the rig has no interposer at {place}"));
+        return Some(format!("the rig has no interposer at {place}"));
+    }
+    None
+}
+
+/// Plays a plan on a link. The outcome tells of the first line that was not met.
+pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome {
+    if let Some(lacks) = lacks(plan, link) {
+        return Outcome::skipped(lacks);
     }
     let mut runner = Runner::new(plan, link, at_finding);
     let mut result = runner.play();
