@@ -6,7 +6,7 @@ mod ring;
 use harness::library::{Entry, sources};
 use harness::link::StreamLink;
 use harness::port::{PortSettings, open};
-use harness::scenario::run::{AtFinding, Outcome, play_over_bus};
+use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_anew};
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_sim::drive::Model;
@@ -34,6 +34,9 @@ fn link(served: &Served) -> StreamLink {
 
 fn play_on(link: &mut StreamLink, entry: &Entry) -> Outcome {
     let plan = entry.plan.as_ref().expect("novobus");
+    if lacks(plan, link).is_none() {
+        start_anew(link, &plan.rings).unwrap_or_else(|why| panic!("{}: {why}", entry.name));
+    }
     play_over_bus(plan, link, AtFinding::Stop)
 }
 
@@ -43,7 +46,7 @@ fn by_rings() -> BTreeMap<(&'static str, Vec<u8>), Vec<Entry>> {
     for source in sources(&[]).expect("the built-in scenarios") {
         let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}", p.all()));
         let plan = entry.plan.as_ref().expect("novobus");
-        if plan.rate == Rate::default() {
+        if plan.rate == Rate::default() && plan.rings[0].drives() < 100 {
             let sizes = plan.rings.iter().map(|ring| ring.drives()).collect();
             let model = if plan.model(0, 0) == Model::Plain {
                 "plain"
@@ -56,37 +59,60 @@ fn by_rings() -> BTreeMap<(&'static str, Vec<u8>), Vec<Entry>> {
     all
 }
 
-fn all_that_fit(transport: &str, marks: bool) {
-    let mut verdicts: BTreeMap<Verdict, usize> = BTreeMap::new();
+/// What a ring does not show beside the bus, or only in an answer that takes longer than the line is exact.
+const INCONCLUSIVE: [&str; 6] = [
+    "14.10.5-prog-param",
+    "14.10.6.2-time-basis",
+    "14.10.6.4-trigger-delay",
+    "14.10.6.5-scope-status",
+    "9.2-empty-short-telegram",
+    "9.3-address-byte",
+];
+
+/// Plays all that fits rings of up to `largest` drives, and says how many passed.
+fn all_that_fit(transport: &str, marks: bool, largest: u8) -> usize {
+    let mut passed = 0;
     let mut wrong = Vec::new();
     for ((model, sizes), entries) in by_rings() {
+        if sizes.iter().any(|size| *size > largest) {
+            continue;
+        }
         let served = Served::start(model, &sizes, transport, marks, &[]);
         let mut link = link(&served);
         for entry in entries {
-            let started = std::time::Instant::now();
             let outcome = play_on(&mut link, &entry);
-            *verdicts.entry(outcome.verdict).or_default() += 1;
-            if outcome.verdict != Verdict::Skipped {
-                eprintln!(
-                    "{:?} {} {:?}",
-                    outcome.verdict,
-                    entry.name,
-                    started.elapsed()
-                );
-            }
-            if !matches!(outcome.verdict, Verdict::Passed | Verdict::Skipped) {
-                wrong.push(format!(
-                    "{}: {:?} {:?}",
-                    entry.name, outcome.verdict, outcome.finding
-                ));
+            match outcome.verdict {
+                Verdict::Passed => passed += 1,
+                Verdict::Skipped => {}
+                Verdict::Inconclusive if INCONCLUSIVE.contains(&entry.short_name()) => {}
+                verdict => wrong.push(format!("{}: {verdict} {:?}", entry.name, outcome.finding)),
             }
         }
     }
-    eprintln!("{verdicts:?}");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    passed
 }
 
 #[test]
 fn over_a_socket_with_marks() {
-    all_that_fit("tcp", true);
+    let passed = all_that_fit("tcp", true, 10);
+    assert!(passed >= 26, "{passed}");
+}
+
+#[test]
+fn over_a_socket() {
+    let passed = all_that_fit("tcp", false, 2);
+    assert!(passed >= 7, "{passed}");
+}
+
+#[test]
+fn over_a_pty_with_marks() {
+    let passed = all_that_fit("pty", true, 2);
+    assert!(passed >= 7, "{passed}");
+}
+
+#[test]
+fn over_a_pty() {
+    let passed = all_that_fit("pty", false, 6);
+    assert!(passed >= 22, "{passed}");
 }

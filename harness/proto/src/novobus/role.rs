@@ -95,7 +95,7 @@ struct Reader {
     process_data: u8,
     drive: Option<u8>,
     /// The begun command of each drive.
-    commands: BTreeMap<Option<u8>, Vec<u8>>,
+    commands: BTreeMap<u8, Vec<u8>>,
     foreign: bool,
 }
 
@@ -177,7 +177,13 @@ impl Reader {
     }
 
     fn parameter(&mut self, byte: u8) -> Role {
-        let drive = self.drive;
+        let Some(drive) = self.drive else {
+            // Nobody is meant, so nobody reads a command in it.
+            return Role::Command {
+                drive: None,
+                section: "9.5",
+            };
+        };
         let begun = self.commands.entry(drive).or_default();
         begun.push(byte);
         let Some(layout) = layout(begun[0], ReadLongAnswer::default()) else {
@@ -185,6 +191,8 @@ impl Reader {
             return Role::Foreign;
         };
         let place = begun.len() - 1;
+        let own = drive;
+        let drive = Some(drive);
         let role = match place.checked_sub(1).and_then(|i| layout.answer.get(i)) {
             None | Some(Reply::Echo) => Role::Command {
                 drive,
@@ -201,7 +209,7 @@ impl Reader {
             },
         };
         if begun.len() == layout.length() {
-            self.commands.remove(&drive);
+            self.commands.remove(&own);
         }
         role
     }

@@ -79,7 +79,8 @@ impl PlannedSetupKind {
             // No command writes ROM or registers (ND21 10.2): only a simulated drive can be given them.
             Self::Memory(address, _) if !RAM.contains(address) => Some(Capability::Simulator),
             Self::Memory(..) => Some(Capability::Memory),
-            Self::Eeprom(..) => Some(Capability::Eeprom),
+            // What stands in an EEPROM beside the bus, before the drive is switched on.
+            Self::Eeprom(..) => Some(Capability::Simulator),
             // A real drive is what it is.
             Self::Word(..) | Self::Time(..) => Some(Capability::Simulator),
             Self::Model(_) | Self::Type(_) => None,

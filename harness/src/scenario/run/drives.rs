@@ -43,7 +43,7 @@ impl Runner<'_> {
         within: time::Span,
         span: Span,
     ) -> Result<(), Stop> {
-        let end = self.link.now() + within;
+        let end = self.link.now() + within + self.asking_time(check);
         loop {
             let now = self.link.now();
             self.line_before = now;

@@ -50,7 +50,7 @@ fn look(plan: &Plan, link: &mut dyn Link, check: &PlannedCheck, step: &PlannedSt
         }
     }
     let mut runner = Runner::new(plan, link, AtFinding::Stop);
-    let result = runner.check(check, step.span);
+    let result = runner.check(check, false, step.span);
     match (result, runner.unseen.take()) {
         (Ok(()), None) => Now::Done,
         (Err(stop), _) | (Ok(()), Some(stop)) => Now::Otherwise(stop.into_message()),

@@ -20,6 +20,40 @@ use harness_proto::time::{Instant, Span};
 const PATIENCE: Span = Span::from_millis(200);
 
 impl Runner<'_> {
+    /// Whether a check is on something that the link shows only in the answer to a telegram.
+    fn is_asked_for(&self, check: &PlannedDriveCheck) -> bool {
+        let address = match &check.condition {
+            PlannedCondition::Memory(address, _) => *address,
+            PlannedCondition::Cell(cell) => cell.address,
+            PlannedCondition::InError(false) => nd21::ram::STATUS,
+            PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return false,
+        };
+        let shown = |drive| self.link.peek(check.ring, drive, address).is_some();
+        !check.drives.clone().all(shown)
+    }
+
+    /// What was asked before says nothing of now.
+    pub(super) fn forget_answers(&mut self) {
+        self.seen.clear();
+        self.answers.clear();
+    }
+
+    /// How much later an answer over the bus can come than the cell itself: the cell is asked for again and again.
+    pub(super) fn asking_time(&self, check: &PlannedDriveCheck) -> Span {
+        if !self.is_asked_for(check) {
+            return Span::ZERO;
+        }
+        let drives = u64::from(self.link.drives(check.ring));
+        let bytes = match &check.condition {
+            PlannedCondition::Memory(_, bytes) => bytes.len(),
+            PlannedCondition::Cell(cell) => cell.size,
+            _ => 1,
+        };
+        let asked = check.drives.clone().count() as u64 * bytes as u64;
+        let one = self.link.byte_time() * (2 * drives + 8) + self.link.time_tolerance();
+        one * asked
+    }
+
     /// Where the link shows neither cells nor the error mode, asks the drives that a check is about. What does not
     /// answer stays unseen, and nothing is asked in the middle of a telegram or behind an error.
     pub(super) fn ask_for(&mut self, check: &PlannedDriveCheck) {
@@ -30,14 +64,12 @@ impl Runner<'_> {
             PlannedCondition::InError(false) => (status, 1),
             PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return,
         };
-        let ring = check.ring;
-        let shown = |drive| self.link.peek(ring, drive, address).is_some();
-        if check.drives.clone().all(shown) {
+        if !self.is_asked_for(check) {
             return;
         }
+        let ring = check.ring;
         self.settle();
-        self.seen.clear();
-        self.answers.clear();
+        self.forget_answers();
         let Ok(size_of_ring) = RingSize::new(u64::from(self.link.drives(ring))) else {
             return;
         };
@@ -46,9 +78,13 @@ impl Runner<'_> {
             return;
         }
         let received = self.rings[ring].received.len();
-        let line_before = self.line_before;
         for drive in check.drives.clone() {
             for address in (address..=u16::MAX).take(size) {
+                // The sum of the address passes through BusAddr (FF36) of every drive: a telegram that asks for it
+                // changes it.
+                if address == nd21::ram::BUS_ADDR {
+                    continue;
+                }
                 let read = exchange(self.link, ring, drive, Command::ReadByte { address });
                 if let Some([byte]) = read.as_deref() {
                     self.seen.insert((ring, drive, address), *byte);
@@ -57,7 +93,7 @@ impl Runner<'_> {
             }
         }
         self.rings[ring].received.truncate(received);
-        self.line_before = line_before;
+        self.line_before = self.line_before.max(self.link.now());
     }
 }
 
@@ -124,6 +160,49 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) ->
             ..outcome
         },
     }
+}
+
+/// How long drives may test themselves after a reset.
+const SELF_TEST: Span = Span::from_millis(10_000);
+
+/// Resets every drive (ND21 10.5) and waits until all have tested themselves (11.8): RAM is then as their EEPROMs say.
+///
+/// # Errors
+/// The first drive that does not come back, in a sentence.
+pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String> {
+    link.begin();
+    let drives = |(ring, size): (usize, &RingSize)| (0..size.drives()).map(move |k| (ring, k));
+    let all: Vec<_> = rings.iter().enumerate().flat_map(drives).collect();
+    for (ring, drive) in &all {
+        let cell = Before {
+            ring: *ring,
+            drive: *drive,
+            address: nd21::ram::STATUS,
+            data: 0,
+        };
+        if exchange(link, *ring, *drive, Command::ResetH8).is_none() {
+            return Err(wrong(link, cell, "it does not answer ResetH8"));
+        }
+    }
+    let end = link.now() + SELF_TEST;
+    for (ring, drive) in all {
+        let cell = Before {
+            ring,
+            drive,
+            address: nd21::ram::STATUS,
+            data: 0,
+        };
+        loop {
+            let status = read(link, cell);
+            if status.is_ok_and(|status| status & nd21::bits::status::RESET == 0) {
+                break;
+            }
+            if link.now() >= end || link.trouble().is_some() {
+                return Err(wrong(link, cell, "it does not come back from its reset"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// What a cell held before [`set_up`].
@@ -209,7 +288,7 @@ fn wrong(link: &dyn Link, cell: Before, why: &str) -> String {
     }
     let prefix = if cell.ring == 0 { "" } else { "2:" };
     format!(
-        "cell {:04X} of drive {prefix}{} cannot be set: {why}",
+        "cell {:04X} of drive {prefix}{}: {why}",
         cell.address, cell.drive
     )
 }

@@ -265,7 +265,7 @@ impl Runner<'_> {
                     self.settle();
                     self.line_before = self.line_before.max(self.link.now());
                 }
-                let result = self.check(check, step.span);
+                let result = self.check(check, step.when != PlannedWhen::Now, step.span);
                 self.sent = 0;
                 result
             }
