@@ -61,10 +61,11 @@ fn first(line: &str, problems: &Problems) -> String {
     };
     let before = line.get(..problem.span.start).unwrap_or(line);
     let column = before.chars().count() + 1;
-    let help = problem.help.as_ref();
-    let help = help.map_or(String::new(), |help| format!("; {help}"));
-    format!(
-        "column {column}: {}; {}{help}",
-        problem.message, problem.expected
-    )
+    let mut text = format!("column {column}: {}", problem.message);
+    let wanted = problem.expected.trim_end_matches(" expected here");
+    let more = (!text.contains(wanted)).then_some(&problem.expected);
+    for part in more.into_iter().chain(&problem.help) {
+        text = format!("{text}; {part}");
+    }
+    text
 }

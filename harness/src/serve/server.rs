@@ -8,6 +8,9 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
 use std::collections::VecDeque;
 
+/// How long the rings have been at work when the clock starts: the drives' regulators (ND21 4.1) have seen their inputs.
+const SETTLED: Span = Span::from_millis(1);
+
 /// How much of a client's bytes waits for the line at most: the rest stays with the client.
 const WAITING: Span = Span::from_millis(500);
 
@@ -84,6 +87,7 @@ impl Server {
     #[must_use]
     pub fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: Marks) -> Self {
         link.stop_recording();
+        link.run_until(link.now() + SETTLED);
         Self {
             base: (Instant::START, link.now()),
             seats: vec![Seat::default(); plan.rings.len()],
