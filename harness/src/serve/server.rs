@@ -248,11 +248,10 @@ impl Server {
         }
     }
 
-    /// How many bytes were lost since this was asked for last, because the client did not read.
-    pub fn take_lost(&mut self, ring: usize) -> u64 {
-        self.seats
-            .get_mut(ring)
-            .map_or(0, |seat| std::mem::take(&mut seat.lost))
+    /// How many bytes the client has lost because it did not read.
+    #[must_use]
+    pub fn lost(&self, ring: usize) -> u64 {
+        self.seats.get(ring).map_or(0, |seat| seat.lost)
     }
 
     /// When, by the clock, [`Self::advance`] is to be called again if nothing comes before.

@@ -169,8 +169,9 @@ fn a_client_that_does_not_read_loses_bytes() {
         run(&mut server, at(turn + 1));
     }
     assert_eq!(server.transmit(0).len(), UNREAD);
-    assert_eq!(server.take_lost(0), 80_000 - UNREAD as u64);
-    assert_eq!(server.take_lost(0), 0);
+    assert_eq!(server.lost(0), 80_000 - UNREAD as u64);
+    server.go(0);
+    assert_eq!(server.lost(0), 0);
 }
 
 /// Bytes leap, so that the clock stands still; silence takes its time (ND21 9.9: zeros after 10 ms and 10 ms more).
@@ -244,6 +245,13 @@ fn lines_of_control() {
             "? drive 0 memory FF08 = 1234",
             Some("no: cell FF08 of drive 0 holds 00, expected is 12"),
         ),
+        (
+            "state 2",
+            Some(
+                "ok bus=normal mode=go GPO1=low GPO2=low ready=closed analogue-output=0 encoder=0 display=blank",
+            ),
+        ),
+        ("state 1:2 nist FF08:2", Some("ok nist=0000 FF08=0000")),
         ("   # nothing", None),
         ("", None),
     ] {
@@ -263,12 +271,43 @@ fn lines_of_control() {
         ("drive 0 model plain", "behind the first step"),
         ("ring 3", "error: column 1"),
         ("\u{1}", "is not a text"),
+        ("state", "`state` and a drive of the bench expected"),
+        ("state 3", "`state` and a drive of the bench expected"),
+        ("state 2:0", "`state` and a drive of the bench expected"),
+        ("state 0 nisd", "nist"),
+        ("state 0 EE_pole", "is in the EEPROM"),
     ] {
         let given = server.control(line).expect("an answer").to_string();
         assert!(given.starts_with("error: "), "{line}: {given}");
         assert!(given.contains(part), "{line}: {given}");
         assert!(!given.contains('\n'), "{line}: {given}");
     }
+}
+
+/// The state tells an error of the bus by its code (ND21 14.11.14), and whether a drive turns.
+#[test]
+fn the_state_of_a_drive_follows_what_happens() {
+    let mut server = server(HEADER, &[2], Pace::Line, Marks::None);
+    // Nominal value 1500 rpm, written to drive 1 (ND21 10.2), then a byte with a parity error.
+    let mut telegram = vec![0x8C, 0xFF, 0x63, 0x52, 0x06, 0x08, 0xFF];
+    let sum = telegram[2..]
+        .iter()
+        .fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+    telegram.push(sum);
+    server.receive(0, &telegram).expect("no marks");
+    run(&mut server, at(2_000));
+    let state = |server: &mut Server, line: &str| {
+        let answer = server.control(line).expect("an answer");
+        answer.to_string()
+    };
+    let turning = state(&mut server, "state 1 nsoll nist");
+    assert!(turning.starts_with("ok nsoll=0652 nist=06"), "{turning}");
+    assert_eq!(state(&mut server, "state 0 nist"), "ok nist=0000");
+    assert_eq!(server.control("! master->1: flip p"), Some(Answer::Ok));
+    server.receive(0, &[0x80]).expect("no marks");
+    run(&mut server, at(2_010));
+    let broken = state(&mut server, "state 1");
+    assert!(broken.starts_with("ok bus=0502 "), "{broken}");
 }
 
 /// A fault at a time happens then, however far the clock jumps; the drive without power passes nothing on.
