@@ -1,6 +1,8 @@
 //! Lines of control: what somebody does to the rings beside the client, in the words of the scenario language.
 
 use super::server::Server;
+use crate::link::{Link, Mode, Shown};
+use crate::scenario::argument::{self, Memory};
 use crate::scenario::parse::parse_step;
 use crate::scenario::plan::plan_step;
 use crate::scenario::problem::Problems;
@@ -13,6 +15,8 @@ use std::fmt;
 pub enum Answer {
     /// It is done, or the check holds: `ok`.
     Ok,
+    /// What was asked for: `ok ` and the state of a drive, `name=value` with a space between.
+    State(String),
     /// The check does not hold: `no: ` and what was found.
     No(String),
     /// The line cannot be done, and nothing has happened: `error: ` and why, with the column of a mistake.
@@ -23,6 +27,7 @@ impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Ok => f.write_str("ok"),
+            Self::State(state) => write!(f, "ok {state}"),
             Self::No(found) => write!(f, "no: {found}"),
             Self::Error(why) => write!(f, "error: {why}"),
         }
@@ -31,8 +36,8 @@ impl fmt::Display for Answer {
 
 impl Server {
     /// Does a line of control at once: a fault (`! 98->97: flip 0`), something that happens to drives from outside the bus
-    /// (`drive 3 input GPIN5 high`), or a check that looks at drives (`? drive 3 nist = 0rpm +-5rpm`). `None` for an empty line or a
-    /// comment. Bytes and times in a fault are counted from the server's start.
+    /// (`drive 3 input GPIN5 high`), or a check that looks at drives (`? drive 3 nist = 0rpm +-5rpm`). `state 3` asks what a drive
+    /// shows outside the bus, `state 2:3 nist FF08:2` for cells of it, in hexadecimal digits. `None` for an empty line or a comment. Bytes and times in a fault are counted from the server's start.
     pub fn control(&mut self, line: &str) -> Option<Answer> {
         let said = line.split('#').next().unwrap_or_default().trim();
         if said.is_empty() {
@@ -42,6 +47,11 @@ impl Server {
             Ok(source) => source,
             Err(error) => return Some(Answer::Error(error.to_string())),
         };
+        let mut words = said.split_whitespace().map(str::to_owned);
+        if words.next().as_deref() == Some("state") {
+            let state = self.state(words.next().as_deref(), &words.collect::<Vec<_>>());
+            return Some(state.map_or_else(Answer::Error, Answer::State));
+        }
         let step = parse_step(&source).and_then(|step| plan_step(&self.plan, &step, &source));
         Some(match step {
             Err(problems) => Answer::Error(first(&source.text, &problems)),
@@ -52,6 +62,63 @@ impl Server {
             },
         })
     }
+
+    /// What a drive shows, or what these of its cells hold.
+    fn state(&self, drive: Option<&str>, cells: &[String]) -> Result<String, String> {
+        let (ring, number) = match drive.and_then(|drive| drive.split_once(':')) {
+            Some(("1", number)) => (0, Some(number)),
+            Some(("2", number)) => (1, Some(number)),
+            Some(_) => (usize::MAX, None),
+            None => (0, drive),
+        };
+        let drive = number
+            .and_then(|number| number.parse::<u8>().ok())
+            .filter(|drive| *drive < self.drives(ring))
+            .ok_or("`state` and a drive of the bench expected: `state 3`, `state 2:3` in the second ring")?;
+        let cells = argument::cells(cells).map_err(|problems| first("", &problems))?;
+        let mut found = Vec::new();
+        for location in &cells {
+            if location.memory == Memory::Eeprom {
+                let name = location.name();
+                return Err(format!(
+                    "`{name}` is in the EEPROM; a cell of the memory expected"
+                ));
+            }
+            let bytes: Option<String> = (location.address()..=u16::MAX)
+                .take(usize::from(location.size))
+                .map(|address| self.link.peek(ring, drive, address))
+                .map(|byte| byte.map(|byte| format!("{byte:02X}")))
+                .collect();
+            let bytes = bytes.ok_or("the drive's memory cannot be seen")?;
+            found.push(format!("{}={bytes}", location.name()));
+        }
+        if cells.is_empty() {
+            let bus = match self.link.error_of(ring, drive).flatten() {
+                Some(error) => format!("{:04X}", error.code()),
+                None => "normal".to_owned(),
+            };
+            found.push(format!("bus={bus}"));
+            found.extend(self.link.shown(ring, drive).map(|shown| outside(&shown)));
+        }
+        Ok(found.join(" "))
+    }
+}
+
+/// What stands outside the bus (ND21 5.3, 11.8): the analogue output in mV.
+fn outside(shown: &Shown) -> String {
+    let level = |high| if high { "high" } else { "low" };
+    let contact = if shown.ready { "closed" } else { "open" };
+    let mode = Mode::NAMES.iter().find(|(_, mode)| *mode == shown.mode);
+    let mode = mode.map_or("", |(name, _)| name);
+    let digits = |digits: [u8; 3]| digits.iter().map(|digit| format!("{digit:X}")).collect();
+    let display: String = shown.display.map_or("blank".to_owned(), digits);
+    format!(
+        "mode={mode} GPO1={} GPO2={} ready={contact} analogue-output={} encoder={} display={display}",
+        level(shown.gpo1),
+        level(shown.gpo2),
+        shown.analogue,
+        shown.encoder,
+    )
 }
 
 /// The first mistake in a line, and where it stands: characters counted from 1.
@@ -61,10 +128,11 @@ fn first(line: &str, problems: &Problems) -> String {
     };
     let before = line.get(..problem.span.start).unwrap_or(line);
     let column = before.chars().count() + 1;
-    let help = problem.help.as_ref();
-    let help = help.map_or(String::new(), |help| format!("; {help}"));
-    format!(
-        "column {column}: {}; {}{help}",
-        problem.message, problem.expected
-    )
+    let mut text = format!("column {column}: {}", problem.message);
+    let wanted = problem.expected.trim_end_matches(" expected here");
+    let more = (!text.contains(wanted)).then_some(&problem.expected);
+    for part in more.into_iter().chain(&problem.help) {
+        text = format!("{text}; {part}");
+    }
+    text
 }

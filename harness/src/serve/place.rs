@@ -1,6 +1,5 @@
 //! Where rings are served, and where lines of control come from.
 
-use std::fmt;
 use std::path::PathBuf;
 
 /// Where a ring is served.
@@ -19,13 +18,4 @@ pub enum ControlPlace {
     Standard,
     /// A socket that listens.
     Tcp(String),
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Tcp(address) => f.write_str(address),
-            Self::Pty(path) => path.display().fmt(f),
-        }
-    }
 }

@@ -88,6 +88,7 @@ impl Pty {
     /// Who has come or gone. Openings that follow one another may be told as one, so a byte read shows a client too.
     pub(super) fn changes(&mut self) -> Vec<Change> {
         let mut changes = Vec::new();
+        let mut here = self.here;
         let mut buffer = [MaybeUninit::uninit(); 1024];
         let mut reader = Reader::new(&self.watch, &mut buffer);
         for _ in 0..EVENTS {
@@ -97,17 +98,19 @@ impl Pty {
             let events = event.events();
             if events.contains(ReadFlags::OPEN) {
                 self.open += 1;
-                changes.extend((!self.here).then_some(Change::Came));
-                self.here = true;
+                changes.extend((!here).then_some(Change::Came));
+                here = true;
             }
             if events.intersects(ReadFlags::CLOSE_WRITE | ReadFlags::CLOSE_NOWRITE) {
                 self.open = self.open.saturating_sub(1);
-                if self.open == 0 && self.here {
-                    changes.push(Change::Gone);
-                    self.here = false;
+                if self.open == 0 {
+                    changes.extend(here.then_some(Change::Gone));
+                    here = false;
                 }
             }
         }
+        // Who has gone is here until `gone` is called: there may be bytes to be read.
+        self.here |= !changes.is_empty();
         changes
     }
 
@@ -124,16 +127,18 @@ impl Pty {
         Ok(rustix::io::write(&self.master, bytes)?)
     }
 
-    /// Drops what the client that has gone did not read.
-    pub(super) fn drop_unread(&self) {
+    /// The client has gone, and all that it sent has been read: what it did not read is dropped.
+    pub(super) fn gone(&mut self) {
+        self.here = self.open > 0;
         // Where it fails, the next client reads it.
         let _unflushed = tcflush(&self.slave, QueueSelector::IFlush);
     }
 
-    /// What to wait for: the openings, and the stream.
-    pub(super) fn polls(&self, stream: PollFlags) -> (PollFd<'_>, PollFd<'_>) {
-        let watch = PollFd::new(&self.watch, PollFlags::IN);
-        (watch, PollFd::new(&self.master, stream))
+    /// What to wait for: the stream, and openings and closings where it is read.
+    pub(super) fn polls(&self, stream: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
+        let read = stream.contains(PollFlags::IN);
+        let watch = read.then(|| PollFd::new(&self.watch, PollFlags::IN));
+        (PollFd::new(&self.master, stream), watch)
     }
 }
 

@@ -8,6 +8,9 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
 use std::collections::VecDeque;
 
+/// How long the rings have been at work when the clock starts: the drives' regulators (ND21 4.1) have seen their inputs.
+const SETTLED: Span = Span::from_millis(1);
+
 /// How much of a client's bytes waits for the line at most: the rest stays with the client.
 const WAITING: Span = Span::from_millis(500);
 
@@ -84,6 +87,7 @@ impl Server {
     #[must_use]
     pub fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: Marks) -> Self {
         link.stop_recording();
+        link.run_until(link.now() + SETTLED);
         Self {
             base: (Instant::START, link.now()),
             seats: vec![Seat::default(); plan.rings.len()],
@@ -244,11 +248,10 @@ impl Server {
         }
     }
 
-    /// How many bytes were lost since this was asked for last, because the client did not read.
-    pub fn take_lost(&mut self, ring: usize) -> u64 {
-        self.seats
-            .get_mut(ring)
-            .map_or(0, |seat| std::mem::take(&mut seat.lost))
+    /// How many bytes the client has lost because it did not read.
+    #[must_use]
+    pub fn lost(&self, ring: usize) -> u64 {
+        self.seats.get(ring).map_or(0, |seat| seat.lost)
     }
 
     /// When, by the clock, [`Self::advance`] is to be called again if nothing comes before.

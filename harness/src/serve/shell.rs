@@ -139,6 +139,7 @@ pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, Serv
     };
     let mut shell = Shell {
         garbled: vec![false; ends.len()],
+        losing: vec![false; ends.len()],
         server,
         ends,
         control,
@@ -220,6 +221,8 @@ struct Shell<'a> {
     gone: bool,
     /// Whether the client's marks were wrong; it is said once.
     garbled: Vec<bool>,
+    /// Whether the client has lost bytes; it is said once.
+    losing: Vec<bool>,
 }
 
 impl Shell<'_> {
@@ -287,8 +290,9 @@ impl Shell<'_> {
                     fds.extend(client);
                 }
                 Seat::Pty(pty) => {
-                    let (watch, stream) = pty.polls(stream);
-                    fds.extend([watch, stream]);
+                    let (stream, watch) = pty.polls(stream);
+                    fds.push(stream);
+                    fds.extend(watch);
                 }
             }
         }
@@ -339,34 +343,39 @@ impl Shell<'_> {
                 ),
             }
         }
-        let alive = self.hear(ring).and_then(|()| self.speak(ring));
-        let gone = match &mut self.ends[ring] {
-            Seat::Tcp(tcp) if tcp.taken() => alive.err(),
-            _ => None,
-        };
-        if let Some(error) = gone {
-            if let Seat::Tcp(tcp) = &mut self.ends[ring] {
+        let heard = self.hear(ring);
+        let drained = matches!(heard, Ok(true));
+        let alive = heard.and_then(|_| self.speak(ring));
+        match (&mut self.ends[ring], alive) {
+            (Seat::Tcp(tcp), Err(error)) if tcp.taken() => {
                 tcp.close();
+                let why = match error.kind() {
+                    io::ErrorKind::UnexpectedEof => String::new(),
+                    _ => format!(" ({error})"),
+                };
+                self.go(ring, &format!("the client has gone{why}"));
             }
-            let why = match error.kind() {
-                io::ErrorKind::UnexpectedEof => String::new(),
-                _ => format!(" ({error})"),
-            };
-            self.go(ring, &format!("the client has gone{why}"));
-        }
-        let changes = match &mut self.ends[ring] {
-            Seat::Pty(pty) => pty.changes(),
-            Seat::Tcp(_) => Vec::new(),
-        };
-        for change in changes {
-            match change {
-                Change::Came => self.come(ring, "a client came"),
-                Change::Gone => {
-                    if let Seat::Pty(pty) = &self.ends[ring] {
-                        pty.drop_unread();
-                    }
-                    self.go(ring, "the client has gone");
+            // Who has gone is still here until all that it sent has been read.
+            (Seat::Pty(pty), _) if drained => {
+                for change in pty.changes() {
+                    self.change(ring, change);
                 }
+            }
+            _ => {}
+        }
+    }
+
+    /// Somebody has opened or closed a pseudo terminal.
+    fn change(&mut self, ring: usize, change: Change) {
+        match change {
+            Change::Came => self.come(ring, "a client came"),
+            Change::Gone => {
+                // What it sent at the very end; a pseudo terminal that fails has nobody there.
+                let _read = self.hear(ring);
+                if let Seat::Pty(pty) = &mut self.ends[ring] {
+                    pty.gone();
+                }
+                self.go(ring, "the client has gone");
             }
         }
     }
@@ -375,6 +384,7 @@ impl Shell<'_> {
         self.here += 1;
         self.gone = false;
         self.garbled[ring] = false;
+        self.losing[ring] = false;
         self.server.come(ring);
         self.say(ring, text);
     }
@@ -382,21 +392,25 @@ impl Shell<'_> {
     fn go(&mut self, ring: usize, text: &str) {
         self.here = self.here.saturating_sub(1);
         self.gone = self.here == 0;
+        let lost = match self.server.lost(ring) {
+            0 => String::new(),
+            lost => format!("; it has lost {lost} bytes"),
+        };
         self.server.go(ring);
-        self.say(ring, text);
+        self.say(ring, &format!("{text}{lost}"));
     }
 
     fn say(&mut self, ring: usize, text: &str) {
         self.host.say(&format!("ring {}: {text}", ring + 1));
     }
 
-    /// Takes what a client has sent, as far as there is room for it.
-    fn hear(&mut self, ring: usize) -> io::Result<()> {
+    /// Takes what a client has sent, as far as there is room for it; says whether that was all.
+    fn hear(&mut self, ring: usize) -> io::Result<bool> {
         let mut buffer = [0; CHUNK];
         loop {
             let room = self.server.room(ring).min(CHUNK);
             if room == 0 {
-                return Ok(());
+                return Ok(false);
             }
             let read = match &mut self.ends[ring] {
                 Seat::Tcp(tcp) => tcp.read(&mut buffer[..room]),
@@ -405,7 +419,7 @@ impl Shell<'_> {
             let read = match read {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(read) => read,
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(true),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
                 Err(error) => return Err(error),
             };
@@ -426,12 +440,8 @@ impl Shell<'_> {
 
     /// Gives a client what has come for it, as far as it takes it.
     fn speak(&mut self, ring: usize) -> io::Result<()> {
-        let lost = self.server.take_lost(ring);
-        if lost > 0 {
-            self.say(
-                ring,
-                &format!("{lost} bytes lost: the client does not read"),
-            );
+        if self.server.lost(ring) > 0 && !std::mem::replace(&mut self.losing[ring], true) {
+            self.say(ring, "bytes are lost: the client does not read");
         }
         loop {
             let bytes = self.server.transmit(ring);

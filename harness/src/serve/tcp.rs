@@ -97,10 +97,10 @@ impl Tcp {
         self.client = None;
     }
 
-    /// What to wait for: the door, and the client where there is one.
+    /// What to wait for: the door, and the client where something is wanted of it.
     pub(super) fn polls(&self, client: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
         let door = PollFd::new(&self.listener, PollFlags::IN);
-        let stream = self.client.as_ref();
+        let stream = self.client.as_ref().filter(|_| !client.is_empty());
         (door, stream.map(|(stream, _)| PollFd::new(stream, client)))
     }
 }

@@ -21,7 +21,8 @@ Lines of control are lines of the scenario language that need no byte of the mas
                                   means the next one
   drive 0 input GPIN5 low         something happens to drives from outside the bus
   ? drive 0 nist = 0rpm +-5rpm    a check that looks at drives or at the error mode
-Each is answered by a line: `ok`, `no: ` and what was found, or `error: ` and why.
+  state 0                         mode, outputs, error of the bus; `state 2:0 nist FF08:2`: these cells
+Each is answered by a line: `ok` (and the state), `no: ` and what was found, or `error: ` and why.
 
 A pseudo terminal carries no parity and no rate, and cannot turn a second program away. Without --marks in-band every
 byte of the client's is a good one, and of a damaged one that comes back only its eight bits are left.
