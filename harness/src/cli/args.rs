@@ -2,6 +2,7 @@
 
 use super::drive::DriveCommand;
 use super::exit::Exit;
+use super::rig::RigCommand;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
@@ -58,6 +59,12 @@ pub enum Command {
     Manual(ManualArguments),
     /// Show the drive's cells: address, size, access, unit, meaning and section of the manual.
     Cells(CellsArguments),
+    /// Show benches, lock them, find their ports.
+    Rig {
+        /// What to do.
+        #[command(subcommand)]
+        command: RigCommand,
+    },
     /// Commands on a bus.
     #[command(flatten)]
     Drive(Box<DriveCommand>),

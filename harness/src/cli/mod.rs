@@ -9,6 +9,7 @@ mod list;
 mod man;
 mod manual;
 mod output;
+mod rig;
 mod run;
 mod trace;
 
@@ -57,6 +58,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Trace(arguments) => trace::trace(&arguments, output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => cells::cells(&arguments, output),
+        Command::Rig { command } => rig::rig(&command, output),
         Command::Drive(command) => drive::drive(&command, output),
         Command::Completions { shell } => man::completions(shell, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),

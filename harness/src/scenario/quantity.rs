@@ -434,3 +434,14 @@ fn ratio(numerator: i128, denominator: i128) -> Option<Ratio> {
     let part = |number: i128| i64::try_from(number / divisor).ok();
     Ratio::new(part(numerator)?, part(denominator)?)
 }
+
+/// Reads a text that is one number with its unit and nothing else, such as `300rpm` or `3 ms`.
+///
+/// # Errors
+/// It is no such text; places count from its start.
+pub fn parse(text: &str) -> Result<Quantity, Problem> {
+    let mut scanner = Scanner::new(text, 0);
+    let found = quantity(&mut scanner, None)?;
+    scanner.expect_end()?;
+    Ok(found)
+}

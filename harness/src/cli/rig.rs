@@ -1,0 +1,258 @@
+//! `drivebench rig`: benches, their files and who holds them.
+
+use super::exit::Exit;
+use super::output::Output;
+use crate::rig::file::Quarantine;
+use crate::rig::find::{self, FindError, Place};
+use crate::rig::lock::{self, LockError, Standing};
+use crate::rig::state::{self, Holder};
+use crate::rig::{Rig, scan, schema};
+use clap::{Subcommand, ValueEnum};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The commands on benches.
+#[derive(Debug, Subcommand)]
+pub enum RigCommand {
+    /// Show what benches there are and whether each is free, held, reserved, quarantined or has mistakes.
+    List {
+        /// In which form.
+        #[arg(long, value_enum, default_value_t = ListFormat::Text)]
+        format: ListFormat,
+    },
+    /// Print a bench's file with every default filled in.
+    Show {
+        /// A name, a file, or sim:N.
+        rig: String,
+    },
+    /// Print the JSON schema of bench files.
+    Schema,
+    /// Propose a block of a bench's file for each serial port of this machine; no port is opened.
+    Scan,
+    /// Keep a bench for yourself until `rig unlock`; other users get exit code 75.
+    Lock {
+        /// A name, a file, or sim:N.
+        rig: String,
+        /// What for; others are shown it.
+        #[arg(long, value_name = "TEXT")]
+        purpose: String,
+    },
+    /// Give a bench back.
+    Unlock {
+        /// A name, a file, or sim:N.
+        rig: String,
+        /// Also one that is kept for somebody else. A running process is not disturbed.
+        #[arg(long)]
+        force: bool,
+    },
+    /// Say that a bench must not be used (exit code 3 for who tries), or may be used again.
+    Quarantine {
+        /// A name, a file, or sim:N.
+        rig: String,
+        /// Why.
+        #[arg(long, value_name = "TEXT", required_unless_present = "lift")]
+        reason: Option<String>,
+        /// It may be used again.
+        #[arg(long, conflicts_with = "reason")]
+        lift: bool,
+    },
+}
+
+/// The forms of a list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ListFormat {
+    /// A line a bench.
+    Text,
+    /// A list for tools.
+    Json,
+}
+
+/// Why a command on a bench came to no good end.
+enum Failure {
+    Find(FindError),
+    Lock(LockError),
+    Said(Exit, String),
+    Output(std::io::Error),
+}
+
+impl Failure {
+    fn state(error: &std::io::Error) -> Self {
+        Self::Said(
+            Exit::RigError,
+            format!("failed to use the folder of locks: {error}; DRIVEBENCH_STATE names another"),
+        )
+    }
+}
+
+/// Does what is asked.
+pub(super) fn rig(command: &RigCommand, output: &mut Output) -> std::io::Result<Exit> {
+    match command_on(command, output) {
+        Ok(exit) => Ok(exit),
+        Err(Failure::Output(error)) => Err(error),
+        Err(Failure::Find(FindError::Mistakes(problems))) => {
+            output.mistakes(&problems);
+            Ok(Exit::Usage)
+        }
+        Err(Failure::Find(error)) => {
+            output.complain(&error.to_string());
+            Ok(Exit::Usage)
+        }
+        Err(Failure::Lock(error)) => {
+            output.complain(&error.to_string());
+            Ok(match error {
+                LockError::Busy { .. } => Exit::Busy,
+                LockError::Io { .. } => Exit::RigError,
+            })
+        }
+        Err(Failure::Said(exit, text)) => {
+            output.complain(&text);
+            Ok(exit)
+        }
+    }
+}
+
+fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure> {
+    let find = |name: &str| find::find(name, &find::folder()).map_err(Failure::Find);
+    let folder = || state::folder().map_err(|error| Failure::state(&error));
+    let text = match command {
+        RigCommand::List { format } => list(*format, &folder()?),
+        RigCommand::Show { rig } => show(&find(rig)?)?,
+        RigCommand::Schema => format!("{:#}\n", schema()),
+        RigCommand::Scan => {
+            let ports = scan::scan(Path::new("/"));
+            if ports.is_empty() {
+                let message = "this machine has no serial port; is the adapter plugged in?";
+                return Err(Failure::Said(Exit::NothingSelected, message.to_owned()));
+            }
+            scan::propose(&ports)
+        }
+        RigCommand::Lock { rig, purpose } => {
+            let rig = find(rig)?;
+            let me = Holder::me(purpose);
+            usable(&rig, &folder()?)?;
+            lock::reserve(&folder()?, rig.id(), &me).map_err(Failure::Lock)?;
+            format!("rig {} is reserved by {me}\n", rig.id())
+        }
+        RigCommand::Unlock { rig, force } => {
+            let rig = find(rig)?;
+            let before = lock::unreserve(&folder()?, rig.id(), &Holder::me("unlock"), *force);
+            match before.map_err(Failure::Lock)? {
+                Some(holder) => format!("rig {} is free; it was reserved by {holder}\n", rig.id()),
+                None => format!("rig {} was free\n", rig.id()),
+            }
+        }
+        RigCommand::Quarantine { rig, reason, .. } => {
+            let rig = find(rig)?;
+            state::set_quarantine(&folder()?, rig.id(), reason.as_deref())
+                .map_err(|error| Failure::state(&error))?;
+            match (reason, &rig.file.quarantine) {
+                (Some(reason), _) => format!("rig {} must not be used: {reason}\n", rig.id()),
+                (None, Some(_)) => {
+                    let message = format!(
+                        "the file of rig {} itself has a table [quarantine]: {}",
+                        rig.id(),
+                        rig.origin
+                    );
+                    return Err(Failure::Said(Exit::RigError, message));
+                }
+                (None, None) => format!("rig {} may be used\n", rig.id()),
+            }
+        }
+    };
+    output.result(&text).map_err(Failure::Output)?;
+    Ok(Exit::Passed)
+}
+
+/// Refuses a rig that must not be used.
+fn usable(rig: &Rig, folder: &Path) -> Result<(), Failure> {
+    let quarantine = quarantine(rig, folder).map_err(|error| Failure::state(&error))?;
+    quarantine.map_or(Ok(()), |Quarantine { since, reason }| {
+        let message = format!(
+            "rig {} must not be used since {since}: {reason}; `drivebench rig quarantine {} --lift` ends it",
+            rig.id(),
+            rig.id()
+        );
+        Err(Failure::Said(Exit::RigError, message))
+    })
+}
+
+/// Why it must not be used, by its file or by `rig quarantine`.
+fn quarantine(rig: &Rig, folder: &Path) -> std::io::Result<Option<Quarantine>> {
+    match &rig.file.quarantine {
+        Some(quarantine) => Ok(Some(quarantine.clone())),
+        None => state::quarantine(folder, rig.id()),
+    }
+}
+
+fn show(rig: &Rig) -> Result<String, Failure> {
+    let text = toml::to_string(&rig.file);
+    let text = text.map_err(|error| {
+        Failure::Said(Exit::RigError, format!("failed to print the rig: {error}"))
+    })?;
+    Ok(format!("# {}\n{text}", rig.origin))
+}
+
+fn list(format: ListFormat, folder: &Path) -> String {
+    let rows: Vec<_> = find::all(&find::folder())
+        .into_iter()
+        .map(|(name, place)| row(&name, &place, folder))
+        .collect();
+    match format {
+        ListFormat::Json => format!("{:#}\n", Value::Array(rows)),
+        ListFormat::Text => rows.iter().fold(String::new(), |mut text, row| {
+            let word = |key: &str| row[key].as_str().unwrap_or_default();
+            // Writing to a String cannot fail.
+            let _infallible = writeln!(
+                text,
+                "{:20} {:12} {}",
+                word("name"),
+                word("state"),
+                word("about")
+            );
+            text
+        }),
+    }
+}
+
+/// What is known of a bench: `name`, `state`, `about` in words, and where it has mistakes nothing else.
+fn row(name: &str, place: &Place, folder: &Path) -> Value {
+    let source = match place {
+        Place::File(path) => path.clone(),
+        Place::BuiltIn(name) => PathBuf::from(format!("built in: {name}")),
+    };
+    let rig = place
+        .source()
+        .map_err(FindError::from)
+        .and_then(|source| find::read(&source));
+    let rig = match rig {
+        Ok(rig) => rig,
+        Err(error) => {
+            return json!({ "name": name, "state": "bad", "file": source, "about": error.to_string() });
+        }
+    };
+    let title = rig.file.rig.title.clone().unwrap_or_default();
+    let known = quarantine(&rig, folder)
+        .and_then(|quarantine| Ok((quarantine, lock::standing(folder, rig.id())?)));
+    let (state, about, holder) = match known {
+        Err(error) => ("bad", error.to_string(), None),
+        Ok((Some(Quarantine { since, reason }), _)) => {
+            ("quarantined", format!("since {since}: {reason}"), None)
+        }
+        Ok((None, Standing::Free)) => ("free", title, None),
+        Ok((None, Standing::Reserved(holder))) => {
+            ("reserved", format!("by {holder}"), Some(holder))
+        }
+        Ok((None, Standing::Held(holder))) => {
+            let who = holder
+                .as_ref()
+                .map_or("somebody".to_owned(), Holder::to_string);
+            ("held", format!("by {who}"), holder)
+        }
+    };
+    let drives: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    json!({
+        "name": name, "id": rig.id(), "state": state, "about": about, "holder": holder, "file": source,
+        "drives": drives, "labels": rig.file.rig.labels,
+    })
+}

@@ -1,0 +1,612 @@
+//! From the text of a rig file to a [`Rig`]: every mistake is found here, before a port is opened.
+
+use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, Transport};
+use super::schema::{compare, span_of};
+use super::values::{ValueError, Wire};
+use crate::scenario::parse::parse_setup;
+use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::quantity::{Dimension, parse as quantity};
+use crate::scenario::source::Source;
+use harness_proto::nd21::cells::{Cell, RAM, cell};
+use harness_proto::nd21::io::Input;
+use std::collections::BTreeSet;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The longest id of a rig.
+const MAX_ID: usize = 64;
+
+/// A rig whose file has no mistakes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// Where it comes from, for messages: a path, `sim:3`, or the name of a built-in rig.
+    pub origin: String,
+    /// What its file says.
+    pub file: RigFile,
+}
+
+impl Rig {
+    /// Its id, by which it is locked.
+    #[must_use]
+    pub fn id(&self) -> &str {
+        &self.file.rig.id
+    }
+
+    /// Its rings with their numbers, 1 and 2.
+    pub fn rings(&self) -> impl Iterator<Item = (u8, &Ring)> {
+        std::iter::once(&self.file.ring.first)
+            .chain(&self.file.ring.second)
+            .zip(1..)
+            .map(|(ring, number)| (number, ring))
+    }
+
+    /// Whether its rings are simulated in the program. Such a rig needs no lock: everyone has a copy.
+    #[must_use]
+    pub fn is_simulated(&self) -> bool {
+        self.file.ring.first.endpoint.transport == Transport::Sim
+    }
+}
+
+/// Reads a rig file.
+///
+/// # Errors
+/// All its mistakes, each with its place.
+pub fn parse(source: &Source) -> Result<Rig, Problems> {
+    let problems = |mut problems: Vec<Problem>| {
+        problems.sort_by_key(|problem| (problem.span.start, problem.span.end));
+        Problems::new(&source.name, source.text.clone(), problems)
+    };
+    let table = DeTable::parse(&source.text).map_err(|e| problems(vec![syntax(&e)]))?;
+    let mistakes = compare(&table);
+    if !mistakes.is_empty() {
+        return Err(problems(mistakes));
+    }
+    let file: RigFile = toml::from_str(&source.text).map_err(|e| problems(vec![syntax(&e)]))?;
+    let mut check = Check {
+        table: &table,
+        file: &file,
+        problems: Vec::new(),
+    };
+    check.all(source);
+    if !check.problems.is_empty() {
+        return Err(problems(check.problems));
+    }
+    Ok(Rig {
+        origin: source.name.clone(),
+        file,
+    })
+}
+
+fn syntax(error: &toml::de::Error) -> Problem {
+    let span = error.span().unwrap_or_default();
+    let span = Span {
+        start: span.start,
+        end: span.end,
+    };
+    Problem::new(
+        span,
+        error.message().replace('\n', ", "),
+        "TOML expected here",
+    )
+}
+
+/// A bound of an interlock, in the unit of its cell's scale.
+pub(super) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
+    let wrong = |message: String, expected: &str| ValueError {
+        message,
+        expected: expected.to_owned(),
+    };
+    let Some(dimension) = cell.scale.and_then(Dimension::of) else {
+        return text.trim().parse::<i32>().map(f64::from).map_err(|_| {
+            wrong(
+                format!("`{text}` is no whole number"),
+                "the cell has no unit: a whole number in quotes expected here",
+            )
+        });
+    };
+    let unit = cell.scale.map_or("", |scale| scale.unit());
+    let expected = format!("a number in {unit} expected here");
+    let value = quantity(text).map_err(|problem| wrong(problem.message, &expected))?;
+    if value.unit.dimension() == dimension {
+        Ok(value.value.to_f64())
+    } else {
+        let message = format!("`{}` is no unit of {}", value.unit.name, cell.printed);
+        Err(wrong(message, &expected))
+    }
+}
+
+/// A step on the way to a value: a key or a number in a list.
+#[derive(Clone, Copy)]
+enum Step<'a> {
+    Key(&'a str),
+    Index(usize),
+}
+
+impl<'a> From<&'a str> for Step<'a> {
+    fn from(key: &'a str) -> Self {
+        Self::Key(key)
+    }
+}
+
+impl From<usize> for Step<'_> {
+    fn from(index: usize) -> Self {
+        Self::Index(index)
+    }
+}
+
+struct Check<'a> {
+    table: &'a Spanned<DeTable<'a>>,
+    file: &'a RigFile,
+    problems: Vec<Problem>,
+}
+
+impl Check<'_> {
+    /// The place of a value, or of the nearest table around it that is there.
+    fn place(&self, path: &[Step<'_>]) -> Span {
+        let mut span = span_of(self.table);
+        let mut value: Option<&Spanned<DeValue<'_>>> = None;
+        for step in path {
+            let next = match (step, value.map(Spanned::get_ref)) {
+                (Step::Key(key), None) => self.table.get_ref().get(*key),
+                (Step::Key(key), Some(DeValue::Table(table))) => table.get(*key),
+                (Step::Index(index), Some(DeValue::Array(array))) => array.get(*index),
+                _ => None,
+            };
+            let Some(next) = next else { break };
+            span = span_of(next);
+            value = Some(next);
+        }
+        span
+    }
+
+    fn wrong(
+        &mut self,
+        path: &[Step<'_>],
+        message: impl Into<String>,
+        expected: impl Into<String>,
+    ) {
+        let problem = Problem::new(self.place(path), message, expected);
+        self.problems.push(problem);
+    }
+
+    fn all(&mut self, source: &Source) {
+        let file = self.file;
+        debug_assert_eq!(file.schema, SCHEMA);
+        self.id();
+        let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
+        for (ring, number) in rings.zip(["1", "2"]) {
+            let path = [Step::Key("ring"), Step::Key(number)];
+            self.endpoint(&path, &ring.endpoint);
+        }
+        self.one_world();
+        for (index, tap) in file.tap.iter().enumerate() {
+            let path = ["tap".into(), index.into()];
+            self.wire(&path, tap.ring, tap.link);
+            self.endpoint(&path, &tap.endpoint);
+            self.is_physical(&path, &tap.endpoint);
+        }
+        for (index, interposer) in file.interposer.iter().enumerate() {
+            let path = ["interposer".into(), index.into()];
+            self.wire(&path, interposer.ring, interposer.link);
+            let ends = [
+                ("upstream", &interposer.upstream),
+                ("downstream", &interposer.downstream),
+            ];
+            for (key, endpoint) in ends {
+                let path = [path[0], path[1], key.into()];
+                self.endpoint(&path, endpoint);
+                self.is_physical(&path, endpoint);
+            }
+        }
+        self.ports();
+        self.drives();
+        for (index, interlock) in file.interlock.iter().enumerate() {
+            self.interlock(&["interlock".into(), index.into()], interlock);
+        }
+        self.programs();
+        self.quarantine();
+        self.setup(source);
+    }
+
+    fn id(&mut self) {
+        let id = &self.file.rig.id;
+        let fits = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
+        if id.is_empty() || id.len() > MAX_ID || id.starts_with(['.', '-']) || !id.chars().all(fits)
+        {
+            let expected =
+                "1 to 64 letters, digits, `.`, `_` or `-`, a letter or digit first, expected here";
+            self.wrong(
+                &["rig".into(), "id".into()],
+                format!("`{id}` is no id"),
+                expected,
+            );
+        }
+    }
+
+    /// Ports that fit their transport.
+    fn endpoint(&mut self, path: &[Step<'_>], endpoint: &Endpoint) {
+        let at = |key| [path, &[Step::Key(key)]].concat();
+        let transport = endpoint.transport.name();
+        match (endpoint.transport, &endpoint.port, endpoint.udev.is_empty()) {
+            (Transport::Sim, Some(_), _) => {
+                self.wrong(
+                    &at("port"),
+                    "a simulated ring has no port",
+                    "no `port` expected here",
+                );
+            }
+            (Transport::Sim, None, true) => {}
+            (Transport::Serial, Some(_), false) => self.wrong(
+                &at("match"),
+                "both `port` and `match` are given",
+                "one of them expected",
+            ),
+            (Transport::Serial, None, true) => self.wrong(
+                &at("transport"),
+                "a serial port needs `port` or `match`",
+                "`port = \"/dev/ttyUSB0\"` or `match = { ... }` expected beside it",
+            ),
+            (Transport::Serial, ..) => {}
+            (_, _, false) => self.wrong(
+                &at("match"),
+                format!("`match` finds serial ports; this is {transport}"),
+                "`port` expected in its place",
+            ),
+            (_, None, _) => self.wrong(
+                &at("transport"),
+                format!("transport {transport} needs `port`"),
+                "`port` expected beside it",
+            ),
+            (Transport::Pty, ..) => {}
+            (Transport::Tcp | Transport::Rfc2217, Some(port), _) => {
+                let fits = port.rsplit_once(':').is_some_and(|(host, number)| {
+                    !host.is_empty() && number.parse::<u16>().is_ok_and(|number| number > 0)
+                });
+                if !fits {
+                    let message = format!("`{port}` is no address");
+                    self.wrong(
+                        &at("port"),
+                        message,
+                        "host:port such as \"127.0.0.1:4021\" expected here",
+                    );
+                }
+            }
+        }
+        if endpoint.port.as_deref() == Some("") {
+            self.wrong(
+                &at("port"),
+                "`port` is empty",
+                "a device or host:port expected here",
+            );
+        }
+        let carries = matches!(endpoint.transport, Transport::Pty | Transport::Tcp);
+        if endpoint.marks == Marks::InBand && !carries {
+            let why = match endpoint.transport {
+                Transport::Rfc2217 => "RFC 2217 cannot carry the value of a bad byte",
+                Transport::Serial => "a serial port tells of line errors by itself",
+                _ => "a simulated ring tells of line errors by itself",
+            };
+            self.wrong(
+                &at("marks"),
+                why,
+                "\"none\" expected here; in-band marks are for pty and tcp",
+            );
+        }
+    }
+
+    fn is_physical(&mut self, path: &[Step<'_>], endpoint: &Endpoint) {
+        if endpoint.transport == Transport::Sim {
+            let path = [path, &["transport".into()]].concat();
+            self.wrong(
+                &path,
+                "taps and interposers have ports; a simulated ring shows every link by itself",
+                "\"serial\", \"pty\", \"tcp\" or \"rfc2217\" expected here",
+            );
+        }
+    }
+
+    /// Rings are all simulated or all outside the program: one clock for all.
+    fn one_world(&mut self) {
+        let rings = &self.file.ring;
+        let sim = |ring: &Ring| ring.endpoint.transport == Transport::Sim;
+        let first = sim(&rings.first);
+        if rings
+            .second
+            .as_ref()
+            .is_some_and(|second| sim(second) != first)
+        {
+            self.wrong(
+                &["ring".into(), "2".into(), "transport".into()],
+                "one ring is simulated and the other is not",
+                "both simulated or both with ports expected",
+            );
+        }
+        if !first && self.file.sim.is_some() {
+            self.wrong(
+                &["sim".into()],
+                "[sim] is for simulated rings; the drives of this one are what they are",
+                "no [sim] expected here",
+            );
+        }
+    }
+
+    /// How many drives the ring has; `None`, and a mistake, where there is no such ring.
+    fn ring(&mut self, path: &[Step<'_>], ring: u8) -> Option<u8> {
+        let rings = &self.file.ring;
+        let found = match ring {
+            1 => Some(&rings.first),
+            _ => rings.second.as_ref(),
+        };
+        if found.is_none() {
+            let path = [path, &["ring".into()]].concat();
+            self.wrong(
+                &path,
+                "the rig has no ring 2",
+                "1, or a table [ring.2], expected",
+            );
+        }
+        found.map(|ring| ring.drives)
+    }
+
+    fn wire(&mut self, path: &[Step<'_>], ring: u8, wire: Wire) {
+        let Some(drives) = self.ring(path, ring) else {
+            return;
+        };
+        if !wire.is_in(drives) {
+            let last = drives.saturating_sub(1);
+            let message = format!("ring {ring} has no link {wire}");
+            let expected = match last {
+                0 => "master->0 or 0->master expected here: the ring has one drive".to_owned(),
+                _ => format!(
+                    "master->{last}, {last}->{} and so on to 0->master expected here: the ring has {drives} drives",
+                    last - 1
+                ),
+            };
+            self.wrong(&[path, &["link".into()]].concat(), message, expected);
+        }
+    }
+
+    /// No port is named twice.
+    fn ports(&mut self) {
+        let file = self.file;
+        let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
+        let mut all: Vec<(Vec<Step<'_>>, &Endpoint)> = Vec::new();
+        for (ring, key) in rings.zip(["1", "2"]) {
+            all.push((vec!["ring".into(), key.into()], &ring.endpoint));
+        }
+        for (index, tap) in file.tap.iter().enumerate() {
+            all.push((vec!["tap".into(), index.into()], &tap.endpoint));
+        }
+        for (index, both) in file.interposer.iter().enumerate() {
+            for (key, endpoint) in [
+                ("upstream", &both.upstream),
+                ("downstream", &both.downstream),
+            ] {
+                all.push((
+                    vec!["interposer".into(), index.into(), key.into()],
+                    endpoint,
+                ));
+            }
+        }
+        let mut seen = BTreeSet::new();
+        for (mut path, endpoint) in all {
+            let Some(port) = &endpoint.port else { continue };
+            if !seen.insert(port) {
+                path.push("port".into());
+                let message = format!("the port {port} is named twice");
+                self.wrong(&path, message, "another port expected here");
+            }
+        }
+    }
+
+    fn drive(&mut self, path: &[Step<'_>], ring: u8, address: u8) {
+        let at = path.split_last().map_or(path, |(_, before)| before);
+        let Some(drives) = self.ring(at, ring) else {
+            return;
+        };
+        if address >= drives {
+            let message = format!("ring {ring} has no drive {address}");
+            let expected = format!(
+                "0 to {} expected here: the ring has {drives} drives",
+                drives.saturating_sub(1)
+            );
+            self.wrong(path, message, expected);
+        }
+    }
+
+    fn drives(&mut self) {
+        let file = self.file;
+        let mut seen = BTreeSet::new();
+        for (index, drive) in file.drive.iter().enumerate() {
+            let path = ["drive".into(), index.into(), "address".into()];
+            self.drive(&path, drive.ring, drive.address);
+            if !seen.insert((drive.ring, drive.address)) {
+                let message = format!(
+                    "drive {} of ring {} is described twice",
+                    drive.address, drive.ring
+                );
+                self.wrong(&path, message, "another address expected here");
+            }
+        }
+        for (index, deviation) in file.deviation.iter().enumerate() {
+            for drive in &deviation.drives {
+                let path = ["deviation".into(), index.into(), "drives".into()];
+                self.drive(&path, deviation.ring, *drive);
+            }
+        }
+    }
+
+    fn interlock(&mut self, path: &[Step<'_>], interlock: &Interlock) {
+        let at = |key| [path, &[Step::Key(key)]].concat();
+        self.drive(&at("drive"), interlock.ring, interlock.drive);
+        let bounds = [("min", &interlock.min), ("max", &interlock.max)];
+        match (&interlock.cell, &interlock.input) {
+            (Some(name), None) => {
+                let Some(cell) = cell(name) else {
+                    let known: Vec<_> = RAM.iter().map(|cell| cell.printed).collect();
+                    let place = self.place(&at("cell"));
+                    let problem = Problem::new(
+                        place,
+                        format!("there is no cell `{name}`"),
+                        "the name of a RAM cell expected here (`drivebench cells`)",
+                    );
+                    self.problems.push(problem.did_you_mean(name, &known));
+                    return;
+                };
+                if interlock.min.is_none() && interlock.max.is_none() {
+                    self.wrong(
+                        &at("cell"),
+                        "nothing bounds this cell",
+                        "`min`, `max` or both expected beside it",
+                    );
+                }
+                if interlock.level.is_some() {
+                    self.wrong(
+                        &at("level"),
+                        "`level` is for inputs",
+                        "`min` or `max` expected in its place",
+                    );
+                }
+                let mut values = Vec::new();
+                for (key, text) in bounds {
+                    let Some(text) = text else { continue };
+                    match bound(cell, text) {
+                        Ok(value) => values.push(value),
+                        Err(error) => self.wrong(&at(key), error.message, error.expected),
+                    }
+                }
+                if values.len() == 2 && values[0] > values[1] {
+                    self.wrong(
+                        &at("min"),
+                        "`min` is above `max`",
+                        "a smaller value expected here",
+                    );
+                }
+            }
+            (None, Some(name)) => {
+                if Input::from_name(name).is_none() {
+                    let known = Input::ALL.map(Input::name);
+                    let problem = Problem::new(
+                        self.place(&at("input")),
+                        format!("there is no input `{name}`"),
+                        format!("one of {} expected here", known.join(", ")),
+                    );
+                    self.problems.push(problem.did_you_mean(name, &known));
+                }
+                if interlock.level.is_none() {
+                    self.wrong(
+                        &at("input"),
+                        "at which level it must stay is missing",
+                        "`level` expected beside it",
+                    );
+                }
+                for (key, text) in bounds {
+                    if text.is_some() {
+                        self.wrong(
+                            &at(key),
+                            format!("`{key}` is for cells"),
+                            "`level` expected in its place",
+                        );
+                    }
+                }
+            }
+            _ => self.wrong(
+                path,
+                "an interlock looks at one thing",
+                "either `cell` or `input` expected in here",
+            ),
+        }
+    }
+
+    /// Programs have a name, and none of their words holds a zero byte.
+    fn programs(&mut self) {
+        let file = self.file;
+        let mut all: Vec<(Vec<Step<'_>>, &[String])> = Vec::new();
+        for (name, power) in &file.power {
+            let entries = [
+                ("on", Some(&power.on)),
+                ("off", Some(&power.off)),
+                ("status", power.status.as_ref()),
+            ];
+            for (key, command) in entries {
+                all.extend(command.map(|c| {
+                    (
+                        vec!["power".into(), name.as_str().into(), key.into()],
+                        c.as_slice(),
+                    )
+                }));
+            }
+        }
+        let hooks = &file.hooks;
+        for (key, hook) in [
+            ("before", &hooks.before),
+            ("after", &hooks.after),
+            ("on_error", &hooks.on_error),
+        ] {
+            all.extend(hook.as_ref().map(|hook| {
+                (
+                    vec!["hooks".into(), key.into(), "command".into()],
+                    hook.command.as_slice(),
+                )
+            }));
+        }
+        for (path, command) in all {
+            if command.first().is_none_or(String::is_empty)
+                || command.iter().any(|word| word.contains('\0'))
+            {
+                self.wrong(
+                    &path,
+                    "this is no program",
+                    "[\"program\", \"argument\"] expected here",
+                );
+            }
+        }
+    }
+
+    fn quarantine(&mut self) {
+        let Some(quarantine) = &self.file.quarantine else {
+            return;
+        };
+        let date = quarantine.since.parse::<toml::value::Datetime>();
+        if !date.is_ok_and(|date| date.date.is_some()) {
+            let message = format!("`{}` is no date", quarantine.since);
+            self.wrong(
+                &["quarantine".into(), "since".into()],
+                message,
+                "a date such as \"2026-03-14\" expected here",
+            );
+        }
+    }
+
+    /// The lines of `[sim]`, in the scenario language.
+    fn setup(&mut self, source: &Source) {
+        let Some(sim) = &self.file.sim else { return };
+        let rings = &self.file.ring;
+        let sizes: Vec<_> = std::iter::once(&rings.first)
+            .chain(&rings.second)
+            .map(|ring| ring.drives)
+            .collect();
+        for (index, line) in sim.setup.iter().enumerate() {
+            let text = Source {
+                name: source.name.clone(),
+                text: line.as_str().into(),
+            };
+            let wrong = match parse_setup(&text, &sizes) {
+                _ if line.contains('\n') => Some(Problem::new(
+                    Span::default(),
+                    "this is more than one line",
+                    "one line expected here",
+                )),
+                Ok(_) => None,
+                Err(problems) => problems.all().first().cloned(),
+            };
+            if let Some(problem) = wrong {
+                let place = self.place(&["sim".into(), "setup".into(), index.into()]);
+                self.problems.push(Problem {
+                    span: place,
+                    ..problem
+                });
+            }
+        }
+    }
+}

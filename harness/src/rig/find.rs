@@ -1,0 +1,188 @@
+//! A rig by its name: `sim:3`, a file, a file of a folder of rigs, or one that the program carries.
+
+use super::check::{Rig, parse};
+use crate::scenario::problem::{Problems, nearest};
+use crate::scenario::source::{Source, SourceError};
+use harness_proto::novobus::address::RingSize;
+use include_dir::{Dir, include_dir};
+use std::path::{Path, PathBuf};
+
+/// The rigs that the binary carries.
+static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/rigs");
+
+/// The folder of rigs, where the environment names one.
+pub const FOLDER_VARIABLE: &str = "DRIVEBENCH_RIGS";
+
+/// The most rigs that are taken from a folder.
+const MAX_RIGS: usize = 1000;
+
+/// Why there is no rig.
+#[derive(Debug, thiserror::Error)]
+pub enum FindError {
+    /// Nothing has this name.
+    #[error("failed to find the rig {name}: no file, and no rig of that name; {remedy}")]
+    NotFound {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        remedy: String,
+    },
+    /// `sim:` with something behind it that is no size of rings.
+    #[error("failed to make the rig {name}: {reason}")]
+    Simulated {
+        /// What was asked for.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file cannot be read.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// A file has mistakes.
+    #[error(transparent)]
+    Mistakes(#[from] Box<Problems>),
+}
+
+/// The folder in which rigs are kept: `$DRIVEBENCH_RIGS`, else `rigs` where the program was started.
+#[must_use]
+pub fn folder() -> PathBuf {
+    std::env::var_os(FOLDER_VARIABLE)
+        .filter(|folder| !folder.is_empty())
+        .map_or_else(|| PathBuf::from("rigs"), PathBuf::from)
+}
+
+/// Finds and reads a rig: `sim:N` and `sim:N,M`, the path of a file, the name of a file of `folder`, or
+/// the name of a built-in one, in this order.
+///
+/// # Errors
+/// There is no such rig, or its file has mistakes.
+pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
+    if let Some(sizes) = name.strip_prefix("sim:") {
+        let text = simulated(sizes).map_err(|reason| FindError::Simulated {
+            name: name.to_owned(),
+            reason,
+        })?;
+        return read(&Source {
+            name: name.to_owned(),
+            text: text.into(),
+        });
+    }
+    let path = Path::new(name);
+    let is_path = name.contains('/') || path.extension().is_some_and(|ending| ending == "toml");
+    if is_path && path.exists() {
+        return read(&Source::read(path)?);
+    }
+    let all = all(folder);
+    if let Some((_, place)) = all.iter().find(|(known, _)| known == name) {
+        return read(&place.source()?);
+    }
+    let known: Vec<_> = all.iter().map(|(name, _)| name.as_str()).collect();
+    let near = nearest(name, &known).map(|near| format!("did you mean `{near}`? "));
+    Err(FindError::NotFound {
+        name: name.to_owned(),
+        remedy: format!(
+            "{}there are {}, and sim:N",
+            near.unwrap_or_default(),
+            known.join(", ")
+        ),
+    })
+}
+
+/// Where a rig stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In a file.
+    File(PathBuf),
+    /// In the binary; the name of its file.
+    BuiltIn(String),
+}
+
+impl Place {
+    /// The text of the file.
+    ///
+    /// # Errors
+    /// It cannot be read or is no text.
+    pub fn source(&self) -> Result<Source, SourceError> {
+        match self {
+            Self::File(path) => Source::read(path),
+            Self::BuiltIn(name) => {
+                let bytes = BUILT_IN
+                    .get_file(name)
+                    .map_or(&[][..], include_dir::File::contents);
+                Source::from_bytes(name.clone(), bytes.to_vec())
+            }
+        }
+    }
+}
+
+/// Reads a rig.
+///
+/// # Errors
+/// Its mistakes.
+pub fn read(source: &Source) -> Result<Rig, FindError> {
+    parse(source).map_err(|problems| Box::new(problems).into())
+}
+
+/// Every rig with its name, in order: those of `folder`, and the built-in ones with other names.
+#[must_use]
+pub fn all(folder: &Path) -> Vec<(String, Place)> {
+    let mut all = std::collections::BTreeMap::new();
+    for file in BUILT_IN.files() {
+        if let Some(name) = rig_name(file.path()) {
+            let place = file.path().display().to_string();
+            all.insert(name, Place::BuiltIn(place));
+        }
+    }
+    // A folder that is not there has no rigs.
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    for path in entries
+        .take(MAX_RIGS)
+        .filter_map(Result::ok)
+        .map(|entry| entry.path())
+    {
+        if let Some(name) = rig_name(&path) {
+            all.insert(name, Place::File(path));
+        }
+    }
+    all.into_iter().collect()
+}
+
+fn rig_name(path: &Path) -> Option<String> {
+    path.extension().filter(|ending| *ending == "toml")?;
+    Some(path.file_stem()?.to_str()?.to_owned())
+}
+
+/// The file of a simulated bench of which only the sizes of its rings are said.
+fn simulated(sizes: &str) -> Result<String, String> {
+    let size = |text: &str| {
+        let number: u64 = text.parse().map_err(|_| {
+            format!("`{text}` is no number of drives: 1 to 250 expected (ND21 8.4)")
+        })?;
+        RingSize::new(number)
+            .map(RingSize::drives)
+            .map_err(|error| error.to_string())
+    };
+    let sizes = sizes.split(',').map(size).collect::<Result<Vec<_>, _>>()?;
+    let ring = |number: usize| {
+        let drives = sizes[number];
+        let prefix = ["", "2:"][number];
+        (
+            format!(
+                "[ring.{}]\ndrives = {drives}\ntransport = \"sim\"\n",
+                number + 1
+            ),
+            format!("\"drive {prefix}0..last input GPIN3 GPIN5 high\""),
+        )
+    };
+    let (rings, setups): (Vec<_>, Vec<_>) = match sizes.len() {
+        count @ 1..=2 => (0..count).map(ring).unzip(),
+        _ => return Err("a bench has one ring or two (ND21 12.2)".to_owned()),
+    };
+    let id: Vec<_> = sizes.iter().map(u8::to_string).collect();
+    Ok(format!(
+        "schema = 1\n[rig]\nid = \"sim-{}\"\n{}[sim]\nsetup = [{}]\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n",
+        id.join("-"),
+        rings.concat(),
+        setups.join(", ")
+    ))
+}

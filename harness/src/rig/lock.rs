@@ -1,0 +1,333 @@
+//! Who holds a rig, and who holds a port.
+//!
+//! A rig is held as long as a process has its lock file locked (flock). The lock goes with the process, however it
+//! ends; what stands in the file then is stale, and nobody heeds it. A reservation stands in the same file, is
+//! heeded without any process, and keeps out every other user until it is given back.
+
+use super::check::Rig;
+use super::state::{self, Holder};
+use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, OpenOptions, Permissions};
+use std::io::{self, Seek, Write};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd};
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// How often a busy lock is tried again.
+const AGAIN: Duration = Duration::from_millis(50);
+/// How long a lock is tried at least: looking at it (`rig list`) takes it for a moment.
+const AT_LEAST: Duration = Duration::from_millis(100);
+
+/// Why there is no lock.
+#[derive(Debug, thiserror::Error)]
+pub enum LockError {
+    /// Somebody else has it.
+    #[error("rig {rig} is {how} by {}", holder_text(.holder.as_ref()))]
+    Busy {
+        /// The rig's id.
+        rig: String,
+        /// `held` or `reserved`.
+        how: &'static str,
+        /// Who; `None` where the file does not say (yet).
+        holder: Option<Holder>,
+    },
+    /// The lock file cannot be used.
+    #[error(
+        "failed to lock the rig {rig} by its file in {folder}: {error}; DRIVEBENCH_STATE names another folder"
+    )]
+    Io {
+        /// The rig's id.
+        rig: String,
+        /// The folder of the lock file.
+        folder: String,
+        /// What the system said.
+        error: io::Error,
+    },
+}
+
+fn holder_text(holder: Option<&Holder>) -> String {
+    holder.map_or_else(|| "somebody who left no name".to_owned(), Holder::to_string)
+}
+
+/// What stands in a lock file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+struct Record {
+    /// Who has it locked; stale where nobody has.
+    holder: Option<Holder>,
+    /// For whom it is kept.
+    reserved: Option<Holder>,
+}
+
+/// Whether a rig can be had.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// Nobody has it.
+    Free,
+    /// A process has it.
+    Held(Option<Holder>),
+    /// It is kept for somebody.
+    Reserved(Holder),
+}
+
+/// A rig that is held until this is dropped.
+#[derive(Debug)]
+pub struct RigLock {
+    file: File,
+    record: Record,
+}
+
+impl RigLock {
+    /// Takes a rig, and waits for it at most so long. Simulated rigs need no lock: everyone has a copy.
+    ///
+    /// # Errors
+    /// Somebody else has it, or its lock file cannot be used.
+    pub fn acquire(rig: &Rig, purpose: &str, wait: Duration) -> Result<Self, LockError> {
+        let folder = state::folder()
+            .map_err(|error| io_error(rig.id(), Path::new("the state folder"), error))?;
+        Self::acquire_in(&folder, rig.id(), &Holder::me(purpose), wait)
+    }
+
+    /// The same in a given folder, for a given holder.
+    ///
+    /// # Errors
+    /// As of [`RigLock::acquire`].
+    pub fn acquire_in(
+        folder: &Path,
+        id: &str,
+        me: &Holder,
+        wait: Duration,
+    ) -> Result<Self, LockError> {
+        let begun = Instant::now();
+        let wait = wait.max(AT_LEAST);
+        loop {
+            match attempt(folder, id, me) {
+                Err(LockError::Busy { .. }) if begun.elapsed() < wait => {
+                    std::thread::sleep(AGAIN.min(wait.saturating_sub(begun.elapsed())));
+                }
+                other => return other,
+            }
+        }
+    }
+}
+
+impl Drop for RigLock {
+    fn drop(&mut self) {
+        self.record.holder = None;
+        // The lock goes in any case when the file is closed; a name left behind is stale.
+        let _stale = write(&mut self.file, &self.record);
+    }
+}
+
+fn io_error(id: &str, folder: &Path, error: io::Error) -> LockError {
+    LockError::Io {
+        rig: id.to_owned(),
+        folder: folder.display().to_string(),
+        error,
+    }
+}
+
+fn open(folder: &Path, id: &str) -> io::Result<File> {
+    let path = folder.join(format!("{id}.lock"));
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).mode(0o666);
+    // In a folder for all users the kernel may refuse O_CREAT on the file of another user.
+    match options.open(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let file = options.create(true).truncate(false).open(&path)?;
+            // The umask took bits away that other users need. Whoever came first has done it.
+            let _not_ours = file.set_permissions(Permissions::from_mode(0o666));
+            Ok(file)
+        }
+        other => other,
+    }
+}
+
+/// What stands in the file; nothing where it is new or was cut off.
+fn record(file: &mut File) -> io::Result<Record> {
+    file.rewind()?;
+    Ok(serde_json::from_slice(&state::read(file)?).unwrap_or_default())
+}
+
+fn write(file: &mut File, record: &Record) -> io::Result<()> {
+    let text = serde_json::to_vec(record)?;
+    file.set_len(0)?;
+    file.rewind()?;
+    file.write_all(&text)
+}
+
+/// Locks the file, if it is free; `false` if not.
+fn lock(file: &File) -> io::Result<bool> {
+    match flock(file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => Ok(true),
+        Err(Errno::WOULDBLOCK) => Ok(false),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn attempt(folder: &Path, id: &str, me: &Holder) -> Result<RigLock, LockError> {
+    let failed = |error| io_error(id, folder, error);
+    let mut file = open(folder, id).map_err(failed)?;
+    let locked = lock(&file).map_err(failed)?;
+    let mut record = record(&mut file).map_err(failed)?;
+    let busy = |how, holder| LockError::Busy {
+        rig: id.to_owned(),
+        how,
+        holder,
+    };
+    if !locked {
+        return Err(busy("held", record.holder));
+    }
+    if let Some(other) = record.reserved.as_ref().filter(|other| !same(other, me)) {
+        return Err(busy("reserved", Some(other.clone())));
+    }
+    record.holder = Some(me.clone());
+    write(&mut file, &record).map_err(failed)?;
+    Ok(RigLock { file, record })
+}
+
+fn same(one: &Holder, other: &Holder) -> bool {
+    one.uid == other.uid && one.user == other.user
+}
+
+/// Whether a rig can be had. A rig that was never locked is free, and no file is made for it.
+///
+/// # Errors
+/// The lock file cannot be read.
+pub fn standing(folder: &Path, id: &str) -> io::Result<Standing> {
+    let mut file = match File::open(folder.join(format!("{id}.lock"))) {
+        Ok(file) => file,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Standing::Free),
+        Err(error) => return Err(error),
+    };
+    let free = lock(&file)?;
+    let record = record(&mut file)?;
+    Ok(match (free, record.reserved) {
+        (false, _) => Standing::Held(record.holder),
+        (true, Some(holder)) => Standing::Reserved(holder),
+        (true, None) => Standing::Free,
+    })
+}
+
+/// Keeps a rig for this user until it is given back with [`unreserve`].
+///
+/// # Errors
+/// Somebody else has it, or its lock file cannot be used.
+pub fn reserve(folder: &Path, id: &str, me: &Holder) -> Result<(), LockError> {
+    let mut lock = RigLock::acquire_in(folder, id, me, Duration::ZERO)?;
+    lock.record.reserved = Some(me.clone());
+    lock.give_back(folder, id)
+}
+
+/// Gives a rig back, also that of another user with `force`; a process that holds it is not disturbed. Says
+/// for whom it was kept.
+///
+/// # Errors
+/// It is kept for somebody else, a process holds it, or its lock file cannot be used.
+pub fn unreserve(
+    folder: &Path,
+    id: &str,
+    me: &Holder,
+    force: bool,
+) -> Result<Option<Holder>, LockError> {
+    let kept = match standing(folder, id).map_err(|error| io_error(id, folder, error))? {
+        Standing::Reserved(holder) => holder,
+        Standing::Free => return Ok(None),
+        Standing::Held(holder) => {
+            return Err(LockError::Busy {
+                rig: id.to_owned(),
+                how: "held",
+                holder,
+            });
+        }
+    };
+    let who = if force { &kept } else { me };
+    let mut lock = RigLock::acquire_in(folder, id, who, Duration::ZERO)?;
+    let before = lock.record.reserved.take();
+    lock.give_back(folder, id)?;
+    Ok(before)
+}
+
+impl RigLock {
+    /// Writes what is to stay, so that a failure is told; dropping it tells nobody.
+    fn give_back(mut self, folder: &Path, id: &str) -> Result<(), LockError> {
+        self.record.holder = None;
+        write(&mut self.file, &self.record).map_err(|error| io_error(id, folder, error))
+    }
+}
+
+/// Why a port cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum PortLockError {
+    /// Another program has it.
+    #[error("the port is in use by another program ({how})")]
+    Busy {
+        /// By what it shows.
+        how: &'static str,
+    },
+    /// The system refused.
+    #[error("failed to lock the port: {0}")]
+    Io(#[from] io::Error),
+}
+
+/// A port that is held until this is dropped, against programs that heed flock and, for a terminal, against
+/// every later open (TIOCEXCL; root is let in all the same).
+#[derive(Debug)]
+pub struct PortLock {
+    port: OwnedFd,
+    exclusive: bool,
+}
+
+impl PortLock {
+    /// Takes an open port: flock first, so that nothing is changed of a port that somebody else has. That
+    /// somebody made it exclusive before shows in a second open, which fails with EBUSY; root does not see it.
+    ///
+    /// # Errors
+    /// Another program has it, or the system refused. Then nothing of it was changed.
+    pub fn acquire(port: impl AsFd) -> Result<Self, PortLockError> {
+        let port = port.as_fd().try_clone_to_owned()?;
+        match flock(&port, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => {}
+            Err(Errno::WOULDBLOCK) => return Err(PortLockError::Busy { how: "flock" }),
+            Err(error) => return Err(PortLockError::Io(error.into())),
+        }
+        // From here on dropping it undoes what was done.
+        let mut lock = Self {
+            port,
+            exclusive: false,
+        };
+        if !rustix::termios::isatty(&lock.port) {
+            return Ok(lock);
+        }
+        if lock.is_exclusive() {
+            return Err(PortLockError::Busy { how: "TIOCEXCL" });
+        }
+        rustix::termios::ioctl_tiocexcl(&lock.port).map_err(io::Error::from)?;
+        lock.exclusive = true;
+        Ok(lock)
+    }
+
+    /// Whether a second open is refused.
+    fn is_exclusive(&self) -> bool {
+        use rustix::fs::{Mode, OFlags};
+        let again = format!("/proc/self/fd/{}", self.port.as_raw_fd());
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        matches!(
+            rustix::fs::open(again, flags, Mode::empty()),
+            Err(Errno::BUSY)
+        )
+    }
+}
+
+impl Drop for PortLock {
+    fn drop(&mut self) {
+        if self.exclusive {
+            // A port that was unplugged has nothing to undo.
+            let _gone = rustix::termios::ioctl_tiocnxcl(&self.port);
+        }
+        // The description may live on in the caller's descriptor: closing this one does not unlock it.
+        let _gone = flock(&self.port, FlockOperation::Unlock);
+    }
+}

@@ -1,0 +1,249 @@
+//! The JSON schema of a rig file, and the check of a text against it: unknown keys, missing keys, wrong types,
+//! numbers out of their range. All mistakes at once, each with its place.
+
+use super::file::RigFile;
+use super::values::check_format;
+use crate::scenario::problem::{Problem, Span};
+use serde_json::Value;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// How deep a schema is followed; ours has a quarter of it.
+const MAX_DEPTH: usize = 32;
+
+/// The JSON schema of a rig file, draft 2020-12.
+#[must_use]
+pub fn schema() -> Value {
+    schemars::schema_for!(RigFile).to_value()
+}
+
+/// A place of a TOML value.
+pub(super) fn span_of<T>(value: &Spanned<T>) -> Span {
+    let range = value.span();
+    Span {
+        start: range.start,
+        end: range.end,
+    }
+}
+
+/// Compares a document with the schema.
+pub(super) fn compare(table: &Spanned<DeTable<'_>>) -> Vec<Problem> {
+    let root = schema();
+    let mut walk = Walk {
+        root: &root,
+        problems: Vec::new(),
+    };
+    walk.table(&root, table.get_ref(), span_of(table), "a rig file", 0);
+    walk.problems
+}
+
+struct Walk<'a> {
+    root: &'a Value,
+    problems: Vec<Problem>,
+}
+
+impl<'a> Walk<'a> {
+    /// Follows a reference, and the branch that is not null.
+    fn resolve(&self, schema: &'a Value) -> &'a Value {
+        let mut schema = schema;
+        for _ in 0..MAX_DEPTH {
+            let reference = schema["$ref"].as_str().and_then(|r| r.strip_prefix('#'));
+            let branch = schema["anyOf"]
+                .as_array()
+                .and_then(|all| all.iter().find(|one| one["type"] != "null"));
+            schema = match reference
+                .and_then(|path| self.root.pointer(path))
+                .or(branch)
+            {
+                Some(inner) => inner,
+                None => return schema,
+            };
+        }
+        schema
+    }
+
+    fn table(
+        &mut self,
+        schema: &'a Value,
+        table: &DeTable<'_>,
+        place: Span,
+        what: &str,
+        depth: usize,
+    ) {
+        let properties = schema["properties"].as_object();
+        let known: Vec<&str> = properties
+            .into_iter()
+            .flatten()
+            .map(|(name, _)| name.as_str())
+            .collect();
+        let mut entries: Vec<_> = table.iter().collect();
+        entries.sort_by_key(|(key, _)| key.span().start);
+        for (key, value) in entries {
+            let name = key.get_ref().as_ref();
+            let inner = properties.and_then(|all| all.get(name)).or_else(|| {
+                schema["additionalProperties"]
+                    .as_object()
+                    .map(|_| &schema["additionalProperties"])
+            });
+            match inner {
+                Some(inner) => self.value(inner, value, name, depth + 1),
+                None => self.problems.push(
+                    Problem::new(
+                        span_of(key),
+                        format!("`{name}` is no key of {what}"),
+                        format!("one of {} expected here", known.join(", ")),
+                    )
+                    .did_you_mean(name, &known),
+                ),
+            }
+        }
+        for name in schema["required"].as_array().into_iter().flatten() {
+            let name = name.as_str().unwrap_or_default();
+            if !table.contains_key(name) {
+                self.problems.push(
+                    Problem::new(
+                        place,
+                        format!("{what} needs the key `{name}`"),
+                        format!("`{name}` expected in here"),
+                    )
+                    .help(self.about(&schema["properties"][name], name)),
+                );
+            }
+        }
+    }
+
+    /// What the schema says of a key.
+    fn about(&self, schema: &'a Value, name: &str) -> String {
+        let about = [schema, self.resolve(schema)]
+            .into_iter()
+            .find_map(|schema| schema["description"].as_str())
+            .unwrap_or_default();
+        format!("`{name}`: {}", about.replace('\n', " "))
+    }
+
+    fn value(&mut self, schema: &'a Value, value: &Spanned<DeValue<'_>>, name: &str, depth: usize) {
+        let outer = schema;
+        let schema = self.resolve(schema);
+        if depth > MAX_DEPTH {
+            return;
+        }
+        let place = span_of(value);
+        let words = words(schema);
+        let wanted = wanted(schema);
+        match (value.get_ref(), wanted) {
+            (DeValue::Table(table), "object") => {
+                self.table(schema, table, place, &format!("`{name}`"), depth);
+            }
+            (DeValue::Array(array), "array") => {
+                let (least, most) = (&schema["minItems"], &schema["maxItems"]);
+                self.range(
+                    array.len() as i64,
+                    least,
+                    most,
+                    place,
+                    &format!("entries in `{name}`"),
+                );
+                for entry in array.iter().take(most.as_u64().unwrap_or(1000) as usize) {
+                    self.value(&schema["items"], entry, name, depth + 1);
+                }
+            }
+            (DeValue::Integer(number), "integer") => {
+                let parsed = i64::from_str_radix(&number.as_str().replace('_', ""), number.radix());
+                // The bounds of the key itself before those of its type.
+                let bound = |key: &str| {
+                    [outer, schema]
+                        .into_iter()
+                        .map(|s| &s[key])
+                        .find(|v| !v.is_null())
+                };
+                let (least, most) = (bound("minimum"), bound("maximum"));
+                let null = Value::Null;
+                self.range(
+                    parsed.unwrap_or(i64::MAX),
+                    least.unwrap_or(&null),
+                    most.unwrap_or(&null),
+                    place,
+                    &format!("for `{name}`"),
+                );
+            }
+            (DeValue::Boolean(_), "boolean") => {}
+            (DeValue::String(text), "string") if words.is_empty() => {
+                let format = schema["format"].as_str().unwrap_or_default();
+                if let Err(error) = check_format(format, text) {
+                    self.problems
+                        .push(Problem::new(place, error.message, error.expected));
+                }
+            }
+            (DeValue::String(text), _) if !words.is_empty() => {
+                if !words.contains(&text.as_ref()) {
+                    let problem = Problem::new(
+                        place,
+                        format!("`{text}` is no value of `{name}`"),
+                        format!("one of \"{}\" expected here", words.join("\", \"")),
+                    );
+                    self.problems.push(problem.did_you_mean(text, &words));
+                }
+            }
+            (other, wanted) => {
+                let found = article(match other.type_str() {
+                    "string" => "text",
+                    other => other,
+                });
+                let expected = match wanted {
+                    "object" => "a table expected here",
+                    "array" => "a list in [ ] expected here",
+                    "integer" => "a whole number expected here",
+                    "boolean" => "true or false expected here",
+                    _ => "a text in quotes expected here",
+                };
+                let message = format!("`{name}` cannot be {found}");
+                let problem = Problem::new(place, message, expected);
+                self.problems.push(problem.help(self.about(outer, name)));
+            }
+        }
+    }
+
+    fn range(&mut self, number: i64, least: &Value, most: &Value, place: Span, what: &str) {
+        let (least, most) = (least.as_f64(), most.as_f64());
+        let number_f = number as f64;
+        if least.is_some_and(|least| number_f < least) || most.is_some_and(|most| number_f > most) {
+            let bounds = match (least, most) {
+                (Some(least), Some(most)) => format!("{least} to {most}"),
+                (Some(least), None) => format!("{least} or more"),
+                (None, most) => format!("up to {}", most.unwrap_or_default()),
+            };
+            self.problems.push(Problem::new(
+                place,
+                format!("{number} is not possible {what}"),
+                format!("{bounds} expected here"),
+            ));
+        }
+    }
+}
+
+/// The type that a schema demands.
+fn wanted(schema: &Value) -> &str {
+    let listed = schema["type"]
+        .as_array()
+        .and_then(|all| all.iter().find(|one| *one != "null"));
+    listed
+        .unwrap_or(&schema["type"])
+        .as_str()
+        .unwrap_or("string")
+}
+
+/// The words that a schema allows; none where any text will do.
+fn words(schema: &Value) -> Vec<&str> {
+    let listed = schema["enum"].as_array().into_iter().flatten();
+    let constants = schema["oneOf"].as_array().into_iter().flatten();
+    let constants = constants.flat_map(|one| {
+        let several = one["enum"].as_array().into_iter().flatten();
+        std::iter::once(&one["const"]).chain(several)
+    });
+    listed.chain(constants).filter_map(Value::as_str).collect()
+}
+
+fn article(noun: &str) -> String {
+    let an = noun.starts_with(['a', 'e', 'i', 'o', 'u']);
+    format!("{} {noun}", if an { "an" } else { "a" })
+}

@@ -1,0 +1,218 @@
+//! The values of a rig file that are written as a text: times, speeds, links, lines.
+
+use crate::scenario::quantity::{Dimension, figures, parse};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+/// The longest time in a rig file: a week.
+const MAX_TIME: Duration = Duration::from_secs(7 * 24 * 3600);
+/// The highest speed in a rig file, in rpm: that of the fastest range (ND21 14.5.1).
+const MAX_SPEED: f64 = 32_767.0;
+
+/// Why a text is no value: what is wrong, and what was expected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}: {expected}")]
+pub struct ValueError {
+    /// What is wrong.
+    pub message: String,
+    /// What was expected.
+    pub expected: String,
+}
+
+fn wrong(message: impl Into<String>, expected: impl Into<String>) -> ValueError {
+    ValueError {
+        message: message.into(),
+        expected: expected.into(),
+    }
+}
+
+/// A time longer than nothing and not longer than a week, written with its unit: `100ms`, `5 s`, `1h`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Time(pub Duration);
+
+impl Time {
+    /// So many seconds.
+    #[must_use]
+    pub const fn seconds(seconds: u64) -> Self {
+        Self(Duration::from_secs(seconds))
+    }
+}
+
+impl FromStr for Time {
+    type Err = ValueError;
+
+    fn from_str(text: &str) -> Result<Self, ValueError> {
+        let expected = "a time such as \"100ms\", \"5s\" or \"1h\" expected here";
+        let quantity = parse(text).map_err(|problem| wrong(problem.message, expected))?;
+        let micros = match quantity.unit.dimension() {
+            Dimension::Time => quantity.value.to_f64(),
+            Dimension::Hours => quantity.value.to_f64() * 3.6e9,
+            _ => {
+                return Err(wrong(
+                    format!("`{}` is no unit of time", quantity.unit.name),
+                    expected,
+                ));
+            }
+        };
+        Duration::try_from_secs_f64((micros * 1e-6 * 1e9).round() / 1e9)
+            .ok()
+            .filter(|time| !time.is_zero() && *time <= MAX_TIME)
+            .map(Self)
+            .ok_or_else(|| {
+                wrong(
+                    format!("`{text}` is not possible here"),
+                    "a time above 0 and up to 168h expected here",
+                )
+            })
+    }
+}
+
+impl fmt::Display for Time {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let micros = self.0.as_micros();
+        match (micros % 3_600_000_000, micros % 1_000_000, micros % 1000) {
+            (0, _, _) => write!(f, "{}h", micros / 3_600_000_000),
+            (_, 0, _) => write!(f, "{}s", micros / 1_000_000),
+            (_, _, 0) => write!(f, "{}ms", micros / 1000),
+            _ => write!(f, "{micros}us"),
+        }
+    }
+}
+
+/// A speed above nothing, in rpm, written with its unit: `300rpm`.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Speed(pub f64);
+
+impl FromStr for Speed {
+    type Err = ValueError;
+
+    fn from_str(text: &str) -> Result<Self, ValueError> {
+        let expected = "a speed such as \"300rpm\" expected here";
+        let quantity = parse(text).map_err(|problem| wrong(problem.message, expected))?;
+        let rpm = quantity.value.to_f64();
+        if quantity.unit.dimension() != Dimension::Speed {
+            let message = format!("`{}` is no unit of speed", quantity.unit.name);
+            return Err(wrong(message, expected));
+        }
+        if rpm <= 0.0 || rpm > MAX_SPEED {
+            return Err(wrong(
+                format!("`{text}` is not possible here"),
+                "a speed above 0 and up to 32767rpm expected here",
+            ));
+        }
+        Ok(Self(rpm))
+    }
+}
+
+impl fmt::Display for Speed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}rpm", figures(self.0, "rpm"))
+    }
+}
+
+/// One wire of a ring by its ends, as a scenario writes it: `98->97`, `master->99`, `0->master`. An end that
+/// is `None` is the master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Wire {
+    /// Who sends.
+    pub from: Option<u8>,
+    /// Who receives.
+    pub to: Option<u8>,
+}
+
+impl Wire {
+    /// Whether a ring of so many drives has this wire: bytes go from the master to the drive with the highest
+    /// address and down to drive 0 (ND21 8.1).
+    #[must_use]
+    pub fn is_in(self, drives: u8) -> bool {
+        match (self.from, self.to) {
+            (None, Some(to)) => to.checked_add(1) == Some(drives),
+            (Some(from), None) => from == 0 && drives > 0,
+            (Some(from), Some(to)) => to.checked_add(1) == Some(from) && from < drives,
+            (None, None) => false,
+        }
+    }
+}
+
+impl FromStr for Wire {
+    type Err = ValueError;
+
+    fn from_str(text: &str) -> Result<Self, ValueError> {
+        let end = |text: &str| match text.trim() {
+            "master" => Some(None),
+            number => number.parse().ok().map(Some),
+        };
+        text.split_once("->")
+            .and_then(|(from, to)| {
+                Some(Self {
+                    from: end(from)?,
+                    to: end(to)?,
+                })
+            })
+            .ok_or_else(|| {
+                wrong(
+                    format!("`{text}` is no link"),
+                    "a link such as \"98->97\", \"master->99\" or \"0->master\" expected here",
+                )
+            })
+    }
+}
+
+impl fmt::Display for Wire {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let end = |end: Option<u8>| end.map_or("master".to_owned(), |drive| drive.to_string());
+        write!(f, "{}->{}", end(self.from), end(self.to))
+    }
+}
+
+/// What each of these values has in common: from and to a text, and a `format` by which a file is checked.
+macro_rules! text_values {
+    ($($value:ident $format:literal $about:literal;)*) => {
+        $(
+            impl TryFrom<String> for $value {
+                type Error = ValueError;
+
+                fn try_from(text: String) -> Result<Self, ValueError> {
+                    text.parse()
+                }
+            }
+
+            impl From<$value> for String {
+                fn from(value: $value) -> Self {
+                    value.to_string()
+                }
+            }
+
+            impl JsonSchema for $value {
+                fn schema_name() -> Cow<'static, str> {
+                    stringify!($value).into()
+                }
+
+                fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                    json_schema!({ "type": "string", "format": $format, "description": $about })
+                }
+            }
+        )*
+
+        /// Checks a text against the `format` of the schema; formats that are not ours fit every text.
+        pub(super) fn check_format(format: &str, text: &str) -> Result<(), ValueError> {
+            match format {
+                $($format => text.parse::<$value>().map(|_| ()),)*
+                _ => Ok(()),
+            }
+        }
+    };
+}
+
+text_values! {
+    Time "drivebench-time" "a time above 0 with its unit: 100ms, 5s, 1h";
+    Speed "drivebench-speed" "a speed above 0 with its unit: 300rpm";
+    Wire "drivebench-link" "a link by its ends: 98->97, master->99, 0->master";
+}
