@@ -112,6 +112,12 @@ impl Guard {
         }
     }
 
+    /// Believes that every drive waits for a sync byte and has heard nothing: true of simulated drives that have just been made, and
+    /// of no machine.
+    pub fn assume_fresh(&mut self) {
+        self.state = State::Sync;
+    }
+
     /// What it allows.
     #[must_use]
     pub const fn limits(&self) -> &Limits {
