@@ -75,6 +75,8 @@ pub struct Drive {
     zeros_sent: u8,
     preceding: bool,
     matched: usize,
+    /// What was executed, oldest first: a command without its checking byte, or 00 and two process data bytes.
+    executed: Vec<Vec<u8>>,
 }
 
 impl Drive {
@@ -93,6 +95,29 @@ impl Drive {
     #[must_use]
     pub fn peek(&self, address: u16) -> u8 {
         self.memory.get(&address).copied().unwrap_or(0)
+    }
+
+    /// Fetches what was executed since the last call, oldest first: commands without their checking byte; 00 and two bytes
+    /// for process data, as 00 begins no command (ND21 9.5).
+    pub fn take_executed(&mut self) -> Vec<Vec<u8>> {
+        std::mem::take(&mut self.executed)
+    }
+
+    /// Forgets a command received in half.
+    pub fn forget_half(&mut self) {
+        self.command.clear();
+        self.answer.clear();
+    }
+
+    /// Silence for 10 ms: the error mode, in which increments begin with the "*" (ND21 9.9).
+    pub fn time_out(&mut self) {
+        if !self.in_error() {
+            self.state = State::Error;
+            self.zeros_received = 0;
+            self.preceding = false;
+            self.matched = 0;
+        }
+        self.zeros_sent = 17;
     }
 
     /// Whether the drive is in error mode (ND21 9.7).
@@ -163,6 +188,7 @@ impl Drive {
             self.process = (byte, self.peek(from.wrapping_add(1)));
             return self.peek(from);
         }
+        self.executed.push(vec![0, self.process.0, byte]);
         self.poke_word([0xFF, self.peek(0xFF32)], [self.process.0, byte]);
         self.process.1
     }
@@ -227,6 +253,7 @@ impl Drive {
 
     /// ND21 10.2 to 10.5: what a complete command does.
     fn execute(&mut self) {
+        self.executed.push(self.command.clone());
         match *self.command {
             [0x82, data, low, high] => self.poke(u16::from_be_bytes([high, low]), data),
             [0x63, lower, upper, low, high] => self.poke_word([high, low], [upper, lower]),
@@ -260,8 +287,10 @@ impl Drive {
     /// After a reset and a check sequence all but the memory is as after power-up.
     fn restart(&mut self) {
         let memory = std::mem::take(&mut self.memory);
+        let executed = std::mem::take(&mut self.executed);
         *self = Self::new();
         self.memory = memory;
+        self.executed = executed;
     }
 
     /// ND21 9.7, 9.8: from the offending byte on, zeros, then increments, until the check sequence.

@@ -1,3 +1,15 @@
 //! What may leave the program: decides byte by byte, below scenarios, driver and fuzzer.
 //!
 //! This is no safety function in the sense of a machine's safety: an emergency stop must be wired.
+//!
+//! [`Guarded`] stands around a line or a link and asks the guard of each ring
+//! ([`harness_proto::novobus::guard`], where the reasoning is) about every byte. [`safe_state`] stops and blocks all drives and
+//! reads back that they stand. Both begin with 17 zeros and the check sequence (ND21 9.8): before them it is not known what drives make
+//! of a byte, and nothing else passes.
+
+mod guarded;
+mod safe_state;
+
+pub use guarded::Guarded;
+pub use harness_proto::novobus::guard::{Denial, Guard, Limits, Need};
+pub use safe_state::{MOST_STANDING, NotSafe, SafeState, safe_state};

@@ -16,6 +16,7 @@
 //! | 9.8 | the check sequence | [`check_sequence`] |
 //! | 9.1-9.9 | a drive's end of the bus | [`bus_end`] |
 //! | 8-11 | the master's end of the bus | [`master`] |
+//! | 9-14 | which bytes may go onto a ring | [`guard`] |
 //! | 10.1-10.3 | what of a drive the bus reaches | [`memory`] |
 //! | 10.4 | the digital outputs | [`output`] |
 //!
@@ -29,6 +30,7 @@ pub mod command;
 pub mod decode;
 pub mod error;
 pub mod error_mode;
+pub mod guard;
 pub mod master;
 pub mod memory;
 pub mod output;

@@ -5,9 +5,11 @@
 //! that are kept; plain `cargo test` plays all of them.
 
 mod drive;
+mod guard;
 mod hostile;
 
 pub use drive::drive;
+pub use guard::guard;
 pub use hostile::master;
 
 use crate::fault::{Flips, LinkFault};
@@ -27,12 +29,13 @@ use harness_proto::time::{Instant, Span};
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 5] = [
+pub const TARGETS: [Target; 6] = [
     ("codec", codec),
     ("detector", detector),
     ("ring", ring),
     ("drive", drive),
     ("master", master),
+    ("guard", guard),
 ];
 
 /// The longest input that is looked at; what lies behind is left out.

@@ -1,0 +1,138 @@
+//! Why a byte did not pass.
+
+use super::effect::Act;
+use super::limits::Need;
+use crate::nd21::cells::cell_at;
+use crate::novobus::address::RingSize;
+use core::fmt;
+
+/// A byte that did not pass, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Denial {
+    /// The number of the byte since the guard began, counted from 1.
+    pub number: u64,
+    /// The byte.
+    pub byte: u8,
+    /// The ring.
+    pub ring: RingSize,
+    /// The address byte of the telegram in which it stands, as the master sends it; `None` outside of one.
+    pub address: Option<u8>,
+    /// Why.
+    pub cause: Cause,
+}
+
+/// Why a byte did not pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// With it a drive would do what the rig does not allow.
+    NotAllowed {
+        /// What.
+        act: Act,
+        /// What leave is missing.
+        missing: Need,
+    },
+    /// With it a speed would be written that is above the rig's, or a part of a speed.
+    TooFast {
+        /// What.
+        act: Act,
+        /// The highest speed in rpm.
+        most: u16,
+    },
+    /// It is not known what the drives would make of it.
+    InDoubt,
+    /// A short address where nobody knows whom it means (ND21 9.2).
+    NoAddress,
+    /// The check sequence, or what becomes one by being counted up, where it is not due (ND21 9.7, 9.8).
+    CheckSequence,
+    /// More bytes in a second than the rig allows.
+    TooMany {
+        /// So many in a second.
+        most: u32,
+    },
+    /// More bytes in all than the rig allows.
+    TooLong {
+        /// So many.
+        most: u64,
+    },
+    /// An earlier byte was denied.
+    Closed,
+}
+
+impl Denial {
+    /// The drive that is meant; `None` where there is none of this address.
+    #[must_use]
+    pub fn drive(&self) -> Option<u8> {
+        let drive = self.address?.wrapping_add(self.ring.drives());
+        (drive < self.ring.drives()).then_some(drive)
+    }
+}
+
+impl fmt::Display for Denial {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "byte {} ({:02X}) is not sent: ", self.number, self.byte)?;
+        let whom = |f: &mut fmt::Formatter<'_>| match (self.drive(), self.address) {
+            (Some(drive), _) => write!(f, " to drive {drive}"),
+            (None, Some(address)) => write!(f, " to address byte {address:02X}"),
+            (None, None) => Ok(()),
+        };
+        match self.cause {
+            Cause::NotAllowed { act, missing } => {
+                write!(f, "{act}")?;
+                whom(f)?;
+                write!(f, " needs {missing}")
+            }
+            Cause::TooFast { act, most } => {
+                write!(f, "{act}")?;
+                whom(f)?;
+                write!(
+                    f,
+                    " is, or may become, more than the {most} rpm of `max_speed` in the rig's [limits]; write the \
+                     whole word of a lower speed"
+                )
+            }
+            Cause::InDoubt => f.write_str(
+                "it is not known where in a telegram the drives are; 17 zeros and the check sequence come first \
+                 (ND21 9.8)",
+            ),
+            Cause::NoAddress => f.write_str(
+                "nobody knows whom a short address means before an address byte has been sent (ND21 9.2)",
+            ),
+            Cause::CheckSequence => f.write_str(
+                "the check sequence, as it is or as drives in the error mode would make it, passes only behind \
+                 17 zeros (ND21 9.7, 9.8)",
+            ),
+            Cause::TooMany { most } => write!(
+                f,
+                "{most} bytes have been sent within a second, which is the most that the rig's [limits] allow"
+            ),
+            Cause::TooLong { most } => write!(
+                f,
+                "{most} bytes have been sent, which is the most that the rig's [limits] allow"
+            ),
+            Cause::Closed => f.write_str("an earlier byte was not allowed"),
+        }
+    }
+}
+
+impl core::error::Error for Denial {}
+
+impl fmt::Display for Act {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Read => f.write_str("a read")?,
+            Self::WriteByte(address, data) => write!(f, "WriteByte {data:02X} to {address:04X}")?,
+            Self::WriteWord(address, data) => write!(f, "WriteWord {data:04X} to {address:04X}")?,
+            Self::And(address, mask) => write!(f, "And {mask:02X} into {address:04X}")?,
+            Self::Or(address, mask) => write!(f, "Or {mask:02X} into {address:04X}")?,
+            Self::WriteIo(code) => write!(f, "WriteIO {code:02X}")?,
+            Self::Reset => f.write_str("ResetH8")?,
+            Self::ProcessDataToCome => f.write_str("a telegram with process data")?,
+            Self::ProcessData(data) => write!(f, "process data {data:04X}")?,
+            Self::Unknown(code) => write!(f, "the unknown command {code:02X}")?,
+        }
+        match self.address().and_then(cell_at) {
+            Some(cell) => write!(f, " ({})", cell.printed),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,508 @@
+//! The guard itself: bytes in, leave or denial out.
+
+use super::denial::{Cause, Denial};
+use super::effect::Act;
+use super::limits::Limits;
+use crate::novobus::address::RingSize;
+use crate::novobus::check_sequence::{SEQUENCE, ZEROS};
+use crate::novobus::checksum::Checksum;
+use crate::novobus::error_mode::UPSTREAM_ZEROS;
+use crate::novobus::sync::{Addressing, Header, PAUSE, SYNCO, SyncByte};
+use crate::time::{Instant, Span};
+use alloc::boxed::Box;
+
+/// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below mean nobody in any ring.
+const FIRST_ADDRESS: u8 = 6;
+/// The longest command without its checking byte (ND21 10.1).
+const LONGEST: usize = 5;
+
+/// Decides byte by byte what goes onto one ring. See the head of the module.
+#[derive(Clone, Debug)]
+pub struct Guard {
+    ring: RingSize,
+    limits: Limits,
+    state: State,
+    /// Commands received in part, by the address byte that means their drive.
+    halves: Box<[Half; 256]>,
+    /// The last address byte, counted up by "next"; `None` where no short address is valid.
+    kept: Option<u8>,
+    /// The last bytes, and the last ones without PAUSE, which drives swallow.
+    tails: [Tail; 2],
+    /// Zeros in a row.
+    zeros: u8,
+    passed: u64,
+    /// The second that is counted: its begin, and bytes in it.
+    second: (Instant, u32),
+    closed: bool,
+}
+
+/// What the drives take the next byte for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Doubt(Doubt),
+    /// A sync byte.
+    Sync,
+    /// An address byte.
+    Address(Header),
+    /// A net byte.
+    Net {
+        key: u8,
+        left: u8,
+        process: Process,
+    },
+}
+
+/// What has been done about doubt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Doubt {
+    /// No drive is in the middle of a telegram.
+    cleared: bool,
+    /// Zeros in a row, up to 17, and not lost by a check sequence behind them.
+    zeros: u8,
+    /// Bytes of the check sequence.
+    matched: u8,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Process {
+    None,
+    High,
+    Low(u8),
+}
+
+/// A command, its checking byte left out, as far as it has been sent.
+#[derive(Clone, Copy, Debug, Default)]
+struct Half {
+    bytes: [u8; LONGEST],
+    length: u8,
+}
+
+/// The last four bytes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tail {
+    bytes: [u8; 4],
+    length: u8,
+}
+
+/// What becomes of a parameter byte.
+enum Parameter {
+    /// A half command, with the byte.
+    Half(Half),
+    /// A command is complete.
+    Complete(Act),
+    /// A drive goes into the error mode over it.
+    Error,
+}
+
+impl Guard {
+    /// A guard of a ring of which nothing is known.
+    #[must_use]
+    pub fn new(ring: RingSize, limits: Limits) -> Self {
+        Self {
+            ring,
+            limits,
+            state: State::Doubt(Doubt::default()),
+            halves: Box::new([Half::default(); 256]),
+            kept: None,
+            tails: [Tail::default(); 2],
+            zeros: 0,
+            passed: 0,
+            second: (Instant::START, 0),
+            closed: false,
+        }
+    }
+
+    /// Believes that every drive waits for a sync byte and has heard nothing: true of simulated drives that have just been made, and
+    /// of no machine.
+    pub fn assume_fresh(&mut self) {
+        self.state = State::Sync;
+    }
+
+    /// What it allows.
+    #[must_use]
+    pub const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// How many bytes have passed.
+    #[must_use]
+    pub const fn passed(&self) -> u64 {
+        self.passed
+    }
+
+    /// Whether nothing passes but the bytes of the recovery.
+    #[must_use]
+    pub const fn in_doubt(&self) -> bool {
+        matches!(self.state, State::Doubt(_)) && !self.limits.allow_everything()
+    }
+
+    /// The drives may stand anywhere from now on: something has happened to what was sent, or one was switched on.
+    pub fn doubt(&mut self) {
+        self.state = State::Doubt(Doubt::default());
+        self.kept = None;
+    }
+
+    /// After a denial: lets the bytes of the recovery pass, and what is allowed behind them. The zeros end what was sent in half, and
+    /// no command is completed by them (ND21 9.5, 9.6).
+    pub fn reset_after_denial(&mut self) {
+        self.closed = false;
+        self.doubt();
+    }
+
+    /// Judges the next byte. `line_error`: it is to leave with wrong parity or a broken frame; as not every port sends what
+    /// it is told to, it must be allowed as a good byte as well, and brings doubt.
+    ///
+    /// # Errors
+    /// [`Denial`]: it must not be sent. Nothing changes but that no byte passes before [`Self::reset_after_denial`].
+    pub fn admit(&mut self, now: Instant, byte: u8, line_error: bool) -> Result<(), Denial> {
+        match self.judge(now, byte) {
+            Ok(next) => {
+                self.commit(now, byte, line_error, next);
+                Ok(())
+            }
+            Err(cause) => {
+                let denial = Denial {
+                    number: self.passed + 1,
+                    byte,
+                    ring: self.ring,
+                    address: self.address(),
+                    cause,
+                };
+                self.closed = true;
+                Err(denial)
+            }
+        }
+    }
+
+    /// The address byte of the telegram under way.
+    fn address(&self) -> Option<u8> {
+        match self.state {
+            State::Net { key, .. } => Some(key),
+            _ => None,
+        }
+    }
+
+    fn judge(&self, now: Instant, byte: u8) -> Result<Next, Cause> {
+        if self.closed {
+            return Err(Cause::Closed);
+        }
+        let most = self.limits.most_bytes;
+        if self.passed >= most {
+            return Err(Cause::TooLong { most });
+        }
+        if let Some(most) = self.limits.bytes_per_second
+            && self.in_this_second(now) >= most
+        {
+            return Err(Cause::TooMany { most });
+        }
+        if self.limits.allow_everything() {
+            return Ok(Next::to(self.state));
+        }
+        let next = self.follow(byte)?;
+        let shift = self.tails[0].shift(byte);
+        let shift = shift.or_else(|| self.tails[1].shift(byte).filter(|_| byte != PAUSE));
+        match (shift, self.state) {
+            (Some(0), State::Doubt(_)) | (None, _) => Ok(next),
+            _ => Err(Cause::CheckSequence),
+        }
+    }
+
+    /// How many bytes have passed in the second in which `now` lies.
+    fn in_this_second(&self, now: Instant) -> u32 {
+        let (begin, count) = self.second;
+        if now.since(begin) < Span::from_millis(1_000) {
+            count
+        } else {
+            0
+        }
+    }
+
+    fn commit(&mut self, now: Instant, byte: u8, line_error: bool, next: Next) {
+        let count = self.in_this_second(now);
+        if count == 0 {
+            self.second.0 = now;
+        }
+        self.second.1 = count.saturating_add(1);
+        self.passed += 1;
+        self.tails[0].push(byte);
+        if byte != PAUSE {
+            self.tails[1].push(byte);
+        }
+        self.zeros = if byte == 0 {
+            self.zeros.saturating_add(1)
+        } else {
+            0
+        };
+        if next.recovered {
+            self.halves.fill(Half::default());
+            self.kept = None;
+        }
+        if let Some((key, half)) = next.half {
+            self.halves[usize::from(key)] = half;
+        }
+        if let Some(kept) = next.kept {
+            self.kept = kept;
+        }
+        self.state = match (self.state, next.state) {
+            // Where no drive can be in the middle of a telegram, a bad byte does not bring one there.
+            (State::Doubt(doubt), _) if line_error => State::Doubt(Doubt {
+                cleared: doubt.cleared,
+                ..Doubt::default()
+            }),
+            _ if line_error => State::Doubt(Doubt::default()),
+            // A drive in the error mode may take these for its neighbour's (ND21 9.7).
+            (_, state) if !matches!(state, State::Doubt(_)) && self.zeros >= UPSTREAM_ZEROS => {
+                State::Doubt(Doubt {
+                    zeros: self.zeros.min(ZEROS),
+                    ..Doubt::default()
+                })
+            }
+            (_, state) => state,
+        };
+    }
+
+    /// What follows behind a byte.
+    fn follow(&self, byte: u8) -> Result<Next, Cause> {
+        match self.state {
+            State::Doubt(doubt) => doubt.follow(byte),
+            State::Sync => self.sync_byte(byte),
+            State::Address(header) => Ok(Next {
+                kept: Some(Some(byte)),
+                ..Next::to(net(header, byte))
+            }),
+            State::Net { key, left, process } => {
+                let (process, next) = match process {
+                    Process::High => {
+                        // If zeros must end this telegram, the low byte is one of them.
+                        Act::ProcessData(u16::from(byte) << 8).judge(&self.limits)?;
+                        (Process::Low(byte), None)
+                    }
+                    Process::Low(high) => {
+                        let data = u16::from_be_bytes([high, byte]);
+                        Act::ProcessData(data).judge(&self.limits)?;
+                        (Process::None, None)
+                    }
+                    Process::None if key < FIRST_ADDRESS => (Process::None, None),
+                    Process::None => (Process::None, Some(self.parameter(key, byte)?)),
+                };
+                let state = if left > 1 {
+                    let left = left - 1;
+                    State::Net { key, left, process }
+                } else {
+                    State::Sync
+                };
+                Ok(match next {
+                    None => Next::to(state),
+                    Some(Parameter::Half(half)) => Next {
+                        half: Some((key, half)),
+                        ..Next::to(state)
+                    },
+                    Some(Parameter::Complete(Act::Reset) | Parameter::Error) => {
+                        Next::to(in_doubt(byte))
+                    }
+                    Some(Parameter::Complete(_)) => Next {
+                        half: Some((key, Half::default())),
+                        ..Next::to(state)
+                    },
+                })
+            }
+        }
+    }
+
+    /// ND21 9.2.
+    fn sync_byte(&self, byte: u8) -> Result<Next, Cause> {
+        let header = match SyncByte::decode(byte) {
+            Ok(SyncByte::Synco | SyncByte::Pause) => return Ok(Next::to(State::Sync)),
+            Ok(SyncByte::Telegram(header)) => header,
+            // These can be no sync bytes to anybody, and leave no telegram open.
+            Err(_) if byte & 0x90 != 0x80 => {
+                let zeros = u8::from(byte == 0);
+                return Ok(Next::to(State::Doubt(Doubt {
+                    cleared: true,
+                    zeros,
+                    matched: 0,
+                })));
+            }
+            Err(_) => return Ok(Next::to(in_doubt(byte))),
+        };
+        if header.process_data() {
+            Act::ProcessDataToCome.judge(&self.limits)?;
+        }
+        let key = match (header.addressing(), self.kept) {
+            (Addressing::AddressFollows, _) => return Ok(Next::to(State::Address(header))),
+            (Addressing::SameDrive, Some(kept)) => kept,
+            (Addressing::NextDrive, Some(kept)) => kept.wrapping_add(1),
+            _ if header.net_length() == 0 => return Ok(Next::to(State::Sync)),
+            (_, None) => return Err(Cause::NoAddress),
+        };
+        Ok(Next {
+            kept: Some(Some(key)),
+            ..Next::to(net(header, key))
+        })
+    }
+
+    /// ND21 9.5, 9.6, chapter 10.
+    fn parameter(&self, key: u8, byte: u8) -> Result<Parameter, Cause> {
+        let half = self.halves[usize::from(key)];
+        let sent = half.sent();
+        if sent.is_empty() && byte == 0 {
+            return Ok(Parameter::Error);
+        }
+        let Some(length) = length(sent.first().copied().unwrap_or(byte)) else {
+            Act::Unknown(byte).judge(&self.limits)?;
+            return Ok(Parameter::Error);
+        };
+        if sent.len() < length {
+            let half = half.with(byte);
+            // A drive that takes 00 for the checking byte of such a command would execute it at a zero of the recovery.
+            if half.sent().len() == length
+                && Checksum::over(half.sent()) == Checksum::EMPTY
+                && let Some(act) = Act::of(half.sent())
+            {
+                act.judge(&self.limits)?;
+            }
+            return Ok(Parameter::Half(half));
+        }
+        match Act::of(sent) {
+            Some(act) if Checksum::over(sent).plus() == byte => {
+                act.judge(&self.limits)?;
+                Ok(Parameter::Complete(act))
+            }
+            _ => Ok(Parameter::Error),
+        }
+    }
+}
+
+/// What a byte changes, if it passes.
+struct Next {
+    state: State,
+    half: Option<(u8, Half)>,
+    kept: Option<Option<u8>>,
+    recovered: bool,
+}
+
+impl Next {
+    const fn to(state: State) -> Self {
+        Self {
+            state,
+            half: None,
+            kept: None,
+            recovered: false,
+        }
+    }
+}
+
+/// Doubt that begins with this byte.
+fn in_doubt(byte: u8) -> State {
+    State::Doubt(Doubt {
+        zeros: u8::from(byte == 0),
+        ..Doubt::default()
+    })
+}
+
+/// The net bytes of a telegram.
+fn net(header: Header, key: u8) -> State {
+    match header.net_length() {
+        0 => State::Sync,
+        left => State::Net {
+            key,
+            left,
+            process: if header.process_data() {
+                Process::High
+            } else {
+                Process::None
+            },
+        },
+    }
+}
+
+/// How many bytes a command has in front of its checking byte (ND21 10.1-10.5).
+const fn length(code: u8) -> Option<usize> {
+    Some(match code {
+        0xC8 | 0xDD => 2,
+        0xC0 | 0xA4 | 0xA5 => 3,
+        0xC1 | 0x82 => 4,
+        0xC7 | 0x63 => 5,
+        _ => return None,
+    })
+}
+
+impl Doubt {
+    fn follow(self, byte: u8) -> Result<Next, Cause> {
+        let next = match byte {
+            0 => {
+                let zeros = (self.zeros + 1).min(ZEROS);
+                // A sequence that breaks off leaves a single zero.
+                let zeros = if self.matched > 0 { 1 } else { zeros };
+                Self {
+                    cleared: self.cleared || zeros == ZEROS,
+                    zeros,
+                    matched: 0,
+                }
+            }
+            _ if !self.cleared => return Err(Cause::InDoubt),
+            SYNCO | PAUSE => Self {
+                zeros: 0,
+                matched: 0,
+                ..self
+            },
+            _ if byte == SEQUENCE[usize::from(self.matched)] => {
+                let matched = self.matched + 1;
+                if usize::from(matched) < SEQUENCE.len() {
+                    Self { matched, ..self }
+                } else if self.zeros == ZEROS {
+                    return Ok(Next {
+                        recovered: true,
+                        ..Next::to(State::Sync)
+                    });
+                } else {
+                    Self {
+                        zeros: 0,
+                        matched: 0,
+                        ..self
+                    }
+                }
+            }
+            0xFF => Self {
+                zeros: 0,
+                matched: 1,
+                ..self
+            },
+            _ => return Err(Cause::InDoubt),
+        };
+        Ok(Next::to(State::Doubt(next)))
+    }
+}
+
+impl Half {
+    fn sent(&self) -> &[u8] {
+        &self.bytes[..usize::from(self.length)]
+    }
+
+    fn with(mut self, byte: u8) -> Self {
+        if let Some(place) = self.bytes.get_mut(usize::from(self.length)) {
+            *place = byte;
+            self.length += 1;
+        }
+        self
+    }
+}
+
+impl Tail {
+    /// By how much the last four bytes and this one must be counted up to be the check sequence.
+    fn shift(&self, byte: u8) -> Option<u8> {
+        let [a, b, c, d] = self.bytes;
+        let shift = SEQUENCE[0].wrapping_sub(a);
+        let fits = [a, b, c, d, byte]
+            .iter()
+            .zip(SEQUENCE)
+            .all(|(byte, printed)| byte.wrapping_add(shift) == printed);
+        (fits && usize::from(self.length) == self.bytes.len()).then_some(shift)
+    }
+
+    fn push(&mut self, byte: u8) {
+        self.bytes.rotate_left(1);
+        self.bytes[3] = byte;
+        self.length = (self.length + 1).min(4);
+    }
+}

@@ -1,0 +1,145 @@
+//! What a rig allows, and what an act needs of it.
+
+use core::fmt;
+
+/// What a rig allows. Reading, and what stops a machine, needs no leave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Motors may start, change their speed or their place; parameters of the regulators may be written.
+    pub motion: bool,
+    /// The EEPROM may be written (ND21 14.10.5).
+    pub eeprom: bool,
+    /// Drives may be reset (ND21 10.5). A reset ends a software block and a software stop (11.8), so it needs `motion` as well.
+    pub reset: bool,
+    /// Digital and analogue outputs may be changed (ND21 10.4, 14.7).
+    pub outputs: bool,
+    /// The highest speed that may be written, in rpm; `None` for any. Counted in the range of 12000 rpm, in which
+    /// a bit is worth most (ND21 14.5.3.1): a drive of the range of 8000 rpm is held to half of it.
+    pub max_speed: Option<u16>,
+    /// The most bytes that may begin within a second on the link's clock; `None`: as many as the line carries. Bytes queued
+    /// at one time count at that time.
+    pub bytes_per_second: Option<u32>,
+    /// The most bytes that may pass in all.
+    pub most_bytes: u64,
+}
+
+impl Default for Limits {
+    /// Nothing but reading and stopping, for about 80 hours at 38400 bit/s.
+    fn default() -> Self {
+        Self {
+            motion: false,
+            eeprom: false,
+            reset: false,
+            outputs: false,
+            max_speed: None,
+            bytes_per_second: None,
+            most_bytes: 1_000_000_000,
+        }
+    }
+}
+
+impl Limits {
+    /// Everything, as on a bench of simulated drives.
+    #[must_use]
+    pub fn unlimited() -> Self {
+        Self {
+            motion: true,
+            eeprom: true,
+            reset: true,
+            outputs: true,
+            ..Self::default()
+        }
+    }
+
+    /// Whether every act is allowed, with any value.
+    #[must_use]
+    pub const fn allow_everything(&self) -> bool {
+        self.motion && self.eeprom && self.reset && self.outputs && self.max_speed.is_none()
+    }
+
+    /// What of `need` is not allowed.
+    #[must_use]
+    pub const fn missing(&self, need: Need) -> Need {
+        let mut has = 0;
+        if self.motion {
+            has |= Need::MOTION.0;
+        }
+        if self.eeprom {
+            has |= Need::EEPROM.0;
+        }
+        if self.reset {
+            has |= Need::RESET.0;
+        }
+        if self.outputs {
+            has |= Need::OUTPUTS.0;
+        }
+        if self.allow_everything() {
+            has |= Need::EVERYTHING.0;
+        }
+        Need(need.0 & !has)
+    }
+}
+
+/// What an act needs the rig's leave for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Need(u8);
+
+impl Need {
+    /// Nothing.
+    pub const NONE: Self = Self(0);
+    /// [`Limits::motion`].
+    pub const MOTION: Self = Self(1);
+    /// [`Limits::eeprom`].
+    pub const EEPROM: Self = Self(1 << 1);
+    /// [`Limits::reset`].
+    pub const RESET: Self = Self(1 << 2);
+    /// [`Limits::outputs`].
+    pub const OUTPUTS: Self = Self(1 << 3);
+    /// All of them and no greatest speed: nobody knows what it does, or it changes what this guard relies on.
+    pub const EVERYTHING: Self = Self(0b1_1111);
+
+    /// Both.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether it is nothing.
+    #[must_use]
+    pub const fn is_none(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether all of `other` is needed.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+impl fmt::Display for Need {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = [
+            (
+                Self::MOTION,
+                "`allow_motion` in the rig's [limits] and --allow-motion",
+            ),
+            (Self::EEPROM, "`allow_eeprom` in the rig's [limits]"),
+            (Self::RESET, "`allow_reset` in the rig's [limits]"),
+            (Self::OUTPUTS, "`allow_outputs` in the rig's [limits]"),
+        ];
+        let mut first = true;
+        for (need, name) in names {
+            if self.contains(need) {
+                let and = if first { "" } else { ", " };
+                write!(f, "{and}{name}")?;
+                first = false;
+            }
+        }
+        if self.0 & (1 << 4) != 0 {
+            let and = if first { "" } else { ", " };
+            write!(f, "{and}no `max_speed`, as nobody knows what it does")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,308 @@
+//! A line or a link behind a guard.
+
+use crate::link::{
+    Capability, DriveFault, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus, Trouble,
+};
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::guard::{Denial, Guard, Limits};
+use harness_proto::novobus::sync::SYNCO;
+use harness_proto::time::{Instant, Span};
+use harness_sim::trace::Trace;
+use std::collections::BTreeMap;
+
+/// A line or a link that sends nothing that the limits do not allow. After a denial it is in
+/// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
+#[derive(Debug)]
+pub struct Guarded<L> {
+    inner: L,
+    rings: Vec<Ring>,
+    limits: Limits,
+    trouble: Option<Trouble>,
+    capabilities: Vec<Capability>,
+}
+
+#[derive(Debug)]
+struct Ring {
+    guard: Guard,
+    size: RingSize,
+    /// Data bits to be inverted in a byte that is sent damaged, by the number of the byte.
+    damaged: BTreeMap<u64, u8>,
+    /// Bytes handed on, denied ones not counted: the numbers of the link's own.
+    sent: u64,
+}
+
+/// What is to be done about a fault.
+enum Verdict {
+    /// It changes no byte: at most an error is noticed.
+    Harmless,
+    /// A byte that the master sends arrives with these data bits inverted, and with an error.
+    Damages { byte: u64, data: u8 },
+    /// Drives may be out of step behind it.
+    Doubt,
+    /// Nobody can judge what drives make of it.
+    Open,
+}
+
+impl<L: Line> Guarded<L> {
+    /// A guarded line with rings of these sizes, in doubt until it was [synchronised](Self::synchronise).
+    pub fn over_line(inner: L, sizes: &[RingSize], limits: Limits) -> Self {
+        let ring = |&size| Ring {
+            guard: Guard::new(size, limits),
+            size,
+            damaged: BTreeMap::new(),
+            sent: 0,
+        };
+        Self {
+            inner,
+            rings: sizes.iter().map(ring).collect(),
+            limits,
+            trouble: None,
+            capabilities: Vec::new(),
+        }
+    }
+
+    /// Sends 17 zeros and the check sequence on every ring (ND21 9.8), waits until they have come round, and takes what came. Behind
+    /// it commands pass, as far as they are allowed.
+    pub fn synchronise(&mut self) {
+        let sizes: Vec<_> = self.rings.iter().map(|ring| ring.size).collect();
+        for (ring, size) in sizes.into_iter().enumerate() {
+            let sent = self.send(ring, &CHECK_SEQUENCE);
+            let end = sent + self.byte_time() * (u64::from(size.drives()) + 8);
+            while self.now() < end && self.wait(end) {}
+            while self.receive(ring).is_some() {}
+        }
+    }
+
+    /// Believes that the drives have just been made and have heard nothing; see [`Guard::assume_fresh`].
+    pub fn assume_fresh(&mut self) {
+        for ring in &mut self.rings {
+            ring.guard.assume_fresh();
+        }
+    }
+
+    /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](super::safe_state).
+    pub fn reset_after_denial(&mut self) {
+        self.trouble = None;
+        for ring in &mut self.rings {
+            ring.guard.reset_after_denial();
+        }
+    }
+
+    /// The link behind the guard.
+    pub fn inner(&self) -> &L {
+        &self.inner
+    }
+
+    fn deny(&mut self, text: String) {
+        if self.trouble.is_none() {
+            self.trouble = Some(Trouble::Denied(text));
+        }
+    }
+}
+
+impl Ring {
+    /// Judges a byte as it will be, and as it would be if the port did not damage it.
+    fn admit(&mut self, now: Instant, byte: u8) -> Result<(), Denial> {
+        let number = self.sent + 1;
+        match self.damaged.get(&number) {
+            None => self.guard.admit(now, byte, false)?,
+            Some(data) => {
+                self.guard.clone().admit(now, byte, false)?;
+                self.guard.admit(now, byte ^ data, true)?;
+                self.damaged.remove(&number);
+            }
+        }
+        self.sent = number;
+        Ok(())
+    }
+}
+
+impl<L: Link> Guarded<L> {
+    /// A guarded link, in doubt until it was [synchronised](Self::synchronise). What the limits deny is no capability of it.
+    pub fn new(inner: L, limits: Limits) -> Self {
+        // A link has one ring or two; a ring that it does not have has no drives.
+        let sizes: Vec<_> = (0..2)
+            .map_while(|ring| RingSize::new(inner.drives(ring).into()).ok())
+            .collect();
+        let mut guarded = Self::over_line(inner, &sizes, limits);
+        let has = |capability: &Capability| match capability {
+            Capability::Motion => limits.motion,
+            Capability::Eeprom => limits.eeprom,
+            // A reset ends block and stop (ND21 11.8).
+            Capability::Reset => limits.reset && limits.motion,
+            _ => true,
+        };
+        let own = guarded.inner.capabilities().iter().copied();
+        guarded.capabilities = own.filter(has).collect();
+        guarded
+    }
+
+    /// What a fault may do to the bytes that drives hear.
+    fn verdict(&self, ring: usize, fault: PlacedFault, moment: Moment) -> Verdict {
+        let settled = moment == Moment::Now && !self.inner.busy();
+        match fault {
+            PlacedFault::Stimulus(..) | PlacedFault::Drive(_, DriveFault::Off) => Verdict::Harmless,
+            PlacedFault::Link(link, LinkFault::Flip(flips)) if flips.noticed().is_some() => {
+                let sent = self.rings.get(ring).map_or(0, |ring| ring.sent);
+                match moment {
+                    _ if flips.data == 0 => Verdict::Harmless,
+                    Moment::Byte(byte) if link == 0 && byte > sent => {
+                        let data = flips.data;
+                        Verdict::Damages { byte, data }
+                    }
+                    Moment::Now if link == 0 && settled => {
+                        let (byte, data) = (sent + 1, flips.data);
+                        Verdict::Damages { byte, data }
+                    }
+                    _ => Verdict::Open,
+                }
+            }
+            PlacedFault::Link(_, LinkFault::Cut | LinkFault::Delay(_)) => Verdict::Harmless,
+            // Bytes are lost on the way: drives that nothing tells of it are out of step.
+            PlacedFault::Drive(_, DriveFault::On) | PlacedFault::Link(_, LinkFault::Join)
+                if settled =>
+            {
+                Verdict::Doubt
+            }
+            PlacedFault::Link(..) | PlacedFault::Drive(..) => Verdict::Open,
+        }
+    }
+}
+
+impl<L: Line> Line for Guarded<L> {
+    fn byte_time(&self) -> Span {
+        self.inner.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.inner.now()
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        let now = self.inner.now();
+        let Some(state) = self.rings.get_mut(ring) else {
+            self.deny(format!("ring {} is not in the rig's file", ring + 1));
+            return now;
+        };
+        if self.trouble.is_some() {
+            return now;
+        }
+        let mut admitted = 0;
+        let mut denial = None;
+        for &byte in bytes {
+            match state.admit(now, byte) {
+                Ok(()) => admitted += 1,
+                Err(why) => {
+                    denial = Some(why);
+                    break;
+                }
+            }
+        }
+        let end = self.inner.send(ring, &bytes[..admitted]);
+        if let Some(denial) = denial {
+            self.deny(format!("ring {}: {denial}", ring + 1));
+        }
+        end
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        self.inner.receive(ring)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.inner.wait(until)
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.inner.trouble().or(self.trouble.as_ref())
+    }
+}
+
+impl<L: Link> Link for Guarded<L> {
+    fn capabilities(&self) -> &[Capability] {
+        &self.capabilities
+    }
+
+    fn busy(&self) -> bool {
+        self.inner.busy()
+    }
+
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        if !self.limits.allow_everything() {
+            match self.verdict(ring, fault, moment) {
+                Verdict::Harmless => {}
+                Verdict::Damages { byte, data } => {
+                    if let Some(ring) = self.rings.get_mut(ring) {
+                        *ring.damaged.entry(byte).or_default() ^= data;
+                    }
+                }
+                Verdict::Doubt => {
+                    if let Some(ring) = self.rings.get_mut(ring) {
+                        ring.guard.doubt();
+                    }
+                }
+                Verdict::Open => {
+                    self.deny(format!(
+                        "ring {}: the fault {fault:?} is not made: what drives take changed or lost bytes for cannot be \
+                         judged, so it needs everything allowed in the rig's [limits], --allow-motion, and no `max_speed`",
+                        ring + 1
+                    ));
+                    return;
+                }
+            }
+        }
+        self.inner.inject(ring, fault, moment);
+    }
+
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+        let now = self.inner.now();
+        let Some(state) = self.rings.get_mut(ring) else {
+            return Vec::new();
+        };
+        let mut guard = state.guard.clone();
+        if self.trouble.is_some() || (0..count).any(|_| guard.admit(now, SYNCO, false).is_err()) {
+            return Vec::new();
+        }
+        // A simulated link probes a copy of itself.
+        if !self.capabilities.contains(&Capability::Simulator) {
+            state.guard = guard;
+            state.sent += count as u64;
+        }
+        self.inner.probe(ring, count)
+    }
+
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
+        self.inner.error_of(ring, drive)
+    }
+
+    fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
+        self.inner.stimulate(ring, drive, stimulus);
+    }
+
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
+        self.inner.shown(ring, drive)
+    }
+
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
+        self.inner.peek(ring, drive, address)
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        self.inner.unused_faults()
+    }
+
+    fn carried(&self) -> u64 {
+        self.inner.carried()
+    }
+
+    fn drives(&self, ring: usize) -> u8 {
+        self.inner.drives(ring)
+    }
+
+    fn trace(&self, ring: usize) -> Trace {
+        self.inner.trace(ring)
+    }
+}

@@ -1,0 +1,246 @@
+//! The safe state of a bench: every drive stopped, standing and blocked, and read back.
+
+use crate::bus::{Axis, Bus, Error, Options, recover};
+use crate::link::{Line, Trouble};
+use harness_proto::line::Received;
+use harness_proto::nd21::bits::{flags, status};
+use harness_proto::nd21::ram;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
+use harness_proto::time::{Instant, Span};
+use std::fmt;
+
+/// The highest raw `nist` at which a motor counts as standing: 10.6 rpm in the range of 12000 rpm (ND21 14.5.3.1).
+pub const MOST_STANDING: u16 = 20;
+/// How long a motor may take to stop on its ramp.
+const TIME_TO_STOP: Span = Span::from_millis(10_000);
+/// How often a ring is brought back before it counts as lost (ND21 9.8; three are the most that were ever needed).
+const ATTEMPTS: u8 = 3;
+
+/// Whether the bench is in its safe state.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[must_use]
+pub enum SafeState {
+    /// Every drive answered that it is stopped, blocked and standing: so many drives a ring.
+    Confirmed(Vec<RingSize>),
+    /// Of these drives nobody knows; the others are.
+    NotConfirmed(Vec<NotSafe>),
+}
+
+/// A drive that was not confirmed to stand.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NotSafe {
+    /// The drive.
+    pub axis: Axis,
+    /// Why.
+    pub why: String,
+}
+
+impl fmt::Display for SafeState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Confirmed(rings) => {
+                let drives: u32 = rings.iter().map(|size| u32::from(size.drives())).sum();
+                write!(
+                    f,
+                    "safe state: {drives} drives are stopped, standing and blocked"
+                )
+            }
+            Self::NotConfirmed(drives) => {
+                f.write_str("the safe state is NOT confirmed; use the emergency stop")?;
+                for drive in drives {
+                    write!(f, "\n  drive {}: {}", drive.axis, drive.why)?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Brings every drive of the rings to its safe state and reads it back; a guarded line lets all of it pass, behind a
+/// denial after [`Guarded::reset_after_denial`](super::Guarded::reset_after_denial).
+///
+/// A ring is brought back first (9.8), whatever was half-sent. Then all drives get the software stop, which
+/// ends every motion on its ramp (11.8), each is waited for until `nist` is within [`MOST_STANDING`], and the nominal speed 0 and the
+/// software block follow, on a drive that does not stand as well. Confirmed is a drive whose `Flags` show stop and block (14.4.2) and
+/// that stands. A ring that does not answer is given the stops all the same, as drives in front of a break hear
+/// them.
+///
+/// It ends within about 15 seconds a ring and 10 a drive that does not stop.
+pub fn safe_state(line: &mut dyn Line, rings: &[RingSize]) -> SafeState {
+    let mut not_safe = Vec::new();
+    for (ring, &size) in rings.iter().enumerate() {
+        not_safe.extend(ring_to_safe_state(line, ring, size));
+    }
+    if not_safe.is_empty() {
+        SafeState::Confirmed(rings.to_vec())
+    } else {
+        SafeState::NotConfirmed(not_safe)
+    }
+}
+
+fn ring_to_safe_state(line: &mut dyn Line, ring: usize, size: RingSize) -> Vec<NotSafe> {
+    let all = |why: String| {
+        let axes = (0..size.drives()).filter_map(|drive| Axis::new(ring, drive));
+        let not_safe = axes.map(|axis| NotSafe {
+            axis,
+            why: why.clone(),
+        });
+        not_safe.collect()
+    };
+    if let Err(why) = bring_back(line, ring, size) {
+        stop_blindly(line, ring, size);
+        return all(why);
+    }
+    let options = Options {
+        patience: Span::from_millis(2_000),
+        ..Options::default()
+    };
+    let line = OneRing { line, ring };
+    let bus = match Bus::open(Box::new(line), &[size], options) {
+        Ok(bus) => bus,
+        Err(error) => return all(error.to_string()),
+    };
+    // The bus has one ring, whichever it is of the bench.
+    let axes = || (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
+    let stopped: Vec<_> = axes().map(|axis| bus.stop(axis)).collect();
+    let mut not_safe = Vec::new();
+    for (axis, stopped) in axes().zip(stopped) {
+        let stands = stopped.and_then(|()| wait_until_standing(&bus, axis));
+        let blocked = block(&bus, axis);
+        let why = match (stands, blocked) {
+            (Ok(()), Ok(())) => continue,
+            (Err(error), _) | (_, Err(error)) => error.to_string(),
+        };
+        if let Some(axis) = Axis::new(ring, axis.drive()) {
+            not_safe.push(NotSafe { axis, why });
+        }
+    }
+    bus.close();
+    not_safe
+}
+
+/// Ends what was half-sent and brings the ring back (ND21 9.8).
+fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), String> {
+    let mut why = String::new();
+    for _ in 0..ATTEMPTS {
+        let sent = line.send(ring, &CHECK_SEQUENCE);
+        while line.now() < sent && line.wait(sent) {}
+        let recovery = recover(line, ring);
+        if recovery.drives == Some(size) {
+            return Ok(());
+        }
+        let reported = recovery.after.or(recovery.before);
+        why = match (line.trouble(), recovery.drives, reported) {
+            (Some(trouble), ..) => return Err(trouble.to_string()),
+            (None, Some(found), _) => format!(
+                "the ring has {} drives, not {} as expected",
+                found.drives(),
+                size.drives()
+            ),
+            (None, None, Some(drive)) => {
+                format!("the ring is broken in front of drive {drive} (ND21 9.7, 9.9)")
+            }
+            (None, None, None) => "the ring does not answer".to_owned(),
+        };
+    }
+    Err(why)
+}
+
+/// Software stop to every drive, nominal speed 0 behind it, without an answer (ND21 14.10).
+fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
+    if matches!(line.trouble(), Some(Trouble::Lost(_))) {
+        return;
+    }
+    let mut bytes = CHECK_SEQUENCE.to_vec();
+    let stop = Command::Or {
+        address_low: ram::STATUS.to_be_bytes()[1],
+        data: status::STOP,
+    };
+    let net = stop.encode();
+    let length = u8::try_from(net.len()).unwrap_or(u8::MAX);
+    let Ok(header) = Header::new(Addressing::AddressFollows, false, length) else {
+        return;
+    };
+    for drive in 0..size.drives() {
+        if let Ok(address) = size.address_byte(drive) {
+            bytes.extend([SyncByte::Telegram(header).encode(), address]);
+            bytes.extend(&net[..]);
+        }
+    }
+    let sent = line.send(ring, &bytes);
+    while line.now() < sent && line.wait(sent) {}
+}
+
+fn wait_until_standing(bus: &Bus<'_>, axis: Axis) -> Result<(), Error> {
+    let end = bus.now() + TIME_TO_STOP;
+    loop {
+        let speed = bus.read_word(axis, ram::NIST)?.cast_signed();
+        if speed.unsigned_abs() <= MOST_STANDING {
+            return Ok(());
+        }
+        if bus.now() >= end {
+            return Err(Error::TimeOut {
+                waited: TIME_TO_STOP,
+                what: format!("drive {axis} to stand (nist is {speed:04X})"),
+            });
+        }
+    }
+}
+
+fn block(bus: &Bus<'_>, axis: Axis) -> Result<(), Error> {
+    bus.write_word(axis, ram::NSOLL, 0)?;
+    bus.block(axis)?;
+    let wanted = flags::STOP | flags::BLOCK;
+    // `Flags` follow in the drive's next cycle.
+    let end = bus.now() + Span::from_millis(500);
+    loop {
+        let found = bus.read_byte(axis, ram::FLAGS)?;
+        let speed = bus.read_word(axis, ram::NIST)?.cast_signed();
+        if found & wanted == wanted && speed.unsigned_abs() <= MOST_STANDING {
+            return Ok(());
+        }
+        if bus.now() >= end {
+            return Err(Error::TimeOut {
+                waited: Span::from_millis(500),
+                what: format!(
+                    "drive {axis} to be stopped and blocked (Flags are {found:02X}, nist is {speed:04X})"
+                ),
+            });
+        }
+    }
+}
+
+/// One ring of a line, as a line of its own.
+struct OneRing<'l> {
+    line: &'l mut dyn Line,
+    ring: usize,
+}
+
+impl Line for OneRing<'_> {
+    fn byte_time(&self) -> Span {
+        self.line.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.line.now()
+    }
+
+    fn send(&mut self, _: usize, bytes: &[u8]) -> Instant {
+        self.line.send(self.ring, bytes)
+    }
+
+    fn receive(&mut self, _: usize) -> Option<(Instant, Received)> {
+        self.line.receive(self.ring)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.line.wait(until)
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.line.trouble()
+    }
+}

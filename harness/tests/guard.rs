@@ -1,0 +1,160 @@
+//! Attacks on the guard: telegrams of denied and allowed commands, whole and cut, shifted, mixed with recoveries, zeros,
+//! check sequences, short addresses, line errors and silence. `harness_sim::fuzz::guard` judges.
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+const RECOVERY: [u8; 22] = [
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0x44, 0x72, 0x4C, 0x41,
+];
+
+/// A command with its checking byte (ND21 9.6).
+fn closed(mut command: Vec<u8>) -> Vec<u8> {
+    let sum = command
+        .iter()
+        .fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+    command.push(sum.max(1));
+    command
+}
+
+fn command() -> impl Strategy<Value = Vec<u8>> {
+    let low = prop_oneof![
+        Just(0x00_u8),
+        Just(0x08),
+        Just(0x09),
+        Just(0x32),
+        Just(0x36),
+        Just(0x43),
+        Just(0x57),
+        Just(0x8A),
+        Just(0x88),
+        Just(0x38),
+        Just(0x7C),
+        Just(0xFF),
+        any::<u8>(),
+    ];
+    let high = prop_oneof![6 => Just(0xFF_u8), 3 => Just(0xFD), 1 => any::<u8>()];
+    let data = prop_oneof![
+        Just(0x00_u8),
+        Just(0x01),
+        Just(0x80),
+        Just(0x81),
+        Just(0x82),
+        Just(0x84),
+        Just(0x10),
+        Just(0xFF),
+        any::<u8>(),
+    ];
+    (0..12_u8, low, high, data.clone(), data).prop_map(|(kind, low, high, a, b)| {
+        closed(match kind {
+            0 => vec![0xC0, low, high],
+            1 => vec![0xC1, low, high, b'?'],
+            2 => vec![0xC7, low, high, b'1', b'2'],
+            3 | 4 => vec![0x82, a, low, high],
+            5 | 6 => vec![0x63, a, b, low, high],
+            7 => vec![0xA4, a, low & 0x7F],
+            8 | 9 => vec![0xA5, a, low & 0x7F],
+            10 => vec![0xC8, a & 3],
+            _ => vec![0xDD, b'!'],
+        })
+    })
+}
+
+/// Commands cut over telegrams: each piece behind a sync byte of one kind or another.
+fn telegrams() -> impl Strategy<Value = Vec<u8>> {
+    let pieces = vec(
+        (1..8_usize, 0..8_u8, 0xF8..=0xFF_u8, any::<[u8; 2]>()),
+        1..7,
+    );
+    (command(), pieces).prop_map(|(command, pieces)| {
+        let mut bytes = Vec::new();
+        let mut rest = &command[..];
+        for (most, kind, address, process) in pieces {
+            let with_process = kind == 7;
+            let most = if with_process { most.min(5) } else { most };
+            let (net, behind) = rest.split_at(most.min(rest.len()));
+            let length = net.len() as u8 + 2 * u8::from(with_process);
+            let short = match kind {
+                0 | 1 => 0x20,
+                2 => 0x60,
+                _ => 0,
+            };
+            bytes.push(0x80 | short | length << 1 | u8::from(with_process));
+            if short == 0 {
+                // Most often the same drive.
+                bytes.push(if kind < 6 { 0xFF } else { address });
+            }
+            if with_process {
+                bytes.extend(process);
+            }
+            bytes.extend(net);
+            rest = behind;
+            if rest.is_empty() {
+                break;
+            }
+        }
+        bytes
+    })
+}
+
+fn piece() -> impl Strategy<Value = Vec<u8>> {
+    let shifted = |bytes: Vec<u8>, by: u8| bytes.iter().map(|byte| byte.wrapping_sub(by)).collect();
+    prop_oneof![
+        8 => telegrams(),
+        3 => Just(RECOVERY.to_vec()),
+        2 => (0..20_usize).prop_map(|zeros| vec![0; zeros]),
+        2 => (telegrams(), 1..4_u8).prop_map(move |(bytes, by)| shifted(bytes, by)),
+        2 => (1..4_u8).prop_map(move |by| shifted(RECOVERY[17..].to_vec(), by)),
+        1 => Just(RECOVERY[17..].to_vec()),
+        1 => vec(prop_oneof![Just(0x80_u8), Just(0x81), Just(0x41), Just(0xFF), any::<u8>()], 1..8),
+        1 => (telegrams(), any::<prop::sample::Index>()).prop_map(|(mut bytes, at)| {
+            bytes.truncate(at.index(bytes.len() + 1));
+            bytes
+        }),
+        1 => (telegrams(), any::<prop::sample::Index>(), any::<u8>()).prop_map(|(mut bytes, at, by)| {
+            let at = at.index(bytes.len());
+            bytes[at] ^= by;
+            bytes
+        }),
+    ]
+}
+
+fn case() -> impl Strategy<Value = Vec<u8>> {
+    let head = (
+        any::<u8>(),
+        prop_oneof![2 => Just(0_u8), 1 => 1..120_u8],
+        prop_oneof![2 => Just(0_u8), 1 => 1..120_u8],
+        any::<u8>(),
+    );
+    let start = vec(piece(), 0..3).prop_map(|pieces| {
+        let mut bytes = pieces.concat();
+        bytes.truncate(40);
+        bytes
+    });
+    (head, start, any::<bool>(), vec(piece(), 1..12)).prop_map(|(head, start, recovered, wire)| {
+        let (what, damaged, silent, whose) = head;
+        let mut case = vec![what, damaged, silent, whose, start.len() as u8];
+        case.extend(start);
+        if recovered {
+            case.extend(RECOVERY);
+        }
+        case.extend(wire.concat());
+        case
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// No input makes the guard let pass what the limits deny.
+    #[test]
+    fn no_sequence_smuggles_a_command_through(case in case()) {
+        harness_sim::fuzz::guard(&case);
+    }
+
+    /// Nor do bytes without any order.
+    #[test]
+    fn nor_do_random_bytes(case in vec(any::<u8>(), 5..200)) {
+        harness_sim::fuzz::guard(&case);
+    }
+}
