@@ -22,6 +22,8 @@ pub struct Guarded<L> {
     limits: Limits,
     trouble: Option<Trouble>,
     capabilities: Vec<Capability>,
+    /// When the present conversation began, on the guard's clock, which is never set back.
+    origin: Instant,
 }
 
 #[derive(Debug)]
@@ -61,6 +63,7 @@ impl<L: Line> Guarded<L> {
             limits,
             trouble: None,
             capabilities: Vec::new(),
+            origin: Instant::START,
         }
     }
 
@@ -94,6 +97,16 @@ impl<L: Line> Guarded<L> {
     /// The link behind the guard.
     pub fn inner(&self) -> &L {
         &self.inner
+    }
+
+    /// The link behind the guard, for what sends nothing. Bytes sent past the guard are nobody's to judge.
+    pub(crate) fn inner_mut(&mut self) -> &mut L {
+        &mut self.inner
+    }
+
+    /// The time on the guard's clock.
+    fn guard_time(&self) -> Instant {
+        self.origin + self.inner.now().since_start()
     }
 
     fn deny(&mut self, text: String) {
@@ -183,6 +196,7 @@ impl<L: Line> Line for Guarded<L> {
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         let now = self.inner.now();
+        let guard_time = self.guard_time();
         let Some(state) = self.rings.get_mut(ring) else {
             self.deny(format!("ring {} is not in the rig's file", ring + 1));
             return now;
@@ -193,7 +207,7 @@ impl<L: Line> Line for Guarded<L> {
         let mut admitted = 0;
         let mut denial = None;
         for &byte in bytes {
-            match state.admit(now, byte) {
+            match state.admit(guard_time, byte) {
                 Ok(()) => admitted += 1,
                 Err(why) => {
                     denial = Some(why);
@@ -219,6 +233,10 @@ impl<L: Line> Line for Guarded<L> {
     fn trouble(&self) -> Option<&Trouble> {
         self.inner.trouble().or(self.trouble.as_ref())
     }
+
+    fn lead(&self) -> Span {
+        self.inner.lead()
+    }
 }
 
 impl<L: Link> Link for Guarded<L> {
@@ -226,8 +244,25 @@ impl<L: Link> Link for Guarded<L> {
         &self.capabilities
     }
 
+    fn begin(&mut self) {
+        self.origin = self.guard_time();
+        self.inner.begin();
+        for ring in &mut self.rings {
+            ring.sent = 0;
+            ring.damaged.clear();
+        }
+    }
+
     fn busy(&self) -> bool {
         self.inner.busy()
+    }
+
+    fn reaches(&self, ring: usize, link: usize) -> bool {
+        self.inner.reaches(ring, link)
+    }
+
+    fn time_tolerance(&self) -> Span {
+        self.inner.time_tolerance()
     }
 
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
@@ -258,7 +293,7 @@ impl<L: Link> Link for Guarded<L> {
     }
 
     fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        let now = self.inner.now();
+        let now = self.guard_time();
         let Some(state) = self.rings.get_mut(ring) else {
             return Vec::new();
         };
