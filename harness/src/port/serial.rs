@@ -37,7 +37,6 @@ impl Drop for Serial {
     fn drop(&mut self) {
         // A port that is gone has no settings any more.
         let _gone = rustix::termios::tcsetattr(&self.fd, OptionalActions::Now, &self.before);
-        let _gone = rustix::termios::ioctl_tiocnxcl(&self.fd);
     }
 }
 
@@ -72,7 +71,6 @@ pub(super) fn open(
             .map_err(|error| OpenError::of(path, &error))?,
         gaps: Vec::new(),
     };
-    rustix::termios::ioctl_tiocexcl(&fd).map_err(other)?;
     set_marks(&fd, rate).map_err(|what| OpenError::Setting {
         port: name.clone(),
         what,

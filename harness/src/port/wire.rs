@@ -9,7 +9,7 @@ use harness_proto::time::Span;
 use rustix::event::{PollFd, PollFlags};
 use rustix::io::Errno;
 use std::collections::VecDeque;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 
 /// What is read from the operating system at a time.
 const CHUNK: usize = 4096;
@@ -89,6 +89,12 @@ impl Wire {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The descriptor, for locks.
+    #[must_use]
+    pub fn fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
     }
 
     /// What it shows and does.

@@ -5,15 +5,21 @@
 //! that is kept, and which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
 
 mod check;
+mod ends;
 pub mod file;
 pub mod find;
 pub mod hook;
 pub mod lock;
+mod open;
 pub mod scan;
 mod schema;
+mod session;
 pub mod state;
 pub mod values;
 
 pub use check::{Rig, parse};
+pub use ends::Ends;
 pub use find::{FindError, find};
+pub use open::{OpenRigError, simulated, whole_drives};
 pub use schema::schema;
+pub use session::{End, Health, Options, Session, SessionError, Unhealthy};

@@ -1,0 +1,143 @@
+//! The two kinds of ring ends that a rig can have, as one link.
+
+use crate::link::{
+    Capability, Line, Link, Moment, PlacedFault, Shown, SimulatedLink, Stimulus, StreamLink,
+    Trouble,
+};
+use harness_proto::line::Received;
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::{Instant, Span};
+use harness_sim::trace::Trace;
+
+/// Where a rig's rings end: in the simulator, or at ports.
+#[derive(Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one of them in a program, and it is not moved"
+)]
+pub enum Ends {
+    /// In the simulator, in virtual time.
+    Simulated(SimulatedLink),
+    /// At ports, in real time.
+    Ports(StreamLink),
+}
+
+/// The same call for whichever it is.
+macro_rules! each {
+    ($self:ident, $link:ident => $call:expr) => {
+        match $self {
+            Ends::Simulated($link) => $call,
+            Ends::Ports($link) => $call,
+        }
+    };
+}
+
+impl Ends {
+    /// The link at ports, if it is one.
+    pub fn ports(&self) -> Option<&StreamLink> {
+        match self {
+            Self::Simulated(_) => None,
+            Self::Ports(link) => Some(link),
+        }
+    }
+
+    /// The link at ports, if it is one.
+    pub fn ports_mut(&mut self) -> Option<&mut StreamLink> {
+        match self {
+            Self::Simulated(_) => None,
+            Self::Ports(link) => Some(link),
+        }
+    }
+}
+
+impl Line for Ends {
+    fn byte_time(&self) -> Span {
+        each!(self, link => link.byte_time())
+    }
+
+    fn now(&self) -> Instant {
+        each!(self, link => link.now())
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        each!(self, link => link.send(ring, bytes))
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        each!(self, link => link.receive(ring))
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        each!(self, link => link.wait(until))
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        each!(self, link => link.trouble())
+    }
+
+    fn lead(&self) -> Span {
+        each!(self, link => link.lead())
+    }
+}
+
+impl Link for Ends {
+    fn capabilities(&self) -> &[Capability] {
+        each!(self, link => link.capabilities())
+    }
+
+    fn begin(&mut self) {
+        each!(self, link => link.begin());
+    }
+
+    fn busy(&self) -> bool {
+        each!(self, link => link.busy())
+    }
+
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        each!(self, link => link.inject(ring, fault, moment));
+    }
+
+    fn reaches(&self, ring: usize, link: usize) -> bool {
+        each!(self, own => own.reaches(ring, link))
+    }
+
+    fn time_tolerance(&self) -> Span {
+        each!(self, link => link.time_tolerance())
+    }
+
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+        each!(self, link => link.probe(ring, count))
+    }
+
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
+        each!(self, link => link.error_of(ring, drive))
+    }
+
+    fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
+        each!(self, link => link.stimulate(ring, drive, stimulus));
+    }
+
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
+        each!(self, link => link.shown(ring, drive))
+    }
+
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
+        each!(self, link => link.peek(ring, drive, address))
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        each!(self, link => link.unused_faults())
+    }
+
+    fn carried(&self) -> u64 {
+        each!(self, link => link.carried())
+    }
+
+    fn drives(&self, ring: usize) -> u8 {
+        each!(self, link => link.drives(ring))
+    }
+
+    fn trace(&self, ring: usize) -> Trace {
+        each!(self, link => link.trace(ring))
+    }
+}

@@ -1,0 +1,207 @@
+//! From a rig's file to its rings' ends: ports opened and locked, or simulated rings set up.
+
+use super::Rig;
+use super::ends::Ends;
+use super::file::{Endpoint, Line, Marks, Transport};
+use super::lock::{PortLock, PortLockError};
+use super::scan::{self, MatchError, Port};
+use crate::link::{InnerLink, Ports, SimulatedLink, StreamLink};
+use crate::port::{self, OpenError, PortSettings, Wire};
+use crate::scenario::expression::{Expression, Located};
+use crate::scenario::parse::parse_setup;
+use crate::scenario::plan::{Plan, plan};
+use crate::scenario::problem::{Problems, Span};
+use crate::scenario::simulate;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::{Drives, Scenario, Setup, SetupKind};
+use harness_proto::line::Rate;
+use harness_proto::time;
+use harness_sim::drive::Model;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// How long a simulated rig has been switched on when somebody comes to it: the self-tests are over (11.8).
+const WARM: time::Span = time::Span::from_millis(200);
+
+/// Why a rig's ports cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenRigError {
+    /// A port.
+    #[error(transparent)]
+    Port(#[from] OpenError),
+    /// No port, or several, fit what the file says of one.
+    #[error(transparent)]
+    Match(#[from] MatchError),
+    /// Somebody else uses a port.
+    #[error("{port}: {error}")]
+    Lock {
+        /// Which port.
+        port: String,
+        /// Why not.
+        error: PortLockError,
+    },
+    /// The lines of `[sim]`.
+    #[error(transparent)]
+    Setup(#[from] Problems),
+    /// Several transports that have no line in common.
+    #[error("ring 2 runs at {second} bit/s, ring 1 at {first}: both rings of a bench share their rate")]
+    Rates {
+        /// Ring 1.
+        first: u32,
+        /// Ring 2.
+        second: u32,
+    },
+}
+
+/// Open ends, and the locks of their ports.
+#[derive(Debug)]
+pub(super) struct Opened {
+    pub(super) ends: Ends,
+    pub(super) locks: Vec<PortLock>,
+}
+
+/// Opens a rig's ends; nothing is sent.
+pub(super) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
+    if rig.is_simulated() {
+        let (_, mut link) = simulated(rig, &[])?;
+        run_until_warm(&mut link);
+        return Ok(Opened {
+            ends: Ends::Simulated(link),
+            locks: Vec::new(),
+        });
+    }
+    let ports = scan::scan(Path::new("/"));
+    let mut locks = Vec::new();
+    let rate = rate(rig.file.ring.first.endpoint.line);
+    let mut wires = Vec::new();
+    for (_, ring) in rig.rings() {
+        let own = self::rate(ring.endpoint.line);
+        if own != rate {
+            return Err(OpenRigError::Rates {
+                first: rate.bits_per_second(),
+                second: own.bits_per_second(),
+            });
+        }
+        wires.push((wire(&ring.endpoint, &ports, &mut locks)?, ring.drives));
+    }
+    let mut inner = Vec::new();
+    for tap in &rig.file.tap {
+        let wire = wire(&tap.endpoint, &ports, &mut locks)?;
+        inner.push(inner_link(rig, tap.ring, tap.link.from, Ports::Tap(wire)));
+    }
+    for interposer in &rig.file.interposer {
+        let up = wire(&interposer.upstream, &ports, &mut locks)?;
+        let interposer_ports = if interposer.upstream == interposer.downstream {
+            Ports::Interposer(up)
+        } else {
+            let down = wire(&interposer.downstream, &ports, &mut locks)?;
+            Ports::TwoPortInterposer(up, down)
+        };
+        let from = interposer.link.from;
+        inner.push(inner_link(rig, interposer.ring, from, interposer_ports));
+    }
+    let mut link = StreamLink::new(wires, inner, rate, interrupt);
+    let tolerance = rig.rings().map(|(_, ring)| ring.time_tolerance.0).max();
+    let tolerance = tolerance.map_or(0, |t| u64::try_from(t.as_nanos()).unwrap_or(u64::MAX));
+    link.set_time_tolerance(time::Span::from_nanos(tolerance));
+    Ok(Opened {
+        ends: Ends::Ports(link),
+        locks,
+    })
+}
+
+fn run_until_warm(link: &mut SimulatedLink) {
+    use crate::link::{Line, Link};
+    let end = link.now() + WARM;
+    link.run_until(end);
+    link.begin();
+}
+
+fn rate(line: Line) -> Rate {
+    match line {
+        Line::Baud38400 => Rate::Baud38400,
+        Line::Baud19200 => Rate::Baud19200,
+        Line::Baud9600 => Rate::Baud9600,
+    }
+}
+
+fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: Ports) -> InnerLink {
+    let index = usize::from(ring.saturating_sub(1));
+    let drives = rig.rings().nth(index).map_or(0, |(_, ring)| ring.drives);
+    let place = from.map_or(0, |from| usize::from(drives.saturating_sub(from)));
+    InnerLink::new(index, place, ports)
+}
+
+fn wire(
+    endpoint: &Endpoint,
+    ports: &[Port],
+    locks: &mut Vec<PortLock>,
+) -> Result<Wire, OpenRigError> {
+    let named = endpoint.port.clone().unwrap_or_default();
+    let place = match endpoint.transport {
+        Transport::Serial if endpoint.port.is_none() => {
+            port::Endpoint::Serial(scan::resolve(ports, &endpoint.udev)?)
+        }
+        Transport::Serial => port::Endpoint::Serial(named.into()),
+        Transport::Pty => port::Endpoint::Pty(named.into()),
+        Transport::Rfc2217 => port::Endpoint::Rfc2217(named),
+        // Checked before: a rig is simulated as a whole or not at all.
+        Transport::Tcp | Transport::Sim => port::Endpoint::Tcp(named),
+    };
+    let name = place.to_string();
+    let wire = port::open(&PortSettings {
+        endpoint: place,
+        rate: rate(endpoint.line),
+        marks: endpoint.marks == Marks::InBand,
+        low_latency: endpoint.low_latency,
+    })?;
+    if matches!(endpoint.transport, Transport::Serial | Transport::Pty) {
+        let lock = PortLock::acquire(wire.fd());
+        locks.push(lock.map_err(|error| OpenRigError::Lock { port: name, error })?);
+    }
+    Ok(wire)
+}
+
+/// The simulated rings of a rig, or those that a rig with ports is compared with: whole drives where no line names a
+/// model, with what the file and `more` lines of a header say.
+///
+/// # Errors
+/// A line has a mistake.
+pub fn simulated(rig: &Rig, more: &[String]) -> Result<(Plan, SimulatedLink), Problems> {
+    let sizes: Vec<u8> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    let own = rig.file.sim.iter().flat_map(|sim| &sim.setup);
+    let lines: Vec<&str> = own.chain(more).map(String::as_str).collect();
+    let source = Source {
+        name: format!("rig {}", rig.id()),
+        text: (lines.join("\n") + "\n").into(),
+    };
+    let mut scenario = parse_setup(&source, &sizes)?;
+    whole_drives(&mut scenario);
+    let plan = plan(&scenario, &source, None)?;
+    let link = simulate::bench(&plan);
+    Ok((plan, link))
+}
+
+/// Every drive is an ND21 where no line of the header names a model.
+pub fn whole_drives(scenario: &mut Scenario) {
+    let says_model = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
+    if scenario.setups.iter().any(says_model) {
+        return;
+    }
+    for ring in 0..scenario.rings.len() {
+        let last = Located {
+            expression: Expression::Last,
+            ..Located::number(0)
+        };
+        scenario.setups.push(Setup {
+            drives: Drives {
+                ring,
+                from: Located::number(0),
+                to: Some(last),
+            },
+            what: SetupKind::Model(Model::Nd21),
+            span: Span::default(),
+        });
+    }
+}

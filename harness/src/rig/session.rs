@@ -1,0 +1,424 @@
+//! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
+
+use super::Rig;
+use super::ends::Ends;
+use super::file::{HookEntry, SafeStep};
+use super::hook::{self, HookError};
+use super::lock::{LockError, PortLock, RigLock};
+use super::open::{OpenRigError, open};
+use super::state;
+use crate::bus::recover;
+use crate::guard::{Guarded, SafeState, safe_state};
+use crate::link::{Line, Link, Trouble};
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::guard::Limits;
+use harness_proto::time::Span;
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// How long a rig is listened to before anything is sent.
+const LISTEN: Span = Span::from_millis(40);
+
+/// Bytes of somebody else's that are shown.
+const SHOWN: usize = 8;
+
+/// How a rig is used.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// What for; others who want it are told.
+    pub purpose: String,
+    /// How long to wait for a rig that somebody else has.
+    pub wait: Duration,
+    /// Whether motors may turn, where the rig's file allows it too.
+    pub allow_motion: bool,
+    /// Set by whoever wants the program to end.
+    pub interrupt: Arc<AtomicBool>,
+}
+
+/// Why a rig cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// Somebody has it, or its lock cannot be used.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// It must not be used.
+    #[error("rig {rig} is in quarantine since {since}: {reason} (`drivebench rig quarantine {rig} --lift`)")]
+    Quarantine {
+        /// Which.
+        rig: String,
+        /// Since when.
+        since: String,
+        /// Why.
+        reason: String,
+    },
+    /// The folder of locks.
+    #[error("failed to use the folder of locks: {0}; DRIVEBENCH_STATE names another")]
+    State(std::io::Error),
+    /// A port.
+    #[error("rig {rig}: {error}")]
+    Open {
+        /// Which.
+        rig: String,
+        /// Why not.
+        error: Box<OpenRigError>,
+    },
+    /// A hook.
+    #[error("rig {rig}: {error}")]
+    Hook {
+        /// Which.
+        rig: String,
+        /// Why.
+        error: Box<HookError>,
+    },
+    /// It is not healthy.
+    #[error("rig {rig}, ring {ring}: {ill}")]
+    Ill {
+        /// Which.
+        rig: String,
+        /// Which ring, 1 or 2.
+        ring: usize,
+        /// What is wrong.
+        ill: Unhealthy,
+    },
+}
+
+/// What is wrong with a ring.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unhealthy {
+    /// Bytes come although the bench sends nothing.
+    #[error("{count} bytes came although nothing was sent ({bytes}): another master on this line, drives that miss their bytes (ND21 9.9), or noise")]
+    Talking {
+        /// How many.
+        count: usize,
+        /// The first of them.
+        bytes: String,
+    },
+    /// Nothing comes back.
+    #[error("nothing comes back: the ring is open, a drive has no power, or this is another port (ND21 8.2)")]
+    Silent,
+    /// What comes back is no ring's answer.
+    #[error("what comes back is no answer of a ring: {bytes}; is the other end a master, or another rate?")]
+    Foreign {
+        /// The first bytes.
+        bytes: String,
+    },
+    /// A drive reports an error behind the check sequence.
+    #[error("the ring does not come back: drive {0} reports a fault in front of it (ND21 9.7)")]
+    Broken(u8),
+    /// Another number of drives.
+    #[error("the ring has {found} drives, the rig's file says {stated}")]
+    Size {
+        /// How many answered.
+        found: u8,
+        /// How many the file says.
+        stated: u8,
+    },
+    /// The link.
+    #[error("{0}")]
+    Trouble(Trouble),
+}
+
+/// What a healthy ring showed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Health {
+    /// How many drives each ring has.
+    pub rings: Vec<RingSize>,
+    /// Drives that reported a fault before the ring was brought back: ring and drive.
+    pub reported: Vec<(usize, u8)>,
+}
+
+/// How a session ended.
+#[derive(Debug)]
+pub struct End {
+    /// Whether every drive stands and is blocked; `None` for rings that are simulated in the program.
+    pub safe: Option<SafeState>,
+    /// What else went wrong on the way out, in sentences.
+    pub remarks: Vec<String>,
+}
+
+/// A rig in use.
+#[derive(Debug)]
+pub struct Session {
+    rig: Rig,
+    link: Guarded<Ends>,
+    rings: Vec<RingSize>,
+    started: Instant,
+    ended: bool,
+    // Given back in this order.
+    _ports: Vec<PortLock>,
+    _lock: Option<RigLock>,
+}
+
+impl Session {
+    /// Takes a rig: lock, hook, ports, and its first health check.
+    ///
+    /// # Errors
+    /// [`SessionError`]; nothing is left locked or open.
+    pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+        let own = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
+            rig: rig.id().to_owned(),
+            since: quarantine.since.clone(),
+            reason: quarantine.reason.clone(),
+        };
+        if let Some(quarantine) = &rig.file.quarantine {
+            return Err(own(quarantine));
+        }
+        let lock = if rig.is_simulated() {
+            None
+        } else {
+            let folder = state::folder().map_err(SessionError::State)?;
+            let kept = state::quarantine(&folder, rig.id()).map_err(SessionError::State)?;
+            if let Some(quarantine) = kept {
+                return Err(own(&quarantine));
+            }
+            Some(RigLock::acquire(rig, &options.purpose, options.wait)?)
+        };
+        run_hook(rig, "before", rig.file.hooks.before.as_ref())?;
+        let opened = open(rig, options.interrupt.clone()).map_err(|error| SessionError::Open {
+            rig: rig.id().to_owned(),
+            error: Box::new(error),
+        })?;
+        let rings: Vec<_> = rig
+            .rings()
+            .filter_map(|(_, ring)| RingSize::new(ring.drives.into()).ok())
+            .collect();
+        let mut session = Self {
+            rig: rig.clone(),
+            link: Guarded::new(opened.ends, limits(rig, options.allow_motion)),
+            rings,
+            started: Instant::now(),
+            // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
+            ended: true,
+            _ports: opened.locks,
+            _lock: lock,
+        };
+        session.listen()?;
+        if rig.file.health.before || !rig.is_simulated() {
+            session.health()?;
+        }
+        session.ended = rig.is_simulated();
+        Ok(session)
+    }
+
+    /// The rig.
+    #[must_use]
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// Its rings.
+    #[must_use]
+    pub fn rings(&self) -> &[RingSize] {
+        &self.rings
+    }
+
+    /// Its guarded link.
+    pub fn link(&mut self) -> &mut Guarded<Ends> {
+        &mut self.link
+    }
+
+    /// Whether it has been used for longer than its file allows.
+    #[must_use]
+    pub fn overdue(&self) -> bool {
+        let longest = self.rig.file.limits.max_run.as_ref();
+        longest.is_some_and(|longest| self.started.elapsed() > longest.0)
+    }
+
+    /// Listens before anything is sent: a bench must not talk into somebody else's conversation.
+    fn listen(&mut self) -> Result<(), SessionError> {
+        if self.rig.is_simulated() {
+            return Ok(());
+        }
+        let end = self.link.now() + LISTEN;
+        while self.link.now() < end && self.link.wait(end) {}
+        for ring in 0..self.rings.len() {
+            let bytes = self.take(ring);
+            if !bytes.is_empty() {
+                return Err(self.ill(ring, Unhealthy::talking(&bytes)));
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, ring: usize) -> Vec<Received> {
+        std::iter::from_fn(|| self.link.receive(ring).map(|(_, byte)| byte)).collect()
+    }
+
+    fn ill(&self, ring: usize, ill: Unhealthy) -> SessionError {
+        SessionError::Ill {
+            rig: self.rig.id().to_owned(),
+            ring: ring + 1,
+            ill,
+        }
+    }
+
+    /// Brings every ring back (9.8), counts its drives, and compares with the rig's file; as often as the file says.
+    ///
+    /// # Errors
+    /// [`SessionError::Ill`].
+    pub fn health(&mut self) -> Result<Health, SessionError> {
+        let mut health = Health {
+            rings: self.rings.clone(),
+            reported: Vec::new(),
+        };
+        self.link.begin();
+        self.link.reset_after_denial();
+        self.link.synchronise();
+        for ring in 0..self.rings.len() {
+            let mut attempts = self.rig.file.health.attempts.max(1);
+            loop {
+                match self.examine(ring) {
+                    Ok(reported) => {
+                        health.reported.extend(reported.map(|drive| (ring, drive)));
+                        break;
+                    }
+                    Err(ill) => {
+                        attempts -= 1;
+                        if attempts == 0 || self.link.trouble().is_some() {
+                            return Err(self.ill(ring, ill));
+                        }
+                    }
+                }
+            }
+        }
+        self.link.begin();
+        Ok(health)
+    }
+
+    /// One ring, once; the drive that reported a fault before.
+    fn examine(&mut self, ring: usize) -> Result<Option<u8>, Unhealthy> {
+        let recovery = recover(&mut self.link, ring);
+        if let Some(trouble) = self.link.trouble() {
+            return Err(Unhealthy::Trouble(trouble.clone()));
+        }
+        let stated = self.rings[ring];
+        match recovery.drives {
+            Some(found) if found == stated => Ok(recovery.before),
+            Some(found) => Err(Unhealthy::Size {
+                found: found.drives(),
+                stated: stated.drives(),
+            }),
+            None => {
+                let bytes = self.link.probe(ring, 4 * usize::from(stated.drives()) + 8);
+                Err(match (recovery.after, bytes.is_empty()) {
+                    (Some(drive), _) => Unhealthy::Broken(drive),
+                    (None, true) => Unhealthy::Silent,
+                    (None, false) => Unhealthy::Foreign {
+                        bytes: shown(&bytes),
+                    },
+                })
+            }
+        }
+    }
+
+    /// Takes the rig to its safe state and gives it back.
+    #[must_use]
+    pub fn close(mut self) -> End {
+        self.end(false)
+    }
+
+    /// The same after a rig error or an interlock.
+    #[must_use]
+    pub fn close_with_error(mut self) -> End {
+        self.end(true)
+    }
+
+    fn end(&mut self, error: bool) -> End {
+        let mut end = End {
+            safe: None,
+            remarks: Vec::new(),
+        };
+        if std::mem::replace(&mut self.ended, true) && !self.rig.is_simulated() {
+            return end;
+        }
+        if !self.rig.is_simulated() {
+            if let Some(ports) = self.link.inner_mut().ports_mut() {
+                ports.resume();
+            }
+            self.link.begin();
+            self.link.reset_after_denial();
+            end.safe = Some(safe_state(&mut self.link, &self.rings));
+            let order = self.rig.file.safe_state.order.clone();
+            if order.contains(&SafeStep::PowerOff) {
+                for (name, power) in &self.rig.file.power {
+                    let what = format!("power {name} off");
+                    if let Err(error) = hook::run(&self.rig, &what, &power.off, power.timeout.0) {
+                        end.remarks.push(format!("{what}: {error}"));
+                    }
+                }
+            }
+        }
+        let hooks = self.rig.file.hooks.clone();
+        let after = [("after", hooks.after), ("on_error", hooks.on_error.filter(|_| error))];
+        for (name, entry) in after {
+            if let Err(error) = run_hook(&self.rig, name, entry.as_ref()) {
+                end.remarks.push(error.to_string());
+            }
+        }
+        end
+    }
+}
+
+impl Drop for Session {
+    /// A panic unwinds through here.
+    fn drop(&mut self) {
+        if !self.ended {
+            let _told_by_nobody = self.end(true);
+        }
+    }
+}
+
+impl Unhealthy {
+    fn talking(bytes: &[Received]) -> Self {
+        Self::Talking {
+            count: bytes.len(),
+            bytes: shown(bytes),
+        }
+    }
+}
+
+fn shown(bytes: &[Received]) -> String {
+    let mut text = String::new();
+    for byte in bytes.iter().take(SHOWN) {
+        // Writing to a String cannot fail.
+        let _infallible = write!(text, "{:02X} ", byte.byte);
+    }
+    if bytes.len() > SHOWN {
+        text.push_str("...");
+    }
+    text.trim_end().to_owned()
+}
+
+fn run_hook(rig: &Rig, name: &str, entry: Option<&HookEntry>) -> Result<(), SessionError> {
+    let Some(entry) = entry else {
+        return Ok(());
+    };
+    match hook::run(rig, name, &entry.command, entry.timeout.0) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(SessionError::Hook {
+            rig: rig.id().to_owned(),
+            error: Box::new(error),
+        }),
+    }
+}
+
+/// What a rig's file and the command line allow together.
+fn limits(rig: &Rig, allow_motion: bool) -> Limits {
+    let own = &rig.file.limits;
+    let motion = own.allow_motion && (allow_motion || rig.is_simulated());
+    let speeds = rig.file.drive.iter().filter_map(|drive| drive.max_speed);
+    let slowest = speeds.chain(own.max_speed).map(|speed| speed.0).reduce(f64::min);
+    Limits {
+        motion: motion && rig.file.drive.iter().all(|drive| drive.motion),
+        eeprom: own.allow_eeprom,
+        reset: own.allow_reset,
+        outputs: own.allow_outputs,
+        // Cut off below; what is no number is no speed.
+        max_speed: slowest.map(|rpm| rpm.clamp(0.0, 65_535.0).floor() as u16),
+        bytes_per_second: own.max_bytes_per_second,
+        ..Limits::default()
+    }
+}
