@@ -11,6 +11,7 @@ pub mod hook;
 pub mod lock;
 pub mod scan;
 mod schema;
+pub(crate) mod sim;
 pub mod state;
 pub mod values;
 
