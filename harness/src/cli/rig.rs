@@ -166,7 +166,9 @@ fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure
 
 /// Refuses a rig that must not be used.
 fn usable(rig: &Rig, folder: &Path) -> Result<(), Failure> {
-    let quarantine = quarantine(rig, folder).map_err(|error| Failure::state(&error))?;
+    let quarantine = rig
+        .quarantine(folder)
+        .map_err(|error| Failure::state(&error))?;
     quarantine.map_or(Ok(()), |Quarantine { since, reason }| {
         let message = format!(
             "rig {} must not be used since {since}: {reason}; `drivebench rig quarantine {} --lift` ends it",
@@ -175,14 +177,6 @@ fn usable(rig: &Rig, folder: &Path) -> Result<(), Failure> {
         );
         Err(Failure::Said(Exit::RigError, message))
     })
-}
-
-/// Why it must not be used, by its file or by `rig quarantine`.
-fn quarantine(rig: &Rig, folder: &Path) -> std::io::Result<Option<Quarantine>> {
-    match &rig.file.quarantine {
-        Some(quarantine) => Ok(Some(quarantine.clone())),
-        None => state::quarantine(folder, rig.id()),
-    }
 }
 
 fn show(rig: &Rig) -> Result<String, Failure> {
@@ -232,7 +226,8 @@ fn row(name: &str, place: &Place, folder: &Path) -> Value {
         }
     };
     let title = rig.file.rig.title.clone().unwrap_or_default();
-    let known = quarantine(&rig, folder)
+    let known = rig
+        .quarantine(folder)
         .and_then(|quarantine| Ok((quarantine, lock::standing(folder, rig.id())?)));
     let (state, about, holder) = match known {
         Err(error) => ("bad", error.to_string(), None),

@@ -2,8 +2,8 @@
 
 use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, Transport};
 use super::schema::{compare, span_of};
+use super::sim::settle;
 use super::values::{ValueError, Wire};
-use crate::scenario::parse::parse_setup;
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::quantity::{Dimension, parse as quantity};
 use crate::scenario::source::Source;
@@ -54,6 +54,7 @@ impl Rig {
 pub fn parse(source: &Source) -> Result<Rig, Problems> {
     let problems = |mut problems: Vec<Problem>| {
         problems.sort_by_key(|problem| (problem.span.start, problem.span.end));
+        problems.dedup();
         Problems::new(&source.name, source.text.clone(), problems)
     };
     let table = DeTable::parse(&source.text).map_err(|e| problems(vec![syntax(&e)]))?;
@@ -581,30 +582,25 @@ impl Check<'_> {
     /// The lines of `[sim]`, in the scenario language.
     fn setup(&mut self, source: &Source) {
         let Some(sim) = &self.file.sim else { return };
-        let rings = &self.file.ring;
-        let sizes: Vec<_> = std::iter::once(&rings.first)
-            .chain(&rings.second)
-            .map(|ring| ring.drives)
-            .collect();
-        for (index, line) in sim.setup.iter().enumerate() {
-            let text = Source {
-                name: source.name.clone(),
-                text: line.as_str().into(),
-            };
-            let wrong = match parse_setup(&text, &sizes) {
-                _ if line.contains('\n') => Some(Problem::new(
-                    Span::default(),
-                    "this is more than one line",
-                    "one line expected here",
-                )),
-                Ok(_) => None,
-                Err(problems) => problems.all().first().cloned(),
-            };
-            if let Some(problem) = wrong {
-                let place = self.place(&["sim".into(), "setup".into(), index.into()]);
+        let at = |index: usize| [Step::Key("sim"), Step::Key("setup"), Step::Index(index)];
+        if let Some(index) = sim
+            .setup
+            .iter()
+            .position(|line| line.contains(['\n', '\r']))
+        {
+            self.wrong(
+                &at(index),
+                "this is more than one line",
+                "one line expected here",
+            );
+        } else if let Err(problems) = settle(&source.name, self.file, &[]) {
+            let text = sim.setup.join("\n");
+            for problem in problems.all() {
+                let before = text.get(..problem.span.start).unwrap_or(&text);
+                let span = self.place(&at(before.matches('\n').count()));
                 self.problems.push(Problem {
-                    span: place,
-                    ..problem
+                    span,
+                    ..problem.clone()
                 });
             }
         }

@@ -11,10 +11,6 @@ use harness_sim::trace::Trace;
 
 /// Where a rig's rings end: in the simulator, or at ports.
 #[derive(Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is one of them in a program, and it is not moved"
-)]
 pub enum Ends {
     /// In the simulator, in virtual time.
     Simulated(SimulatedLink),

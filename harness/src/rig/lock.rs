@@ -25,14 +25,14 @@ const AT_LEAST: Duration = Duration::from_millis(100);
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Somebody else has it.
-    #[error("rig {rig} is {how} by {}", holder_text(.holder.as_ref()))]
+    #[error("rig {rig} is {how} by {}", holder_text(.holder.as_deref()))]
     Busy {
         /// The rig's id.
         rig: String,
         /// `held` or `reserved`.
         how: &'static str,
         /// Who; `None` where the file does not say (yet).
-        holder: Option<Holder>,
+        holder: Option<Box<Holder>>,
     },
     /// The lock file cannot be used.
     #[error(
@@ -175,7 +175,7 @@ fn attempt(folder: &Path, id: &str, me: &Holder) -> Result<RigLock, LockError> {
     let busy = |how, holder| LockError::Busy {
         rig: id.to_owned(),
         how,
-        holder,
+        holder: Option::map(holder, Box::new),
     };
     if !locked {
         return Err(busy("held", record.holder));
@@ -239,7 +239,7 @@ pub fn unreserve(
             return Err(LockError::Busy {
                 rig: id.to_owned(),
                 how: "held",
-                holder,
+                holder: holder.map(Box::new),
             });
         }
     };

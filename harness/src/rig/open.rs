@@ -7,16 +7,10 @@ use super::lock::{PortLock, PortLockError};
 use super::scan::{self, MatchError, Port};
 use crate::link::{InnerLink, Ports, SimulatedLink, StreamLink};
 use crate::port::{self, OpenError, PortSettings, Wire};
-use crate::scenario::expression::{Expression, Located};
-use crate::scenario::parse::parse_setup;
-use crate::scenario::plan::{Plan, plan};
-use crate::scenario::problem::{Problems, Span};
+use crate::scenario::problem::Problems;
 use crate::scenario::simulate;
-use crate::scenario::source::Source;
-use crate::scenario::syntax::{Drives, Scenario, Setup, SetupKind};
 use harness_proto::line::Rate;
 use harness_proto::time;
-use harness_sim::drive::Model;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -45,7 +39,9 @@ pub enum OpenRigError {
     #[error(transparent)]
     Setup(#[from] Problems),
     /// Several transports that have no line in common.
-    #[error("ring 2 runs at {second} bit/s, ring 1 at {first}: both rings of a bench share their rate")]
+    #[error(
+        "ring 2 runs at {second} bit/s, ring 1 at {first}: both rings of a bench share their rate"
+    )]
     Rates {
         /// Ring 1.
         first: u32,
@@ -64,7 +60,7 @@ pub(super) struct Opened {
 /// Opens a rig's ends; nothing is sent.
 pub(super) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
     if rig.is_simulated() {
-        let (_, mut link) = simulated(rig, &[])?;
+        let mut link = simulate::bench(&rig.plan()?);
         run_until_warm(&mut link);
         return Ok(Opened {
             ends: Ends::Simulated(link),
@@ -161,47 +157,4 @@ fn wire(
         locks.push(lock.map_err(|error| OpenRigError::Lock { port: name, error })?);
     }
     Ok(wire)
-}
-
-/// The simulated rings of a rig, or those that a rig with ports is compared with: whole drives where no line names a
-/// model, with what the file and `more` lines of a header say.
-///
-/// # Errors
-/// A line has a mistake.
-pub fn simulated(rig: &Rig, more: &[String]) -> Result<(Plan, SimulatedLink), Problems> {
-    let sizes: Vec<u8> = rig.rings().map(|(_, ring)| ring.drives).collect();
-    let own = rig.file.sim.iter().flat_map(|sim| &sim.setup);
-    let lines: Vec<&str> = own.chain(more).map(String::as_str).collect();
-    let source = Source {
-        name: format!("rig {}", rig.id()),
-        text: (lines.join("\n") + "\n").into(),
-    };
-    let mut scenario = parse_setup(&source, &sizes)?;
-    whole_drives(&mut scenario);
-    let plan = plan(&scenario, &source, None)?;
-    let link = simulate::bench(&plan);
-    Ok((plan, link))
-}
-
-/// Every drive is an ND21 where no line of the header names a model.
-pub fn whole_drives(scenario: &mut Scenario) {
-    let says_model = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
-    if scenario.setups.iter().any(says_model) {
-        return;
-    }
-    for ring in 0..scenario.rings.len() {
-        let last = Located {
-            expression: Expression::Last,
-            ..Located::number(0)
-        };
-        scenario.setups.push(Setup {
-            drives: Drives {
-                ring,
-                from: Located::number(0),
-                to: Some(last),
-            },
-            what: SetupKind::Model(Model::Nd21),
-            span: Span::default(),
-        });
-    }
 }

@@ -106,7 +106,7 @@ pub fn scan(root: &Path) -> Vec<Port> {
         .filter_map(Result::ok)
         .filter_map(|entry| port(root, &entry.path()))
         .collect();
-    ports.sort_by(|a, b| natural(&a.device).cmp(&natural(&b.device)));
+    ports.sort_by_key(|port| natural(&port.device));
     ports
 }
 
@@ -148,7 +148,7 @@ fn port(root: &Path, folder: &Path) -> Option<Port> {
     })
 }
 
-/// A block of a rig file for each port.
+/// A block of a rig file for each port, to choose from: each is made for ring 1.
 #[must_use]
 pub fn propose(ports: &[Port]) -> String {
     let mut text = String::new();
@@ -172,9 +172,8 @@ pub fn propose(ports: &[Port]) -> String {
         // Writing to a String cannot fail.
         let _infallible = write!(
             text,
-            "{gap}# {device}{model}\n[ring.{}]\ndrives = 1                      # how many there are\n\
-             transport = \"serial\"\n{place}\nline = \"38400 8O1\"\n",
-            number + 1
+            "{gap}# {device}{model}\n[ring.1]\ndrives = 1                      # how many there are\n\
+             transport = \"serial\"\n{place}\nline = \"38400 8O1\"\n"
         );
     }
     text

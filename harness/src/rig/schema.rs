@@ -33,7 +33,7 @@ pub(super) fn compare(table: &Spanned<DeTable<'_>>) -> Vec<Problem> {
         root: &root,
         problems: Vec::new(),
     };
-    walk.table(&root, table.get_ref(), span_of(table), "a rig file", 0);
+    walk.table(&root, table.get_ref(), span_of(table), "", 0);
     walk.problems
 }
 
@@ -67,9 +67,13 @@ impl<'a> Walk<'a> {
         schema: &'a Value,
         table: &DeTable<'_>,
         place: Span,
-        what: &str,
+        path: &str,
         depth: usize,
     ) {
+        let what = match path {
+            "" => "a rig file".to_owned(),
+            path => format!("[{path}]"),
+        };
         let properties = schema["properties"].as_object();
         let known: Vec<&str> = properties
             .into_iter()
@@ -86,7 +90,10 @@ impl<'a> Walk<'a> {
                     .map(|_| &schema["additionalProperties"])
             });
             match inner {
-                Some(inner) => self.value(inner, value, name, depth + 1),
+                Some(inner) => {
+                    let path = format!("{path}.{name}");
+                    self.value(inner, value, path.trim_start_matches('.'), depth + 1);
+                }
                 None => self.problems.push(
                     Problem::new(
                         span_of(key),
@@ -121,7 +128,8 @@ impl<'a> Walk<'a> {
         format!("`{name}`: {}", about.replace('\n', " "))
     }
 
-    fn value(&mut self, schema: &'a Value, value: &Spanned<DeValue<'_>>, name: &str, depth: usize) {
+    fn value(&mut self, schema: &'a Value, value: &Spanned<DeValue<'_>>, path: &str, depth: usize) {
+        let name = path.rsplit('.').next().unwrap_or(path);
         let outer = schema;
         let schema = self.resolve(schema);
         if depth > MAX_DEPTH {
@@ -132,7 +140,7 @@ impl<'a> Walk<'a> {
         let wanted = wanted(schema);
         match (value.get_ref(), wanted) {
             (DeValue::Table(table), "object") => {
-                self.table(schema, table, place, &format!("`{name}`"), depth);
+                self.table(schema, table, place, path, depth);
             }
             (DeValue::Array(array), "array") => {
                 let (least, most) = (&schema["minItems"], &schema["maxItems"]);
@@ -141,10 +149,10 @@ impl<'a> Walk<'a> {
                     least,
                     most,
                     place,
-                    &format!("entries in `{name}`"),
+                    &format!("as the number of entries of `{name}`"),
                 );
                 for entry in array.iter().take(most.as_u64().unwrap_or(1000) as usize) {
-                    self.value(&schema["items"], entry, name, depth + 1);
+                    self.value(&schema["items"], entry, path, depth + 1);
                 }
             }
             (DeValue::Integer(number), "integer") => {
@@ -208,7 +216,8 @@ impl<'a> Walk<'a> {
         let number_f = number as f64;
         if least.is_some_and(|least| number_f < least) || most.is_some_and(|most| number_f > most) {
             let bounds = match (least, most) {
-                (Some(least), Some(most)) => format!("{least} to {most}"),
+                (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
+                (Some(least), Some(_)) => least.to_string(),
                 (Some(least), None) => format!("{least} or more"),
                 (None, most) => format!("up to {}", most.unwrap_or_default()),
             };

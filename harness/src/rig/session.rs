@@ -45,7 +45,9 @@ pub enum SessionError {
     #[error(transparent)]
     Lock(#[from] LockError),
     /// It must not be used.
-    #[error("rig {rig} is in quarantine since {since}: {reason} (`drivebench rig quarantine {rig} --lift`)")]
+    #[error(
+        "rig {rig} is in quarantine since {since}: {reason} (`drivebench rig quarantine {rig} --lift`)"
+    )]
     Quarantine {
         /// Which.
         rig: String,
@@ -89,7 +91,9 @@ pub enum SessionError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unhealthy {
     /// Bytes come although the bench sends nothing.
-    #[error("{count} bytes came although nothing was sent ({bytes}): another master on this line, drives that miss their bytes (ND21 9.9), or noise")]
+    #[error(
+        "{count} bytes came although nothing was sent ({bytes}): another master on this line, drives that miss their bytes (ND21 9.9), or noise"
+    )]
     Talking {
         /// How many.
         count: usize,
@@ -97,10 +101,14 @@ pub enum Unhealthy {
         bytes: String,
     },
     /// Nothing comes back.
-    #[error("nothing comes back: the ring is open, a drive has no power, or this is another port (ND21 8.2)")]
+    #[error(
+        "nothing comes back: the ring is open, a drive has no power, or this is another port (ND21 8.2)"
+    )]
     Silent,
     /// What comes back is no ring's answer.
-    #[error("what comes back is no answer of a ring: {bytes}; is the other end a master, or another rate?")]
+    #[error(
+        "what comes back is no answer of a ring: {bytes}; is the other end a master, or another rate?"
+    )]
     Foreign {
         /// The first bytes.
         bytes: String,
@@ -352,7 +360,10 @@ impl Session {
             }
         }
         let hooks = self.rig.file.hooks.clone();
-        let after = [("after", hooks.after), ("on_error", hooks.on_error.filter(|_| error))];
+        let after = [
+            ("after", hooks.after),
+            ("on_error", hooks.on_error.filter(|_| error)),
+        ];
         for (name, entry) in after {
             if let Err(error) = run_hook(&self.rig, name, entry.as_ref()) {
                 end.remarks.push(error.to_string());
@@ -410,7 +421,10 @@ fn limits(rig: &Rig, allow_motion: bool) -> Limits {
     let own = &rig.file.limits;
     let motion = own.allow_motion && (allow_motion || rig.is_simulated());
     let speeds = rig.file.drive.iter().filter_map(|drive| drive.max_speed);
-    let slowest = speeds.chain(own.max_speed).map(|speed| speed.0).reduce(f64::min);
+    let slowest = speeds
+        .chain(own.max_speed)
+        .map(|speed| speed.0)
+        .reduce(f64::min);
     Limits {
         motion: motion && rig.file.drive.iter().all(|drive| drive.motion),
         eeprom: own.allow_eeprom,

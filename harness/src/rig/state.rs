@@ -4,6 +4,7 @@
 //! `$XDG_RUNTIME_DIR/drivebench`, else `drivebench-UID` in the folder for temporary files. Of each rig it has
 //! `ID.lock`, which is never removed, and `ID.quarantine` while the rig must not be used.
 
+use super::check::Rig;
 use super::file::Quarantine;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -50,6 +51,7 @@ impl Holder {
             pid: std::process::id(),
             user: name("USER")
                 .or_else(|| name("LOGNAME"))
+                .or_else(|| account(uid))
                 .unwrap_or_else(|| uid.to_string()),
             uid,
             host: host.map_or_else(|_| "this machine".to_owned(), |host| host.trim().to_owned()),
@@ -57,6 +59,16 @@ impl Holder {
             purpose: purpose.to_owned(),
         }
     }
+}
+
+/// The name of a user of this machine.
+fn account(uid: u32) -> Option<String> {
+    let text = std::fs::read_to_string("/etc/passwd").ok()?;
+    text.lines().find_map(|line| {
+        let mut fields = line.split(':');
+        let name = fields.next()?;
+        (fields.nth(1)? == uid.to_string()).then(|| name.to_owned())
+    })
 }
 
 impl fmt::Display for Holder {
@@ -150,6 +162,19 @@ pub(super) fn read(file: &File) -> io::Result<Vec<u8>> {
 
 fn quarantine_file(folder: &Path, id: &str) -> PathBuf {
     folder.join(format!("{id}.quarantine"))
+}
+
+impl Rig {
+    /// Why it must not be used: by its file, or by what stands in the folder.
+    ///
+    /// # Errors
+    /// As of [`quarantine`].
+    pub fn quarantine(&self, folder: &Path) -> io::Result<Option<Quarantine>> {
+        match &self.file.quarantine {
+            Some(quarantine) => Ok(Some(quarantine.clone())),
+            None => quarantine(folder, self.id()),
+        }
+    }
 }
 
 /// Why a rig must not be used, if somebody said so with [`set_quarantine`].

@@ -48,7 +48,7 @@ impl FromStr for Time {
 
     fn from_str(text: &str) -> Result<Self, ValueError> {
         let expected = "a time such as \"100ms\", \"5s\" or \"1h\" expected here";
-        let quantity = parse(text).map_err(|problem| wrong(problem.message, expected))?;
+        let quantity = parse(text).map_err(|_| wrong(format!("`{text}` is no time"), expected))?;
         let micros = match quantity.unit.dimension() {
             Dimension::Time => quantity.value.to_f64(),
             Dimension::Hours => quantity.value.to_f64() * 3.6e9,
@@ -94,7 +94,7 @@ impl FromStr for Speed {
 
     fn from_str(text: &str) -> Result<Self, ValueError> {
         let expected = "a speed such as \"300rpm\" expected here";
-        let quantity = parse(text).map_err(|problem| wrong(problem.message, expected))?;
+        let quantity = parse(text).map_err(|_| wrong(format!("`{text}` is no speed"), expected))?;
         let rpm = quantity.value.to_f64();
         if quantity.unit.dimension() != Dimension::Speed {
             let message = format!("`{}` is no unit of speed", quantity.unit.name);

@@ -4,16 +4,14 @@ use super::args::RigArguments;
 use super::failure::Failure;
 use crate::bus::{Axis, Bus, Options};
 use crate::link::SimulatedLink;
-use crate::scenario::expression::{Expression, Located};
+use crate::rig::sim::all_nd21;
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Drives, Setup, SetupKind};
 use harness_proto::nd21::units::Drive;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
-use harness_sim::drive::Model;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -106,32 +104,11 @@ pub(super) fn link(arguments: &RigArguments) -> Result<(Plan, SimulatedLink), Fa
             range.default = *size;
         }
     }
-    let says_model = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
-    if !scenario.setups.iter().any(says_model) {
-        for ring in 0..scenario.rings.len() {
-            scenario.setups.push(all_are_nd21(ring));
-        }
-    }
+    all_nd21(&mut scenario);
     let plan = plan(&scenario, &source, None)?;
     let mut link = simulate::bench(&plan);
     link.stop_recording();
     Ok((plan, link))
-}
-
-fn all_are_nd21(ring: usize) -> Setup {
-    let last = Located {
-        expression: Expression::Last,
-        ..Located::number(0)
-    };
-    Setup {
-        drives: Drives {
-            ring,
-            from: Located::number(0),
-            to: Some(last),
-        },
-        what: SetupKind::Model(Model::Nd21),
-        span: crate::scenario::problem::Span::default(),
-    }
 }
 
 fn read(path: &Path) -> Result<Source, Failure> {

@@ -1,0 +1,68 @@
+//! Simulated rigs: what their drives are before anything is sent.
+
+use super::check::Rig;
+use super::file::RigFile;
+use crate::scenario::expression::{Expression, Located};
+use crate::scenario::parse::parse_setup;
+use crate::scenario::plan::{Plan, plan};
+use crate::scenario::problem::{Problems, Span};
+use crate::scenario::source::Source;
+use crate::scenario::syntax::{Drives, Scenario, Setup, SetupKind};
+use harness_sim::drive::Model;
+
+impl Rig {
+    /// The setup of a simulated rig, as `scenario::simulate::bench` takes it: whole ND21s where its file names
+    /// no model.
+    ///
+    /// # Errors
+    /// None of a rig that was read: its lines were settled then.
+    pub fn plan(&self) -> Result<Plan, Problems> {
+        settle(&self.origin, &self.file, &[])
+    }
+
+    /// The same with more lines of a header behind those of the file.
+    ///
+    /// # Errors
+    /// The lines have mistakes.
+    pub fn plan_with(&self, more: &[String]) -> Result<Plan, Problems> {
+        settle(&self.origin, &self.file, more)
+    }
+}
+
+/// Settles the lines of `[sim]`. The places of mistakes are in those lines, joined by line ends.
+pub(super) fn settle(name: &str, file: &RigFile, more: &[String]) -> Result<Plan, Problems> {
+    let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
+    let sizes: Vec<_> = rings.map(|ring| ring.drives).collect();
+    let own = file.sim.iter().flat_map(|sim| &sim.setup);
+    let lines: Vec<_> = own.chain(more).map(String::as_str).collect();
+    let source = Source {
+        name: name.to_owned(),
+        text: lines.join("\n").into(),
+    };
+    let mut scenario = parse_setup(&source, &sizes)?;
+    all_nd21(&mut scenario);
+    plan(&scenario, &source, None)
+}
+
+/// Makes every drive a whole ND21, where the header names no model at all.
+pub(crate) fn all_nd21(scenario: &mut Scenario) {
+    let says_model = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
+    if scenario.setups.iter().any(says_model) {
+        return;
+    }
+    for ring in 0..scenario.rings.len() {
+        let last = Located {
+            expression: Expression::Last,
+            ..Located::number(0)
+        };
+        scenario.setups.push(Setup {
+            drives: Drives {
+                ring,
+                from: Located::number(0),
+                to: Some(last),
+            },
+            what: SetupKind::Model(Model::Nd21),
+            span: Span::default(),
+        });
+    }
+}
