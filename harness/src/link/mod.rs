@@ -4,6 +4,7 @@
 //! cannot makes a scenario that needs it skipped, never wrong.
 
 mod inner;
+mod record;
 mod sim;
 mod stream;
 mod tamper;
@@ -11,6 +12,7 @@ mod tamper;
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use inner::{Delay, InnerLink, Ports};
+pub use record::{Event, Recording, Sink};
 pub use sim::SimulatedLink;
 pub use stream::{StreamLink, TOLERANCE};
 pub use tamper::{needs_line_errors, only_simulated};

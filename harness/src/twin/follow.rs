@@ -1,9 +1,10 @@
 //! The twin itself, and what it is given.
 
 use super::compare::{Comparer, Comparison, Exactness};
-use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,6 +29,53 @@ pub struct Conversation {
 }
 
 impl Conversation {
+    /// The conversations of a record; `byte_time` is that of its line. What SYNCO and answers of a probe were is part of
+    /// the conversation, but a simulated link probes a copy of itself (`probes_a_copy`).
+    #[must_use]
+    pub fn all(events: &[Event], byte_time: Span, probes_a_copy: bool) -> Vec<Self> {
+        let mut all = Vec::new();
+        let mut open = Self::default();
+        for event in events {
+            match event {
+                Event::Begin(at) => {
+                    let end = open.end.max(*at);
+                    all.push(Self {
+                        end,
+                        ..std::mem::take(&mut open)
+                    });
+                }
+                Event::Sent(ring, end, bytes) => {
+                    let mut start = *end - byte_time * bytes.len() as u64;
+                    for byte in bytes {
+                        open.done.push((*ring, Done::Sent(start, *byte)));
+                        start += byte_time;
+                    }
+                    open.end = open.end.max(*end);
+                }
+                Event::Received(ring, at, byte) => {
+                    open.received.push((*ring, *at, *byte));
+                    open.end = open.end.max(*at);
+                }
+                Event::Fault(ring, at, fault, moment) => {
+                    open.done.push((*ring, Done::Fault(*at, *fault, *moment)));
+                }
+                Event::Probe(ring, at, count, bytes) if !probes_a_copy => {
+                    let mut start = *at;
+                    for _ in 0..*count {
+                        open.done.push((*ring, Done::Sent(start, SYNCO)));
+                        start += byte_time;
+                    }
+                    // Their times are lost: each as soon as it can have come.
+                    let received = bytes.iter().map(|byte| (*ring, start, *byte));
+                    open.received.extend(received);
+                }
+                Event::Probe(..) => {}
+            }
+        }
+        all.push(open);
+        all
+    }
+
     /// The bytes sent into a ring, and whether they went round whole.
     pub(super) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
         let mut damaged = BTreeSet::new();
