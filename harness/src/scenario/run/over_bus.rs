@@ -10,6 +10,7 @@ use crate::link::Link;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use harness_proto::line::Received;
 use harness_proto::nd21;
+use harness_proto::nd21::cells::cell_at;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
@@ -183,6 +184,10 @@ pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String>
         if exchange(link, *ring, *drive, Command::ResetH8).is_none() {
             return Err(wrong(link, cell, "it does not answer ResetH8"));
         }
+        // Whoever was in the middle of something hears the next telegram whole (9.8).
+        link.send(*ring, &CHECK_SEQUENCE);
+        let end = link.now() + PATIENCE;
+        while link.busy() && link.now() < end && link.wait(end) {}
     }
     let end = link.now() + SELF_TEST;
     for (ring, drive) in all {
@@ -275,7 +280,9 @@ fn write(link: &mut dyn Link, cell: Before) -> Result<(), String> {
         return Err(wrong(link, cell, "no answer"));
     }
     let held = read(link, cell)?;
-    if held == cell.data {
+    // Bits that the drive writes itself (14.2).
+    let own = cell_at(cell.address).map_or(0, |known| known.read_only_bits);
+    if (held ^ cell.data) & !own == 0 {
         return Ok(());
     }
     let why = format!("{:02X} was written, {held:02X} is read", cell.data);
