@@ -202,7 +202,7 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         section: "14.10.5",
         about: "what is read from its EEPROM is inverted",
         behind_the_bus: true,
-        how: How::Reads(|peek, a| peek(a) ^ if a == ram::EEPROM_BUFFER + 1 { 0xFF } else { 0 }),
+        how: How::Reads(|peek, a| peek(a) ^ if a == ram::EEPROM_BUFFER { 0xFF } else { 0 }),
     },
     Deviation {
         name: "eeprom-not-written",
