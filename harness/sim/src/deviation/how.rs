@@ -20,7 +20,7 @@ pub struct Deviation {
     pub name: &'static str,
     /// The section of the ND21's manual that it breaks: `9.7`.
     pub section: &'static str,
-    /// What such a drive does, in one sentence that begins with "it".
+    /// What such a drive does, in one sentence.
     pub about: &'static str,
     /// Only a drive of the model `nd21` can deviate so: a plain one has nothing behind its bus.
     pub behind_the_bus: bool,

@@ -49,11 +49,12 @@ impl Memory for Proxy<'_> {
     }
 
     fn permits(&self, kind: Kind, address: u16) -> bool {
-        let other = self.deviations.iter().find_map(|d| match d.how {
-            How::Permits(permits) => Some(permits(kind, address)),
-            _ => None,
-        });
-        other.unwrap_or_else(|| self.memory.permits(kind, address))
+        let right = self.memory.permits(kind, address);
+        let differs = |d: &&Deviation| match d.how {
+            How::Permits(permits) => permits(kind, address) != right,
+            _ => false,
+        };
+        right != self.deviations.iter().copied().any(|d| differs(&d))
     }
 
     fn write_output(&mut self, change: OutputChange) {
@@ -106,19 +107,17 @@ pub(super) fn monitors(deviations: &[&'static Deviation]) -> Option<bool> {
     })
 }
 
-/// What a cell seems to hold.
+/// What a cell seems to hold: each deviation sees what those before it show.
 pub(super) fn seen(
     deviations: &[&'static Deviation],
     peek: &mut dyn FnMut(u16) -> u8,
     address: u16,
 ) -> u8 {
-    let other = deviations.iter().find_map(|d| match d.how {
-        How::Reads(reads) => Some(reads),
-        _ => None,
-    });
-    // The first that deviates at this address decides; the others leave the cell as it is.
-    match other {
-        Some(reads) => reads(peek, address),
-        None => peek(address),
+    let Some((last, before)) = deviations.split_last() else {
+        return peek(address);
+    };
+    match last.how {
+        How::Reads(reads) => reads(&mut |a| seen(before, peek, a), address),
+        _ => seen(before, peek, address),
     }
 }

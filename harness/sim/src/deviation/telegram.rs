@@ -179,9 +179,9 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         }),
     },
     Deviation {
-        name: "answers-with-a-late-byte",
-        section: "9.3",
-        about: "it answers every byte 200 us late",
+        name: "answers-late",
+        section: "8.2",
+        about: "it sends every byte 200 us later than a byte time after it came in",
         behind_the_bus: false,
         how: How::Late(Span::from_micros(200)),
     },
