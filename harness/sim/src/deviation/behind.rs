@@ -272,9 +272,9 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
     Deviation {
         name: "cooler-too-warm",
         section: "14.5.7.1",
-        about: "TempKK is ten units too high",
+        about: "TempKK is ten units too low, which is too warm",
         behind_the_bus: true,
-        how: How::Reads(|peek, a| peek(a).wrapping_add(if a == ram::TEMP_KK { 10 } else { 0 })),
+        how: How::Reads(|peek, a| peek(a).wrapping_sub(if a == ram::TEMP_KK { 10 } else { 0 })),
     },
     Deviation {
         name: "positioning-never-finished",
@@ -366,7 +366,7 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         section: "14.5.7.1",
         about: "it does not notice that its cooler is too hot",
         behind_the_bus: true,
-        how: How::Holds(&[byte(ram::MAX_TEMP_KK, |_| 0xFF)]),
+        how: How::Holds(&[byte(ram::MAX_TEMP_KK, |_| 0)]),
     },
     Deviation {
         name: "target-one-increment-off",
