@@ -406,6 +406,25 @@ fn the_manual_shows_what_is_pinned_and_what_is_not() {
 }
 
 #[test]
+fn deviations_are_listed() {
+    let all = stdout(&drivebench(&["deviations"]));
+    assert!(all.lines().count() >= 40, "{all}");
+    assert!(all.contains("sends-16-zeros"), "{all}");
+    let some = stdout(&drivebench(&["deviations", "16 ZEROS"]));
+    assert_eq!(some.lines().count(), 2, "{some}");
+    let json = drivebench(&["deviations", "sends-16", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_slice(&json.stdout).expect("JSON");
+    assert_eq!(json["schema"], 1);
+    assert_eq!(json["deviations"][0]["name"], "sends-16-zeros");
+    assert_eq!(json["deviations"][0]["section"], "9.7");
+    assert_eq!(
+        json["deviations"][0]["models"],
+        serde_json::json!(["plain", "nd21"])
+    );
+    assert_eq!(code(&drivebench(&["deviations", "no such"])), 4);
+}
+
+#[test]
 fn cells_are_shown_under_their_printed_names() {
     let all = stdout(&drivebench(&["cells"]));
     assert_eq!(all.lines().count(), 113, "the rows of ND21 14.2.1");

@@ -84,6 +84,48 @@ fn refused(text: &str, place: &str, message: &str, help: Option<&str>) {
 }
 
 #[test]
+fn drives_deviate() {
+    let text = |what: &str| format!("title x\nring 2\n{what}\n> 88 FE\n< 88 00\n");
+    passes(&text(""));
+    fails(&text("drive 0 deviates increments-twice"), "received 01");
+    // Two drives that pass the address on unchanged, and one that adds 2: what is wrong adds up.
+    passes(&text(
+        "drive 0 deviates does-not-increment\ndrive 1 deviates increments-twice",
+    ));
+    passes(&text(
+        "drive 0 deviates does-not-increment\ndrive 0 deviates increments-twice\n",
+    ));
+    let needs = entry(&text("drive 0..1 deviates increments-twice")).expect("a scenario");
+    let needs = needs.plan.expect("novobus").needs;
+    assert_eq!(needs, [harness::link::Capability::Simulator]);
+    refused(
+        &text("drive 0 deviates increments-twise"),
+        "increments-twise",
+        "drivebench deviations",
+        Some("`increments-twice`"),
+    );
+    refused(
+        &text("drive 0 deviates"),
+        "",
+        "the name of a deviation",
+        None,
+    );
+    // What is behind the bus is not in a plain drive.
+    refused(
+        &text("drive 0 model plain\ndrive 0 deviates ramps-ignored"),
+        "drive 0 deviates ramps-ignored",
+        "its model is `plain`",
+        Some("drive 0 model nd21"),
+    );
+    passes(&text("drive 0 deviates ramps-ignored"));
+    // What a drive shows of its cells is what a look finds.
+    fails(
+        &text("drive 0 deviates cooler-too-warm\n? drive 0 TempKK = 25C"),
+        "TempKK",
+    );
+}
+
+#[test]
 fn near_misses_get_a_suggestion() {
     refused(
         "titel x\nring 3\n",

@@ -3,7 +3,7 @@
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{Deadline, Step};
 use harness_proto::novobus::error::BusError;
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 
 /// A drive as the ring sees it: bytes and deadlines, no topology.
 pub trait Device {
@@ -29,4 +29,10 @@ pub trait Device {
 
     /// Why it last went into the error mode.
     fn cause(&self) -> Option<BusError>;
+
+    /// By how much earlier than a whole byte later its answers go out. A drive stores and forwards, so this
+    /// is 0 (ND21 8.2).
+    fn head_start(&self) -> Span {
+        Span::ZERO
+    }
 }

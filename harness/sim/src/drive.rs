@@ -1,13 +1,15 @@
 //! The drive models that a simulated ring can hold, each drive its own.
 
 use crate::cells::Cells;
+use crate::deviation::Deviant;
 use crate::device::Device;
 use crate::nd21::{Nd21Drive, Shown, Stimulus, factory};
 use crate::plain::PlainDrive;
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
-use harness_proto::time::Instant;
+use harness_proto::novobus::memory::Memory;
+use harness_proto::time::{Instant, Span};
 
 /// Which model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,6 +46,8 @@ pub enum Drive {
     Plain(PlainDrive),
     /// An ND21.
     Nd21(Nd21Drive),
+    /// A drive of either model that deviates from the manual.
+    Deviant(Box<Deviant>),
 }
 
 /// The same call for whichever model it is.
@@ -52,6 +56,7 @@ macro_rules! each {
         match $self {
             Drive::Plain($drive) => $call,
             Drive::Nd21($drive) => $call,
+            Drive::Deviant($drive) => $call,
         }
     };
 }
@@ -63,6 +68,7 @@ impl Drive {
         match self {
             Self::Plain(drive) => drive.memory(),
             Self::Nd21(drive) => drive.program().cells(),
+            Self::Deviant(drive) => drive.drive().cells(),
         }
     }
 
@@ -71,6 +77,41 @@ impl Drive {
         match self {
             Self::Plain(drive) => drive.memory_mut(),
             Self::Nd21(drive) => drive.program_mut().cells_mut(),
+            Self::Deviant(drive) => drive.drive_mut().cells_mut(),
+        }
+    }
+
+    /// What its cell seems to hold, to someone who reads it from outside.
+    #[must_use]
+    pub fn peek(&self, address: u16) -> u8 {
+        match self {
+            Self::Deviant(drive) => drive.peek(address),
+            _ => self.cells().peek(address),
+        }
+    }
+
+    /// Its end of the bus, and the memory on which that works.
+    pub(crate) fn inside(&self) -> (&BusEnd, &dyn Memory) {
+        match self {
+            Self::Plain(drive) => drive.inside(),
+            Self::Nd21(drive) => drive.inside(),
+            Self::Deviant(drive) => drive.drive().inside(),
+        }
+    }
+
+    /// The same, to work with.
+    pub(crate) fn parts(&mut self) -> (&mut BusEnd, &mut dyn Memory) {
+        match self {
+            Self::Plain(drive) => drive.parts(),
+            Self::Nd21(drive) => drive.parts(),
+            Self::Deviant(drive) => drive.drive_mut().parts(),
+        }
+    }
+
+    /// Its bus end has taken a byte or a deadline from someone who worked with its [parts](Self::parts).
+    pub(crate) fn bus_has_worked(&mut self) {
+        if let Self::Nd21(drive) = self {
+            drive.bus_has_worked();
         }
     }
 }
@@ -84,6 +125,7 @@ impl Drive {
                 drive.stimulate(stimulus);
                 true
             }
+            Self::Deviant(drive) => drive.drive_mut().stimulate(stimulus),
         }
     }
 
@@ -93,6 +135,7 @@ impl Drive {
         match self {
             Self::Plain(_) => None,
             Self::Nd21(drive) => Some(drive.shown()),
+            Self::Deviant(drive) => drive.drive().shown(),
         }
     }
 }
@@ -124,5 +167,9 @@ impl Device for Drive {
 
     fn cause(&self) -> Option<BusError> {
         each!(self, drive => drive.cause())
+    }
+
+    fn head_start(&self) -> Span {
+        each!(self, drive => drive.head_start())
     }
 }

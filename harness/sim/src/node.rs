@@ -5,7 +5,7 @@ use crate::fault::{DriveFault, Plan};
 use crate::link::Link;
 use crate::trace::Mark;
 use harness_proto::novobus::bus_end::{Deadline, Step};
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 
 /// A device in its place in the ring.
 #[derive(Clone, Debug)]
@@ -17,11 +17,14 @@ pub struct Node<D> {
     marks: Vec<Mark>,
     recording: bool,
     drive: u8,
+    /// See [`Device::head_start`].
+    head_start: Span,
 }
 
 impl<D: Device> Node<D> {
     pub(crate) fn new(device: D, drive: u8) -> Self {
         Self {
+            head_start: device.head_start(),
             device,
             powered: true,
             stuck: None,
@@ -178,7 +181,7 @@ impl<D: Device> Node<D> {
         outbound: &mut Link,
     ) {
         if let Some(byte) = step.byte {
-            outbound.transmit(now, self.stuck.unwrap_or(byte), solicited);
+            outbound.transmit(now - self.head_start, self.stuck.unwrap_or(byte), solicited);
         }
         if !step.marks.is_empty() && self.recording {
             self.marks.push(Mark {

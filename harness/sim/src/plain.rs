@@ -5,6 +5,7 @@ use crate::device::Device;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Instant;
 
@@ -44,6 +45,16 @@ impl PlainDrive {
     #[must_use]
     pub fn bus_end(&self) -> &BusEnd {
         &self.bus_end
+    }
+
+    /// Its end of the bus, and the memory on which that works.
+    pub(crate) fn inside(&self) -> (&BusEnd, &dyn Memory) {
+        (&self.bus_end, &self.memory)
+    }
+
+    /// The same, to work with.
+    pub(crate) fn parts(&mut self) -> (&mut BusEnd, &mut dyn Memory) {
+        (&mut self.bus_end, &mut self.memory)
     }
 }
 

@@ -65,6 +65,8 @@ pub enum Command {
         #[command(subcommand)]
         command: RigCommand,
     },
+    /// Show the ways in which a simulated drive can deviate from the manual.
+    Deviations(DeviationsArguments),
     /// Commands on a bus.
     #[command(flatten)]
     Drive(Box<DriveCommand>),
@@ -156,12 +158,22 @@ pub struct CellsArguments {
     pub eeprom: bool,
 }
 
-/// The forms of a trace.
+/// For `deviations`.
+#[derive(Clone, Debug, Args)]
+pub struct DeviationsArguments {
+    /// Only those with this text in their name, section or sentence.
+    pub filter: Option<String>,
+    /// In which form.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    pub format: Format,
+}
+
+/// The forms of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// The manual's own table: one column a drive.
+    /// For people; a trace as the manual's own table, one column a drive.
     Table,
-    /// One object for tools, described in the documentation.
+    /// JSON for tools, described in the documentation.
     Json,
 }
 

@@ -3,6 +3,7 @@
 mod args;
 mod cells;
 mod check;
+mod deviations;
 mod drive;
 mod exit;
 mod list;
@@ -59,6 +60,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => cells::cells(&arguments, output),
         Command::Rig { command } => rig::rig(&command, output),
+        Command::Deviations(arguments) => deviations::deviations(&arguments, output),
         Command::Drive(command) => drive::drive(&command, output),
         Command::Completions { shell } => man::completions(shell, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),

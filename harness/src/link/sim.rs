@@ -256,7 +256,7 @@ impl Link for SimulatedLink {
     }
 
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        Some(self.ring(ring)?.drive(drive)?.cells().peek(address))
+        Some(self.ring(ring)?.drive(drive)?.peek(address))
     }
 
     fn unused_faults(&self) -> Vec<String> {

@@ -5,6 +5,7 @@ use crate::link::SimulatedLink;
 use harness_proto::nd21::ee;
 use harness_proto::novobus::properties::Properties;
 use harness_sim::bench::Bench;
+use harness_sim::deviation::Deviant;
 use harness_sim::drive::{Drive, Model};
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, set_parity};
 use harness_sim::plain::PlainDrive;
@@ -60,10 +61,20 @@ fn drive(plan: &Plan, ring: usize, k: u8) -> Drive {
     if model == Model::Nd21 && !own_parity {
         set_parity(&mut eeprom);
     }
+    let deviations: Vec<_> = plan
+        .setups_of(ring, k)
+        .filter_map(|setup| match setup {
+            PlannedSetupKind::Deviates(deviation) => Some(*deviation),
+            _ => None,
+        })
+        .collect();
     let mut drive = match model {
         Model::Plain => Drive::Plain(PlainDrive::new(properties, eeprom)),
         Model::Nd21 => Drive::Nd21(Nd21Drive::new(properties, own, eeprom)),
     };
+    if !deviations.is_empty() {
+        drive = Drive::Deviant(Box::new(Deviant::new(drive, deviations)));
+    }
     for setup in plan.setups_of(ring, k) {
         if let PlannedSetupKind::Memory(address, bytes) = setup {
             for (address, byte) in (*address..=u16::MAX).zip(bytes) {

@@ -8,7 +8,7 @@
 use super::address::{ADDRESSED, passed_on};
 use super::command::PAGE;
 use super::error::BusError;
-use super::error_mode::{ErrorMode, Marks};
+use super::error_mode::{ErrorMode, Marks, Rules};
 use super::memory::Memory;
 use super::parameter_channel::ParameterChannel;
 use super::properties::{EmptyShortTelegram, Properties, ShortAddress, TimeOutAnswer};
@@ -16,6 +16,8 @@ use super::sync::{Addressing, Header, SyncByte};
 use crate::line::Received;
 use crate::nd21;
 use crate::time::Instant;
+
+pub use super::parameter_channel::Parameter;
 
 /// What a drive does about a byte or a deadline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,6 +57,7 @@ pub struct BusEnd {
     channel: ParameterChannel,
     cause: Option<BusError>,
     properties: Properties,
+    rules: Rules,
 }
 
 /// What the next byte is.
@@ -94,6 +97,27 @@ enum Net {
     Parameter,
 }
 
+/// What the next byte is to a drive, for those who look at a bus end from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A sync byte (ND21 9.2).
+    Sync,
+    /// The address byte of a telegram (9.3).
+    Address,
+    /// A net byte of a telegram for another drive (9.3).
+    Passing,
+    /// The high byte of the process data for this drive (9.4).
+    ProcessHigh,
+    /// Their low byte.
+    ProcessLow,
+    /// The first byte of a command for this drive (9.5).
+    Command,
+    /// Another byte of it.
+    Parameter(Parameter),
+    /// Any byte: the drive is in the error mode (9.7).
+    ErrorMode,
+}
+
 impl BusEnd {
     /// A bus end as it is after power-up: waiting for a sync byte.
     #[must_use]
@@ -105,7 +129,41 @@ impl BusEnd {
             channel: ParameterChannel::default(),
             cause: None,
             properties,
+            rules: Rules::MANUAL,
         }
+    }
+
+    /// The same with other properties and rules, now and after every reset; for wrong drives.
+    pub fn amend(&mut self, amend: impl FnOnce(&mut Properties, &mut Rules)) {
+        amend(&mut self.properties, &mut self.rules);
+    }
+
+    fn reset(&self) -> Self {
+        Self {
+            rules: self.rules,
+            ..Self::new(self.properties)
+        }
+    }
+
+    /// What the next byte is.
+    #[must_use]
+    pub fn place(&self) -> Place {
+        match &self.state {
+            State::Sync => Place::Sync,
+            State::Address(_) => Place::Address,
+            State::Passing { .. } => Place::Passing,
+            State::Error(..) => Place::ErrorMode,
+            State::Addressed { next, .. } => match next {
+                Net::ProcessHigh => Place::ProcessHigh,
+                Net::ProcessLow { .. } => Place::ProcessLow,
+                Net::Parameter => self.channel.next().map_or(Place::Command, Place::Parameter),
+            },
+        }
+    }
+
+    /// Leaves the error mode as if a check sequence had come (ND21 9.8); for wrong drives.
+    pub fn recover(&mut self) {
+        self.leave_error_mode();
     }
 
     /// Whether the drive is in the error mode.
@@ -168,12 +226,17 @@ impl BusEnd {
     /// When this bus end next wants [`Self::handle_deadline`] to be called.
     #[must_use]
     pub fn deadline<M: Memory>(&self, memory: &M) -> Option<Deadline> {
+        self.due(|| memory.monitors_time_out())
+    }
+
+    /// The same where it is known otherwise whether time-outs are monitored.
+    #[inline]
+    #[must_use]
+    pub fn due(&self, monitored: impl FnOnce() -> bool) -> Option<Deadline> {
         match self.state {
             State::Error(_, Silence::Waiting { until }) => Some(Deadline::At(until)),
             State::Error(_, Silence::Sending { since }) => Some(Deadline::LineFree(since)),
-            _ if memory.monitors_time_out() => {
-                Some(Deadline::At(self.last_received? + self.properties.time_out))
-            }
+            _ if monitored() => Some(Deadline::At(self.last_received? + self.properties.time_out)),
             _ => None,
         }
     }
@@ -201,7 +264,7 @@ impl BusEnd {
             },
             _ => {
                 self.blame(BusError::TimeOut, memory);
-                self.state = State::Error(ErrorMode::enter_after_time_out(), waiting);
+                self.state = State::Error(ErrorMode::enter_after_time_out(self.rules), waiting);
                 Step {
                     byte: None,
                     marks: Marks::DETECTED,
@@ -242,7 +305,7 @@ impl BusEnd {
                             self.channel
                                 .receive(byte, self.properties.read_long, memory)?;
                         if answer.reset {
-                            *self = Self::new(self.properties);
+                            *self = self.reset();
                             return Ok(Step {
                                 byte: Some(answer.byte),
                                 marks: answer.marks,
@@ -309,7 +372,7 @@ impl BusEnd {
 
     fn detect<M: Memory>(&mut self, error: BusError, offending: Received, memory: &mut M) -> Step {
         self.blame(error, memory);
-        self.state = State::Error(ErrorMode::enter(offending), Silence::None);
+        self.state = State::Error(ErrorMode::enter(offending, self.rules), Silence::None);
         Step {
             byte: Some(0),
             marks: Marks::DETECTED,

@@ -21,6 +21,24 @@ use crate::line::Received;
 /// (ND21 9.7).
 pub const UPSTREAM_ZEROS: u8 = 8;
 
+/// The numbers of the error mode. A drive obeys those of the [manual](Self::MANUAL); others make a wrong
+/// drive, for tests of what must find one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rules {
+    /// Good zeros in a row that show that the drive before is in the error mode (ND21 9.7).
+    pub upstream_zeros: u8,
+    /// Zeros that a drive has sent when it begins to increment (ND21 9.7).
+    pub sent_zeros: u8,
+}
+
+impl Rules {
+    /// Eight and seventeen (ND21 9.7).
+    pub const MANUAL: Self = Self {
+        upstream_zeros: UPSTREAM_ZEROS,
+        sent_zeros: ZEROS,
+    };
+}
+
 /// What happened at a byte, in the manual's own marks (ND21 9.7, 9.8). Several can coincide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Marks(u8);
@@ -65,6 +83,7 @@ impl Marks {
 /// A drive in the error mode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorMode {
+    rules: Rules,
     zeros_received: u8,
     zeros_sent: u8,
     upstream: bool,
@@ -85,8 +104,9 @@ pub struct Response {
 impl ErrorMode {
     /// Enters the error mode with the offending byte; 00 goes out in its place.
     #[must_use]
-    pub fn enter(offending: Received) -> Self {
+    pub fn enter(offending: Received, rules: Rules) -> Self {
         Self {
+            rules,
             zeros_received: u8::from(offending.is(0)),
             zeros_sent: 1,
             upstream: false,
@@ -98,8 +118,9 @@ impl ErrorMode {
 
     /// Enters the error mode after a time-out: no byte is to blame, and none is answered.
     #[must_use]
-    pub fn enter_after_time_out() -> Self {
+    pub fn enter_after_time_out(rules: Rules) -> Self {
         Self {
+            rules,
             zeros_received: 0,
             zeros_sent: 0,
             upstream: false,
@@ -168,7 +189,7 @@ impl ErrorMode {
     /// Notes that a 00 goes out, asked for or not.
     pub fn send_zero(&mut self) -> Marks {
         self.zeros_sent = self.zeros_sent.saturating_add(1);
-        if self.zeros_sent == ZEROS {
+        if self.zeros_sent == self.rules.sent_zeros {
             Marks::SEVENTEENTH
         } else {
             Marks::NONE
@@ -182,7 +203,7 @@ impl ErrorMode {
             return Marks::NONE;
         }
         self.zeros_received = self.zeros_received.saturating_add(1);
-        if self.zeros_received == UPSTREAM_ZEROS && !self.upstream {
+        if self.zeros_received == self.rules.upstream_zeros && !self.upstream {
             self.upstream = true;
             return Marks::UPSTREAM;
         }
@@ -191,6 +212,6 @@ impl ErrorMode {
 
     /// Rule 3.
     fn increments(&self) -> bool {
-        self.upstream && (self.after_time_out || self.zeros_sent >= ZEROS)
+        self.upstream && (self.after_time_out || self.zeros_sent >= self.rules.sent_zeros)
     }
 }

@@ -28,6 +28,25 @@ struct Partial {
     answer_sum: Checksum,
 }
 
+/// What the next byte of a command begun is, for those who look at a bus end from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// The command.
+    pub kind: Kind,
+    /// What the byte is.
+    pub field: Field,
+    /// What is answered for it.
+    pub reply: Reply,
+    /// The address received, as far as it is.
+    pub address: u16,
+    /// The data received or read, in memory order.
+    pub data: [u8; 4],
+    /// The sum over the command so far (ND21 9.6).
+    pub command_sum: Checksum,
+    /// The sum over the answer so far.
+    pub answer_sum: Checksum,
+}
+
 /// An answer byte with the marks of the manual's tables, and whether the drive resets after it.
 pub(super) struct Answer {
     pub(super) byte: u8,
@@ -36,6 +55,21 @@ pub(super) struct Answer {
 }
 
 impl ParameterChannel {
+    /// What the next byte of the command under way is; `None` where none is.
+    pub(super) fn next(&self) -> Option<Parameter> {
+        let partial = self.partial.as_ref()?;
+        let index = usize::from(partial.received);
+        Some(Parameter {
+            kind: partial.layout.kind,
+            field: partial.layout.command[index],
+            reply: partial.layout.answer[index],
+            address: partial.address,
+            data: partial.data,
+            command_sum: partial.command_sum,
+            answer_sum: partial.answer_sum,
+        })
+    }
+
     /// Takes one byte of the parameter channel of a drive that is addressed.
     pub(super) fn receive<M: Memory>(
         &mut self,

@@ -9,6 +9,7 @@ use harness_proto::line::Received;
 use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Instant;
 
@@ -69,14 +70,29 @@ impl Nd21Drive {
     pub fn program_mut(&mut self) -> &mut Program {
         &mut self.program
     }
+
+    /// Its end of the bus, and the memory on which that works.
+    pub(crate) fn inside(&self) -> (&BusEnd, &dyn Memory) {
+        (&self.bus_end, &self.program)
+    }
+
+    /// The same, to work with.
+    pub(crate) fn parts(&mut self) -> (&mut BusEnd, &mut dyn Memory) {
+        (&mut self.bus_end, &mut self.program)
+    }
+
+    /// The bus end has taken a byte: "NOVOBUS OK!" (14.4.3).
+    pub(crate) fn bus_has_worked(&mut self) {
+        if !self.bus_end.in_error() {
+            self.program.bus_works();
+        }
+    }
 }
 
 impl Device for Nd21Drive {
     fn receive(&mut self, now: Instant, received: Received) -> Step {
         let step = self.bus_end.receive(now, received, &mut self.program);
-        if !self.bus_end.in_error() {
-            self.program.bus_works();
-        }
+        self.bus_has_worked();
         step
     }
 

@@ -14,6 +14,7 @@ use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::units::{Device, INCREMENTS_PER_TURN};
 use harness_proto::novobus::properties::PROPERTIES;
+use harness_sim::deviation::{Deviation, deviation, deviations};
 use harness_sim::drive::Model;
 use harness_sim::nd21;
 
@@ -48,6 +49,7 @@ enum Word {
     Memory,
     Eeprom,
     Property,
+    Deviates,
     Model,
     Type,
     Input,
@@ -65,10 +67,11 @@ enum Word {
 }
 
 /// What can be set, and what can happen.
-const SETTINGS: [(&str, Word); 17] = [
+const SETTINGS: [(&str, Word); 18] = [
     ("memory", Word::Memory),
     ("eeprom", Word::Eeprom),
     ("property", Word::Property),
+    ("deviates", Word::Deviates),
     ("model", Word::Model),
     ("type", Word::Type),
     ("input", Word::Input),
@@ -160,6 +163,7 @@ fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
             Ok(Line::Setup(SetupKind::Eeprom(place, value)))
         }
         Word::Property => Ok(Line::Setup(property(scanner)?)),
+        Word::Deviates => Ok(Line::Setup(SetupKind::Deviates(deviates(scanner)?))),
         Word::Model => {
             let model = named(scanner, &Model::NAMES, "a drive model")?;
             Ok(Line::Setup(SetupKind::Model(model)))
@@ -216,6 +220,17 @@ fn device(scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
         }
         None => Err(scanner.unexpected("a type: 5605, 5610, 5615 or 5620 (ND21 4.2.2)")),
     }
+}
+
+fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, Problem> {
+    let names: Vec<_> = deviations().map(|d| d.name).collect();
+    let before = scanner.clone();
+    let word = scanner.word().map_or("", |word| word.value);
+    deviation(word).ok_or_else(|| {
+        *scanner = before;
+        let expected = "the name of a deviation (`drivebench deviations` lists them)";
+        scanner.unexpected(expected).did_you_mean(word, &names)
+    })
 }
 
 fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {

@@ -85,6 +85,7 @@ impl Planner {
                 set_property(&name.value, Setting::Time(span), duration.span())?;
                 PlannedSetupKind::Time(name.value.clone(), span)
             }
+            SetupKind::Deviates(deviation) => PlannedSetupKind::Deviates(deviation),
         };
         Ok(vec![PlannedSetup { ring, drives, what }])
     }
@@ -189,6 +190,9 @@ impl Planner {
                 (format!("`{}`", name.value), name.span)
             }
             SetupKind::Influence(Influence::Stimuli(_)) => (OUTSIDE.to_owned(), setup.span),
+            SetupKind::Deviates(deviation) if deviation.behind_the_bus => {
+                (format!("`{}`", deviation.name), setup.span)
+            }
             _ => return None,
         };
         self.only_nd21(&setup.drives, &what, span).err()
@@ -221,6 +225,7 @@ pub(super) fn model_unless_said(scenario: &Scenario) -> Model {
     }
     let set = scenario.setups.iter().any(|setup| match &setup.what {
         SetupKind::Influence(Influence::Stimuli(_)) => true,
+        SetupKind::Deviates(deviation) => deviation.behind_the_bus,
         SetupKind::Word(name, _) | SetupKind::Time(name, _) => {
             PROPERTIES.iter().any(|own| own.name == name.value)
         }

@@ -14,6 +14,7 @@ use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time;
+use harness_sim::deviation::Deviation;
 use harness_sim::drive::Model;
 use harness_sim::nd21::Nd21Properties;
 use std::ops::RangeInclusive;
@@ -60,6 +61,7 @@ pub(in crate::scenario) enum PlannedSetupKind {
     Influence(Influence),
     Word(String, String),
     Time(String, time::Span),
+    Deviates(&'static Deviation),
 }
 
 impl PlannedSetupKind {
@@ -82,7 +84,7 @@ impl PlannedSetupKind {
             // What stands in an EEPROM beside the bus, before the drive is switched on.
             Self::Eeprom(..) => Some(Capability::Simulator),
             // A real drive is what it is.
-            Self::Word(..) | Self::Time(..) => Some(Capability::Simulator),
+            Self::Word(..) | Self::Time(..) | Self::Deviates(_) => Some(Capability::Simulator),
             Self::Model(_) | Self::Type(_) => None,
             Self::Influence(influence) => Some(influence.needs()),
         }

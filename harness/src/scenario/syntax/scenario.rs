@@ -11,6 +11,7 @@ use crate::scenario::times::{Duration, Window};
 use harness_proto::line::Rate;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::units::Device;
+use harness_sim::deviation::Deviation;
 use harness_sim::drive::Model;
 use harness_sim::fault::{DriveFault, Flips};
 
@@ -120,6 +121,8 @@ pub enum SetupKind {
     Word(Spanned<String>, Spanned<String>),
     /// `property NAME = TIME`
     Time(Spanned<String>, Duration),
+    /// `deviates NAME`
+    Deviates(&'static Deviation),
 }
 
 /// What happens to drives from outside the bus: `input GPIN5 high`, `power off`.

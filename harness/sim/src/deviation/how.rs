@@ -1,0 +1,200 @@
+//! What a deviation is, and the ways to inject one.
+
+use super::{behind, channel, errors, telegram};
+use harness_proto::line::{LineError, Received};
+use harness_proto::novobus::bus_end::{Deadline, Parameter, Place, Step};
+use harness_proto::novobus::checksum::Checksum;
+use harness_proto::novobus::command::{Field, Kind, Reply};
+use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::error_mode::{Marks, Rules};
+use harness_proto::novobus::memory::Memory;
+use harness_proto::novobus::output::OutputChange;
+use harness_proto::novobus::properties::Properties;
+use harness_proto::novobus::sync::SyncByte;
+use harness_proto::time::Span;
+use std::fmt;
+
+/// A way in which a drive breaks the manual.
+pub struct Deviation {
+    /// Its name in files: `sends-16-zeros`.
+    pub name: &'static str,
+    /// The section of the ND21's manual that it breaks: `9.7`.
+    pub section: &'static str,
+    /// What such a drive does, in one sentence.
+    pub about: &'static str,
+    /// Only a drive of the model `nd21` can deviate so: a plain one has nothing behind its bus.
+    pub behind_the_bus: bool,
+    pub(super) how: How,
+}
+
+impl fmt::Debug for Deviation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Deviation").field(&self.name).finish()
+    }
+}
+
+/// All of them: first those of the bus end, then those of the drive behind it.
+pub fn deviations() -> impl Iterator<Item = &'static Deviation> {
+    let tables = [
+        telegram::DEVIATIONS,
+        channel::DEVIATIONS,
+        errors::DEVIATIONS,
+        behind::DEVIATIONS,
+    ];
+    tables.into_iter().flatten()
+}
+
+/// The deviation of this name.
+#[must_use]
+pub fn deviation(name: &str) -> Option<&'static Deviation> {
+    deviations().find(|deviation| deviation.name == name)
+}
+
+/// A byte under consideration.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    /// What the drive takes the byte for.
+    pub(super) place: Place,
+    /// What arrived.
+    pub(super) received: Received,
+    /// Which byte it is, counted from 1 since power-up.
+    pub(super) nth: u64,
+    /// How many good zeros, this one included, have come in a row.
+    pub(super) zeros: u8,
+    /// Whether it completes the five bytes of a check sequence.
+    pub(super) sequence: bool,
+    /// What the drive made of it; nothing while it is only heard.
+    pub(super) step: Step,
+}
+
+/// Bit 6 of a sync byte: "the next drive" (ND21 9.2).
+pub(super) const NEXT: u8 = 1 << 6;
+
+impl Moment {
+    /// This byte in place of the one received, with its line error.
+    pub(super) fn good(&self, byte: u8) -> Received {
+        Received {
+            byte,
+            ..self.received
+        }
+    }
+
+    /// Whether it is this sync byte.
+    pub(super) fn at_sync(&self, byte: u8) -> bool {
+        self.place == Place::Sync && self.received.is(byte)
+    }
+
+    /// Whether it is no sync byte where one is due.
+    pub(super) fn bad_sync(&self) -> bool {
+        let undamaged = self.place == Place::Sync && self.received.error.is_none();
+        undamaged && SyncByte::decode(self.received.byte).is_err()
+    }
+
+    /// Whether it is a sync byte for the next drive.
+    pub(super) fn next_drive(&self) -> bool {
+        self.place == Place::Sync && self.received.byte & 0xF0 == 0xE0
+    }
+
+    /// What it is in a command begun.
+    pub(super) fn parameter(&self) -> Option<Parameter> {
+        match self.place {
+            Place::Parameter(parameter) => Some(parameter),
+            _ => None,
+        }
+    }
+
+    /// The right checking byte, where one is due.
+    pub(super) fn check(&self) -> Option<u8> {
+        let due = self.parameter().filter(|p| p.field == Field::Check)?;
+        Some(due.command_sum.plus())
+    }
+
+    /// The sum of the answer, where its checking byte goes out.
+    pub(super) fn answers_check(&self) -> Option<Checksum> {
+        let due = self.parameter().filter(|p| p.reply == Reply::Check)?;
+        let goes_out = self.step.marks.contains(Marks::CHECKSUM);
+        goes_out.then_some(due.answer_sum)
+    }
+
+    /// The byte received, but for an error of this kind.
+    pub(super) fn forgive(&self, error: LineError) -> Received {
+        if self.received.error == Some(error) {
+            Received::good(self.received.byte)
+        } else {
+            self.received
+        }
+    }
+
+    /// Whether `byte` goes out for it by the rule of received + 1 (ND21 9.7).
+    pub(super) fn increments(&self, byte: u8) -> bool {
+        self.place == Place::ErrorMode && byte == self.received.byte.wrapping_add(1)
+    }
+}
+
+/// A write on its way to a cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Write {
+    /// What the byte in hand is taken for.
+    pub(super) place: Place,
+    /// Where.
+    pub(super) address: u16,
+    /// What.
+    pub(super) data: u8,
+    /// What is there now.
+    pub(super) old: u8,
+}
+
+/// Reads a cell as it is.
+pub(super) type Peek<'a> = &'a mut dyn FnMut(u16) -> u8;
+
+/// A cell in which the drive's program finds another value than the one that is there.
+pub(super) struct Held {
+    /// Its address.
+    pub(super) address: u16,
+    /// One byte or two.
+    pub(super) word: bool,
+    /// What is found for what is there.
+    pub(super) value: fn(u16) -> u16,
+}
+
+/// Where a deviation is injected.
+pub(super) enum How {
+    /// In the numbers of the error mode and the times.
+    Amends(fn(&mut Properties, &mut Rules)),
+    /// It hears another byte than the one that arrives.
+    Hears(fn(&Moment) -> Received),
+    /// It says another byte, or none.
+    Says(fn(&Moment, u8) -> Option<u8>),
+    /// Both: what it hears, what it says.
+    Mistakes(fn(&Moment) -> Received, fn(&Moment, u8) -> Option<u8>),
+    /// It says a byte twice.
+    Repeats(fn(&Moment) -> bool),
+    /// It says everything so much later.
+    Late(Span),
+    /// It says everything so much earlier.
+    Early(Span),
+    /// It leaves the error mode after this byte.
+    Leaves(fn(&Moment) -> bool),
+    /// It does something besides.
+    Acts(fn(&Moment, &mut dyn Memory)),
+    /// It does not do what is due then.
+    Waits(fn(Deadline) -> bool),
+    /// It reads another cell.
+    ReadsFrom(fn(Place, u16) -> u16),
+    /// A cell seems to hold something else, to everyone who reads it from outside.
+    Reads(fn(Peek<'_>, u16) -> u8),
+    /// It writes something else, elsewhere or nothing.
+    Writes(fn(Write) -> Option<(u16, u8)>),
+    /// It permits what it must not, or forbids what it must permit.
+    Permits(fn(Kind, u16) -> bool),
+    /// It changes other outputs.
+    Outputs(fn(OutputChange) -> Option<OutputChange>),
+    /// It resets less.
+    Resets(fn(&mut dyn Memory)),
+    /// It reports another error, or none.
+    Reports(fn(BusError) -> Option<BusError>),
+    /// Its time-out monitoring is always so.
+    Monitors(bool),
+    /// Its program finds other values in cells.
+    Holds(&'static [Held]),
+}

@@ -1,0 +1,17 @@
+//! Wrong drives: named deviations from the manual, for tests of what must find them.
+//!
+//! A [`Deviant`] stands around a drive and is the only place where anything is put wrong: it hears what
+//! arrives before the drive's bus end does, says what goes out after it, stands between the bus end and the
+//! memory, and changes what the drive's program finds in its cells. The drive inside knows nothing of it.
+//! [`deviations`] are the table: a name, a sentence, the section that is broken, and the injection.
+
+mod behind;
+mod channel;
+mod deviant;
+mod errors;
+mod how;
+mod proxy;
+mod telegram;
+
+pub use deviant::Deviant;
+pub use how::{Deviation, deviation, deviations};
