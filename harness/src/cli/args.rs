@@ -3,9 +3,11 @@
 use super::drive::DriveCommand;
 use super::exit::Exit;
 use super::rig::RigCommand;
+use crate::rig::values::{Time, ValueError};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Plays scripted conversations with serial servo drives and compares every byte with the manual.
 ///
@@ -100,8 +102,18 @@ pub struct RunArguments {
     #[command(flatten)]
     pub selection: Selection,
     /// Play on a ring of this many drives, where a scenario allows it.
-    #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
+    #[arg(long, value_name = "DRIVES", value_parser = ring_size, conflicts_with = "rig")]
     pub ring: Option<u8>,
+    /// On which rig: sim:N, a file, or a name that `rig list` shows; a simulated ring of each scenario's own size where
+    /// nothing is said.
+    #[arg(long, value_name = "NAME")]
+    pub rig: Option<String>,
+    /// Let motors turn, where the rig's file allows it too.
+    #[arg(long)]
+    pub allow_motion: bool,
+    /// How long to wait for a rig that somebody else has, such as 30s.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub wait: Option<Duration>,
     /// Show what scenarios recorded, also where several are played.
     #[arg(long)]
     pub records: bool,
@@ -215,6 +227,18 @@ fn ring_size(text: &str) -> Result<u8, String> {
     harness_proto::novobus::address::RingSize::new(number)
         .map(harness_proto::novobus::address::RingSize::drives)
         .map_err(|error| error.to_string())
+}
+
+/// A time such as `30s`; at most a day.
+fn duration(text: &str) -> Result<Duration, String> {
+    const LONGEST: Duration = Duration::from_secs(24 * 3_600);
+    let time: Time = text
+        .parse()
+        .map_err(|error: ValueError| error.to_string())?;
+    if time.0 > LONGEST {
+        return Err("at most 24 hours (86400s)".to_owned());
+    }
+    Ok(time.0)
 }
 
 fn rows(text: &str) -> Result<Rows, String> {

@@ -11,7 +11,9 @@ mod man;
 mod manual;
 mod output;
 mod rig;
+mod rig_failure;
 mod run;
+mod run_rig;
 mod trace;
 
 pub use args::Arguments;

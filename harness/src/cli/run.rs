@@ -3,10 +3,12 @@
 use super::args::{RunArguments, Selection};
 use super::exit::Exit;
 use super::output::Output;
+use super::run_rig;
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
 use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
+use crate::rig::{self, Rig, find};
 use crate::scenario::parse::parse;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
@@ -51,7 +53,13 @@ pub(super) fn select(
 
 /// Plays scenarios, one line each.
 pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let entries = match select(&arguments.selection, arguments.ring) {
+    let size = match (&arguments.rig, arguments.ring) {
+        (None, ring) => ring,
+        (Some(name), _) => find(name, &rig::find::folder())
+            .ok()
+            .map(|rig| rig.file.ring.first.drives),
+    };
+    let entries = match select(&arguments.selection, size) {
         Ok(entries) => entries,
         Err(errors) => {
             errors.iter().for_each(|error| output.library_error(error));
@@ -63,12 +71,35 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         output.complain("no scenario was selected; `drivebench list` shows what there is");
         return Ok(Exit::NothingSelected);
     }
+    let rig = match &arguments.rig {
+        None => None,
+        Some(name) => match find(name, &rig::find::folder()) {
+            Ok(rig) => Some(rig),
+            Err(rig::FindError::Mistakes(problems)) => {
+                output.mistakes(&problems);
+                return Ok(Exit::Usage);
+            }
+            Err(error) => {
+                output.complain(&error.to_string());
+                return Ok(Exit::Usage);
+            }
+        },
+    };
+    if let Some(rig) = rig.as_ref().filter(|rig| !rig.is_simulated()) {
+        return run_rig::run(rig, &entries, arguments, output);
+    }
     let bar = progress_bar(entries.len(), output.progress);
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
     for entry in &entries {
         bar.set_message(entry.short_name().to_owned());
-        let played = play_entry(entry, AtFinding::Stop);
+        let played = match rig.as_ref().and_then(|rig| too_large(entry, rig)) {
+            Some(why) => Played {
+                outcome: Outcome::skipped(why),
+                traces: Vec::new(),
+            },
+            None => play_entry(entry, AtFinding::Stop),
+        };
         let outcome = &played.outcome;
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
@@ -77,7 +108,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             line.push_str(&records(outcome));
         }
         bar.suspend(|| output.result(&line))?;
-        let details = details(entry, &played);
+        let details = details(entry, outcome, &played.traces);
         bar.suspend(|| output.say(&details));
         bar.inc(1);
     }
@@ -90,6 +121,14 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
 pub(super) struct Played {
     pub(super) outcome: Outcome,
     pub(super) traces: Vec<Trace>,
+}
+
+/// Why a scenario does not fit a simulated rig.
+fn too_large(entry: &Entry, rig: &Rig) -> Option<String> {
+    let plan = entry.plan.as_ref()?;
+    let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
+    let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    (own != sizes).then(|| format!("it is for {own:?} drives, the rig has {sizes:?}"))
 }
 
 /// Plays a scenario on simulated rings.
@@ -118,7 +157,7 @@ fn records(outcome: &Outcome) -> String {
     lines.lines().map(|line| format!("  {line}\n")).collect()
 }
 
-fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
+pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
     let rings = entry.plan.iter().flat_map(|plan| &plan.rings);
     let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
     format!(
@@ -132,14 +171,14 @@ fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
 }
 
 /// What there is to say about a scenario beside its line, for people.
-pub(super) fn details(entry: &Entry, played: &Played) -> String {
+pub(super) fn details(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
-    for remark in &played.outcome.remarks {
+    for remark in &outcome.remarks {
         let _infallible = writeln!(text, "  note: {remark}");
     }
-    if let Some(finding) = &played.outcome.finding {
-        text.push_str(&explain(entry, finding, &played.traces));
+    if let Some(finding) = &outcome.finding {
+        text.push_str(&explain(entry, finding, traces));
     }
     text
 }
@@ -186,7 +225,7 @@ fn place(entry: &Entry, finding: &Finding) -> String {
     format!("{}:{line}:{column}", entry.name)
 }
 
-fn summary(verdicts: &[Verdict], took: Span) -> String {
+pub(super) fn summary(verdicts: &[Verdict], took: Span) -> String {
     let count = |wanted: Verdict| verdicts.iter().filter(|v| **v == wanted).count();
     let mut text = format!(
         "{} passed, {} failed",

@@ -51,7 +51,7 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
             output.result(&plots(records))?;
         }
     }
-    output.say(&details(&entry, &played));
+    output.say(&details(&entry, &played.outcome, &played.traces));
     Ok(Exit::of(&[played.outcome.verdict], false))
 }
 

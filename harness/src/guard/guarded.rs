@@ -253,6 +253,10 @@ impl<L: Link> Link for Guarded<L> {
         }
     }
 
+    fn step(&mut self, place: usize) {
+        self.inner.step(place);
+    }
+
     fn busy(&self) -> bool {
         self.inner.busy()
     }

@@ -169,6 +169,11 @@ pub trait Link: Line {
     /// what was received and not fetched. The drives go on as they are.
     fn begin(&mut self);
 
+    /// A step of a scenario begins, that at this place of its text: for links that remember.
+    fn step(&mut self, place: usize) {
+        let _forgotten = place;
+    }
+
     /// Whether bytes of the master's are still on their way round.
     fn busy(&self) -> bool;
 

@@ -14,6 +14,8 @@ use harness_sim::trace::Trace;
 pub enum Event {
     /// A conversation began, at this time of the one before.
     Begin(Instant),
+    /// A step of the scenario began, that at this place of its text.
+    Step(usize),
     /// Bytes were sent into a ring, counted from 0; the last one will have left at this time.
     Sent(usize, Instant, Vec<u8>),
     /// A byte was received from a ring.
@@ -101,6 +103,11 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
     fn begin(&mut self) {
         self.sink.take(&Event::Begin(self.link.now()));
         self.link.begin();
+    }
+
+    fn step(&mut self, place: usize) {
+        self.sink.take(&Event::Step(place));
+        self.link.step(place);
     }
 
     fn busy(&self) -> bool {

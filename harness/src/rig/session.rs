@@ -12,6 +12,7 @@ use crate::guard::{Guarded, SafeState, safe_state};
 use crate::link::{Line, Link, Trouble};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
@@ -255,70 +256,23 @@ impl Session {
         std::iter::from_fn(|| self.link.receive(ring).map(|(_, byte)| byte)).collect()
     }
 
-    fn ill(&self, ring: usize, ill: Unhealthy) -> SessionError {
-        SessionError::Ill {
-            rig: self.rig.id().to_owned(),
-            ring: ring + 1,
-            ill,
-        }
-    }
-
     /// Brings every ring back (9.8), counts its drives, and compares with the rig's file; as often as the file says.
     ///
     /// # Errors
     /// [`SessionError::Ill`].
     pub fn health(&mut self) -> Result<Health, SessionError> {
-        let mut health = Health {
-            rings: self.rings.clone(),
-            reported: Vec::new(),
-        };
-        self.link.begin();
         self.link.reset_after_denial();
-        self.link.synchronise();
-        for ring in 0..self.rings.len() {
-            let mut attempts = self.rig.file.health.attempts.max(1);
-            loop {
-                match self.examine(ring) {
-                    Ok(reported) => {
-                        health.reported.extend(reported.map(|drive| (ring, drive)));
-                        break;
-                    }
-                    Err(ill) => {
-                        attempts -= 1;
-                        if attempts == 0 || self.link.trouble().is_some() {
-                            return Err(self.ill(ring, ill));
-                        }
-                    }
-                }
-            }
-        }
-        self.link.begin();
-        Ok(health)
+        let attempts = self.rig.file.health.attempts;
+        examine(&mut self.link, &self.rings, attempts).map_err(|(ring, ill)| self.ill(ring, ill))
     }
 
-    /// One ring, once; the drive that reported a fault before.
-    fn examine(&mut self, ring: usize) -> Result<Option<u8>, Unhealthy> {
-        let recovery = recover(&mut self.link, ring);
-        if let Some(trouble) = self.link.trouble() {
-            return Err(Unhealthy::Trouble(trouble.clone()));
-        }
-        let stated = self.rings[ring];
-        match recovery.drives {
-            Some(found) if found == stated => Ok(recovery.before),
-            Some(found) => Err(Unhealthy::Size {
-                found: found.drives(),
-                stated: stated.drives(),
-            }),
-            None => {
-                let bytes = self.link.probe(ring, 4 * usize::from(stated.drives()) + 8);
-                Err(match (recovery.after, bytes.is_empty()) {
-                    (Some(drive), _) => Unhealthy::Broken(drive),
-                    (None, true) => Unhealthy::Silent,
-                    (None, false) => Unhealthy::Foreign {
-                        bytes: shown(&bytes),
-                    },
-                })
-            }
+    /// The error for a ring that [`examine`] found ill.
+    #[must_use]
+    pub fn ill(&self, ring: usize, ill: Unhealthy) -> SessionError {
+        SessionError::Ill {
+            rig: self.rig.id().to_owned(),
+            ring: ring + 1,
+            ill,
         }
     }
 
@@ -378,6 +332,73 @@ impl Drop for Session {
     fn drop(&mut self) {
         if !self.ended {
             let _told_by_nobody = self.end(true);
+        }
+    }
+}
+
+/// Brings every ring back (9.8), counts its drives, and compares.
+///
+/// # Errors
+/// The first ring that is ill, and what is wrong with it.
+pub fn examine(
+    link: &mut dyn Link,
+    rings: &[RingSize],
+    attempts: u8,
+) -> Result<Health, (usize, Unhealthy)> {
+    let mut health = Health {
+        rings: rings.to_vec(),
+        reported: Vec::new(),
+    };
+    link.begin();
+    for (ring, size) in rings.iter().enumerate() {
+        let mut left = attempts.max(1);
+        loop {
+            // Behind it commands pass the guard.
+            let sent = link.send(ring, &CHECK_SEQUENCE);
+            while link.now() < sent && link.wait(sent) {}
+            match examine_once(link, ring, *size) {
+                Ok(reported) => {
+                    health.reported.extend(reported.map(|drive| (ring, drive)));
+                    break;
+                }
+                Err(ill) => {
+                    left -= 1;
+                    if left == 0 || link.trouble().is_some() {
+                        return Err((ring, ill));
+                    }
+                }
+            }
+        }
+    }
+    link.begin();
+    Ok(health)
+}
+
+/// One ring, once; the drive that reported a fault before.
+fn examine_once(
+    link: &mut dyn Link,
+    ring: usize,
+    stated: RingSize,
+) -> Result<Option<u8>, Unhealthy> {
+    let recovery = recover(link, ring);
+    if let Some(trouble) = link.trouble() {
+        return Err(Unhealthy::Trouble(trouble.clone()));
+    }
+    match recovery.drives {
+        Some(found) if found == stated => Ok(recovery.before),
+        Some(found) => Err(Unhealthy::Size {
+            found: found.drives(),
+            stated: stated.drives(),
+        }),
+        None => {
+            let bytes = link.probe(ring, 4 * usize::from(stated.drives()) + 8);
+            Err(match (recovery.after, bytes.is_empty()) {
+                (Some(drive), _) => Unhealthy::Broken(drive),
+                (None, true) => Unhealthy::Silent,
+                (None, false) => Unhealthy::Foreign {
+                    bytes: shown(&bytes),
+                },
+            })
         }
     }
 }

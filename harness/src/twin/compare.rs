@@ -52,6 +52,8 @@ pub struct Divergence {
     pub received: Option<(Instant, Received)>,
     /// What the byte is for.
     pub role: Role,
+    /// The step of the scenario that was under way when the byte went out, as a place in its text.
+    pub step: Option<usize>,
     /// The drive that is meant by the telegram, or that the ring spells out.
     pub drive: Option<u8>,
 }
@@ -153,7 +155,12 @@ impl Comparer<'_> {
                         || aligned && self.may_differ(ring, role, received, index);
                     self.note_write(ring, role);
                     match (same, wanted_good == found_good) {
-                        (true, true) => self.time(ring, index, role, (due, wanted), (at, found)),
+                        (true, true) => {
+                            let step = || conversation.step_at(ring, index);
+                            let pair = ((due, wanted), (at, found));
+                            self.time((ring, index), role, step, pair);
+                            None
+                        }
                         (true, false) => Some(What::LineStatus),
                         (false, _) => Some(what_of(expected, received, index)),
                     }
@@ -175,6 +182,7 @@ impl Comparer<'_> {
                     expected: pair.0,
                     received: pair.1,
                     role,
+                    step: conversation.step_at(ring, index),
                     drive: role.drive().or(spelled),
                 };
                 self.comparison.divergence.get_or_insert(found);
@@ -248,29 +256,28 @@ impl Comparer<'_> {
     /// Notes how far two times are apart; never ends the comparison.
     fn time(
         &mut self,
-        ring: usize,
-        index: usize,
+        (ring, index): (usize, usize),
         role: Role,
-        expected: (Instant, Received),
-        received: (Instant, Received),
-    ) -> Option<What> {
+        step: impl FnOnce() -> Option<usize>,
+        (expected, received): ((Instant, Received), (Instant, Received)),
+    ) {
         let apart = expected
             .0
             .since(received.0)
             .max(received.0.since(expected.0));
         self.comparison.latest = self.comparison.latest.max(apart);
-        if apart > self.exactness.tolerance {
-            self.comparison.untimely.get_or_insert(Divergence {
+        if apart > self.exactness.tolerance && self.comparison.untimely.is_none() {
+            self.comparison.untimely = Some(Divergence {
                 ring,
                 byte: index + 1,
                 what: What::Time,
                 expected: Some(expected),
                 received: Some(received),
                 role,
+                step: step(),
                 drive: role.drive(),
             });
         }
-        None
     }
 }
 

@@ -13,6 +13,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub enum Done {
     /// It sent a byte, whose start bit was due at this time.
     Sent(Instant, u8),
+    /// It came to the step at this place of the scenario's text.
+    Step(usize),
     /// It let a fault happen, at this time or at the moment given.
     Fault(Instant, PlacedFault, Moment),
 }
@@ -44,6 +46,7 @@ impl Conversation {
                         ..std::mem::take(&mut open)
                     });
                 }
+                Event::Step(place) => open.done.push((0, Done::Step(*place))),
                 Event::Sent(ring, end, bytes) => {
                     let mut start = *end - byte_time * bytes.len() as u64;
                     for byte in bytes {
@@ -91,12 +94,34 @@ impl Conversation {
                 Done::Fault(..) => {
                     damaged.insert(next);
                 }
+                Done::Step(_) => {}
             }
         }
         let numbered = (1..).zip(sent);
         numbered
             .map(|(number, byte)| (byte, !damaged.contains(&number)))
             .collect()
+    }
+
+    /// The step that was under way when the `index`-th byte was sent into a ring, counted from 0.
+    pub(super) fn step_at(&self, ring: usize, index: usize) -> Option<usize> {
+        let mut step = None;
+        let mut sent = 0;
+        for (at, done) in &self.done {
+            match done {
+                Done::Step(place) if sent <= index => step = Some(*place),
+                Done::Sent(..) if *at == ring => sent += 1,
+                _ => {}
+            }
+        }
+        step
+    }
+
+    /// Whether it is that of a scenario, and not of what comes before or behind it.
+    #[must_use]
+    pub fn has_steps(&self) -> bool {
+        let step = |(_, done): &(usize, Done)| matches!(done, Done::Step(_));
+        self.done.iter().any(step)
     }
 
     /// The bytes received from a ring.
@@ -159,6 +184,7 @@ impl Twin {
                     self.link.wait(self.link.now());
                     self.link.inject(*ring, *fault, *moment);
                 }
+                Done::Step(_) => {}
             }
         }
         self.pass_until(conversation.end);

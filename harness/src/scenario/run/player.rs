@@ -206,6 +206,7 @@ impl Runner<'_> {
     }
 
     fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
+        self.link.step(step.span.start);
         if let PlannedAction::Receive(ring, expected) = &step.action {
             return self.receive(step, *ring, expected);
         }

@@ -1,0 +1,50 @@
+//! What a rig in use says when it cannot be used, and how it ended.
+
+use super::exit::Exit;
+use super::output::Output;
+use crate::guard::SafeState;
+use crate::rig::lock::LockError;
+use crate::rig::{End, SessionError};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// A flag that SIGINT and SIGTERM set: what is under way ends in the rig's safe state.
+pub(super) fn interrupt_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // Where a signal cannot be caught, it ends the program as it always did.
+        let _as_before = signal_hook::flag::register(signal, Arc::clone(&flag));
+    }
+    flag
+}
+
+/// The exit code for a rig that cannot be used.
+pub(super) fn exit_of(error: &SessionError) -> Exit {
+    match error {
+        SessionError::Lock(LockError::Busy { .. }) => Exit::Busy,
+        SessionError::Lock(LockError::Io { .. })
+        | SessionError::Quarantine { .. }
+        | SessionError::State(_)
+        | SessionError::Open { .. }
+        | SessionError::Hook { .. }
+        | SessionError::Ill { .. } => Exit::RigError,
+    }
+}
+
+/// Tells how a rig was given back; a safe state that is not confirmed is graver than all else.
+pub(super) fn tell_end(end: &End, exit: Exit, output: &mut Output) -> Exit {
+    for remark in &end.remarks {
+        output.complain(remark);
+    }
+    match &end.safe {
+        Some(safe @ SafeState::NotConfirmed(_)) => {
+            output.complain(&safe.to_string());
+            Exit::NotSafe
+        }
+        Some(safe @ SafeState::Confirmed(_)) => {
+            output.say(&format!("{safe}\n"));
+            exit
+        }
+        None => exit,
+    }
+}
