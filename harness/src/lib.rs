@@ -7,6 +7,7 @@
 
 pub mod bus;
 pub mod cli;
+pub mod evidence;
 pub mod guard;
 pub mod library;
 pub mod link;

@@ -1,12 +1,13 @@
 //! The twin: a ring beside its model, and what explains a ring that is otherwise.
 
 use harness::library::{Entry, sources};
-use harness::link::{Event, Link, Recording};
+use harness::link::{Event, Link, Recording, Replay};
 use harness::qualify::{Hypothesis, explaining, hypotheses, probes};
 use harness::scenario::plan::Plan;
-use harness::scenario::run::{AtFinding, lacks, play_over_bus};
+use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus};
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
+use harness::scenario::verdict::Verdict;
 use harness::twin::{Conversation, Exactness, Twin, What};
 use harness_proto::time::Span;
 
@@ -58,6 +59,38 @@ fn a_ring_is_its_own_twin() {
         }
     }
     assert!(compared > 5_000, "{compared}");
+}
+
+/// A record is judged as the run was: the same verdict, the same sentence, and nothing is left over.
+#[test]
+fn a_record_is_played_again() {
+    let mut played = 0;
+    for source in sources(&[]).expect("the built-in scenarios") {
+        let name = source.name.clone();
+        let plan = Entry::new(source, None).expect("no mistakes").plan;
+        let plan = plan.expect("novobus");
+        if plan.rings[0].drives() > 10 {
+            continue;
+        }
+        let mut link = bench(&plan);
+        let mut events: Vec<Event> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut events);
+        let capabilities = recording.capabilities().to_vec();
+        let outcome = play_over_bus(&plan, &mut recording, AtFinding::Stop);
+        let drives = plan.rings.iter().map(|ring| ring.drives()).collect();
+        let mut replay = Replay::new(events, plan.rate, Span::ZERO, drives, capabilities);
+        let again = play_over_bus(&plan, &mut replay, AtFinding::Stop);
+        assert_eq!(
+            again.verdict, outcome.verdict,
+            "{name}: {:?}",
+            again.finding
+        );
+        let message = |outcome: &Outcome| outcome.finding.as_ref().map(|f| f.message.clone());
+        assert_eq!(message(&again), message(&outcome), "{name}");
+        assert!(replay.is_at_end(), "{name}");
+        played += usize::from(outcome.verdict != Verdict::Skipped);
+    }
+    assert!(played >= 30, "{played}");
 }
 
 /// Every word that an open property can have is told from the others by its probe.

@@ -61,6 +61,13 @@ pub enum Command {
     Manual(ManualArguments),
     /// Show the drive's cells: address, size, access, unit, meaning and section of the manual.
     Cells(CellsArguments),
+    /// Play everything that fits a rig, settle what the manual leaves open, name deviations, and keep the evidence.
+    Qualify(QualifyArguments),
+    /// Judge every verdict of a folder of evidence again, from its record.
+    Verify {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// Show benches, lock them, find their ports.
     Rig {
         /// What to do.
@@ -114,9 +121,35 @@ pub struct RunArguments {
     /// How long to wait for a rig that somebody else has, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
+    /// Keep the evidence of a run on a rig in this folder, which is not there or is empty; `verify` judges it again.
+    #[arg(long, value_name = "FOLDER", requires = "rig")]
+    pub evidence: Option<PathBuf>,
     /// Show what scenarios recorded, also where several are played.
     #[arg(long)]
     pub records: bool,
+    /// Count a skipped scenario as missing (exit code 5).
+    #[arg(long)]
+    pub require_all: bool,
+}
+
+/// For `qualify`.
+#[derive(Clone, Debug, Args)]
+pub struct QualifyArguments {
+    /// Which scenarios; all that fit where none is given.
+    #[command(flatten)]
+    pub selection: Selection,
+    /// On which rig: sim:N, a file, or a name that `rig list` shows.
+    #[arg(long, value_name = "NAME")]
+    pub rig: String,
+    /// Let motors turn, where the rig's file allows it too.
+    #[arg(long)]
+    pub allow_motion: bool,
+    /// How long to wait for a rig that somebody else has, such as 30s.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub wait: Option<Duration>,
+    /// Where the evidence goes: a folder that is not there or is empty; evidence-RIG-DATE where nothing is said.
+    #[arg(long, value_name = "FOLDER")]
+    pub evidence: Option<PathBuf>,
     /// Count a skipped scenario as missing (exit code 5).
     #[arg(long)]
     pub require_all: bool,

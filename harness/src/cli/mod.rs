@@ -10,11 +10,13 @@ mod list;
 mod man;
 mod manual;
 mod output;
+mod qualify;
 mod rig;
 mod rig_failure;
 mod run;
 mod run_rig;
 mod trace;
+mod verify;
 
 pub use args::Arguments;
 pub use exit::Exit;
@@ -61,6 +63,8 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Trace(arguments) => trace::trace(&arguments, output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => cells::cells(&arguments, output),
+        Command::Qualify(arguments) => qualify::qualify(&arguments, output),
+        Command::Verify { folder } => verify::verify(&folder, output),
         Command::Rig { command } => rig::rig(&command, output),
         Command::Deviations(arguments) => deviations::deviations(&arguments, output),
         Command::Drive(command) => drive::drive(&command, output),

@@ -3,7 +3,7 @@
 use super::args::{RunArguments, Selection};
 use super::exit::Exit;
 use super::output::Output;
-use super::run_rig;
+use super::run_rig::{Job, work};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
 use crate::report::mismatch::mismatch;
@@ -85,8 +85,18 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             }
         },
     };
-    if let Some(rig) = rig.as_ref().filter(|rig| !rig.is_simulated()) {
-        return run_rig::run(rig, &entries, arguments, output);
+    let recorded = arguments.evidence.is_some();
+    if let Some(rig) = rig.as_ref().filter(|rig| recorded || !rig.is_simulated()) {
+        let job = Job {
+            purpose: "run",
+            allow_motion: arguments.allow_motion,
+            wait: arguments.wait.unwrap_or_default(),
+            evidence: arguments.evidence.clone(),
+            records: arguments.records,
+            require_all: arguments.require_all,
+            qualify: false,
+        };
+        return work(rig, &entries, &job, output);
     }
     let bar = progress_bar(entries.len(), output.progress);
     let mut verdicts = Vec::new();

@@ -1,29 +1,69 @@
-//! `drivebench run --rig NAME` on a rig with ports: taken, guarded, and given back in its safe state.
+//! Work on a rig in use: `run --rig` on a rig with ports, and `qualify`.
 
-use super::args::RunArguments;
 use super::exit::Exit;
 use super::output::Output;
+use super::qualify::{Findings, settle};
 use super::rig_failure::{exit_of, interrupt_flag, tell_end};
 use super::run::{details, line, progress_bar, summary};
+use crate::evidence::{About, EvidenceError, Folder};
 use crate::library::Entry;
 use crate::link::{Line, Trouble};
 use crate::report::plot::plot;
-use crate::rig::{Options, Played, Rig, Run, Session};
+use crate::rig::{Options, Played, Rig, Run, Session, SessionError};
 use crate::scenario::run::Outcome;
-use crate::scenario::verdict::Verdict;
+use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use std::path::PathBuf;
+use std::time::Duration;
 
-/// Plays scenarios on a rig.
-pub(super) fn run(
+/// What is to be done.
+pub(super) struct Job {
+    pub(super) purpose: &'static str,
+    pub(super) allow_motion: bool,
+    pub(super) wait: Duration,
+    pub(super) evidence: Option<PathBuf>,
+    pub(super) records: bool,
+    pub(super) require_all: bool,
+    /// Also settle what the manual leaves open, and name the deviations.
+    pub(super) qualify: bool,
+}
+
+/// Why work ends early.
+pub(super) enum Stop {
+    Session(SessionError),
+    Evidence(EvidenceError),
+    Output(std::io::Error),
+}
+
+impl From<SessionError> for Stop {
+    fn from(error: SessionError) -> Self {
+        Self::Session(error)
+    }
+}
+
+impl From<EvidenceError> for Stop {
+    fn from(error: EvidenceError) -> Self {
+        Self::Evidence(error)
+    }
+}
+
+impl From<std::io::Error> for Stop {
+    fn from(error: std::io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+/// Does it, and gives the rig back in its safe state.
+pub(super) fn work(
     rig: &Rig,
     entries: &[Entry],
-    arguments: &RunArguments,
+    job: &Job,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let options = Options {
-        purpose: "run".to_owned(),
-        wait: arguments.wait.unwrap_or_default(),
-        allow_motion: arguments.allow_motion,
+        purpose: job.purpose.to_owned(),
+        wait: job.wait,
+        allow_motion: job.allow_motion,
         interrupt: interrupt_flag(),
     };
     let mut session = match Session::open(rig, &options) {
@@ -33,82 +73,180 @@ pub(super) fn run(
             return Ok(exit_of(&error));
         }
     };
+    let (exit, folder) = match all(&mut session, entries, job, output) {
+        Ok(done) => done,
+        Err(Stop::Session(error)) => {
+            output.complain(&error.to_string());
+            (exit_of(&error), None)
+        }
+        Err(Stop::Evidence(error)) => {
+            output.complain(&error.to_string());
+            (Exit::Usage, None)
+        }
+        Err(Stop::Output(error)) => {
+            let _end = session.close();
+            return Err(error);
+        }
+    };
+    let interrupted = session.link().trouble() == Some(&Trouble::Interrupted);
+    let exit = if interrupted { Exit::Interrupted } else { exit };
+    let end = match exit {
+        Exit::RigError => session.close_with_error(),
+        _ => session.close(),
+    };
+    let exit = tell_end(&end, exit, output);
+    if let Some(folder) = folder {
+        let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
+        match folder.finish(safe) {
+            Ok(path) => output.say(&format!("evidence in {}\n", path.display())),
+            Err(error) => {
+                output.complain(&error.to_string());
+                return Ok(exit.max(Exit::RigError));
+            }
+        }
+    }
+    Ok(exit)
+}
+
+fn all(
+    session: &mut Session,
+    entries: &[Entry],
+    job: &Job,
+    output: &mut Output,
+) -> Result<(Exit, Option<Folder>), Stop> {
+    let mut run = match Run::new(session) {
+        Ok(run) => run,
+        Err(problems) => {
+            output.mistakes(&problems);
+            return Ok((Exit::Usage, None));
+        }
+    };
+    let mut folder = match &job.evidence {
+        None => None,
+        Some(path) => Some(Folder::create(path, &about(&mut run))?),
+    };
     let bar = progress_bar(entries.len(), output.progress);
+    let mut findings = Findings::default();
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
-    let mut stopped = None;
-    {
-        let mut run = match Run::new(&mut session) {
-            Ok(run) => run,
-            Err(problems) => {
-                output.mistakes(&problems);
-                return Ok(Exit::Usage);
-            }
-        };
-        for entry in entries {
-            bar.set_message(entry.short_name().to_owned());
-            let played = match &entry.plan {
-                None => skipped("the rig has no such bus"),
-                Some(plan) => match run.play(plan) {
-                    Ok(played) => played,
-                    Err(error) => {
-                        stopped = Some(error);
-                        break;
-                    }
-                },
-            };
-            let outcome = &played.outcome;
-            took = took + outcome.took;
-            verdicts.push(outcome.verdict);
-            let mut text = line(entry, outcome, output);
-            if arguments.records || entries.len() == 1 {
-                text.extend(outcome.records.iter().map(plot));
-            }
-            bar.suspend(|| output.result(&text))?;
-            let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
-            let told = details(entry, outcome, traces);
-            bar.suspend(|| output.say(&told));
-            bar.inc(1);
-            let session = run.session();
-            if session.overdue() {
-                output.complain("the rig's file allows no longer run (max_run)");
-                break;
-            }
-            if matches!(
-                session.link().trouble(),
-                Some(Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interrupted)
-            ) {
-                break;
-            }
+    for entry in entries {
+        bar.set_message(entry.short_name().to_owned());
+        let played = play(&mut run, entry, folder.as_mut())?;
+        let outcome = &played.outcome;
+        took = took + outcome.took;
+        verdicts.push(outcome.verdict);
+        let mut text = line(entry, outcome, output);
+        if job.records || entries.len() == 1 {
+            text.extend(outcome.records.iter().map(plot));
+        }
+        bar.suspend(|| output.result(&text))?;
+        let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
+        let told = details(entry, outcome, traces);
+        bar.suspend(|| output.say(&told));
+        bar.inc(1);
+        findings.note(&played);
+        if over(&mut run, output) {
+            break;
         }
     }
     bar.finish_and_clear();
     output.result(&summary(&verdicts, took))?;
-    let interrupted = session.link().trouble() == Some(&Trouble::Interrupted);
-    let played = if interrupted {
-        Exit::Interrupted
-    } else {
-        match &stopped {
-            Some(error) => {
-                output.complain(&error.to_string());
-                exit_of(error)
-            }
-            None => Exit::of(&verdicts, arguments.require_all),
-        }
-    };
-    let end = match played {
-        Exit::RigError => session.close_with_error(),
-        _ => session.close(),
-    };
-    Ok(tell_end(&end, played, output))
+    let mut exit = Exit::of(&verdicts, job.require_all);
+    if job.qualify && !over(&mut run, output) {
+        let settled = settle(&mut run, &findings, folder.as_mut(), output)?;
+        exit = exit.max(settled);
+    }
+    for gap in measured(&mut run) {
+        output.say(&gap);
+    }
+    Ok((exit, folder))
 }
 
-fn skipped(why: &str) -> Played {
-    Played {
-        outcome: Outcome {
-            verdict: Verdict::Skipped,
-            ..Outcome::skipped(why.to_owned())
-        },
-        attempts: Vec::new(),
+/// Plays a scenario, into the folder where there is one.
+pub(super) fn play(
+    run: &mut Run<'_>,
+    entry: &Entry,
+    folder: Option<&mut Folder>,
+) -> Result<Played, Stop> {
+    let Some(plan) = &entry.plan else {
+        return Ok(Played {
+            outcome: Outcome::skipped("the rig has no such bus".to_owned()),
+            attempts: Vec::new(),
+        });
+    };
+    let Some(folder) = folder else {
+        return Ok(run.play(plan, None)?);
+    };
+    let mut kept = folder.keep(entry.short_name(), &entry.source.text);
+    let played = run.play(plan, Some(&mut kept))?;
+    let name = kept.finish()?;
+    let drives: Vec<_> = plan
+        .rings
+        .iter()
+        .map(|ring| ring.drives().to_string())
+        .collect();
+    folder.done(
+        &name,
+        &drives.join("+"),
+        &entry.scenario.title,
+        &played.outcome,
+    );
+    Ok(played)
+}
+
+/// Whether nothing more can or may be played.
+pub(super) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
+    let session = run.session();
+    if session.overdue() {
+        output.complain("the rig's file allows no longer run (max_run)");
+        return true;
     }
+    matches!(
+        session.link().trouble(),
+        Some(Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interrupted)
+    )
+}
+
+/// What a record begins with.
+fn about<'r>(run: &'r mut Run<'_>) -> About<'r> {
+    let exactness = run.exactness();
+    let way = run.way();
+    let byte_time = run.session().link().byte_time();
+    let capabilities = run.capabilities();
+    About {
+        rate: Rate::ALL
+            .into_iter()
+            .find(|rate| rate.byte_time() == byte_time)
+            .unwrap_or_default(),
+        exactness,
+        capabilities,
+        anew: way.anew,
+        rig: run.session().rig(),
+    }
+}
+
+/// How long sending was held up around bytes with a wrong parity bit, and what interposers have cost.
+fn measured(run: &mut Run<'_>) -> Vec<String> {
+    let Some(ports) = run.session().ports() else {
+        return Vec::new();
+    };
+    let gaps = ports.take_gaps();
+    let mut lines = Vec::new();
+    if let Some(longest) = gaps.iter().max() {
+        lines.push(format!(
+            "{} bytes were sent with a wrong parity bit; the line stood still for at most {:.1} ms around one\n",
+            gaps.len(),
+            longest.as_secs_f64() * 1e3
+        ));
+    }
+    for inner in ports.inner_links().iter().filter(|inner| inner.passes()) {
+        let delay = inner.delay();
+        lines.push(format!(
+            "interposer: {} bytes passed on, each a byte time later and {:.3} ms more in the mean, {:.3} ms at most\n",
+            delay.bytes,
+            delay.mean().as_secs_f64() * 1e3,
+            delay.longest.as_secs_f64() * 1e3
+        ));
+    }
+    lines
 }

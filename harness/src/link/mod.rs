@@ -5,6 +5,7 @@
 
 mod inner;
 mod record;
+mod replay;
 mod sim;
 mod stream;
 mod tamper;
@@ -13,6 +14,7 @@ pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use inner::{Delay, InnerLink, Ports};
 pub use record::{Event, Recording, Sink};
+pub use replay::Replay;
 pub use sim::SimulatedLink;
 pub use stream::{StreamLink, TOLERANCE};
 pub use tamper::{needs_line_errors, only_simulated};

@@ -22,6 +22,8 @@ pub enum Event {
     Received(usize, Instant, Received),
     /// A fault was asked for, at this time.
     Fault(usize, Instant, PlacedFault, Moment),
+    /// The link carries nothing more.
+    Trouble(Trouble),
     /// So many SYNCO were sent into a ring from this time on to let it spell out its address, and these bytes came.
     Probe(usize, Instant, usize, Vec<Received>),
 }
@@ -43,6 +45,7 @@ pub struct Recording<'l, L: ?Sized> {
     link: &'l mut L,
     sink: &'l mut dyn Sink,
     capabilities: Vec<Capability>,
+    told: bool,
 }
 
 impl<'l, L: Link + ?Sized> Recording<'l, L> {
@@ -57,6 +60,15 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             link,
             sink,
             capabilities,
+            told: false,
+        }
+    }
+
+    /// Tells of trouble once, where it shows.
+    fn tell(&mut self) {
+        if let Some(trouble) = self.link.trouble().filter(|_| !self.told) {
+            self.told = true;
+            self.sink.take(&Event::Trouble(trouble.clone()));
         }
     }
 }
@@ -73,6 +85,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         let end = self.link.send(ring, bytes);
         self.sink.take(&Event::Sent(ring, end, bytes.to_vec()));
+        self.tell();
         end
     }
 
@@ -83,7 +96,9 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        self.link.wait(until)
+        let more = self.link.wait(until);
+        self.tell();
+        more
     }
 
     fn trouble(&self) -> Option<&Trouble> {

@@ -3,10 +3,12 @@
 //! One idea does both: a hypothesis is a model with one thing changed, and it holds where its twin gives every byte
 //! that the real ring gave.
 
+mod diagnose;
 mod hypothesis;
 mod probes;
 mod profile;
 
+pub use diagnose::deviating;
 pub use hypothesis::{Evidence, Hypothesis, explaining};
 pub use probes::{Probe, hypotheses, probes};
 pub use profile::{Profile, ProfileError, Settled};

@@ -9,7 +9,7 @@ use super::open::{OpenRigError, open};
 use super::state;
 use crate::bus::recover;
 use crate::guard::{Guarded, SafeState, safe_state};
-use crate::link::{Line, Link, Trouble};
+use crate::link::{Line, Link, StreamLink, Trouble};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
@@ -155,6 +155,7 @@ pub struct Session {
     link: Guarded<Ends>,
     rings: Vec<RingSize>,
     started: Instant,
+    allow_motion: bool,
     ended: bool,
     // Given back in this order.
     _ports: Vec<PortLock>,
@@ -199,6 +200,7 @@ impl Session {
             link: Guarded::new(opened.ends, limits(rig, options.allow_motion)),
             rings,
             started: Instant::now(),
+            allow_motion: options.allow_motion,
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
             ended: true,
             _ports: opened.locks,
@@ -224,9 +226,20 @@ impl Session {
         &self.rings
     }
 
+    /// What its file and the command line allow together.
+    #[must_use]
+    pub fn limits(&self) -> Limits {
+        limits(&self.rig, self.allow_motion)
+    }
+
     /// Its guarded link.
     pub fn link(&mut self) -> &mut Guarded<Ends> {
         &mut self.link
+    }
+
+    /// Its ports' link, if it has ports: for what was measured there.
+    pub fn ports(&mut self) -> Option<&mut StreamLink> {
+        self.link.inner_mut().ports_mut()
     }
 
     /// Whether it has been used for longer than its file allows.

@@ -72,7 +72,7 @@ impl Conversation {
                     let received = bytes.iter().map(|byte| (*ring, start, *byte));
                     open.received.extend(received);
                 }
-                Event::Probe(..) => {}
+                Event::Probe(..) | Event::Trouble(_) => {}
             }
         }
         all.push(open);

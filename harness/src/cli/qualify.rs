@@ -1,0 +1,232 @@
+//! `drivebench qualify`: every scenario that fits, every open property settled, every deviation named, and a folder of
+//! evidence.
+
+use super::args::QualifyArguments;
+use super::exit::Exit;
+use super::output::Output;
+use super::run::select;
+use super::run_rig::{Job, Stop, over, play, work};
+use crate::evidence::Folder;
+use crate::qualify::{
+    Evidence, Hypothesis, Profile, Settled, deviating, explaining, hypotheses, probes,
+};
+use crate::rig::{self, Played, Run, find, state};
+use crate::scenario::verdict::Verdict;
+use crate::twin::Conversation;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+/// The most explanations that are told.
+const MOST_TOLD: usize = 8;
+
+/// How often a probe is played until a value explains it: a busy computer is late now and then.
+const PROBED: usize = 3;
+
+/// What was played and was otherwise than the model.
+#[derive(Default)]
+pub(super) struct Findings {
+    /// The conversations of each attempt that diverged.
+    diverged: Vec<Vec<Conversation>>,
+    /// The drives that were named.
+    suspects: Vec<u8>,
+}
+
+impl Findings {
+    /// Notes what came of a scenario.
+    pub(super) fn note(&mut self, played: &Played) {
+        // What was late once and not again says nothing of a drive.
+        let steady = played.outcome.verdict == Verdict::Marginal;
+        for attempt in &played.attempts {
+            let diverged = attempt.comparisons.iter().filter_map(|c| {
+                let untimely = c.untimely.as_ref().filter(|_| steady);
+                c.divergence.as_ref().or(untimely)
+            });
+            let drives: Vec<_> = diverged.map(|divergence| divergence.drive).collect();
+            if !drives.is_empty() {
+                self.diverged.push(attempt.conversations.clone());
+                self.suspects.extend(drives.into_iter().flatten());
+            }
+        }
+        self.suspects.sort_unstable();
+        self.suspects.dedup();
+    }
+}
+
+/// Qualifies a rig.
+pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let rig = match find(&arguments.rig, &rig::find::folder()) {
+        Ok(rig) => rig,
+        Err(rig::FindError::Mistakes(problems)) => {
+            output.mistakes(&problems);
+            return Ok(Exit::Usage);
+        }
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(Exit::Usage);
+        }
+    };
+    let size = rig.file.ring.first.drives;
+    let entries = match select(&arguments.selection, Some(size)) {
+        Ok(entries) => entries,
+        Err(errors) => {
+            errors.iter().for_each(|error| output.library_error(error));
+            return Ok(Exit::Usage);
+        }
+    };
+    let stamp = state::utc(SystemTime::now()).replace([':', ' '], "-");
+    let evidence = arguments
+        .evidence
+        .clone()
+        .unwrap_or_else(|| PathBuf::from(format!("evidence-{}-{stamp}", rig.id())));
+    let job = Job {
+        purpose: "qualify",
+        allow_motion: arguments.allow_motion,
+        wait: arguments.wait.unwrap_or_default(),
+        evidence: Some(evidence),
+        records: false,
+        require_all: arguments.require_all,
+        qualify: true,
+    };
+    work(&rig, &entries, &job, output)
+}
+
+/// Settles what the manual leaves open, and names what drives do otherwise.
+pub(super) fn settle(
+    run: &mut Run<'_>,
+    findings: &Findings,
+    mut folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<Exit, Stop> {
+    let mut exit = Exit::Passed;
+    let named = name(run, findings, output)?;
+    if !findings.diverged.is_empty() {
+        exit = Exit::Failed;
+    }
+    let profile = profile(run, folder.as_deref_mut(), output)?;
+    if let Some(folder) = folder {
+        let text = toml::to_string(&profile).unwrap_or_default();
+        folder.add("profile.toml", &text)?;
+        folder.add("deviations.txt", &named)?;
+    }
+    Ok(exit)
+}
+
+/// The deviations that explain every byte of every attempt that diverged.
+fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<String, Stop> {
+    let Some((first, others)) = findings.diverged.split_first() else {
+        output.result("deviations: none; every byte is as the model of the manual says\n")?;
+        return Ok("none\n".to_owned());
+    };
+    let drives = run.session().rig().file.ring.first.drives;
+    let exactness = run.exactness();
+    let twin = |lines: &[String]| run.twin_with(lines);
+    let mut left = deviating(drives, &findings.suspects);
+    let mut found: Vec<Hypothesis> = Vec::new();
+    for attempt in std::iter::once(first).chain(others) {
+        let explained = explaining(&left, attempt, exactness, &twin).unwrap_or_default();
+        found = explained.into_iter().map(|(h, _)| h.clone()).collect();
+        left.clone_from(&found);
+    }
+    let mut text = String::new();
+    match found.as_slice() {
+        [] => text.push_str("deviations: the ring is otherwise than the model, and no single known deviation explains it\n"),
+        found => {
+            for hypothesis in found.iter().take(MOST_TOLD) {
+                text.push_str(&format!("deviation: {}\n", hypothesis.name));
+            }
+            if found.len() > MOST_TOLD {
+                text.push_str(&format!("and {} more that explain it as well\n", found.len() - MOST_TOLD));
+            }
+        }
+    }
+    output.result(&text)?;
+    Ok(text)
+}
+
+/// Asks by probes how the drives behave where the manual leaves it open.
+fn profile(
+    run: &mut Run<'_>,
+    mut folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<Profile, Stop> {
+    let rings: Vec<u8> = run.session().rings().iter().map(|r| r.drives()).collect();
+    let drives = rings.first().copied().unwrap_or(1);
+    let mut profile = Profile {
+        schema: 1,
+        rig: run.session().rig().id().to_owned(),
+        date: state::utc(SystemTime::now()),
+        rings,
+        property: BTreeMap::new(),
+        open: BTreeMap::new(),
+    };
+    for probe in probes(drives).unwrap_or_default() {
+        let section = format!("nd21 {}", probe.section);
+        let Some(entry) = &probe.entry else {
+            let why = "no conversation on the bus alone shows it";
+            profile
+                .open
+                .insert(probe.property.to_owned(), why.to_owned());
+            continue;
+        };
+        let all = hypotheses(probe.property, drives);
+        let exactness = run.exactness();
+        let mut found = Vec::new();
+        let mut not_asked = None;
+        for _ in 0..PROBED {
+            let played = play(run, entry, folder.as_deref_mut())?;
+            let Some(attempt) = played.attempts.last() else {
+                not_asked = Some(played.outcome.remarks.join("; "));
+                break;
+            };
+            let twin = |lines: &[String]| run.twin_with(lines);
+            found = explaining(&all, &attempt.conversations, exactness, &twin).unwrap_or_default();
+            if !found.is_empty() || over(run, output) {
+                break;
+            }
+        }
+        if let Some(why) = not_asked {
+            output.result(&format!(
+                "{} ({section}): not asked: {why}\n",
+                probe.property
+            ))?;
+            profile.open.insert(probe.property.to_owned(), why);
+            continue;
+        }
+        match best(&found) {
+            Some(hypothesis) => {
+                output.result(&format!(
+                    "{} ({section}): {}\n",
+                    probe.property, hypothesis.name
+                ))?;
+                let settled = Settled {
+                    value: hypothesis.name.clone(),
+                    section,
+                    setup: hypothesis.lines.clone(),
+                };
+                profile.property.insert(probe.property.to_owned(), settled);
+            }
+            None => {
+                let why = "no value of it gives the bytes that came".to_owned();
+                output.result(&format!("{} ({section}): {why}\n", probe.property))?;
+                profile.open.insert(probe.property.to_owned(), why);
+            }
+        }
+    }
+    Ok(profile)
+}
+
+/// The simplest hypothesis that explains what came; among those that are as simple, the one whose times fit best.
+fn best<'h>(found: &[(&'h Hypothesis, Evidence)]) -> Option<&'h Hypothesis> {
+    let simplest = found.iter().map(|(h, _)| h.lines.len()).min()?;
+    let mut simple = found.iter().filter(|(h, _)| h.lines.len() == simplest);
+    let first = simple.next()?;
+    let best = simple.fold(first, |best, other| {
+        if other.1.latest < best.1.latest {
+            other
+        } else {
+            best
+        }
+    });
+    Some(best.0)
+}

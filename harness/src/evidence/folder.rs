@@ -1,0 +1,362 @@
+//! The folder of a run, written as the run goes on.
+
+use super::junit::{Case, junit};
+use super::record::{Line, SCHEMA, Writer};
+use crate::link::{Capability, Event, Sink};
+use crate::report::json;
+use crate::rig::{Attempt, Keeper, Rig, state};
+use crate::scenario::run::Outcome;
+use crate::scenario::verdict::Verdict;
+use crate::twin::Exactness;
+use harness_proto::line::Rate;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+/// The file of sums.
+pub(super) const SUMS: &str = "SHA256SUMS";
+/// The file of the record.
+pub(super) const RECORD: &str = "run.jsonl";
+/// The file of the rig.
+pub(super) const RIG: &str = "rig.toml";
+/// The folder of scenarios.
+pub(super) const SCENARIOS: &str = "scenarios";
+/// The folder of captures.
+const CAPTURES: &str = "captures";
+
+/// Why a folder cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum EvidenceError {
+    /// There is something in it.
+    #[error("{0} is there already and not empty: evidence goes into a folder of its own")]
+    NotEmpty(String),
+    /// A file.
+    #[error("failed to use {path}: {error}")]
+    File {
+        /// Which.
+        path: String,
+        /// Why not.
+        error: io::Error,
+    },
+    /// The rig's file cannot be written as TOML.
+    #[error("failed to write the rig's file: {0}")]
+    Rig(#[from] toml::ser::Error),
+    /// The record is damaged.
+    #[error("{RECORD}: {0}")]
+    Record(#[from] super::record::RecordError),
+    /// It is no folder of a run.
+    #[error("{0} is no folder of evidence: {1}")]
+    Foreign(String, String),
+}
+
+/// What a record begins with.
+#[derive(Clone, Debug)]
+pub struct About<'r> {
+    /// The rig.
+    pub rig: &'r Rig,
+    /// The rate of its line.
+    pub rate: Rate,
+    /// How exactly the twin is compared.
+    pub exactness: Exactness,
+    /// What the link can do.
+    pub capabilities: Vec<Capability>,
+    /// Whether drives are reset before each scenario.
+    pub anew: bool,
+}
+
+/// A folder of evidence that is being written.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    writer: Writer,
+    names: BTreeSet<String>,
+    cases: Vec<Case>,
+    rig: String,
+    report: String,
+}
+
+impl Folder {
+    /// Begins a folder: it must not be there, or be empty.
+    ///
+    /// # Errors
+    /// [`EvidenceError`].
+    pub fn create(path: &Path, about: &About<'_>) -> Result<Self, EvidenceError> {
+        let failed = |error| EvidenceError::File {
+            path: path.display().to_string(),
+            error,
+        };
+        if fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some()) {
+            return Err(EvidenceError::NotEmpty(path.display().to_string()));
+        }
+        for folder in ["", SCENARIOS, CAPTURES] {
+            fs::create_dir_all(path.join(folder)).map_err(failed)?;
+        }
+        let file = fs::File::create(path.join(RECORD)).map_err(failed)?;
+        let rig = toml::to_string(&about.rig.file)?;
+        let started = state::utc(SystemTime::now());
+        let mut folder = Self {
+            path: path.to_owned(),
+            writer: Writer::new(file),
+            names: BTreeSet::new(),
+            cases: Vec::new(),
+            rig: about.rig.id().to_owned(),
+            report: String::new(),
+        };
+        folder.write(RIG, &rig)?;
+        folder.write("versions.json", &versions(&started))?;
+        let rings: Vec<u8> = about.rig.rings().map(|(_, ring)| ring.drives).collect();
+        let names = about.capabilities.iter().map(|own| own.name().to_owned());
+        folder.writer.line(&Line::Run {
+            schema: SCHEMA,
+            drivebench: env!("CARGO_PKG_VERSION").to_owned(),
+            rig: about.rig.id().to_owned(),
+            rig_sha256: sum(rig.as_bytes()),
+            started,
+            rate: about.rate.bits_per_second(),
+            rings,
+            tolerance: about.exactness.tolerance.units(),
+            simulated: about.rig.is_simulated(),
+            capabilities: names.collect(),
+            anew: about.anew,
+        });
+        folder.check()?;
+        Ok(folder)
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Keeps the attempts at a scenario of this name and text.
+    pub fn keep<'f>(&'f mut self, name: &str, text: &'f str) -> Kept<'f> {
+        Kept {
+            name: self.unique(name),
+            text,
+            folder: self,
+            error: None,
+        }
+    }
+
+    /// Counts a scenario, all its attempts done.
+    pub fn done(&mut self, name: &str, drives: &str, title: &str, outcome: &Outcome) {
+        let found = outcome.finding.as_ref().map(|found| found.message.clone());
+        let message: Vec<_> = found.into_iter().chain(outcome.remarks.clone()).collect();
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(self.report, "{:12} {name}: {title}", outcome.verdict);
+        for line in &message {
+            let _infallible = writeln!(self.report, "             {line}");
+        }
+        self.cases.push(Case {
+            name: format!("{name}[rig={},drives={drives}]", self.rig),
+            verdict: outcome.verdict,
+            message: message.join("; "),
+            took: Duration::from_nanos(outcome.took.as_nanos()),
+        });
+    }
+
+    /// Adds a file of the run's own: a profile, findings.
+    ///
+    /// # Errors
+    /// [`EvidenceError::File`].
+    pub fn add(&mut self, file: &str, text: &str) -> Result<(), EvidenceError> {
+        self.write(file, text)
+    }
+
+    /// Ends the folder: reports and sums.
+    ///
+    /// # Errors
+    /// [`EvidenceError::File`].
+    pub fn finish(mut self, safe: Option<bool>) -> Result<PathBuf, EvidenceError> {
+        let verdicts: Vec<Verdict> = self.cases.iter().map(|case| case.verdict).collect();
+        self.writer.line(&Line::End {
+            verdicts: verdicts.iter().map(|v| v.name().to_owned()).collect(),
+            safe,
+        });
+        self.check()?;
+        let xml = junit(&format!("rig {}", self.rig), &self.cases);
+        self.write("junit.xml", &xml)?;
+        let report = format!("rig {}\n\n{}", self.rig, self.report);
+        self.write("report.txt", &report)?;
+        let sums = sums(&self.path)?;
+        self.write(SUMS, &sums)?;
+        Ok(self.path)
+    }
+
+    fn unique(&mut self, name: &str) -> String {
+        let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
+        let bare = name.strip_suffix(".scn").unwrap_or(name);
+        let own: String = bare
+            .chars()
+            .map(|c| if safe(c) { c } else { '_' })
+            .take(120)
+            .collect();
+        let own = own.trim_matches(['_', '.']).to_owned();
+        let mut unique = own.clone();
+        let mut number = 1;
+        while !self.names.insert(unique.clone()) {
+            number += 1;
+            unique = format!("{own}_{number}");
+        }
+        unique
+    }
+
+    /// Written beside and then renamed: a file is there whole or not at all.
+    fn write(&self, file: &str, text: &str) -> Result<(), EvidenceError> {
+        let path = self.path.join(file);
+        let beside = self.path.join(format!("{file}.part"));
+        let written = fs::write(&beside, text).and_then(|()| fs::rename(&beside, &path));
+        written.map_err(|error| EvidenceError::File {
+            path: path.display().to_string(),
+            error,
+        })
+    }
+
+    fn check(&mut self) -> Result<(), EvidenceError> {
+        match self.writer.failed() {
+            None => Ok(()),
+            Some(error) => Err(EvidenceError::File {
+                path: self.path.join(RECORD).display().to_string(),
+                error,
+            }),
+        }
+    }
+}
+
+/// Attempts at one scenario, on their way into a folder.
+#[derive(Debug)]
+pub struct Kept<'f> {
+    folder: &'f mut Folder,
+    name: String,
+    text: &'f str,
+    error: Option<EvidenceError>,
+}
+
+impl Kept<'_> {
+    /// Its name in the folder, once all attempts are kept.
+    ///
+    /// # Errors
+    /// The first file that could not be written.
+    pub fn finish(mut self) -> Result<String, EvidenceError> {
+        match self.error.take() {
+            Some(error) => Err(error),
+            None => self.folder.check().map(|()| self.name),
+        }
+    }
+
+    fn note(&mut self, result: Result<(), EvidenceError>) {
+        if let Err(error) = result {
+            self.error.get_or_insert(error);
+        }
+    }
+}
+
+impl Sink for Kept<'_> {
+    fn take(&mut self, event: &Event) {
+        self.folder.writer.take(event);
+    }
+}
+
+impl Keeper for Kept<'_> {
+    fn begins(&mut self, attempt: usize) {
+        if attempt == 1 {
+            let file = format!("{SCENARIOS}/{}.scn", self.name);
+            let written = self.folder.write(&file, self.text);
+            self.note(written);
+        }
+        self.folder.writer.line(&Line::Scenario {
+            name: self.name.clone(),
+            sha256: sum(self.text.as_bytes()),
+            attempt,
+        });
+    }
+
+    fn ends(&mut self, number: usize, attempt: &Attempt) {
+        let outcome = &attempt.outcome;
+        self.folder.writer.line(&Line::Verdict {
+            verdict: outcome.verdict.name().to_owned(),
+            finding: outcome.finding.as_ref().map(|found| found.message.clone()),
+            remarks: outcome.remarks.clone(),
+            took: outcome.took.units(),
+            unplaced: attempt.unplaced,
+        });
+        let file = format!("{CAPTURES}/{}.{number}.json", self.name);
+        let mut capture = Vec::new();
+        let written = json::write(&attempt.traces, &outcome.records, &mut capture)
+            .map_err(|error| EvidenceError::File {
+                path: file.clone(),
+                error,
+            })
+            .and_then(|()| self.folder.write(&file, &String::from_utf8_lossy(&capture)));
+        self.note(written);
+    }
+}
+
+fn versions(started: &str) -> String {
+    let read = |path| fs::read_to_string(path).unwrap_or_default();
+    let kernel = read("/proc/sys/kernel/osrelease");
+    let value = serde_json::json!({
+        "schema": SCHEMA,
+        "drivebench": env!("CARGO_PKG_VERSION"),
+        "os": std::env::consts::OS,
+        "architecture": std::env::consts::ARCH,
+        "kernel": kernel.trim(),
+        "started": started,
+    });
+    format!("{value:#}\n")
+}
+
+/// The sum of some bytes, as `sha256sum` prints it.
+pub(super) fn sum(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The sums of every file of a folder but that of sums, as `sha256sum` prints them.
+pub(super) fn sums(path: &Path) -> Result<String, EvidenceError> {
+    let mut lines = String::new();
+    for file in files(path)? {
+        let bytes = fs::read(path.join(&file)).map_err(|error| EvidenceError::File {
+            path: file.clone(),
+            error,
+        })?;
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(lines, "{}  {file}", sum(&bytes));
+    }
+    Ok(lines)
+}
+
+/// The files of a folder but that of sums, in order.
+fn files(path: &Path) -> Result<BTreeSet<String>, EvidenceError> {
+    let mut all = BTreeSet::new();
+    for folder in ["", SCENARIOS, CAPTURES] {
+        let failed = |error| EvidenceError::File {
+            path: path.join(folder).display().to_string(),
+            error,
+        };
+        let entries = match fs::read_dir(path.join(folder)) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == io::ErrorKind::NotFound && !folder.is_empty() => continue,
+            Err(error) => return Err(failed(error)),
+        };
+        for entry in entries {
+            let entry = entry.map_err(failed)?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let is_file = entry.file_type().map_err(failed)?.is_file();
+            if is_file && !(folder.is_empty() && name == SUMS) {
+                let prefix = if folder.is_empty() {
+                    String::new()
+                } else {
+                    format!("{folder}/")
+                };
+                all.insert(prefix + &name);
+            }
+        }
+    }
+    Ok(all)
+}

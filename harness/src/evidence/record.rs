@@ -1,0 +1,432 @@
+//! The lines of a record, and events written as such.
+
+use crate::link::{Capability, Event, LinkFault, Moment, PlacedFault, Sink, Trouble};
+use harness_proto::line::{LineError, Received};
+use harness_proto::time::{Instant, Span};
+use harness_sim::fault::Flips;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Write;
+
+/// The version of the form.
+pub(super) const SCHEMA: u32 = 1;
+
+/// A line of a record. Times are in thirds of a nanosecond since the conversation began (a bit at 38400 bit/s is
+/// 78125 of them); bytes are hexadecimal; rings are counted from 1.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Line {
+    /// The first line.
+    Run {
+        /// The version of the form: 1.
+        schema: u32,
+        /// The program's version.
+        drivebench: String,
+        /// The rig's id.
+        rig: String,
+        /// The sum of the rig's file.
+        rig_sha256: String,
+        /// When the run began, in UTC.
+        started: String,
+        /// Bits a second.
+        rate: u32,
+        /// How many drives each ring has.
+        rings: Vec<u8>,
+        /// How exactly times were compared.
+        tolerance: u64,
+        /// Whether the rings are simulated.
+        simulated: bool,
+        /// What the link could do.
+        capabilities: Vec<String>,
+        /// Whether drives were reset before each scenario.
+        anew: bool,
+    },
+    /// An attempt at a scenario begins.
+    Scenario {
+        /// Its name.
+        name: String,
+        /// The sum of its text.
+        sha256: String,
+        /// Which attempt, counted from 1.
+        attempt: usize,
+    },
+    /// A conversation begins, at this time of the one before.
+    Begin {
+        /// When.
+        t: u64,
+    },
+    /// A step of the scenario, by the place of its line in the text.
+    Step {
+        /// Which byte of the text.
+        place: usize,
+    },
+    /// Bytes were sent; the last one will have left at this time.
+    Sent {
+        /// Which ring.
+        ring: usize,
+        /// When.
+        t: u64,
+        /// Which.
+        bytes: String,
+    },
+    /// A byte was received.
+    Received {
+        /// Which ring.
+        ring: usize,
+        /// When.
+        t: u64,
+        /// Which.
+        byte: String,
+        /// What the line status said.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        error: Option<String>,
+    },
+    /// A fault was asked for on a link.
+    Fault {
+        /// Which ring.
+        ring: usize,
+        /// When.
+        t: u64,
+        /// Which link, counted from the master's outgoing one as 0.
+        link: usize,
+        /// At which byte; none for now.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        byte: Option<u64>,
+        /// At which time; none for now.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        at: Option<u64>,
+        /// What: the kind and its number, as `[kind, number]`.
+        what: (String, u64),
+    },
+    /// SYNCO were sent so that a ring spells out its address.
+    Probe {
+        /// Which ring.
+        ring: usize,
+        /// When.
+        t: u64,
+        /// How many.
+        count: usize,
+        /// What came.
+        bytes: Vec<(String, Option<String>)>,
+    },
+    /// The link carries nothing more.
+    Trouble {
+        /// `denied`, `lost`, `garbled` or `interrupted`.
+        cause: String,
+        /// In a sentence.
+        text: String,
+    },
+    /// What came of the attempt.
+    Verdict {
+        /// The verdict.
+        verdict: String,
+        /// What was otherwise, in a sentence.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        finding: Option<String>,
+        /// What is worth saying.
+        remarks: Vec<String>,
+        /// How long it took.
+        took: u64,
+        /// Line errors that the transport told of without their bytes.
+        #[serde(default)]
+        unplaced: u64,
+    },
+    /// The last line: how many scenarios had each verdict.
+    End {
+        /// The verdicts of all scenarios in order.
+        verdicts: Vec<String>,
+        /// Whether the safe state was confirmed; none for simulated rings.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        safe: Option<bool>,
+    },
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect()
+}
+
+fn unhex(text: &str) -> Option<Vec<u8>> {
+    let digits = text.as_bytes();
+    if !digits.len().is_multiple_of(2) || !text.is_ascii() {
+        return None;
+    }
+    let pairs = digits.chunks(2);
+    pairs
+        .map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok())
+        .collect()
+}
+
+const ERRORS: [LineError; 4] = [
+    LineError::Parity,
+    LineError::Framing,
+    LineError::Break,
+    LineError::Overrun,
+];
+
+fn received(byte: &str, error: Option<&str>) -> Option<Received> {
+    let [byte] = unhex(byte)?[..] else {
+        return None;
+    };
+    let error = match error {
+        None => None,
+        Some(name) => Some(ERRORS.into_iter().find(|error| error.name() == name)?),
+    };
+    Some(Received { byte, error })
+}
+
+fn written(byte: Received) -> (String, Option<String>) {
+    (
+        hex(&[byte.byte]),
+        byte.error.map(|error| error.name().to_owned()),
+    )
+}
+
+fn fault(what: LinkFault) -> (String, u64) {
+    let (kind, number) = match what {
+        LinkFault::Flip(flips) => {
+            let bits = u64::from(flips.data);
+            (
+                "flip",
+                bits | u64::from(flips.parity) << 8 | u64::from(flips.stop) << 9,
+            )
+        }
+        LinkFault::Replace(byte) => ("replace", byte.into()),
+        LinkFault::Drop => ("drop", 0),
+        LinkFault::Duplicate => ("duplicate", 0),
+        LinkFault::Insert(byte) => ("insert", byte.into()),
+        LinkFault::Delay(span) => ("delay", span.units()),
+        LinkFault::Break(span) => ("break", span.units()),
+        LinkFault::Overrun => ("overrun", 0),
+        LinkFault::Cut => ("cut", 0),
+        LinkFault::Join => ("join", 0),
+    };
+    (kind.to_owned(), number)
+}
+
+fn unfault((kind, number): &(String, u64)) -> Option<LinkFault> {
+    let byte = u8::try_from(number & 0xFF).ok()?;
+    Some(match kind.as_str() {
+        "flip" => LinkFault::Flip(Flips {
+            data: byte,
+            parity: number >> 8 & 1 == 1,
+            stop: number >> 9 & 1 == 1,
+        }),
+        "replace" => LinkFault::Replace(byte),
+        "drop" => LinkFault::Drop,
+        "duplicate" => LinkFault::Duplicate,
+        "insert" => LinkFault::Insert(byte),
+        "delay" => LinkFault::Delay(Span::from_units(*number)),
+        "break" => LinkFault::Break(Span::from_units(*number)),
+        "overrun" => LinkFault::Overrun,
+        "cut" => LinkFault::Cut,
+        "join" => LinkFault::Join,
+        _ => return None,
+    })
+}
+
+impl Line {
+    /// An event as a line; `None` for what no rig can be given: drives' power and what stands outside the bus.
+    #[must_use]
+    pub fn of(event: &Event) -> Option<Self> {
+        let units = |at: &Instant| at.since_start().units();
+        Some(match event {
+            Event::Begin(at) => Self::Begin { t: units(at) },
+            Event::Step(place) => Self::Step { place: *place },
+            Event::Sent(ring, at, bytes) => Self::Sent {
+                ring: ring + 1,
+                t: units(at),
+                bytes: hex(bytes),
+            },
+            Event::Received(ring, at, byte) => {
+                let (byte, error) = written(*byte);
+                Self::Received {
+                    ring: ring + 1,
+                    t: units(at),
+                    byte,
+                    error,
+                }
+            }
+            Event::Fault(ring, at, PlacedFault::Link(link, what), moment) => Self::Fault {
+                ring: ring + 1,
+                t: units(at),
+                link: *link,
+                byte: match moment {
+                    Moment::Byte(byte) => Some(*byte),
+                    _ => None,
+                },
+                at: match moment {
+                    Moment::At(at) => Some(units(at)),
+                    _ => None,
+                },
+                what: fault(*what),
+            },
+            Event::Fault(..) => return None,
+            Event::Trouble(trouble) => Self::Trouble {
+                cause: match trouble {
+                    Trouble::Denied(_) => "denied",
+                    Trouble::Lost(_) => "lost",
+                    Trouble::Garbled(_) => "garbled",
+                    Trouble::Interrupted => "interrupted",
+                }
+                .to_owned(),
+                text: trouble.to_string(),
+            },
+            Event::Probe(ring, at, count, bytes) => Self::Probe {
+                ring: ring + 1,
+                t: units(at),
+                count: *count,
+                bytes: bytes.iter().map(|byte| written(*byte)).collect(),
+            },
+        })
+    }
+
+    /// The event of a line; `None` where it is none, or holds what cannot be.
+    #[must_use]
+    pub fn event(&self) -> Option<Event> {
+        let instant = |t: &u64| Instant::START + Span::from_units(*t);
+        let index = |ring: &usize| ring.checked_sub(1).filter(|ring| *ring < 2);
+        Some(match self {
+            Self::Begin { t } => Event::Begin(instant(t)),
+            Self::Step { place } => Event::Step(*place),
+            Self::Sent { ring, t, bytes } => Event::Sent(index(ring)?, instant(t), unhex(bytes)?),
+            Self::Received {
+                ring,
+                t,
+                byte,
+                error,
+            } => Event::Received(index(ring)?, instant(t), received(byte, error.as_deref())?),
+            Self::Fault {
+                ring,
+                t,
+                link,
+                byte,
+                at,
+                what,
+            } => {
+                let moment = match (byte, at) {
+                    (Some(byte), _) => Moment::Byte(*byte),
+                    (None, Some(at)) => Moment::At(instant(at)),
+                    (None, None) => Moment::Now,
+                };
+                let what = PlacedFault::Link(*link, unfault(what)?);
+                Event::Fault(index(ring)?, instant(t), what, moment)
+            }
+            Self::Trouble { cause, text } => Event::Trouble(match cause.as_str() {
+                "denied" => Trouble::Denied(text.clone()),
+                "lost" => Trouble::Lost(text.clone()),
+                "garbled" => Trouble::Garbled(text.clone()),
+                "interrupted" => Trouble::Interrupted,
+                _ => return None,
+            }),
+            Self::Probe {
+                ring,
+                t,
+                count,
+                bytes,
+            } => {
+                let bytes = bytes
+                    .iter()
+                    .map(|(byte, error)| received(byte, error.as_deref()))
+                    .collect::<Option<Vec<_>>>()?;
+                Event::Probe(index(ring)?, instant(t), *count, bytes)
+            }
+            Self::Run { .. } | Self::Scenario { .. } | Self::Verdict { .. } | Self::End { .. } => {
+                return None;
+            }
+        })
+    }
+}
+
+/// Writes a record as it happens.
+#[derive(Debug)]
+pub struct Writer {
+    file: File,
+    failed: Option<std::io::Error>,
+}
+
+impl Writer {
+    /// Writes into a file.
+    #[must_use]
+    pub fn new(file: File) -> Self {
+        Self { file, failed: None }
+    }
+
+    /// Writes a line at once; what goes wrong is kept for [`Self::failed`].
+    pub fn line(&mut self, line: &Line) {
+        if self.failed.is_some() {
+            return;
+        }
+        let text = serde_json::to_string(line).map_err(std::io::Error::other);
+        let written = text.and_then(|text| self.file.write_all((text + "\n").as_bytes()));
+        self.failed = written.err();
+    }
+
+    /// The first error, once.
+    pub fn failed(&mut self) -> Option<std::io::Error> {
+        self.failed.take()
+    }
+}
+
+impl Sink for Writer {
+    fn take(&mut self, event: &Event) {
+        if let Some(line) = Line::of(event) {
+            self.line(&line);
+        }
+    }
+}
+
+/// Why a text is no record.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// A line is no line of a record.
+    #[error("line {line}, column {column}: {message}")]
+    Line {
+        /// Which, counted from 1.
+        line: usize,
+        /// Where in it, counted from 1.
+        column: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// It does not begin as a record does.
+    #[error("line 1: the record of a run expected here, of schema {SCHEMA}")]
+    Start,
+}
+
+/// The lines of a record, and whether the last one is whole; a run that was killed leaves half a line.
+///
+/// # Errors
+/// The first line that is none.
+pub fn read(text: &str) -> Result<(Vec<Line>, bool), RecordError> {
+    let mut lines = Vec::new();
+    let whole = text.is_empty() || text.ends_with('\n');
+    let count = text.lines().count();
+    for (index, line) in text.lines().enumerate() {
+        let parsed = serde_json::from_str::<Line>(line);
+        match parsed {
+            Ok(line) => lines.push(line),
+            Err(_) if !whole && index + 1 == count => return Ok((lines, false)),
+            Err(error) => {
+                return Err(RecordError::Line {
+                    line: index + 1,
+                    column: error.column(),
+                    message: error.to_string(),
+                });
+            }
+        }
+    }
+    match lines.first() {
+        Some(Line::Run { schema: SCHEMA, .. }) => Ok((lines, whole)),
+        _ => Err(RecordError::Start),
+    }
+}
+
+/// Capabilities by their names; unknown ones are left out.
+#[must_use]
+pub(super) fn capabilities(names: &[String]) -> Vec<Capability> {
+    let named = |name: &String| {
+        let mut all = Capability::NAMES.iter();
+        all.find(|(known, _)| known == name).map(|(_, own)| *own)
+    };
+    names.iter().filter_map(named).collect()
+}

@@ -1,0 +1,303 @@
+//! Every verdict of a folder, judged again from its record.
+
+use super::folder::{EvidenceError, RECORD, RIG, SCENARIOS, SUMS, sum, sums};
+use super::record::{Line, capabilities, read};
+use crate::library::Entry;
+use crate::link::{Event, Replay};
+use crate::rig::run::{judge, known, twin};
+use crate::rig::{Rig, Way, parse, play_one};
+use crate::scenario::run::Outcome;
+use crate::scenario::source::Source;
+use crate::twin::{Conversation, Exactness, Twin};
+use harness_proto::line::Rate;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::Span;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What was found out about one attempt.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// The scenario, and which attempt.
+    pub name: String,
+    /// The verdict in the record; `None` where the run did not come to it.
+    pub recorded: Option<String>,
+    /// The verdict as it is judged again.
+    pub judged: String,
+    /// What differs, if anything does.
+    pub differs: Option<String>,
+}
+
+/// What a folder is worth.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Verified {
+    /// What is wrong with its files: sums that differ, files that are missing or were added.
+    pub files: Vec<String>,
+    /// The attempts, in order.
+    pub attempts: Vec<Finding>,
+    /// Whether the run came to its end.
+    pub complete: bool,
+}
+
+struct Header {
+    rate: Rate,
+    drives: Vec<u8>,
+    rings: Vec<RingSize>,
+    exactness: Exactness,
+    capabilities: Vec<crate::link::Capability>,
+    simulated: bool,
+    way: Way,
+}
+
+struct Recorded {
+    name: String,
+    sha256: String,
+    attempt: usize,
+    events: Vec<Event>,
+    verdict: Option<(String, Option<String>, u64)>,
+}
+
+/// Judges a folder again.
+///
+/// # Errors
+/// It is no folder of evidence, or its record is damaged; with the place.
+pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
+    let text = |file: &str| {
+        std::fs::read_to_string(path.join(file)).map_err(|error| {
+            let path = path.display().to_string();
+            EvidenceError::Foreign(path, format!("{file}: {error}"))
+        })
+    };
+    let mut verified = Verified {
+        files: compare_sums(path)?,
+        ..Verified::default()
+    };
+    let (lines, whole) = read(&text(RECORD)?)?;
+    let rig_text = text(RIG)?;
+    let rig = parse(&Source {
+        name: RIG.to_owned(),
+        text: rig_text.clone().into(),
+    })
+    .map_err(|problems| EvidenceError::Foreign(path.display().to_string(), problems.to_string()))?;
+    let header = header(&lines, &rig, &rig_text, &mut verified).ok_or_else(|| {
+        EvidenceError::Foreign(
+            path.display().to_string(),
+            "the record's first line holds what cannot be".to_owned(),
+        )
+    })?;
+    verified.complete = whole && matches!(lines.last(), Some(Line::End { .. }));
+    let fresh = || {
+        twin(&rig, &known(&rig)).map_err(|problems| {
+            EvidenceError::Foreign(path.display().to_string(), problems.to_string())
+        })
+    };
+    let mut own = fresh()?;
+    for recorded in group(&lines[1..]) {
+        let file = format!("{SCENARIOS}/{}.scn", recorded.name);
+        let finding = match std::fs::read_to_string(path.join(&file)) {
+            Err(error) => recorded.with("aborted", Some(format!("{file}: {error}"))),
+            Ok(text) if sum(text.as_bytes()) != recorded.sha256 => recorded.with(
+                "aborted",
+                Some(format!("{file} is not the text that was played")),
+            ),
+            Ok(text) => {
+                let (outcome, diverged) = again(&recorded, &text, &header, &rig, &mut own);
+                if diverged {
+                    own = fresh()?;
+                }
+                recorded.compare(&outcome)
+            }
+        };
+        verified.attempts.push(finding);
+    }
+    Ok(verified)
+}
+
+fn header(lines: &[Line], rig: &Rig, rig_text: &str, verified: &mut Verified) -> Option<Header> {
+    let Some(Line::Run {
+        rig_sha256,
+        rate,
+        rings: drives,
+        tolerance,
+        simulated,
+        capabilities: names,
+        anew,
+        ..
+    }) = lines.first()
+    else {
+        return None;
+    };
+    if *rig_sha256 != sum(rig_text.as_bytes()) {
+        verified
+            .files
+            .push(format!("{RIG} is not the file that was used"));
+    }
+    let sizes = drives.iter().map(|n| RingSize::new((*n).into()).ok());
+    let rings = sizes.collect::<Option<Vec<_>>>()?;
+    let capabilities = capabilities(names);
+    let health = &rig.file.health;
+    Some(Header {
+        rate: Rate::from_bits_per_second(*rate)?,
+        drives: drives.clone(),
+        exactness: Exactness {
+            tolerance: Span::from_units(*tolerance),
+            line_errors: capabilities.contains(&crate::link::Capability::LineErrors),
+            knows_cells: *simulated,
+        },
+        capabilities,
+        simulated: *simulated,
+        way: Way {
+            rings: rings.clone(),
+            attempts: health.between.then_some(health.attempts),
+            anew: *anew,
+        },
+        rings,
+    })
+}
+
+/// The attempts of a record.
+fn group(lines: &[Line]) -> Vec<Recorded> {
+    let mut all: Vec<Recorded> = Vec::new();
+    for line in lines {
+        match line {
+            Line::Scenario {
+                name,
+                sha256,
+                attempt,
+            } => all.push(Recorded {
+                name: name.clone(),
+                sha256: sha256.clone(),
+                attempt: *attempt,
+                events: Vec::new(),
+                verdict: None,
+            }),
+            Line::Verdict {
+                verdict,
+                finding,
+                unplaced,
+                ..
+            } => {
+                if let Some(last) = all.last_mut() {
+                    last.verdict = Some((verdict.clone(), finding.clone(), *unplaced));
+                }
+            }
+            line => {
+                if let (Some(last), Some(event)) = (all.last_mut(), line.event()) {
+                    last.events.push(event);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Plays an attempt again from its record, and says whether the twin found something.
+fn again(
+    recorded: &Recorded,
+    text: &str,
+    header: &Header,
+    rig: &Rig,
+    twin: &mut Twin,
+) -> (Outcome, bool) {
+    let source = Source {
+        name: recorded.name.clone(),
+        text: text.to_owned().into(),
+    };
+    let size = header.rings.first().map(|ring| ring.drives());
+    let plan = match Entry::new(source, size) {
+        Ok(Entry {
+            plan: Some(plan), ..
+        }) => plan,
+        Ok(_) => {
+            return (
+                Outcome::rig_error("no scenario of this bus".to_owned()),
+                false,
+            );
+        }
+        Err(problems) => return (Outcome::rig_error(problems.to_string()), false),
+    };
+    let mut replay = Replay::new(
+        recorded.events.clone(),
+        header.rate,
+        header.exactness.tolerance,
+        header.drives.clone(),
+        header.capabilities.clone(),
+    );
+    let mut outcome = match play_one(&mut replay, &plan, &header.way) {
+        Ok(outcome) => outcome,
+        Err((_, ill)) => Outcome::rig_error(ill.to_string()),
+    };
+    let conversations =
+        Conversation::all(&recorded.events, header.rate.byte_time(), header.simulated);
+    let comparisons: Vec<_> = conversations
+        .iter()
+        .map(|conversation| twin.follow(conversation, header.exactness))
+        .collect();
+    let unplaced = recorded
+        .verdict
+        .as_ref()
+        .map_or(0, |(.., unplaced)| *unplaced);
+    judge(&mut outcome, &comparisons, unplaced, &rig.file.deviation);
+    let diverged = comparisons.iter().any(|c| c.divergence.is_some());
+    (outcome, diverged)
+}
+
+impl Recorded {
+    fn with(&self, judged: &str, differs: Option<String>) -> Finding {
+        let number = if self.attempt > 1 {
+            format!(", attempt {}", self.attempt)
+        } else {
+            String::new()
+        };
+        Finding {
+            name: format!("{}{number}", self.name),
+            recorded: self.verdict.as_ref().map(|(verdict, ..)| verdict.clone()),
+            judged: judged.to_owned(),
+            differs,
+        }
+    }
+
+    fn compare(&self, outcome: &Outcome) -> Finding {
+        let judged = outcome.verdict.name();
+        let found = outcome.finding.as_ref().map(|found| found.message.clone());
+        let differs = match &self.verdict {
+            None => None,
+            Some((verdict, ..)) if verdict != judged => Some(format!(
+                "the record says {verdict}, its bytes say {judged}{}",
+                found.map_or(String::new(), |found| format!(": {found}"))
+            )),
+            Some((_, finding, _)) if *finding != found => Some(format!(
+                "the record says \"{}\", its bytes say \"{}\"",
+                finding.as_deref().unwrap_or("nothing"),
+                found.as_deref().unwrap_or("nothing")
+            )),
+            Some(_) => None,
+        };
+        self.with(judged, differs)
+    }
+}
+
+/// What is wrong with the files of a folder; nothing where there are no sums, as of a run that did not end.
+fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
+    let Ok(stated) = std::fs::read_to_string(path.join(SUMS)) else {
+        return Ok(Vec::new());
+    };
+    let table = |text: &str| -> BTreeMap<String, String> {
+        let pairs = text.lines().filter_map(|line| line.split_once("  "));
+        pairs
+            .map(|(sum, file)| (file.to_owned(), sum.to_owned()))
+            .collect()
+    };
+    let (stated, found) = (table(&stated), table(&sums(path)?));
+    let mut wrong = Vec::new();
+    for (file, sum) in &stated {
+        match found.get(file) {
+            None => wrong.push(format!("{file} is missing")),
+            Some(own) if own != sum => wrong.push(format!("{file} was changed")),
+            Some(_) => {}
+        }
+    }
+    let added = found.keys().filter(|file| !stated.contains_key(*file));
+    wrong.extend(added.map(|file| format!("{file} was added")));
+    Ok(wrong)
+}

@@ -1,0 +1,224 @@
+//! A link that gives again what was recorded.
+//!
+//! The record's order decides: a byte comes where it came before, behind the same bytes sent. Who sends something
+//! else than was sent then finds the link in trouble. Time is that of the record.
+
+use super::{Capability, Event, Line, Link, Moment, PlacedFault, Shown, Trouble};
+use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::{Instant, Span};
+use harness_sim::trace::Trace;
+use std::collections::VecDeque;
+
+/// A record, played back.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    events: VecDeque<Event>,
+    now: Instant,
+    rate: Rate,
+    tolerance: Span,
+    drives: Vec<u8>,
+    capabilities: Vec<Capability>,
+    reaches: Vec<(usize, usize)>,
+    trouble: Option<Trouble>,
+}
+
+impl Replay {
+    /// What was recorded on rings of so many drives, on a link that could do so much.
+    #[must_use]
+    pub fn new(
+        events: Vec<Event>,
+        rate: Rate,
+        tolerance: Span,
+        drives: Vec<u8>,
+        capabilities: Vec<Capability>,
+    ) -> Self {
+        let reached = events.iter().filter_map(|event| match event {
+            Event::Fault(ring, _, PlacedFault::Link(link, _), _) => Some((*ring, *link)),
+            _ => None,
+        });
+        Self {
+            reaches: reached.collect(),
+            events: events.into(),
+            now: Instant::START,
+            rate,
+            tolerance,
+            drives,
+            capabilities,
+            trouble: None,
+        }
+    }
+
+    /// Whether everything was played back.
+    #[must_use]
+    pub fn is_at_end(&self) -> bool {
+        let left = |event: &Event| !matches!(event, Event::Received(..) | Event::Step(_));
+        !self.events.iter().any(left)
+    }
+
+    fn otherwise(&mut self, what: &str) {
+        let text = format!("the record holds something else than {what}: the scenario was changed");
+        self.trouble.get_or_insert(Trouble::Garbled(text));
+    }
+
+    fn trouble_comes(&mut self) {
+        if let Some(Event::Trouble(trouble)) = self.events.front() {
+            self.trouble = Some(trouble.clone());
+            self.events.pop_front();
+        }
+    }
+}
+
+impl Line for Replay {
+    fn byte_time(&self) -> Span {
+        self.rate.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        if self.trouble.is_some() {
+            return self.now;
+        }
+        match self.events.front() {
+            Some(Event::Sent(own, end, sent)) if *own == ring && sent == bytes => {
+                let end = *end;
+                self.events.pop_front();
+                self.trouble_comes();
+                end
+            }
+            _ => {
+                self.otherwise("what is sent");
+                self.now
+            }
+        }
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        match self.events.front() {
+            Some(Event::Received(own, at, byte)) if *own == ring && *at <= self.now => {
+                let byte = (*at, *byte);
+                self.events.pop_front();
+                Some(byte)
+            }
+            _ => None,
+        }
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.trouble_comes();
+        if self.trouble.is_some() {
+            return false;
+        }
+        // The next byte that comes, behind those that have come and that nobody has fetched.
+        let mut bytes = self.events.iter().map_while(|event| match event {
+            Event::Received(_, at, _) => Some(*at),
+            _ => None,
+        });
+        let now = self.now;
+        let next = bytes.find(|at| *at > now);
+        self.now = next.map_or(until, |at| at.min(until)).max(now);
+        !self.events.is_empty()
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.trouble.as_ref()
+    }
+}
+
+impl Link for Replay {
+    fn capabilities(&self) -> &[Capability] {
+        &self.capabilities
+    }
+
+    fn begin(&mut self) {
+        while matches!(self.events.front(), Some(Event::Received(..))) {
+            self.events.pop_front();
+        }
+        match self.events.pop_front() {
+            Some(Event::Begin(_)) => self.now = Instant::START,
+            Some(other) => {
+                self.events.push_front(other);
+                self.otherwise("the beginning of a conversation");
+            }
+            None => self.otherwise("the beginning of a conversation"),
+        }
+    }
+
+    fn step(&mut self, place: usize) {
+        if self.events.front() == Some(&Event::Step(place)) {
+            self.events.pop_front();
+        }
+    }
+
+    fn busy(&self) -> bool {
+        matches!(self.events.front(), Some(Event::Received(..)))
+    }
+
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        match self.events.front() {
+            Some(Event::Fault(own, _, known, then))
+                if (*own, *known, *then) == (ring, fault, moment) =>
+            {
+                self.events.pop_front();
+            }
+            _ => self.otherwise("the fault that is asked for"),
+        }
+    }
+
+    fn reaches(&self, ring: usize, link: usize) -> bool {
+        self.reaches.contains(&(ring, link))
+    }
+
+    fn time_tolerance(&self) -> Span {
+        self.tolerance
+    }
+
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+        match self.events.pop_front() {
+            Some(Event::Probe(own, at, known, bytes)) if (own, known) == (ring, count) => {
+                self.now = self.now.max(at);
+                bytes
+            }
+            other => {
+                self.events.extend(other);
+                self.otherwise("SYNCO that let the ring spell out its address");
+                Vec::new()
+            }
+        }
+    }
+
+    fn error_of(&self, _ring: usize, _drive: u8) -> Option<Option<BusError>> {
+        None
+    }
+
+    fn shown(&self, _ring: usize, _drive: u8) -> Option<Shown> {
+        None
+    }
+
+    fn peek(&self, _ring: usize, _drive: u8, _address: u16) -> Option<u8> {
+        None
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn carried(&self) -> u64 {
+        0
+    }
+
+    fn drives(&self, ring: usize) -> u8 {
+        self.drives.get(ring).copied().unwrap_or(0)
+    }
+
+    fn trace(&self, ring: usize) -> Trace {
+        Trace {
+            drives: self.drives(ring),
+            links: Vec::new(),
+            marks: Vec::new(),
+        }
+    }
+}
