@@ -145,15 +145,7 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) ->
         return outcome;
     }
     link.begin();
-    let restored = restore(link, &mut before).or_else(|_| {
-        // A scenario may leave the ring in the error mode, or in the middle of a telegram (9.8).
-        for ring in 0..plan.rings.len() {
-            link.send(ring, &CHECK_SEQUENCE);
-        }
-        let end = link.now() + PATIENCE;
-        while link.busy() && link.now() < end && link.wait(end) {}
-        restore(link, &mut before)
-    });
+    let restored = restore(link, &before).or_else(|_| restore(link, &before));
     match restored {
         Ok(()) => outcome,
         Err(why) => Outcome {
@@ -186,8 +178,7 @@ pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String>
         }
         // Whoever was in the middle of something hears the next telegram whole (9.8).
         link.send(*ring, &CHECK_SEQUENCE);
-        let end = link.now() + PATIENCE;
-        while link.busy() && link.now() < end && link.wait(end) {}
+        settle(link);
     }
     let end = link.now() + SELF_TEST;
     for (ring, drive) in all {
@@ -249,16 +240,47 @@ fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<
     Ok(())
 }
 
-/// Sets cells to what they held before, the last one first.
+/// Sets cells to what they held before, the last one first, and reads them back.
+///
+/// The check sequence (9.8) and all telegrams go out without a gap: a scenario may have left the ring in the error mode,
+/// or with drives that miss their bytes after 10 ms (9.9) until one of these cells says otherwise.
 ///
 /// # Errors
 /// The first cell that does not hold it, in a sentence.
-fn restore(link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
-    while let Some(cell) = before.last().copied() {
-        write(link, cell)?;
-        before.pop();
+fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), String> {
+    for ring in 0..2 {
+        let mut bytes = CHECK_SEQUENCE.to_vec();
+        for cell in before.iter().rev().filter(|cell| cell.ring == ring) {
+            let command = Command::WriteByte {
+                address: cell.address,
+                data: cell.data,
+            };
+            let own = Exchange::new(link.drives(ring), cell.drive, command);
+            bytes.extend(own.into_iter().flat_map(|exchange| exchange.bytes));
+        }
+        if bytes.len() > CHECK_SEQUENCE.len() {
+            link.send(ring, &bytes);
+            settle(link);
+        }
+    }
+    for cell in before {
+        let held = read(link, *cell)?;
+        if (held ^ cell.data) & !own_bits(cell.address) != 0 {
+            let why = format!("it held {:02X} and now {held:02X}", cell.data);
+            return Err(wrong(link, *cell, &why));
+        }
     }
     Ok(())
+}
+
+fn settle(link: &mut dyn Link) {
+    let end = link.now() + PATIENCE;
+    while link.busy() && link.now() < end && link.wait(end) {}
+}
+
+/// Bits that the drive writes itself (14.2).
+fn own_bits(address: u16) -> u8 {
+    cell_at(address).map_or(0, |known| known.read_only_bits)
 }
 
 fn read(link: &mut dyn Link, cell: Before) -> Result<u8, String> {
@@ -280,9 +302,7 @@ fn write(link: &mut dyn Link, cell: Before) -> Result<(), String> {
         return Err(wrong(link, cell, "no answer"));
     }
     let held = read(link, cell)?;
-    // Bits that the drive writes itself (14.2).
-    let own = cell_at(cell.address).map_or(0, |known| known.read_only_bits);
-    if (held ^ cell.data) & !own == 0 {
+    if (held ^ cell.data) & !own_bits(cell.address) == 0 {
         return Ok(());
     }
     let why = format!("{:02X} was written, {held:02X} is read", cell.data);
