@@ -3,7 +3,7 @@
 
 use harness::library::Entry;
 use harness::link::{
-    InnerLink, Line, Link, LinkFault, Moment, PlacedFault, Ports, SimulatedLink, StreamLink,
+    InnerLink, Link, LinkFault, Moment, PlacedFault, Ports, SimulatedLink, StreamLink,
 };
 use harness::port::{Endpoint, PortSettings, Wire, open};
 use harness::scenario::run::{AtFinding, lacks, play_over_bus, start_anew};
@@ -59,7 +59,8 @@ impl Served {
         command.args([ring, &place("ring")]);
         let mut lines = 1;
         for (option, link, ports) in inner {
-            let places: Vec<_> = (0..*ports).map(|n| place(&format!("inner{n}"))).collect();
+            let names = (0..*ports).map(|n| format!("inner{}", lines + n));
+            let places: Vec<_> = names.map(|name| place(&name)).collect();
             command.args([*option, &format!("{link}={}", places.join(","))]);
             lines += ports;
         }
