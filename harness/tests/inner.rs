@@ -16,6 +16,7 @@ use harness_sim::fault::Flips;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Reads of FE13 from the drives 3 and 2 of a ring of four, one telegram behind the other (ND21 9.2, 10.1).
 const READS: [u8; 12] = [
@@ -209,6 +210,7 @@ fn interposer(transport: &str) {
     let delay = link.inner_links()[0].delay();
     assert!(delay.bytes > 12, "{delay:?}");
     assert!(delay.longest >= delay.mean(), "{delay:?}");
+    assert!(delay.mean() > Duration::ZERO, "{delay:?}");
 }
 
 /// The check sequence brings all drives back (ND21 9.8), whatever they wait for.
@@ -315,6 +317,29 @@ fn a_cut_link_with_nobody_there_is_open() {
     let served = Served::start("tcp", true, &[("--cut", "2->1", 1)]);
     let mut link = served.link(Vec::new());
     assert_eq!(exchange(&mut link, &[0x80; 4]), []);
+}
+
+/// One port may be both ends of an interposer; two interposers need two.
+#[test]
+fn one_port_for_both_ends_in_a_rig_file() {
+    let ring = "schema = 1\n[rig]\nid = \"a\"\n[ring.1]\ndrives = 4\ntransport = \"tcp\"\nport = \"h:1\"\n";
+    let interposer = |link: &str| {
+        let end = "{ transport = \"tcp\", port = \"h:2\" }";
+        format!("[[interposer]]\nlink = \"{link}\"\nupstream = {end}\ndownstream = {end}\n")
+    };
+    let parsed = |text: String| {
+        let source = Source::from_bytes("a.toml".to_owned(), text.into()).expect("a text");
+        harness::rig::parse(&source)
+    };
+    let one = parsed(format!("{ring}{}", interposer("2->1")));
+    assert!(one.is_ok(), "{one:?}");
+    let two = parsed(format!(
+        "{ring}{}{}",
+        interposer("2->1"),
+        interposer("1->0")
+    ));
+    let problems = two.expect_err("the port is taken");
+    assert!(problems.all()[0].message.contains("named twice"));
 }
 
 /// What the command line refuses, with the reason.

@@ -213,8 +213,8 @@ impl Link {
     /// The next byte that an open link's transmitter has sent by `now`.
     pub(crate) fn fetch(&mut self, now: Instant) -> Option<LineByte> {
         let sent = &mut self.opening.as_mut()?.sent;
-        let byte = sent.pop_front_if(|byte| byte.at <= now)?;
-        Some(byte.unpack())
+        sent.front().filter(|byte| byte.at <= now)?;
+        sent.pop_front().map(UnderWay::unpack)
     }
 
     /// Forgets what it has carried and the faults whose byte has not come; what is under way counts as the first

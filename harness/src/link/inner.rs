@@ -25,7 +25,7 @@ pub enum Ports {
     TwoPortInterposer(Wire, Wire),
 }
 
-/// How long bytes were inside the program on their way through an interposer.
+/// How long bytes were inside the program on their way through an interposer. What a fault holds back is not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delay {
     /// How many bytes were passed on.
@@ -51,7 +51,7 @@ impl Delay {
     }
 }
 
-/// What is passed on: when, whether a gap in front is wanted, what, and when it was read.
+/// What is passed on: when, what, and since when it could be.
 type Waiting = (Instant, Outgoing, time::Instant);
 
 /// An inner link that the bench has a port at.
@@ -193,6 +193,7 @@ impl InnerLink {
         let mut free = start + passed.delay;
         self.taken += 1;
         self.given += passed.bytes.len() as u64 + u64::from(passed.hold.is_some());
+        let read = read + time::Duration::from_nanos(free.since(at).as_nanos());
         for received in &passed.bytes {
             let outgoing = match received.error {
                 None | Some(LineError::Overrun) => Outgoing::Byte(received.byte),

@@ -194,17 +194,17 @@ fn send_wrong_parity(port: &mut impl ParityPort, byte: u8) -> io::Result<Duratio
 
 impl ParityPort for BorrowedFd<'_> {
     fn drain(&mut self) -> io::Result<()> {
-        Ok(rustix::termios::tcdrain(&*self)?)
+        Ok(rustix::termios::tcdrain(*self)?)
     }
 
     fn set_odd(&mut self, odd: bool) -> io::Result<()> {
-        switch_parity(&*self, odd)
+        switch_parity(*self, odd)
     }
 
     fn put(&mut self, byte: u8) -> io::Result<()> {
         let end = Instant::now() + PATIENCE;
         while Instant::now() < end {
-            match rustix::io::write(&*self, &[byte]) {
+            match rustix::io::write(*self, &[byte]) {
                 Ok(1) => return Ok(()),
                 // The port has just been drained: there is room in a moment.
                 Ok(_) | Err(Errno::AGAIN | Errno::INTR) => std::thread::yield_now(),
