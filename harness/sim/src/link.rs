@@ -120,6 +120,15 @@ impl UnderWay {
     }
 }
 
+/// A link cut open: what the transmitter sends goes to somebody else, and what the receiver hears comes from them.
+#[derive(Clone, Debug, Default)]
+struct Opening {
+    /// What has been sent and not been fetched.
+    sent: VecDeque<UnderWay>,
+    /// When the last byte sent arrives there.
+    last_arrival: Instant,
+}
+
 /// A wire from one transmitter to one receiver.
 #[derive(Clone, Debug)]
 pub struct Link {
@@ -132,6 +141,7 @@ pub struct Link {
     transmitted: u64,
     plan: Plan<LinkFault>,
     cut: bool,
+    opening: Option<Box<Opening>>,
     /// Until when the line is held at 0.
     held_until: Instant,
     log: Option<Vec<LineByte>>,
@@ -148,6 +158,7 @@ impl Link {
             transmitted: 0,
             plan: Plan::default(),
             cut: false,
+            opening: None,
             held_until: Instant::START,
             log: Some(Vec::new()),
             arrived: 0,
@@ -162,6 +173,48 @@ impl Link {
 
     pub(crate) fn stop_recording(&mut self) {
         self.log = None;
+    }
+
+    /// Records what it carries from now on.
+    pub(crate) fn record_anew(&mut self) {
+        self.log = Some(Vec::new());
+    }
+
+    /// What has been recorded since the last call.
+    pub(crate) fn take_log(&mut self) -> Vec<LineByte> {
+        self.log.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Cuts the link open: from now on the receiver hears only what is fed, and what the transmitter sends has to be
+    /// fetched.
+    pub(crate) fn open(&mut self) {
+        self.opening.get_or_insert_default();
+    }
+
+    /// Feeds the receiver of an open link a byte that starts at `now` at the earliest; says when it arrives.
+    pub(crate) fn feed(&mut self, now: Instant, byte: Received) -> Instant {
+        self.line_up(UnderWay::pack(LineByte {
+            at: now + self.byte_time,
+            sent: Some(byte.byte),
+            received: Some(byte.byte),
+            error: byte.error,
+            solicited: true,
+        }));
+        self.last_arrival
+    }
+
+    /// When the next byte of an open link's transmitter has been sent.
+    pub(crate) fn next_sent(&self) -> Instant {
+        let opening = self.opening.as_ref();
+        let next = opening.and_then(|opening| opening.sent.front());
+        next.map_or(Instant::NEVER, |byte| byte.at)
+    }
+
+    /// The next byte that an open link's transmitter has sent by `now`.
+    pub(crate) fn fetch(&mut self, now: Instant) -> Option<LineByte> {
+        let sent = &mut self.opening.as_mut()?.sent;
+        sent.front().filter(|byte| byte.at <= now)?;
+        sent.pop_front().map(UnderWay::unpack)
     }
 
     /// Forgets what it has carried and the faults whose byte has not come; what is under way counts as the first
@@ -220,8 +273,12 @@ impl Link {
     pub(crate) fn hold(&mut self, now: Instant, span: Span) {
         self.lose_after(now);
         self.held_until = self.held_until.max(now + span);
-        let at = self.last_arrival.max(now) + self.byte_time;
-        self.last_arrival = at;
+        let (under_way, last_arrival) = match &mut self.opening {
+            None => (&mut self.under_way, &mut self.last_arrival),
+            Some(opening) => (&mut opening.sent, &mut opening.last_arrival),
+        };
+        let at = (*last_arrival).max(now) + self.byte_time;
+        *last_arrival = at;
         let byte = LineByte {
             at,
             sent: None,
@@ -229,8 +286,8 @@ impl Link {
             error: Some(LineError::Break),
             solicited: true,
         };
-        let place = self.under_way.partition_point(|other| other.at <= at);
-        self.under_way.insert(place, UnderWay::pack(byte));
+        let place = under_way.partition_point(|other| other.at <= at);
+        under_way.insert(place, UnderWay::pack(byte));
     }
 
     /// The transmitter loses its power: what it has not finished is never sent.
@@ -240,7 +297,12 @@ impl Link {
     }
 
     fn lose_after(&mut self, now: Instant) {
-        for byte in &mut self.under_way {
+        // On an open link what is under way is not the transmitter's.
+        let own = match &mut self.opening {
+            None => &mut self.under_way,
+            Some(opening) => &mut opening.sent,
+        };
+        for byte in own {
             if byte.at > now {
                 byte.lose();
             }
@@ -255,7 +317,9 @@ impl Link {
         self.transmitted += 1;
         let on_wire = UnderWay::whole(self.line_free, byte, solicited);
         match self.plan.take(self.transmitted) {
-            None if !self.cut && start >= self.held_until => self.deliver(on_wire),
+            None if !self.cut && start >= self.held_until && self.opening.is_none() => {
+                self.line_up(on_wire);
+            }
             first => self.transmit_damaged(first, start, on_wire.unpack()),
         }
     }
@@ -321,9 +385,21 @@ impl Link {
         }
     }
 
+    /// Lets a byte of the transmitter's go its way.
+    fn deliver(&mut self, mut byte: UnderWay) {
+        match &mut self.opening {
+            None => self.line_up(byte),
+            Some(opening) => {
+                byte.at = byte.at.max(opening.last_arrival + self.byte_time);
+                opening.last_arrival = byte.at;
+                opening.sent.push_back(byte);
+            }
+        }
+    }
+
     /// Lines a byte up behind those under way.
     #[inline]
-    fn deliver(&mut self, mut byte: UnderWay) {
+    fn line_up(&mut self, mut byte: UnderWay) {
         byte.at = byte.at.max(self.last_arrival + self.byte_time);
         self.last_arrival = byte.at;
         self.under_way.push_back(byte);

@@ -9,7 +9,7 @@ use crate::fault::{DriveFault, LinkFault};
 use crate::link::{LineByte, Link};
 use crate::node::Node;
 use crate::trace::{LinkTrace, Trace};
-use harness_proto::line::Rate;
+use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
@@ -54,6 +54,48 @@ impl<D: Device> Ring<D> {
     pub fn stop_recording(&mut self) {
         self.links.iter_mut().for_each(Link::stop_recording);
         self.nodes.iter_mut().for_each(Node::stop_recording);
+    }
+
+    /// Records what link `link` carries from now on, for [`Self::take_record`]: a tap.
+    pub fn record_link(&mut self, link: usize) {
+        if let Some(link) = self.links.get_mut(link) {
+            link.record_anew();
+        }
+    }
+
+    /// What link `link` has carried since the last call, as far as it was recorded.
+    pub fn take_record(&mut self, link: usize) -> Vec<LineByte> {
+        self.links
+            .get_mut(link)
+            .map(Link::take_log)
+            .unwrap_or_default()
+    }
+
+    /// Cuts link `link` open: what its transmitter sends is to be fetched, and its receiver hears what is fed. Faults
+    /// of the link act in front of the cut.
+    pub fn open_link(&mut self, link: usize) {
+        if let Some(link) = self.links.get_mut(link) {
+            link.open();
+        }
+    }
+
+    /// Feeds the receiver of an open link a byte, behind those fed before; says when it arrives.
+    pub fn feed_link(&mut self, link: usize, byte: Received) -> Instant {
+        let now = self.now;
+        let link = self.links.get_mut(link);
+        link.map_or(now, |link| link.feed(now, byte))
+    }
+
+    /// The next byte that the transmitter of an open link has sent.
+    pub fn fetch_link(&mut self, link: usize) -> Option<LineByte> {
+        self.links.get_mut(link)?.fetch(self.now)
+    }
+
+    /// When the next byte of an open link can be fetched; `None` where none is under way.
+    #[must_use]
+    pub fn next_fetch(&self, link: usize) -> Option<Instant> {
+        let next = self.links.get(link)?.next_sent();
+        (next < Instant::NEVER).then_some(next)
     }
 
     /// Begins another conversation: bytes are counted anew, what was recorded and the faults whose byte has not come

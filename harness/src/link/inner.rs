@@ -25,7 +25,7 @@ pub enum Ports {
     TwoPortInterposer(Wire, Wire),
 }
 
-/// How long bytes were inside the program on their way through an interposer.
+/// How long bytes were inside the program on their way through an interposer. What a fault holds back is not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delay {
     /// How many bytes were passed on.
@@ -51,7 +51,7 @@ impl Delay {
     }
 }
 
-/// What is passed on: when, whether a gap in front is wanted, what, and when it was read.
+/// What is passed on: when, what, and since when it could be.
 type Waiting = (Instant, Outgoing, time::Instant);
 
 /// An inner link that the bench has a port at.
@@ -67,6 +67,10 @@ pub struct InnerLink {
     last_arrival: Instant,
     pub(super) log: Vec<LineByte>,
     pub(super) carried: u64,
+    /// Bytes that an interposer has taken from the ring, and those that it has given back, since the ring was last at
+    /// rest.
+    pub(super) taken: u64,
+    pub(super) given: u64,
     delay: Delay,
 }
 
@@ -84,6 +88,8 @@ impl InnerLink {
             last_arrival: Instant::START,
             log: Vec::new(),
             carried: 0,
+            taken: 0,
+            given: 0,
             delay: Delay::default(),
         }
     }
@@ -124,6 +130,12 @@ impl InnerLink {
         self.last_arrival = Instant::START;
         self.log.clear();
         self.carried = 0;
+        self.rest();
+    }
+
+    /// The ring is at rest: nothing is under way.
+    pub(super) fn rest(&mut self) {
+        (self.taken, self.given) = (0, 0);
     }
 
     /// When something waits to be passed on.
@@ -179,6 +191,9 @@ impl InnerLink {
         let start = at.max(self.free);
         let passed = self.tamper.pass(byte, start);
         let mut free = start + passed.delay;
+        self.taken += 1;
+        self.given += passed.bytes.len() as u64 + u64::from(passed.hold.is_some());
+        let read = read + time::Duration::from_nanos(free.since(at).as_nanos());
         for received in &passed.bytes {
             let outgoing = match received.error {
                 None | Some(LineError::Overrun) => Outgoing::Byte(received.byte),

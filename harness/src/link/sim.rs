@@ -8,6 +8,7 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::bench::Bench;
 use harness_sim::device::Device;
 use harness_sim::drive::Drive;
+use harness_sim::link::LineByte;
 use harness_sim::ring::Ring;
 use harness_sim::trace::Trace;
 use std::collections::VecDeque;
@@ -68,6 +69,48 @@ impl SimulatedLink {
                 ring.stop_recording();
             }
         }
+    }
+
+    /// Listens on a link from now on, counted from the master's outgoing one: [`Self::fetch`] gives what arrives there.
+    pub fn tap(&mut self, ring: usize, link: usize) {
+        if let Some(ring) = self.bench.ring_mut(ring) {
+            ring.record_link(link);
+        }
+    }
+
+    /// Cuts a link open: what the drive in front sends is to be fetched, and the one behind hears what is fed.
+    pub fn open(&mut self, ring: usize, link: usize) {
+        if let Some(ring) = self.bench.ring_mut(ring) {
+            ring.open_link(link);
+        }
+    }
+
+    /// What has arrived at a tap, or at an open link's near side, since the last call.
+    pub fn fetch(&mut self, ring: usize, link: usize) -> Vec<Received> {
+        let Some(ring) = self.bench.ring_mut(ring) else {
+            return Vec::new();
+        };
+        let heard = ring.take_record(link);
+        let mut heard: Vec<_> = heard.iter().filter_map(LineByte::arrival).collect();
+        while let Some(byte) = ring.fetch_link(link) {
+            heard.extend(byte.arrival());
+        }
+        heard
+    }
+
+    /// Feeds the drive behind an open link a byte; says when the line will have carried it.
+    pub fn feed(&mut self, ring: usize, link: usize, byte: Received) -> Instant {
+        let now = self.bench.now();
+        let ring = self.bench.ring_mut(ring);
+        let at = ring.map_or(now, |ring| ring.feed_link(link, byte));
+        self.since_origin(at)
+    }
+
+    /// When the next byte of an open link can be fetched.
+    #[must_use]
+    pub fn next_fetch(&self, ring: usize, link: usize) -> Option<Instant> {
+        let next = self.ring(ring)?.next_fetch(link)?;
+        Some(self.since_origin(next))
     }
 
     /// A time on the bench's clock as one of the conversation.

@@ -377,6 +377,8 @@ impl Line for StreamLink {
         };
         if rest {
             (own.sent, own.came) = (0, 0);
+            let inner = self.inner.iter_mut().filter(|inner| inner.ring == ring);
+            inner.for_each(InnerLink::rest);
         }
         for byte in bytes {
             own.send(now, *byte, byte_time, recording);
@@ -423,15 +425,29 @@ impl Line for StreamLink {
 }
 
 impl StreamLink {
-    fn ring_busy(&self, ring: usize, now: Instant) -> bool {
-        let Some(ring) = self.rings.get(ring) else {
+    /// Whether the port at an inner link still has to show bytes that have come home: its adapter may be slower than
+    /// the master's own.
+    fn lags(&self, inner: &InnerLink, now: Instant) -> bool {
+        let ring = self.rings.get(inner.ring);
+        ring.is_some_and(|ring| {
+            inner.carried < ring.incoming.count() && now < ring.last_arrival + SLACK
+        })
+    }
+
+    fn ring_busy(&self, index: usize, now: Instant) -> bool {
+        let Some(ring) = self.rings.get(index) else {
             return false;
         };
         if !ring.queue.is_empty() || ring.wire.waiting() > 0 || now < ring.free {
             return true;
         }
         // More than was sent comes after a time-out (ND21 9.9): then only silence tells.
-        let home = ring.came == ring.sent;
+        // What an interposer has dropped does not come home, and what it has put in does.
+        let inner = self.inner.iter().filter(|inner| inner.ring == index);
+        let (taken, given) = inner.fold((0, 0), |(taken, given), inner| {
+            (taken + inner.taken, given + inner.given)
+        });
+        let home = ring.came + taken == ring.sent + given;
         let quiet = ring.free.max(ring.last_arrival) + self.round(ring);
         !home && now < quiet
     }
@@ -452,7 +468,8 @@ impl Link for StreamLink {
 
     fn busy(&self) -> bool {
         let now = self.now();
-        let relays = self.inner.iter().any(InnerLink::busy);
+        let late = |inner: &InnerLink| inner.busy() || self.lags(inner, now);
+        let relays = self.inner.iter().any(late);
         let rings = (0..self.rings.len()).any(|ring| self.ring_busy(ring, now));
         self.trouble.is_none() && (relays || rings)
     }

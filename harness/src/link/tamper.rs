@@ -53,6 +53,11 @@ pub(super) struct Tamper {
 }
 
 impl Tamper {
+    /// How many bytes have come.
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+
     /// Arms a fault for the `byte`-th byte.
     pub(super) fn arm(&mut self, byte: u64, fault: LinkFault) {
         self.armed.entry(byte).or_default().push(fault);

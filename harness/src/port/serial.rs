@@ -6,7 +6,7 @@
 use super::open::OpenError;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use rustix::fd::{AsFd, OwnedFd};
+use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
 use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, PidfdGetfdFlags};
 use rustix::termios::{ControlModes, InputModes, OptionalActions, QueueSelector, Termios};
@@ -146,18 +146,13 @@ impl Serial {
         std::mem::take(&mut self.gaps)
     }
 
-    /// Sends a byte with a wrong parity bit: the parity is switched between drained bytes.
+    /// Sends a byte with a wrong parity bit, and remembers how long that held up the line.
     pub(super) fn send_wrong_parity(&mut self, fd: &OwnedFd, byte: u8) -> io::Result<()> {
-        rustix::termios::tcdrain(fd)?;
-        let start = Instant::now();
-        switch_parity(fd, false)?;
-        let written = write_all(fd, byte).and_then(|()| Ok(rustix::termios::tcdrain(fd)?));
-        // Whatever happened, what comes next has the right parity.
-        switch_parity(fd, true)?;
+        let gap = send_wrong_parity(&mut fd.as_fd(), byte)?;
         if self.gaps.len() < MOST_GAPS {
-            self.gaps.push(start.elapsed());
+            self.gaps.push(gap);
         }
-        written
+        Ok(())
     }
 
     /// Holds the line at 0.
@@ -169,21 +164,59 @@ impl Serial {
     }
 }
 
-fn write_all(fd: &OwnedFd, byte: u8) -> io::Result<()> {
-    let end = Instant::now() + PATIENCE;
-    while Instant::now() < end {
-        match rustix::io::write(fd, &[byte]) {
-            Ok(1) => return Ok(()),
-            // The port has just been drained: there is room in a moment.
-            Ok(_) | Err(Errno::AGAIN | Errno::INTR) => std::thread::yield_now(),
-            Err(error) => return Err(error.into()),
-        }
+/// What a byte with a wrong parity bit needs of a port.
+trait ParityPort {
+    /// Waits until all bytes have left the line.
+    fn drain(&mut self) -> io::Result<()>;
+
+    /// Sets odd or even parity, and reads it back.
+    fn set_odd(&mut self, odd: bool) -> io::Result<()>;
+
+    /// Hands over a byte.
+    fn put(&mut self, byte: u8) -> io::Result<()>;
+}
+
+/// Sends a byte with a wrong parity bit: even parity between drained bytes. Even is wrong for every byte of an odd line;
+/// mark and space (CMSPAR) would be right for half of them, and fewer drivers know them.
+///
+/// Says how long the line was held up. Whatever happens, what comes next has the right parity again, or it is an error.
+fn send_wrong_parity(port: &mut impl ParityPort, byte: u8) -> io::Result<Duration> {
+    port.drain()?;
+    let start = Instant::now();
+    let sent = port
+        .set_odd(false)
+        .and_then(|()| port.put(byte))
+        .and_then(|()| port.drain());
+    let restored = port.set_odd(true);
+    sent.and(restored)?;
+    Ok(start.elapsed())
+}
+
+impl ParityPort for BorrowedFd<'_> {
+    fn drain(&mut self) -> io::Result<()> {
+        Ok(rustix::termios::tcdrain(*self)?)
     }
-    Err(io::ErrorKind::TimedOut.into())
+
+    fn set_odd(&mut self, odd: bool) -> io::Result<()> {
+        switch_parity(*self, odd)
+    }
+
+    fn put(&mut self, byte: u8) -> io::Result<()> {
+        let end = Instant::now() + PATIENCE;
+        while Instant::now() < end {
+            match rustix::io::write(*self, &[byte]) {
+                Ok(1) => return Ok(()),
+                // The port has just been drained: there is room in a moment.
+                Ok(_) | Err(Errno::AGAIN | Errno::INTR) => std::thread::yield_now(),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Err(io::ErrorKind::TimedOut.into())
+    }
 }
 
 /// Sets the parity and reads it back: some drivers of USB adapters ignore it.
-pub(super) fn switch_parity(fd: impl AsFd, odd: bool) -> io::Result<()> {
+fn switch_parity(fd: impl AsFd, odd: bool) -> io::Result<()> {
     let mut termios = rustix::termios::tcgetattr(&fd)?;
     termios.control_modes.set(ControlModes::PARODD, odd);
     rustix::termios::tcsetattr(&fd, OptionalActions::Now, &termios)?;
@@ -195,3 +228,7 @@ pub(super) fn switch_parity(fd: impl AsFd, odd: bool) -> io::Result<()> {
         "the driver of this port does not switch the parity",
     ))
 }
+
+#[cfg(test)]
+#[path = "serial_tests.rs"]
+mod tests;

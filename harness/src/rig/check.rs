@@ -379,10 +379,11 @@ impl Check<'_> {
             all.push((vec!["tap".into(), index.into()], &tap.endpoint));
         }
         for (index, both) in file.interposer.iter().enumerate() {
-            for (key, endpoint) in [
-                ("upstream", &both.upstream),
-                ("downstream", &both.downstream),
-            ] {
+            let up = ("upstream", &both.upstream);
+            let down = ("downstream", &both.downstream);
+            // One port for both: its receiver is upstream, its transmitter downstream.
+            let two = Some(down).filter(|_| both.upstream != both.downstream);
+            for (key, endpoint) in std::iter::once(up).chain(two) {
                 all.push((
                     vec!["interposer".into(), index.into(), key.into()],
                     endpoint,

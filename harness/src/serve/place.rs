@@ -19,3 +19,37 @@ pub enum ControlPlace {
     /// A socket that listens.
     Tcp(String),
 }
+
+/// A link between two stations of a ring at which somebody sits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inner {
+    /// Which ring, counted from 0.
+    pub ring: usize,
+    /// Which link, counted from the master's outgoing one.
+    pub link: usize,
+    /// What the client does there.
+    pub role: Role,
+}
+
+/// What a client does at a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// It hears what the link carries; what it sends is dropped.
+    Tap,
+    /// The link is cut open there: the client hears the drive in front and feeds the drive behind.
+    Cut,
+    /// The same, and this client only hears.
+    Upstream,
+    /// The same, and this client only feeds.
+    Downstream,
+}
+
+impl Role {
+    pub(super) fn hears(self) -> bool {
+        self != Self::Downstream
+    }
+
+    pub(super) fn feeds(self) -> bool {
+        matches!(self, Self::Cut | Self::Downstream)
+    }
+}

@@ -1,8 +1,9 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
-use crate::link::{Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
+use super::place::{Inner, Role};
+use crate::link::{Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink, link_name};
 use crate::scenario::plan::Plan;
-use harness_proto::line::LineError;
+use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
@@ -28,6 +29,9 @@ const LEAP: u64 = 2_000;
 
 /// How many byte times a leap goes on where the master has nothing more to send.
 const STRIDE: u64 = 4;
+
+/// What is taken at a time from a client that only listens, and dropped.
+const DROPPED: usize = 4096;
 
 /// The most bytes that wait for a client. What comes then is lost, as in a serial port that nobody reads.
 const UNREAD: usize = 64 << 10;
@@ -55,7 +59,7 @@ pub enum Marks {
     InBand,
 }
 
-/// Simulated rings, each with a client at its master's place or none.
+/// Simulated rings with seats for clients: first the master's place of each ring, then the inner links.
 #[derive(Clone, Debug)]
 pub struct Server {
     pub(super) plan: Plan,
@@ -68,9 +72,19 @@ pub struct Server {
     clock: Instant,
 }
 
-/// The master's place in a ring.
-#[derive(Clone, Debug, Default)]
+/// Where a client sits.
+#[derive(Clone, Copy, Debug)]
+enum At {
+    /// At the master's place of a ring.
+    Master(usize),
+    /// Between two stations.
+    Inner(Inner),
+}
+
+/// A place for a client.
+#[derive(Clone, Debug)]
 struct Seat {
+    at: At,
     taken: bool,
     unmark: Unmark,
     /// Bytes sent since the start, by all clients.
@@ -82,6 +96,37 @@ struct Seat {
     lost: u64,
 }
 
+impl Seat {
+    fn new(at: At) -> Self {
+        Self {
+            at,
+            taken: false,
+            unmark: Unmark::default(),
+            sent: 0,
+            sent_by: Instant::START,
+            outbox: VecDeque::new(),
+            lost: 0,
+        }
+    }
+
+    /// Has a byte for the client.
+    fn give(&mut self, read: Received, marks: Marks) {
+        let marked = mark(read);
+        let bytes = match marks {
+            Marks::None => std::slice::from_ref(&read.byte),
+            Marks::InBand => marked.as_bytes(),
+        };
+        if !self.taken {
+            return;
+        }
+        if self.outbox.len() + bytes.len() > UNREAD {
+            self.lost += 1;
+        } else {
+            self.outbox.extend(bytes);
+        }
+    }
+}
+
 impl Server {
     /// Serves the rings of a plan; nobody is there yet. The clock starts at [`Instant::START`].
     #[must_use]
@@ -90,7 +135,9 @@ impl Server {
         link.run_until(link.now() + SETTLED);
         Self {
             base: (Instant::START, link.now()),
-            seats: vec![Seat::default(); plan.rings.len()],
+            seats: (0..plan.rings.len())
+                .map(|ring| Seat::new(At::Master(ring)))
+                .collect(),
             clock: Instant::START,
             plan,
             link,
@@ -99,10 +146,46 @@ impl Server {
         }
     }
 
+    /// Adds a seat at an inner link, behind those there are. A link that is cut is open from now on, whether
+    /// somebody sits there or not.
+    pub fn add(&mut self, inner: Inner) {
+        match inner.role {
+            Role::Tap => self.link.tap(inner.ring, inner.link),
+            Role::Cut | Role::Upstream | Role::Downstream => {
+                self.link.open(inner.ring, inner.link);
+            }
+        }
+        self.seats.push(Seat::new(At::Inner(inner)));
+    }
+
     /// How many rings there are: one or two.
     #[must_use]
     pub fn rings(&self) -> usize {
+        self.plan.rings.len()
+    }
+
+    /// How many seats there are: a ring each, and those added.
+    #[must_use]
+    pub fn seats(&self) -> usize {
         self.seats.len()
+    }
+
+    /// What a seat is called: `ring 1`, `tap 2->1`, `cut 2->1`.
+    #[must_use]
+    pub fn name(&self, seat: usize) -> String {
+        match self.seats.get(seat).map(|seat| seat.at) {
+            None => String::new(),
+            Some(At::Master(ring)) => format!("ring {}", ring + 1),
+            Some(At::Inner(Inner { ring, link, role })) => {
+                let link = link_name(ring, self.drives(ring), link);
+                match role {
+                    Role::Tap => format!("tap {link}"),
+                    Role::Cut => format!("cut {link}"),
+                    Role::Upstream => format!("cut {link} upstream"),
+                    Role::Downstream => format!("cut {link} downstream"),
+                }
+            }
+        }
     }
 
     /// How many drives ring `ring` has, rings counted from 0.
@@ -117,9 +200,9 @@ impl Server {
         self.link.now()
     }
 
-    /// A client takes the master's place in a ring.
-    pub fn come(&mut self, ring: usize) {
-        if let Some(seat) = self.seats.get_mut(ring) {
+    /// A client takes a seat.
+    pub fn come(&mut self, seat: usize) {
+        if let Some(seat) = self.seats.get_mut(seat) {
             seat.taken = true;
             seat.unmark = Unmark::default();
         }
@@ -127,58 +210,58 @@ impl Server {
 
     /// The client has gone: what it has not fetched is dropped, and half a mark is forgotten. The ring lives on, and what is
     /// under way there goes its way.
-    pub fn go(&mut self, ring: usize) {
-        if let Some(seat) = self.seats.get_mut(ring) {
+    pub fn go(&mut self, seat: usize) {
+        if let Some(seat) = self.seats.get_mut(seat) {
             seat.taken = false;
             seat.outbox.clear();
             seat.lost = 0;
         }
     }
 
-    /// How many bytes of its client's stream a ring takes now: none while half a second of them waits for the line.
+    /// How many bytes of its client's stream a seat takes now: none while half a second of them waits for the line.
     #[must_use]
-    pub fn room(&self, ring: usize) -> usize {
-        let Some(seat) = self.seats.get(ring) else {
+    pub fn room(&self, seat: usize) -> usize {
+        let Some(seat) = self.seats.get(seat) else {
             return 0;
         };
+        if matches!(seat.at, At::Inner(inner) if !inner.role.feeds()) {
+            return DROPPED;
+        }
         let byte = self.link.byte_time().units().max(1);
         let waiting = seat.sent_by.since(self.link.now());
         let room = WAITING.saturating_sub(waiting).units() / byte;
         usize::try_from(room).unwrap_or(usize::MAX)
     }
 
-    /// Takes bytes of a client's stream, which leave one after another behind those still to be sent.
+    /// Takes bytes of a client's stream, which leave one after another behind those still to be sent. Of a client that
+    /// only listens they are dropped.
     ///
     /// # Errors
     /// The first byte that is no mark where one must stand; it is dropped, and the others are taken.
-    pub fn receive(&mut self, ring: usize, bytes: &[u8]) -> Result<(), BadMark> {
-        let Some(seat) = self.seats.get_mut(ring) else {
+    pub fn receive(&mut self, seat: usize, bytes: &[u8]) -> Result<(), BadMark> {
+        let Some(seat) = self.seats.get_mut(seat) else {
             return Ok(());
         };
-        let mut good = Vec::with_capacity(bytes.len());
+        let mut read = Vec::with_capacity(bytes.len());
         let mut wrong = Ok(());
         for &byte in bytes {
-            let read = match self.marks {
-                Marks::None => Some(Ok(harness_proto::line::Received::good(byte))),
-                Marks::InBand => seat.unmark.push(byte),
-            };
-            match read {
-                None => {}
-                Some(Err(bad)) => wrong = wrong.and(Err(bad)),
-                Some(Ok(read)) => {
-                    good.push(read.byte);
-                    if let Some(error) = read.error {
-                        let number = seat.sent + good.len() as u64;
-                        let fault = damage(error, self.link.byte_time());
-                        let fault = PlacedFault::Link(0, fault);
-                        self.link.inject(ring, fault, Moment::Byte(number));
-                    }
-                }
+            match self.marks {
+                Marks::None => read.push(Received::good(byte)),
+                Marks::InBand => match seat.unmark.push(byte) {
+                    None => {}
+                    Some(Err(bad)) => wrong = wrong.and(Err(bad)),
+                    Some(Ok(byte)) => read.push(byte),
+                },
             }
         }
-        if !good.is_empty() {
-            seat.sent += good.len() as u64;
-            seat.sent_by = self.link.send(ring, &good);
+        match seat.at {
+            At::Master(ring) => send(&mut self.link, seat, ring, &read),
+            At::Inner(Inner { ring, link, role }) if role.feeds() => {
+                for byte in read {
+                    seat.sent_by = self.link.feed(ring, link, byte);
+                }
+            }
+            At::Inner(_) => {}
         }
         wrong
     }
@@ -214,35 +297,33 @@ impl Server {
     }
 
     fn fetch(&mut self) {
-        for (ring, seat) in self.seats.iter_mut().enumerate() {
-            while let Some((_, read)) = self.link.receive(ring) {
-                let marked = mark(read);
-                let bytes = match self.marks {
-                    Marks::None => std::slice::from_ref(&read.byte),
-                    Marks::InBand => marked.as_bytes(),
-                };
-                if !seat.taken {
-                    continue;
+        for seat in &mut self.seats {
+            match seat.at {
+                At::Master(ring) => {
+                    while let Some((_, read)) = self.link.receive(ring) {
+                        seat.give(read, self.marks);
+                    }
                 }
-                if seat.outbox.len() + bytes.len() > UNREAD {
-                    seat.lost += 1;
-                } else {
-                    seat.outbox.extend(bytes);
+                At::Inner(Inner { ring, link, role }) if role.hears() => {
+                    for read in self.link.fetch(ring, link) {
+                        seat.give(read, self.marks);
+                    }
                 }
+                At::Inner(_) => {}
             }
         }
     }
 
-    /// What a ring has for its client.
-    pub fn transmit(&mut self, ring: usize) -> &[u8] {
+    /// What a seat has for its client.
+    pub fn transmit(&mut self, seat: usize) -> &[u8] {
         self.seats
-            .get_mut(ring)
+            .get_mut(seat)
             .map_or(&[], |seat| seat.outbox.make_contiguous())
     }
 
     /// The first `count` bytes of that have been passed on.
-    pub fn transmitted(&mut self, ring: usize, count: usize) {
-        if let Some(seat) = self.seats.get_mut(ring) {
+    pub fn transmitted(&mut self, seat: usize, count: usize) {
+        if let Some(seat) = self.seats.get_mut(seat) {
             let count = count.min(seat.outbox.len());
             seat.outbox.drain(..count);
         }
@@ -250,8 +331,8 @@ impl Server {
 
     /// How many bytes the client has lost because it did not read.
     #[must_use]
-    pub fn lost(&self, ring: usize) -> u64 {
-        self.seats.get(ring).map_or(0, |seat| seat.lost)
+    pub fn lost(&self, seat: usize) -> u64 {
+        self.seats.get(seat).map_or(0, |seat| seat.lost)
     }
 
     /// When, by the clock, [`Self::advance`] is to be called again if nothing comes before.
@@ -262,10 +343,31 @@ impl Server {
         }
         let (from, to) = self.base;
         let idle = self.clock + IDLE;
-        self.link.next_event().map_or(idle, |next| {
+        let inner = self.seats.iter().filter_map(|seat| match seat.at {
+            At::Inner(inner) if inner.role.hears() => self.link.next_fetch(inner.ring, inner.link),
+            _ => None,
+        });
+        let next = inner.chain(self.link.next_event()).min();
+        next.map_or(idle, |next| {
             let next = from + next.since(to);
             next.clamp(self.clock + BATCH, idle)
         })
+    }
+}
+
+/// Lets the master send what its client has sent.
+fn send(link: &mut SimulatedLink, seat: &mut Seat, ring: usize, read: &[Received]) {
+    let byte_time = link.byte_time();
+    for (number, read) in (seat.sent + 1..).zip(read) {
+        if let Some(error) = read.error {
+            let fault = PlacedFault::Link(0, damage(error, byte_time));
+            link.inject(ring, fault, Moment::Byte(number));
+        }
+    }
+    if !read.is_empty() {
+        let bytes: Vec<_> = read.iter().map(|read| read.byte).collect();
+        seat.sent += bytes.len() as u64;
+        seat.sent_by = link.send(ring, &bytes);
     }
 }
 

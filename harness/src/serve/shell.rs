@@ -23,7 +23,7 @@ const UNREAD: usize = 64 << 10;
 /// What is served where, and for how long.
 #[derive(Clone, Debug, Default)]
 pub struct Job {
-    /// Where each ring is served, in order.
+    /// Where each seat of the server is served, in order: its rings, then its inner links.
     pub places: Vec<Place>,
     /// Where lines of control come from, if from anywhere.
     pub control: Option<ControlPlace>,
@@ -115,9 +115,10 @@ pub trait Host {
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
 pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, ServeError> {
-    if job.places.len() != server.rings() {
+    if job.places.len() != server.seats() {
+        let inner = server.seats() - server.rings();
         return Err(ServeError::Places {
-            given: job.places.len(),
+            given: job.places.len().saturating_sub(inner),
             rings: server.rings(),
         });
     }
@@ -179,7 +180,7 @@ impl Drop for Signals {
     }
 }
 
-/// The master's place of a ring.
+/// Where a client's stream comes from.
 enum Seat {
     Tcp(Tcp),
     Pty(Pty),
@@ -229,14 +230,17 @@ impl Shell<'_> {
     /// One line for each place, once all of them are ready.
     fn announce(&mut self) -> Result<(), ServeError> {
         let mut lines = Vec::new();
-        for (ring, end) in self.ends.iter().enumerate() {
-            let drives = self.server.drives(ring);
-            let s = if drives == 1 { "" } else { "s" };
+        for (seat, end) in self.ends.iter().enumerate() {
             let place = match end {
                 Seat::Tcp(tcp) => tcp.address().to_string(),
                 Seat::Pty(pty) => pty.link().display().to_string(),
             };
-            lines.push(format!("ring {}: {drives} drive{s} at {place}", ring + 1));
+            let name = self.server.name(seat);
+            lines.push(match self.server.drives(seat) {
+                _ if seat >= self.server.rings() => format!("{name} at {place}"),
+                1 => format!("{name}: 1 drive at {place}"),
+                drives => format!("{name}: {drives} drives at {place}"),
+            });
         }
         if let Some(Control {
             source: Source::Tcp(tcp),
@@ -266,8 +270,8 @@ impl Shell<'_> {
             if self.interrupted() {
                 return Ok(End::Interrupted);
             }
-            for ring in 0..self.ends.len() {
-                self.attend(ring);
+            for seat in 0..self.ends.len() {
+                self.attend(seat);
             }
             self.obey().map_err(ServeError::Output)?;
             if job.once && self.gone {
@@ -279,10 +283,10 @@ impl Shell<'_> {
     /// Waits until something can be read or written, at most so long.
     fn wait(&mut self, longest: Span) -> io::Result<()> {
         let mut fds = vec![PollFd::new(&self.signals.read, PollFlags::IN)];
-        for (ring, end) in self.ends.iter().enumerate() {
+        for (seat, end) in self.ends.iter().enumerate() {
             let mut stream = PollFlags::empty();
-            stream.set(PollFlags::IN, self.server.room(ring) > 0);
-            stream.set(PollFlags::OUT, !self.server.transmit(ring).is_empty());
+            stream.set(PollFlags::IN, self.server.room(seat) > 0);
+            stream.set(PollFlags::OUT, !self.server.transmit(seat).is_empty());
             match end {
                 Seat::Tcp(tcp) => {
                     let (door, client) = tcp.polls(stream);
@@ -329,36 +333,36 @@ impl Shell<'_> {
     }
 
     /// Lets clients come, speak, hear and go.
-    fn attend(&mut self, ring: usize) {
-        let visitors = match &mut self.ends[ring] {
+    fn attend(&mut self, seat: usize) {
+        let visitors = match &mut self.ends[seat] {
             Seat::Tcp(tcp) => tcp.accept(),
             Seat::Pty(_) => Vec::new(),
         };
         for visitor in visitors {
             match visitor {
-                Visitor::Came(address) => self.come(ring, &format!("client {address} came")),
+                Visitor::Came(address) => self.come(seat, &format!("client {address} came")),
                 Visitor::TurnedAway(address) => self.say(
-                    ring,
+                    seat,
                     &format!("client {address} was turned away: another one is there"),
                 ),
             }
         }
-        let heard = self.hear(ring);
+        let heard = self.hear(seat);
         let drained = matches!(heard, Ok(true));
-        let alive = heard.and_then(|_| self.speak(ring));
-        match (&mut self.ends[ring], alive) {
+        let alive = heard.and_then(|_| self.speak(seat));
+        match (&mut self.ends[seat], alive) {
             (Seat::Tcp(tcp), Err(error)) if tcp.taken() => {
                 tcp.close();
                 let why = match error.kind() {
                     io::ErrorKind::UnexpectedEof => String::new(),
                     _ => format!(" ({error})"),
                 };
-                self.go(ring, &format!("the client has gone{why}"));
+                self.go(seat, &format!("the client has gone{why}"));
             }
             // Who has gone is still here until all that it sent has been read.
             (Seat::Pty(pty), _) if drained => {
                 for change in pty.changes() {
-                    self.change(ring, change);
+                    self.change(seat, change);
                 }
             }
             _ => {}
@@ -366,53 +370,54 @@ impl Shell<'_> {
     }
 
     /// Somebody has opened or closed a pseudo terminal.
-    fn change(&mut self, ring: usize, change: Change) {
+    fn change(&mut self, seat: usize, change: Change) {
         match change {
-            Change::Came => self.come(ring, "a client came"),
+            Change::Came => self.come(seat, "a client came"),
             Change::Gone => {
                 // What it sent at the very end; a pseudo terminal that fails has nobody there.
-                let _read = self.hear(ring);
-                if let Seat::Pty(pty) = &mut self.ends[ring] {
+                let _read = self.hear(seat);
+                if let Seat::Pty(pty) = &mut self.ends[seat] {
                     pty.gone();
                 }
-                self.go(ring, "the client has gone");
+                self.go(seat, "the client has gone");
             }
         }
     }
 
-    fn come(&mut self, ring: usize, text: &str) {
+    fn come(&mut self, seat: usize, text: &str) {
         self.here += 1;
         self.gone = false;
-        self.garbled[ring] = false;
-        self.losing[ring] = false;
-        self.server.come(ring);
-        self.say(ring, text);
+        self.garbled[seat] = false;
+        self.losing[seat] = false;
+        self.server.come(seat);
+        self.say(seat, text);
     }
 
-    fn go(&mut self, ring: usize, text: &str) {
+    fn go(&mut self, seat: usize, text: &str) {
         self.here = self.here.saturating_sub(1);
         self.gone = self.here == 0;
-        let lost = match self.server.lost(ring) {
+        let lost = match self.server.lost(seat) {
             0 => String::new(),
             lost => format!("; it has lost {lost} bytes"),
         };
-        self.server.go(ring);
-        self.say(ring, &format!("{text}{lost}"));
+        self.server.go(seat);
+        self.say(seat, &format!("{text}{lost}"));
     }
 
-    fn say(&mut self, ring: usize, text: &str) {
-        self.host.say(&format!("ring {}: {text}", ring + 1));
+    fn say(&mut self, seat: usize, text: &str) {
+        self.host
+            .say(&format!("{}: {text}", self.server.name(seat)));
     }
 
     /// Takes what a client has sent, as far as there is room for it; says whether that was all.
-    fn hear(&mut self, ring: usize) -> io::Result<bool> {
+    fn hear(&mut self, seat: usize) -> io::Result<bool> {
         let mut buffer = [0; CHUNK];
         loop {
-            let room = self.server.room(ring).min(CHUNK);
+            let room = self.server.room(seat).min(CHUNK);
             if room == 0 {
                 return Ok(false);
             }
-            let read = match &mut self.ends[ring] {
+            let read = match &mut self.ends[seat] {
                 Seat::Tcp(tcp) => tcp.read(&mut buffer[..room]),
                 Seat::Pty(pty) => pty.read(&mut buffer[..room]),
             };
@@ -423,37 +428,37 @@ impl Shell<'_> {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
                 Err(error) => return Err(error),
             };
-            let news = match &mut self.ends[ring] {
+            let news = match &mut self.ends[seat] {
                 Seat::Pty(pty) => pty.heard(),
                 Seat::Tcp(_) => false,
             };
             if news {
-                self.come(ring, "a client came");
+                self.come(seat, "a client came");
             }
-            if let Err(bad) = self.server.receive(ring, &buffer[..read])
-                && !std::mem::replace(&mut self.garbled[ring], true)
+            if let Err(bad) = self.server.receive(seat, &buffer[..read])
+                && !std::mem::replace(&mut self.garbled[seat], true)
             {
-                self.say(ring, &bad.to_string());
+                self.say(seat, &bad.to_string());
             }
         }
     }
 
     /// Gives a client what has come for it, as far as it takes it.
-    fn speak(&mut self, ring: usize) -> io::Result<()> {
-        if self.server.lost(ring) > 0 && !std::mem::replace(&mut self.losing[ring], true) {
-            self.say(ring, "bytes are lost: the client does not read");
+    fn speak(&mut self, seat: usize) -> io::Result<()> {
+        if self.server.lost(seat) > 0 && !std::mem::replace(&mut self.losing[seat], true) {
+            self.say(seat, "bytes are lost: the client does not read");
         }
         loop {
-            let bytes = self.server.transmit(ring);
+            let bytes = self.server.transmit(seat);
             if bytes.is_empty() {
                 return Ok(());
             }
-            let written = match &mut self.ends[ring] {
+            let written = match &mut self.ends[seat] {
                 Seat::Tcp(tcp) => tcp.write(bytes),
                 Seat::Pty(pty) => pty.write(bytes),
             };
             match written {
-                Ok(written) => self.server.transmitted(ring, written),
+                Ok(written) => self.server.transmitted(seat, written),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(error),

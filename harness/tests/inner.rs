@@ -1,0 +1,391 @@
+//! Taps and interposers on a ring that another process serves, over sockets and pseudo terminals: the same bytes on
+//! the same links as in the simulator.
+
+use harness::library::Entry;
+use harness::link::{
+    InnerLink, Link, LinkFault, Moment, PlacedFault, Ports, SimulatedLink, StreamLink,
+};
+use harness::port::{Endpoint, PortSettings, Wire, open};
+use harness::scenario::run::{AtFinding, lacks, play_over_bus, start_anew};
+use harness::scenario::simulate;
+use harness::scenario::source::Source;
+use harness::scenario::verdict::Verdict;
+use harness_proto::line::{LineError, Rate, Received};
+use harness_proto::time::Span;
+use harness_sim::fault::Flips;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Reads of FE13 from the drives 3 and 2 of a ring of four, one telegram behind the other (ND21 9.2, 10.1).
+const READS: [u8; 12] = [
+    0x88, 0xFF, 0xC0, 0x13, 0xFE, 0xD1, 0x88, 0xFE, 0xC0, 0x13, 0xFE, 0xD1,
+];
+
+/// What shows an error at the master, and lets drives in error mode count (ND21 9.7).
+const SYNCOS: [u8; 40] = [0x80; 40];
+
+/// The link in the middle of a ring of four, 2->1, counted from the master's.
+const MIDDLE: usize = 2;
+
+/// What somebody sees of a byte: what was sent, what arrived, with which error.
+type Seen = (Option<u8>, Option<u8>, Option<LineError>);
+
+/// The process that serves; it ends with this value.
+struct Served {
+    child: Child,
+    /// In the order of its lines: the ring, then the inner links.
+    endpoints: Vec<Endpoint>,
+    marks: bool,
+    _folder: tempfile::TempDir,
+}
+
+impl Served {
+    /// Serves a ring of four, with inner links: the option and the link. Several places are as many ports.
+    fn start(transport: &str, marks: bool, inner: &[(&str, &str, usize)]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        let place = |name: &str| match transport {
+            "pty" => path(name),
+            _ => "127.0.0.1:0".to_owned(),
+        };
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.args(["sim", "--rig", "sim:4", "--for", "120s"]);
+        command.args(["--marks", if marks { "in-band" } else { "none" }]);
+        let setup = path("setup.scn");
+        std::fs::write(&setup, "drive 0..last model plain\n").expect("room");
+        command.args(["--setup", &setup]);
+        let ring = if transport == "pty" { "--pty" } else { "--tcp" };
+        command.args([ring, &place("ring")]);
+        let mut lines = 1;
+        for (option, link, ports) in inner {
+            let names = (0..*ports).map(|n| format!("inner{}", lines + n));
+            let places: Vec<_> = names.map(|name| place(&name)).collect();
+            command.args([*option, &format!("{link}={}", places.join(","))]);
+            lines += ports;
+        }
+        command.stdin(Stdio::null()).stdout(Stdio::piped());
+        let mut child = command.stderr(Stdio::null()).spawn().expect("the program");
+        let mut out = BufReader::new(child.stdout.take().expect("a pipe")).lines();
+        let endpoints = (0..lines).map(|_| {
+            let line = out.next().expect("it starts").expect("a line");
+            let place = line.rsplit(" at ").next().expect("a place").to_owned();
+            match transport {
+                "pty" => Endpoint::Pty(place.into()),
+                _ => Endpoint::Tcp(place),
+            }
+        });
+        Self {
+            endpoints: endpoints.collect(),
+            child,
+            marks,
+            _folder: folder,
+        }
+    }
+
+    fn wire(&self, index: usize) -> Wire {
+        let endpoint = self.endpoints[index].clone();
+        open(&PortSettings {
+            endpoint,
+            rate: Rate::default(),
+            marks: self.marks,
+            low_latency: false,
+        })
+        .expect("it is served")
+    }
+
+    fn link(&self, inner: Vec<InnerLink>) -> StreamLink {
+        let ring = vec![(self.wire(0), 4)];
+        StreamLink::new(ring, inner, Rate::default(), Arc::default())
+    }
+
+    /// A link with an interposer in the middle.
+    fn interposed(&self) -> StreamLink {
+        let ports = Ports::Interposer(self.wire(1));
+        self.link(vec![InnerLink::new(0, MIDDLE, ports)])
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _gone = self.child.kill();
+        let _gone = self.child.wait();
+    }
+}
+
+fn simulated() -> SimulatedLink {
+    let text = "title t\nsource nd21 9.7\nring 4\ndrive 0..3 model plain\n> 80\n";
+    let source = Source::from_bytes("t.scn".to_owned(), text.into()).expect("a text");
+    let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}", p.all()));
+    simulate::bench(entry.plan.as_ref().expect("novobus"))
+}
+
+/// Sends bytes and gives what comes back until the ring is quiet.
+fn exchange(link: &mut dyn Link, bytes: &[u8]) -> Vec<Received> {
+    let end = link.send(0, bytes) + Span::from_millis(5_000);
+    let mut back = Vec::new();
+    while link.busy() && link.now() < end && link.wait(end) {
+        while let Some((_, byte)) = link.receive(0) {
+            back.push(byte);
+        }
+    }
+    while let Some((_, byte)) = link.receive(0) {
+        back.push(byte);
+    }
+    assert_eq!(link.trouble(), None);
+    back
+}
+
+/// Plays two telegrams with faults in the middle, waits for silence, and asks with SYNCO: what comes back.
+fn play(link: &mut dyn Link, faults: &[(u64, LinkFault)]) -> [Vec<Received>; 2] {
+    link.begin();
+    for (byte, fault) in faults {
+        let fault = PlacedFault::Link(MIDDLE, *fault);
+        link.inject(0, fault, Moment::Byte(*byte));
+    }
+    [exchange(link, &READS), exchange(link, &SYNCOS)]
+}
+
+/// What a link carried.
+fn column(link: &dyn Link, place: usize) -> Vec<Seen> {
+    let bytes = link.trace(0).links[place].bytes.clone();
+    let seen = bytes
+        .iter()
+        .map(|byte| (byte.sent, byte.received, byte.error));
+    seen.collect()
+}
+
+fn flip(data: u8) -> LinkFault {
+    LinkFault::Flip(Flips {
+        data,
+        ..Flips::default()
+    })
+}
+
+/// Faults by name, each with bytes that are damaged by it on their way.
+fn faults() -> Vec<(&'static str, Vec<(u64, LinkFault)>)> {
+    let parity = Flips {
+        parity: true,
+        ..Flips::default()
+    };
+    vec![
+        ("none", vec![]),
+        ("flip 0", vec![(10, flip(1))]),
+        ("flip 0 1, which nobody notices", vec![(10, flip(3))]),
+        ("flip p", vec![(4, LinkFault::Flip(parity))]),
+        ("flip 0 twice", vec![(8, flip(1)), (8, flip(1))]),
+        ("replace", vec![(9, LinkFault::Replace(0xC1))]),
+        ("drop", vec![(5, LinkFault::Drop)]),
+        ("duplicate", vec![(7, LinkFault::Duplicate)]),
+        ("insert", vec![(7, LinkFault::Insert(0x80))]),
+        (
+            "insert and flip",
+            vec![(7, LinkFault::Insert(0x81)), (11, flip(0x80))],
+        ),
+        ("break", vec![(12, LinkFault::Break(Span::from_millis(1)))]),
+        ("delay", vec![(6, LinkFault::Delay(Span::from_millis(20)))]),
+        (
+            "cut and join",
+            vec![(5, LinkFault::Cut), (12, LinkFault::Join)],
+        ),
+    ]
+}
+
+/// Every fault at an interposer against the simulator: at the master and on the link itself.
+fn interposer(transport: &str) {
+    let served = Served::start(transport, true, &[("--cut", "2->1", 1)]);
+    let mut link = served.interposed();
+    for (name, faults) in faults() {
+        let mut model = simulated();
+        let expected = play(&mut model, &faults);
+        let [reads, asked] = play(&mut link, &faults);
+        assert_eq!(reads, expected[0], "{name}: the telegrams");
+        assert_eq!(asked, expected[1], "{name}: SYNCO behind them");
+        let own = column(&link, MIDDLE);
+        assert_eq!(own, column(&model, MIDDLE), "{name}: 2->1");
+        assert_eq!(link.unused_faults(), [""; 0], "{name}");
+        recover(&mut link);
+    }
+    let delay = link.inner_links()[0].delay();
+    assert!(delay.bytes > 12, "{delay:?}");
+    assert!(delay.longest >= delay.mean(), "{delay:?}");
+    assert!(delay.mean() > Duration::ZERO, "{delay:?}");
+}
+
+/// The check sequence brings all drives back (ND21 9.8), whatever they wait for.
+fn recover(link: &mut StreamLink) {
+    link.begin();
+    for _ in 0..3 {
+        exchange(link, &SYNCOS);
+        exchange(link, &[0x00; 32]);
+        exchange(link, &[0xFF, 0x44, 0x72, 0x4C, 0x41]);
+    }
+    let back = exchange(link, &[0x80; 3]);
+    assert_eq!(back, [Received::good(0x80); 3], "the ring is normal again");
+}
+
+#[test]
+fn every_fault_at_an_interposer_on_a_socket() {
+    interposer("tcp");
+}
+
+#[test]
+fn every_fault_at_an_interposer_on_a_pty() {
+    interposer("pty");
+}
+
+#[test]
+fn an_interposer_with_two_ports() {
+    let served = Served::start("tcp", true, &[("--cut", "2->1", 2)]);
+    let ports = Ports::TwoPortInterposer(served.wire(1), served.wire(2));
+    let mut link = served.link(vec![InnerLink::new(0, MIDDLE, ports)]);
+    let faults = [(10, flip(1))];
+    let mut model = simulated();
+    assert_eq!(play(&mut link, &faults), play(&mut model, &faults));
+    assert_eq!(column(&link, MIDDLE), column(&model, MIDDLE));
+}
+
+/// The column of a tapped link is the simulator's, byte for byte; a byte is seen when it has arrived, and then it is
+/// as late as the ring is long.
+fn tapped(transport: &str, marks: bool) {
+    let served = Served::start(
+        transport,
+        marks,
+        &[("--tap", "3->2", 1), ("--tap", "1->0", 1)],
+    );
+    let taps = [(1, 1), (2, 3)];
+    let inner = taps.map(|(wire, place)| InnerLink::new(0, place, Ports::Tap(served.wire(wire))));
+    let mut link = served.link(inner.into());
+    let mut model = simulated();
+    assert_eq!(play(&mut link, &[]), play(&mut model, &[]));
+    let arrived = |link: &dyn Link, place: usize| -> Vec<_> {
+        let column = column(link, place);
+        column
+            .iter()
+            .map(|(_, got, error)| (*got, *error))
+            .collect()
+    };
+    for (_, place) in taps {
+        assert_eq!(arrived(&link, place), arrived(&model, place), "{place}");
+        let times = link.trace(0).links[place].bytes.clone();
+        assert!(times.windows(2).all(|two| two[0].at <= two[1].at));
+        assert!(!link.reaches(0, place), "a tap changes nothing");
+    }
+}
+
+#[test]
+fn taps_on_sockets_and_ptys() {
+    tapped("tcp", true);
+    tapped("tcp", false);
+    tapped("pty", true);
+}
+
+const TITLE: &str = "title t\nsource nd21 9.7\nring 4\n";
+
+fn entry(steps: &str) -> Entry {
+    let text = format!("{TITLE}{steps}");
+    let source = Source::from_bytes("t.scn".to_owned(), text.into()).expect("a text");
+    Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}", p.all()))
+}
+
+/// The 9.7 scenario on a small ring, in the words of the language; a fault elsewhere is skipped, its link named.
+#[test]
+fn scenarios_at_an_interposer() {
+    let served = Served::start("tcp", true, &[("--cut", "2->1", 1)]);
+    let mut link = served.interposed();
+    let located = entry(
+        "drive 0..3 model plain\ndrive 2..3 memory FE13 = 88\n\n> 88 FF C0 13 FE D1\n> 88 FE C0 13 FE D1\n! 2->1 byte 10: flip 0\n\
+         > 80*40\n? located 1\n? within 25 zeros\n",
+    );
+    let plan = located.plan.as_ref().expect("novobus");
+    assert_eq!(lacks(plan, &link), None);
+    start_anew(&mut link, &plan.rings).expect("it answers");
+    let outcome = play_over_bus(plan, &mut link, AtFinding::Stop);
+    assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:?}");
+
+    let elsewhere = entry("! 3->2 byte 1: flip 0\n> 80\n");
+    let plan = elsewhere.plan.as_ref().expect("novobus");
+    let outcome = play_over_bus(plan, &mut link, AtFinding::Stop);
+    assert_eq!(outcome.verdict, Verdict::Skipped);
+    assert!(outcome.remarks[0].contains("3->2"), "{outcome:?}");
+}
+
+/// A cut link is open: with nobody there, nothing comes back.
+#[test]
+fn a_cut_link_with_nobody_there_is_open() {
+    let served = Served::start("tcp", true, &[("--cut", "2->1", 1)]);
+    let mut link = served.link(Vec::new());
+    assert_eq!(exchange(&mut link, &[0x80; 4]), []);
+}
+
+/// One port may be both ends of an interposer; two interposers need two.
+#[test]
+fn one_port_for_both_ends_in_a_rig_file() {
+    let ring = "schema = 1\n[rig]\nid = \"a\"\n[ring.1]\ndrives = 4\ntransport = \"tcp\"\nport = \"h:1\"\n";
+    let interposer = |link: &str| {
+        let end = "{ transport = \"tcp\", port = \"h:2\" }";
+        format!("[[interposer]]\nlink = \"{link}\"\nupstream = {end}\ndownstream = {end}\n")
+    };
+    let parsed = |text: String| {
+        let source = Source::from_bytes("a.toml".to_owned(), text.into()).expect("a text");
+        harness::rig::parse(&source)
+    };
+    let one = parsed(format!("{ring}{}", interposer("2->1")));
+    assert!(one.is_ok(), "{one:?}");
+    let two = parsed(format!(
+        "{ring}{}{}",
+        interposer("2->1"),
+        interposer("1->0")
+    ));
+    let problems = two.expect_err("the port is taken");
+    assert!(problems.all()[0].message.contains("named twice"));
+}
+
+/// What the command line refuses, with the reason.
+#[test]
+fn what_is_refused() {
+    for (arguments, part) in [
+        (
+            &["--tap", "2->0=127.0.0.1:0"][..],
+            "a ring of 4 has no such link",
+        ),
+        (
+            &["--tap", "4->3=127.0.0.1:0"],
+            "a ring of 4 has no such link",
+        ),
+        (
+            &["--cut", "master->3=127.0.0.1:0"],
+            "a link between two drives",
+        ),
+        (&["--tap", "2:2->1=127.0.0.1:0"], "the bench has one ring"),
+        (&["--tap", "3:2->1=127.0.0.1:0"], "there is no ring 3"),
+        (&["--tap", "2->1"], "a link and a place expected"),
+        (&["--tap", "2->1="], "a link and a place expected"),
+        (&["--tap", "21=x:0"], "is no link"),
+        (&["--tap", "2->1=a:0,b:0"], "one place expected for a tap"),
+        (
+            &["--cut", "2->1=a:0,b:0,c:0"],
+            "one place expected for a tap",
+        ),
+        (&["--tap", "2->1=a:0", "--cut", "2->1=b:0"], "somebody sits"),
+        (&["--cut", "2->1=0.0.0.0:0"], "--allow-remote"),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+            .args([
+                "sim",
+                "--rig",
+                "sim:4",
+                "--tcp",
+                "127.0.0.1:0",
+                "--for",
+                "1s",
+            ])
+            .args(arguments)
+            .output()
+            .expect("the program");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(part), "{arguments:?}: {said}");
+    }
+}
