@@ -25,8 +25,8 @@ fn axis(number: u16) -> Axis {
 }
 
 /// A ring of ND21 that are ready to turn.
-fn link(drives: u64) -> SimulatedLink {
-    let ring = Ring::new(size(drives), Rate::Baud38400, |_| {
+fn ring(drives: u64) -> Ring<Drive> {
+    Ring::new(size(drives), Rate::Baud38400, |_| {
         let mut eeprom = factory::eeprom();
         eeprom[0x23] = 0xFB;
         harness_sim::nd21::set_parity(&mut eeprom);
@@ -35,8 +35,11 @@ fn link(drives: u64) -> SimulatedLink {
         drive.stimulate(Stimulus::Input(Input::Gpin3, true));
         drive.stimulate(Stimulus::Input(Input::Gpin5, true));
         Drive::Nd21(drive)
-    });
-    SimulatedLink::new(Bench::one(ring))
+    })
+}
+
+fn link(drives: u64) -> SimulatedLink {
+    SimulatedLink::new(Bench::one(ring(drives)))
 }
 
 /// The same behind a guard, synchronised.

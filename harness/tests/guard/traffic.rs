@@ -115,9 +115,12 @@ const CALLS: &[(&str, Call, &str)] = &[
 #[test]
 fn the_driver_s_functions_in_their_classes() {
     for (name, call, needs) in CALLS {
-        let mut line = guarded(2, Limits::default());
+        // Without the error 0504 of a recovery, which some of them would ask for first.
+        let mut line = Guarded::new(link(2), Limits::default());
+        line.assume_fresh();
         let result = {
             let bus = bus(&mut line, 2);
+            bus.run(Span::from_millis(300));
             call(&bus)
         };
         match line.trouble() {
@@ -148,6 +151,7 @@ fn motion_alone_is_enough_for_motion() {
         let bus = bus(&mut line, 2);
         bus.run(Span::from_millis(300));
         let drive = axis(1);
+        bus.delete_error(drive).expect("deleted");
         bus.go(drive).expect("gone");
         bus.init_ps(drive).expect("initialised");
         bus.write_ps(
@@ -227,7 +231,8 @@ fn caps() {
         ),
     ] {
         let mut line = guarded(1, limits);
-        line.send(0, &[0x80; 21]);
+        // 22 bytes were the recovery.
+        line.send(0, &[0x80; 38]);
         assert_eq!(line.trouble(), None);
         line.send(0, &[0x80]);
         let trouble = line.trouble().expect("denied").to_string();
@@ -239,7 +244,7 @@ fn caps() {
 #[test]
 fn after_a_denial() {
     let mut line = guarded(1, Limits::default());
-    line.send(0, &[0x86, 0xFF, 0xA4, 0x7E, 0x00, 0x22, 0x80]);
+    line.send(0, &[0x88, 0xFF, 0xA4, 0x7E, 0x00, 0x22, 0x80]);
     let text = line.trouble().expect("denied").to_string();
     assert!(
         text.contains("And 7E into FF00 (Status) to drive 0 needs `allow_motion`"),
@@ -293,18 +298,34 @@ fn capabilities_follow_the_limits() {
     assert!(!reset.contains(&Capability::Reset));
 }
 
-/// What becomes of the corpus with nothing allowed: scenarios that need nothing, and are denied all the same, send deliberate rubbish or make
-/// faults that nobody can judge.
-#[test]
-fn the_corpus_with_nothing_allowed() {
+/// Scenarios that are denied although they do nothing of what needs leave, and make no fault: each sends on purpose what
+/// nobody can vouch for on a machine.
+const RUBBISH: &[(&str, &str)] = &[
+    (
+        "9.2-short-address-first",
+        "a short address before any address",
+    ),
+    (
+        "9.2-short-address-kept-sum",
+        "a short address before any address",
+    ),
+    (
+        "9.8-power-cycle",
+        "goes on without a recovery behind a drive that was switched on",
+    ),
+    (
+        "9.8-zeros-before-the-sequence",
+        "goes on behind too few zeros",
+    ),
+];
+
+/// Every scenario of the corpus that is short enough, behind a guard: its name and what was denied.
+fn corpus(limits: Limits) -> Vec<(String, Option<String>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpora/scenarios/novobus");
-    let (mut passed, mut denied) = (0, Vec::new());
+    let mut found = Vec::new();
     for file in std::fs::read_dir(folder).expect("the corpus") {
         let path = file.expect("readable").path();
-        if path
-            .file_name()
-            .is_some_and(|name| name.to_string_lossy().contains("-250"))
-        {
+        if path.to_string_lossy().contains("-250") {
             continue;
         }
         let source = Source::read(&path).expect("readable");
@@ -314,19 +335,35 @@ fn the_corpus_with_nothing_allowed() {
         let Some(plan) = entry.plan.as_ref() else {
             continue;
         };
-        let mut line: Guarded<SimulatedLink> = Guarded::new(simulated(plan), Limits::default());
+        let mut line: Guarded<SimulatedLink> = Guarded::new(simulated(plan), limits);
         line.assume_fresh();
-        let outcome = run(plan, &mut line);
-        match line.trouble() {
-            None => passed += 1,
-            Some(trouble) => denied.push(format!(
-                "{}: {trouble} {}",
-                entry.short_name(),
-                outcome.verdict
-            )),
-        }
+        let _verdict = run(plan, &mut line);
+        let denied = line.trouble().map(ToString::to_string);
+        found.push((entry.short_name().to_owned(), denied));
     }
-    denied.sort();
-    println!("{passed} pass\n{}", denied.join("\n"));
-    assert!(passed > 0);
+    found
+}
+
+/// With nothing allowed what is denied needs leave, or is a fault that nobody can judge, or is rubbish on purpose; and it ends.
+#[test]
+fn the_corpus_with_nothing_allowed() {
+    let found = corpus(Limits::default());
+    let passed = found.iter().filter(|(_, denied)| denied.is_none()).count();
+    assert!(passed >= 30, "only {passed} of {} pass", found.len());
+    let mut rubbish: Vec<_> = found
+        .iter()
+        .filter_map(|(name, denied)| denied.as_ref().map(|why| (name.as_str(), why)))
+        .filter(|(_, why)| !why.contains("needs `allow_") && !why.contains(": the fault "))
+        .collect();
+    rubbish.sort_unstable();
+    let names: Vec<_> = rubbish.iter().map(|(name, _)| *name).collect();
+    let expected: Vec<_> = RUBBISH.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, expected, "{rubbish:#?}");
+}
+
+#[test]
+fn the_corpus_with_everything_allowed() {
+    for (name, denied) in corpus(Limits::unlimited()) {
+        assert_eq!(denied, None, "{name}");
+    }
 }
