@@ -109,6 +109,16 @@ impl Drive {
         self.answer.clear();
     }
 
+    /// Takes the process data that are under way for received, and executes nothing (ND21 9.4).
+    pub fn forget_process_data(&mut self) {
+        if let State::Net(left, process, addressed) = self.state {
+            self.state = match left - process {
+                0 => State::Sync,
+                left => State::Net(left, 0, addressed),
+            };
+        }
+    }
+
     /// Silence for 10 ms: the error mode, in which increments begin with the "*" (ND21 9.9).
     pub fn time_out(&mut self) {
         if !self.in_error() {

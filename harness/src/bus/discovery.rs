@@ -24,12 +24,12 @@ const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 /// 17 zeros and the check sequence (9.8). Nothing is changed in any drive.
 ///
 /// # Errors
-/// [`Error::TimeOut`] where no ring answers.
+/// [`Error::TimeOut`] where no ring answers, [`Error::Link`] where the link carries nothing.
 pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error> {
     let counted = count_behind(link, ring, &[]);
     counted
         .or_else(|| count_behind(link, ring, &repair()))
-        .ok_or_else(no_answer)
+        .ok_or_else(|| link.trouble().cloned().map_or_else(no_answer, Error::Link))
 }
 
 /// What brings a ring back that can be brought back: 17 zeros and the check sequence (9.8).
@@ -78,7 +78,8 @@ fn listen<T>(
     while link.receive(ring).is_some() {}
     let sent = link.send(ring, bytes);
     let end = sent + link.byte_time() * (u64::from(MAX_DRIVES) + 8) + Span::from_millis(50);
-    while link.now() < end {
+    // Where the link carries nothing more, its time may stand still.
+    while link.now() < end && link.trouble().is_none() {
         link.wait(end);
         while let Some((_, received)) = link.receive(ring) {
             if let Some(found) = heard(received) {

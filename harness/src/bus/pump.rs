@@ -172,7 +172,8 @@ impl<'l> Pump<'l> {
         let mut until = end;
         for (index, ring) in self.rings.iter_mut().enumerate() {
             let mut idle = false;
-            while ring.free <= now + lead && !idle {
+            // Where the link carries nothing, no byte takes any time.
+            while ring.free <= now + lead && !idle && self.link.trouble().is_none() {
                 // The time at which the byte leaves, not that at which it is handed over.
                 let start = ring.free.max(now);
                 ring.free = match ring.master.poll_transmit(start) {

@@ -243,4 +243,8 @@ impl Line for OneRing<'_> {
     fn trouble(&self) -> Option<&Trouble> {
         self.line.trouble()
     }
+
+    fn lead(&self) -> Span {
+        self.line.lead()
+    }
 }

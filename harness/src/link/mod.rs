@@ -147,7 +147,7 @@ pub trait Line: Send {
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)>;
 
     /// Lets time pass until something happens, at most until `until`. False where nothing ever will
-    /// unless the master sends.
+    /// unless the master sends. With [trouble](Self::trouble) time may stand still: who waits in a loop looks at it.
     fn wait(&mut self, until: Instant) -> bool;
 
     /// Why nothing more is carried; `None` while all is well. A simulated link has no trouble.
@@ -159,6 +159,37 @@ pub trait Line: Send {
     /// gaps between them.
     fn lead(&self) -> Span {
         Span::ZERO
+    }
+}
+
+/// A line that somebody else goes on with afterwards.
+impl<L: Line + ?Sized> Line for &mut L {
+    fn byte_time(&self) -> Span {
+        (**self).byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        (**self).now()
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        (**self).send(ring, bytes)
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        (**self).receive(ring)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        (**self).wait(until)
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        (**self).trouble()
+    }
+
+    fn lead(&self) -> Span {
+        (**self).lead()
     }
 }
 

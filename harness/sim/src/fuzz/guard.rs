@@ -72,7 +72,8 @@ pub fn guard(data: &[u8]) {
     }
 }
 
-/// A drive that has heard something.
+/// A drive that has heard something. Process data that it awaits have come: whatever byte is sent next would end them
+/// (ND21 9.4), be it the first zero of the recovery, so no guard can keep them back.
 fn started(start: &[u8], index: usize, keep_half: bool) -> Drive {
     let mut drive = Drive::new();
     // 14.10.3: nominal speed in, actual speed out.
@@ -83,6 +84,7 @@ fn started(start: &[u8], index: usize, keep_half: bool) -> Drive {
     }
     drive.take_executed();
     drive.poke(0xFF32, 0x08);
+    drive.forget_process_data();
     if !keep_half {
         drive.forget_half();
     }

@@ -2,9 +2,9 @@
 //! recorded, limited and shown is all the same.
 
 use super::outcome::Stop;
-use super::player::Runner;
+use super::player::{Halt, Runner};
 use crate::bus::{Axis, Bus, Error, Options, count_drives};
-use crate::link::Line;
+use crate::link::{Line, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::PlannedCall;
 use crate::scenario::problem::Span;
@@ -19,6 +19,8 @@ struct Through<'r, 'a> {
     runner: &'r mut Runner<'a>,
     /// The ring that it works on.
     ring: usize,
+    /// Why the scenario cannot go on, if so: its time stands still then.
+    halted: Option<Trouble>,
 }
 
 impl Line for Through<'_, '_> {
@@ -39,7 +41,20 @@ impl Line for Through<'_, '_> {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        self.runner.wait(until)
+        let more = self.runner.wait(until);
+        self.halted = self.runner.full.as_ref().map(|halt| match halt {
+            Halt::Trouble(trouble) => trouble.clone(),
+            Halt::Full(why) => Trouble::Lost(why.clone()),
+        });
+        more
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.halted.as_ref().or_else(|| self.runner.link.trouble())
+    }
+
+    fn lead(&self) -> time::Span {
+        self.runner.link.lead()
     }
 }
 
@@ -58,7 +73,11 @@ impl Runner<'_> {
         let Ok(size) = RingSize::new(u64::from(size)) else {
             return Err(Stop::failed(span, "the ring has no drives"));
         };
-        let line = Through { runner: self, ring };
+        let line = Through {
+            runner: self,
+            ring,
+            halted: None,
+        };
         let result = Bus::open(Box::new(line), &[size], Options::default())
             .map_err(failed)
             .and_then(|bus| {
@@ -76,7 +95,12 @@ impl Runner<'_> {
     pub(super) fn count(&mut self, ring: usize, expected: u8, span: Span) -> Result<(), Stop> {
         self.settle();
         self.forget(ring);
-        let counted = count_drives(&mut Through { runner: self, ring }, 0);
+        let mut line = Through {
+            runner: self,
+            ring,
+            halted: None,
+        };
+        let counted = count_drives(&mut line, 0);
         self.settle();
         self.forget(ring);
         self.line_before = self.link.now();

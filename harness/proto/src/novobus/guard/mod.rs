@@ -27,7 +27,8 @@
 //! * A bit error on a wire that nobody sees turns one command into another: the parity bit catches an odd number of wrong bits in a
 //!   byte, the checking byte is a sum of 8 bits, which 1 wrong command in 256 passes. A lost or doubled byte behind the master can leave a drive
 //!   out of step for the rest of a telegram.
-//! * A command that another program has left half-sent may end with a 01 that a drive before it makes of a zero.
+//! * A command that another program has left half-sent may end with a 01 that a drive before it makes of a zero. Process data
+//!   that it has left half-sent end with the next byte, whichever that is (9.4), so with the first zero of the recovery.
 //! * `DataIn` (FF32) is believed to point at `nsoll` (14.10.3), as this guard lets nothing else be written there.
 //! * What a drive does by itself: by its switches, its cycle control, its EEPROM after switching on.
 

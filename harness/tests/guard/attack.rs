@@ -143,6 +143,16 @@ fn case() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
+/// Process data that another program has left half-sent end with whatever comes next (ND21 9.4), and are not held against the guard; those
+/// that it saw announced are.
+#[test]
+fn process_data_left_by_others_end_with_the_next_byte() {
+    let mut case = vec![0, 0, 0, 0, 3, 0x83, 0xFF, 0xCA];
+    case.extend(RECOVERY);
+    case.extend([0x83, 0xFF, 0xCA]);
+    harness_sim::fuzz::guard(&case);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3_000, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -1,0 +1,55 @@
+//! The guard: attacks on it, what it does to ordinary traffic, and the safe state.
+
+mod attack;
+mod safe_state;
+mod traffic;
+
+use harness::bus::{Axis, Bus, Options};
+use harness::guard::{Guarded, Limits};
+use harness::link::{Link, SimulatedLink, Stimulus};
+use harness_proto::line::Rate;
+use harness_proto::nd21::io::Input;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::properties::Properties;
+use harness_sim::bench::Bench;
+use harness_sim::drive::Drive;
+use harness_sim::nd21::{Nd21Drive, Nd21Properties, factory};
+use harness_sim::ring::Ring;
+
+fn size(drives: u64) -> RingSize {
+    RingSize::new(drives).expect("1 to 250")
+}
+
+fn axis(number: u16) -> Axis {
+    Axis::from_number(number).expect("an axis")
+}
+
+/// A ring of ND21 that are ready to turn.
+fn ring(drives: u64) -> Ring<Drive> {
+    Ring::new(size(drives), Rate::Baud38400, |_| {
+        let mut eeprom = factory::eeprom();
+        eeprom[0x23] = 0xFB;
+        harness_sim::nd21::set_parity(&mut eeprom);
+        let own = Nd21Properties::default();
+        let mut drive = Nd21Drive::new(Properties::default(), own, eeprom);
+        drive.stimulate(Stimulus::Input(Input::Gpin3, true));
+        drive.stimulate(Stimulus::Input(Input::Gpin5, true));
+        Drive::Nd21(drive)
+    })
+}
+
+fn link(drives: u64) -> SimulatedLink {
+    SimulatedLink::new(Bench::one(ring(drives)))
+}
+
+/// The same behind a guard, synchronised.
+fn guarded(drives: u64, limits: Limits) -> Guarded<SimulatedLink> {
+    let mut guarded = Guarded::new(link(drives), limits);
+    guarded.synchronise();
+    assert_eq!(guarded.drives(0), size(drives).drives());
+    guarded
+}
+
+fn bus(line: &mut Guarded<SimulatedLink>, drives: u64) -> Bus<'_> {
+    Bus::open(Box::new(line), &[size(drives)], Options::default()).expect("an open bus")
+}

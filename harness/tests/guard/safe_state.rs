@@ -1,0 +1,145 @@
+//! The safe state, confirmed and not (ND21 11.8, 14.10).
+
+use super::{axis, bus, guarded, ring, size};
+use harness::bus::Bus;
+use harness::guard::{Guarded, Limits, SafeState, safe_state};
+use harness::link::{DriveFault, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
+use harness_proto::line::Rate;
+use harness_proto::nd21::ram;
+use harness_proto::novobus::properties::Properties;
+use harness_proto::time::Span;
+use harness_sim::bench::Bench;
+use harness_sim::drive::Drive;
+use harness_sim::plain::PlainDrive;
+use harness_sim::ring::Ring;
+
+fn turning(bus: &Bus<'_>, drive: u16) {
+    bus.write_word(axis(drive), ram::NSOLL, 0x2C3D)
+        .expect("written");
+    bus.go(axis(drive)).expect("gone");
+}
+
+/// A guarded ring of three whose drives 0 and 2 turn at 3000 rpm.
+fn in_motion() -> Guarded<SimulatedLink> {
+    let mut line = guarded(
+        3,
+        Limits {
+            motion: true,
+            ..Limits::default()
+        },
+    );
+    {
+        let bus = bus(&mut line, 3);
+        bus.run(Span::from_millis(300));
+        // The zeros of the recovery are a bad sync byte, error 0504 (ND21 9.7, 14.10.1).
+        for drive in 0..3 {
+            bus.delete_error(axis(drive)).expect("deleted");
+        }
+        turning(&bus, 0);
+        turning(&bus, 2);
+        bus.run(Span::from_millis(2_000));
+        let speed = bus.read_word(axis(2), ram::NIST).expect("read");
+        assert!(speed > 0x2B00, "nist is {speed:04X}");
+        bus.close();
+    }
+    line
+}
+
+fn word(line: &Guarded<SimulatedLink>, drive: u8, address: u16) -> i16 {
+    let byte = |address| line.peek(0, drive, address).expect("seen");
+    i16::from_be_bytes([byte(address), byte(address + 1)])
+}
+
+#[test]
+fn turning_motors_stand_and_are_blocked() {
+    let mut line = in_motion();
+    let state = safe_state(&mut line, &[size(3)]);
+    assert_eq!(state, SafeState::Confirmed(vec![size(3)]));
+    for drive in 0..3 {
+        assert!(word(&line, drive, ram::NIST).abs() <= 20);
+        assert_eq!(word(&line, drive, ram::NSOLL), 0);
+        assert_eq!(line.peek(0, drive, ram::STATUS).expect("seen") & 0x81, 0x81);
+    }
+}
+
+/// Half a telegram and a denied command stand on the line; nothing but stopping is allowed.
+#[test]
+fn half_a_telegram_does_not_keep_it_away() {
+    let limits = Limits::default();
+    let mut line = guarded(2, limits);
+    let before = line.peek(0, 1, ram::STATUS);
+    line.send(0, &[0x8A, 0xFF, 0x82, 0x00, 0x00, 0xFF, 0x81]);
+    assert!(line.trouble().is_some());
+    assert_eq!(line.peek(0, 1, ram::STATUS), before);
+    line.reset_after_denial();
+    let state = safe_state(&mut line, &[size(2)]);
+    assert_eq!(state, SafeState::Confirmed(vec![size(2)]), "{state}");
+}
+
+#[test]
+fn a_drive_without_power_is_named() {
+    let mut line = in_motion();
+    line.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
+    let begin = line.now();
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(3)]) else {
+        panic!("confirmed");
+    };
+    assert_eq!(drives.len(), 3);
+    assert!(
+        drives.iter().all(|drive| drive.why.contains("ring")),
+        "{drives:?}"
+    );
+    assert!(line.now().since(begin) < Span::from_millis(15_000));
+    // Drive 2 stands in front of the dark one and has heard the stop.
+    let end = line.now() + Span::from_millis(3_000);
+    while line.now() < end && line.wait(end) {}
+    assert!(word(&line, 2, ram::NIST).abs() <= 20);
+}
+
+#[test]
+fn a_cut_ring_is_not_confirmed() {
+    let mut line = in_motion();
+    line.inject(0, PlacedFault::Link(0, LinkFault::Cut), Moment::Now);
+    let begin = line.now();
+    let state = safe_state(&mut line, &[size(3)]);
+    assert!(matches!(&state, SafeState::NotConfirmed(drives) if drives.len() == 3));
+    assert!(state.to_string().contains("NOT confirmed"));
+    assert!(line.now().since(begin) < Span::from_millis(15_000));
+}
+
+/// Half a telegram that nobody denied, on both rings; nothing was synchronised before.
+#[test]
+fn two_rings() {
+    let bench = Bench::two(ring(1), ring(3));
+    let mut line = Guarded::new(SimulatedLink::new(bench), Limits::default());
+    let rings = [size(1), size(3)];
+    line.assume_fresh();
+    for ring in 0..2 {
+        line.send(ring, &[0x8A, 0xFF, 0x82, 0x00]);
+    }
+    assert_eq!(line.trouble(), None);
+    line.reset_after_denial();
+    let state = safe_state(&mut line, &rings);
+    assert_eq!(state, SafeState::Confirmed(rings.to_vec()), "{state}");
+    line.inject(1, PlacedFault::Drive(2, DriveFault::Off), Moment::Now);
+    line.reset_after_denial();
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &rings) else {
+        panic!("confirmed");
+    };
+    assert!(drives.iter().all(|drive| drive.axis.ring() == 1));
+}
+
+/// Plain drives have a memory and no motor behind it: what is not read back is not confirmed, and it ends.
+#[test]
+fn plain_drives_are_not_confirmed() {
+    let plain = |_| Drive::Plain(PlainDrive::new(Properties::default(), [0; 256]));
+    let bench = Bench::one(Ring::new(size(2), Rate::Baud38400, plain));
+    let mut line = Guarded::new(SimulatedLink::new(bench), Limits::default());
+    let begin = line.now();
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(2)]) else {
+        panic!("confirmed");
+    };
+    assert_eq!(drives.len(), 2);
+    assert!(drives[0].why.contains("Flags are 00"), "{drives:?}");
+    assert!(line.now().since(begin) < Span::from_millis(5_000));
+}
