@@ -149,9 +149,9 @@ fn case() -> impl Strategy<Value = Vec<u8>> {
 /// that it saw announced are.
 #[test]
 fn process_data_left_by_others_end_with_the_next_byte() {
-    let mut case = vec![0, 0, 0, 0, 3, 0x83, 0xFF, 0xCA];
+    let mut case = vec![0, 0, 0, 0, 3, 0x85, 0xFF, 0xCA];
     case.extend(RECOVERY);
-    case.extend([0x83, 0xFF, 0xCA]);
+    case.extend([0x85, 0xFF, 0xCA]);
     harness_sim::fuzz::guard(&case);
 }
 
