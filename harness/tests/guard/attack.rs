@@ -45,7 +45,7 @@ fn command() -> impl Strategy<Value = Vec<u8>> {
         Just(0xFF),
         any::<u8>(),
     ];
-    (0..12_u8, low, high, data.clone(), data).prop_map(|(kind, low, high, a, b)| {
+    (0..13_u8, low, high, data.clone(), data).prop_map(|(kind, low, high, a, b)| {
         closed(match kind {
             0 => vec![0xC0, low, high],
             1 => vec![0xC1, low, high, b'?'],
@@ -55,6 +55,8 @@ fn command() -> impl Strategy<Value = Vec<u8>> {
             7 => vec![0xA4, a, low & 0x7F],
             8 | 9 => vec![0xA5, a, low & 0x7F],
             10 => vec![0xC8, a & 3],
+            // The EEPROM controller: write a byte, ProgParam (14.10.5).
+            11 => vec![0x82, if a & 1 == 0 { 0x82 } else { 0x84 }, 0x8A, 0xFD],
             _ => vec![0xDD, b'!'],
         })
     })
@@ -147,9 +149,9 @@ fn case() -> impl Strategy<Value = Vec<u8>> {
 /// that it saw announced are.
 #[test]
 fn process_data_left_by_others_end_with_the_next_byte() {
-    let mut case = vec![0, 0, 0, 0, 3, 0x83, 0xFF, 0xCA];
+    let mut case = vec![0, 0, 0, 0, 3, 0x85, 0xFF, 0xCA];
     case.extend(RECOVERY);
-    case.extend([0x83, 0xFF, 0xCA]);
+    case.extend([0x85, 0xFF, 0xCA]);
     harness_sim::fuzz::guard(&case);
 }
 

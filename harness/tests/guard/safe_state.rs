@@ -5,6 +5,7 @@ use harness::bus::Bus;
 use harness::guard::{Guarded, Limits, SafeState, safe_state};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Rate;
+use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
@@ -105,6 +106,35 @@ fn a_cut_ring_is_not_confirmed() {
     assert!(matches!(&state, SafeState::NotConfirmed(drives) if drives.len() == 3));
     assert!(state.to_string().contains("NOT confirmed"));
     assert!(line.now().since(begin) < Span::from_millis(15_000));
+}
+
+/// In the middle of a path of 200 revolutions (ND21 13.2.2).
+#[test]
+fn a_motion_of_the_positioning_controller_ends() {
+    let limits = Limits {
+        motion: true,
+        ..Limits::default()
+    };
+    let mut line = guarded(1, limits);
+    {
+        let bus = bus(&mut line, 1);
+        let drive = axis(0);
+        bus.run(Span::from_millis(300));
+        bus.delete_error(drive).expect("deleted");
+        bus.go(drive).expect("gone");
+        bus.init_ps(drive).expect("initialised");
+        let path = Position::new(Mode::Relative, 200 * 65_536).expect("a path");
+        bus.write_ps(drive, path).expect("written");
+        bus.start_ps(drive).expect("started");
+        bus.run(Span::from_millis(1_500));
+        bus.close();
+    }
+    assert!(word(&line, 0, ram::NIST).abs() > 200);
+    let state = safe_state(&mut line, &[size(1)]);
+    assert_eq!(state, SafeState::Confirmed(vec![size(1)]), "{state}");
+    let end = line.now() + Span::from_millis(1_000);
+    while line.now() < end && line.wait(end) {}
+    assert!(word(&line, 0, ram::NIST).abs() <= 20);
 }
 
 /// Half a telegram that nobody denied, on both rings; nothing was synchronised before.
