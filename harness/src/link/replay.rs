@@ -39,7 +39,11 @@ impl Replay {
         });
         Self {
             reaches: reached.collect(),
-            events: events.into(),
+            // Which step came when is of no matter here.
+            events: events
+                .into_iter()
+                .filter(|event| !matches!(event, Event::Step(_)))
+                .collect(),
             now: Instant::START,
             rate,
             tolerance,
@@ -52,7 +56,7 @@ impl Replay {
     /// Whether everything was played back.
     #[must_use]
     pub fn is_at_end(&self) -> bool {
-        let left = |event: &Event| !matches!(event, Event::Received(..) | Event::Step(_));
+        let left = |event: &Event| !matches!(event, Event::Received(..));
         !self.events.iter().any(left)
     }
 
@@ -144,12 +148,6 @@ impl Link for Replay {
                 self.otherwise("the beginning of a conversation");
             }
             None => self.otherwise("the beginning of a conversation"),
-        }
-    }
-
-    fn step(&mut self, place: usize) {
-        if self.events.front() == Some(&Event::Step(place)) {
-            self.events.pop_front();
         }
     }
 

@@ -441,15 +441,14 @@ impl StreamLink {
         if !ring.queue.is_empty() || ring.wire.waiting() > 0 || now < ring.free {
             return true;
         }
-        // More than was sent comes after a time-out (ND21 9.9): then only silence tells.
+        // More than was sent comes after a time-out, and without an end (ND21 9.9): then only time tells.
         // What an interposer has dropped does not come home, and what it has put in does.
         let inner = self.inner.iter().filter(|inner| inner.ring == index);
         let (taken, given) = inner.fold((0, 0), |(taken, given), inner| {
             (taken + inner.taken, given + inner.given)
         });
         let home = ring.came + taken == ring.sent + given;
-        let quiet = ring.free.max(ring.last_arrival) + self.round(ring);
-        !home && now < quiet
+        !home && now < ring.free + self.round(ring)
     }
 }
 
