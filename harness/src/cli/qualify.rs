@@ -4,11 +4,12 @@
 use super::args::QualifyArguments;
 use super::exit::Exit;
 use super::output::Output;
-use super::run::select;
+use super::run::{details, line, select};
 use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
 use crate::qualify::{
-    Evidence, Hypothesis, Profile, Settled, deviating, explaining, hypotheses, probes,
+    Evidence, Hypothesis, Profile, Settled, conversations, deviating, explaining, hypotheses,
+    probes,
 };
 use crate::rig::{self, Played, Run, find, state};
 use crate::scenario::verdict::Verdict;
@@ -16,6 +17,9 @@ use crate::twin::Conversation;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::SystemTime;
+
+/// The most attempts that are explained: each is asked of every deviation of every drive.
+const MOST_ATTEMPTS: usize = 12;
 
 /// The most explanations that are told.
 const MOST_TOLD: usize = 8;
@@ -91,22 +95,41 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
     work(&rig, &entries, &job, output)
 }
 
-/// Settles what the manual leaves open, and names what drives do otherwise.
+/// Plays what is judged by the model alone, settles what the manual leaves open, and names what drives do otherwise.
 pub(super) fn settle(
     run: &mut Run<'_>,
-    findings: &Findings,
+    findings: &mut Findings,
+    ill: bool,
     mut folder: Option<&mut Folder>,
     output: &mut Output,
 ) -> Result<Exit, Stop> {
-    let mut exit = Exit::Passed;
-    let named = name(run, findings, output)?;
-    if !findings.diverged.is_empty() {
-        exit = Exit::Failed;
+    let drives = run.session().rig().file.ring.first.drives;
+    if !ill {
+        for entry in conversations(drives).unwrap_or_default() {
+            let played = play(run, &entry, folder.as_deref_mut())?;
+            let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
+            output.result(&line(&entry, &played.outcome, output))?;
+            output.say(&details(&entry, &played.outcome, traces));
+            findings.note(&played);
+            if over(run, output) {
+                break;
+            }
+        }
     }
-    let profile = profile(run, folder.as_deref_mut(), output)?;
+    let profile = match ill {
+        true => None,
+        false => Some(profile(run, findings, folder.as_deref_mut(), output)?),
+    };
+    let named = name(run, findings, output)?;
+    let exit = match findings.diverged.is_empty() {
+        true => Exit::Passed,
+        false => Exit::Failed,
+    };
     if let Some(folder) = folder {
-        let text = toml::to_string(&profile).unwrap_or_default();
-        folder.add("profile.toml", &text)?;
+        if let Some(profile) = profile {
+            let text = toml::to_string(&profile).unwrap_or_default();
+            folder.add("profile.toml", &text)?;
+        }
         folder.add("deviations.txt", &named)?;
     }
     Ok(exit)
@@ -114,20 +137,38 @@ pub(super) fn settle(
 
 /// The deviations that explain every byte of every attempt that diverged.
 fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<String, Stop> {
-    let Some((first, others)) = findings.diverged.split_first() else {
+    if findings.diverged.is_empty() {
         output.result("deviations: none; every byte is as the model of the manual says\n")?;
         return Ok("none\n".to_owned());
-    };
+    }
     let drives = run.session().rig().file.ring.first.drives;
     let exactness = run.exactness();
     let twin = |lines: &[String]| run.twin_with(lines);
-    let mut left = deviating(drives, &findings.suspects);
-    let mut found: Vec<Hypothesis> = Vec::new();
-    for attempt in std::iter::once(first).chain(others) {
-        let explained = explaining(&left, attempt, exactness, &twin).unwrap_or_default();
-        found = explained.into_iter().map(|(h, _)| h.clone()).collect();
-        left.clone_from(&found);
+    let all = deviating(drives, &findings.suspects);
+    // A drive that a deviation has left in another state explains what comes behind in its own way: the deviations count
+    // that explain the most.
+    let mut explained: BTreeMap<&str, (usize, &Hypothesis)> = BTreeMap::new();
+    for attempt in findings.diverged.iter().take(MOST_ATTEMPTS) {
+        for (hypothesis, _) in explaining(&all, attempt, exactness, &twin).unwrap_or_default() {
+            explained
+                .entry(&hypothesis.name)
+                .or_insert((0, hypothesis))
+                .0 += 1;
+        }
     }
+    let most = explained
+        .values()
+        .map(|(count, _)| *count)
+        .max()
+        .unwrap_or(0);
+    let found: Vec<_> = all
+        .iter()
+        .filter(|h| {
+            explained
+                .get(h.name.as_str())
+                .is_some_and(|(count, _)| *count == most)
+        })
+        .collect();
     let mut text = String::new();
     match found.as_slice() {
         [] => text.push_str("deviations: the ring is otherwise than the model, and no single known deviation explains it\n"),
@@ -147,6 +188,7 @@ fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<S
 /// Asks by probes how the drives behave where the manual leaves it open.
 fn profile(
     run: &mut Run<'_>,
+    findings: &mut Findings,
     mut folder: Option<&mut Folder>,
     output: &mut Output,
 ) -> Result<Profile, Stop> {
@@ -173,6 +215,7 @@ fn profile(
         let exactness = run.exactness();
         let mut found = Vec::new();
         let mut not_asked = None;
+        let mut last = None;
         for _ in 0..PROBED {
             let played = play(run, entry, folder.as_deref_mut())?;
             let Some(attempt) = played.attempts.last() else {
@@ -181,7 +224,9 @@ fn profile(
             };
             let twin = |lines: &[String]| run.twin_with(lines);
             found = explaining(&all, &attempt.conversations, exactness, &twin).unwrap_or_default();
-            if !found.is_empty() || over(run, output) {
+            let done = !found.is_empty();
+            last = Some(played);
+            if done || over(run, output) {
                 break;
             }
         }
@@ -207,6 +252,9 @@ fn profile(
                 profile.property.insert(probe.property.to_owned(), settled);
             }
             None => {
+                if let Some(played) = &last {
+                    findings.note(played);
+                }
                 let why = "no value of it gives the bytes that came".to_owned();
                 output.result(&format!("{} ({section}): {why}\n", probe.property))?;
                 profile.open.insert(probe.property.to_owned(), why);

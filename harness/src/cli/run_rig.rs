@@ -11,6 +11,7 @@ use crate::link::{Line, Trouble};
 use crate::report::plot::plot;
 use crate::rig::{Options, Played, Rig, Run, Session, SessionError};
 use crate::scenario::run::Outcome;
+use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use std::path::PathBuf;
@@ -64,6 +65,7 @@ pub(super) fn work(
         purpose: job.purpose.to_owned(),
         wait: job.wait,
         allow_motion: job.allow_motion,
+        ill_as_well: job.qualify,
         interrupt: interrupt_flag(),
     };
     let mut session = match Session::open(rig, &options) {
@@ -145,7 +147,7 @@ fn all(
         bar.suspend(|| output.say(&told));
         bar.inc(1);
         findings.note(&played);
-        if over(&mut run, output) {
+        if played.outcome.verdict == Verdict::RigError || over(&mut run, output) {
             break;
         }
     }
@@ -153,8 +155,12 @@ fn all(
     output.result(&summary(&verdicts, took))?;
     let mut exit = Exit::of(&verdicts, job.require_all);
     if job.qualify && !over(&mut run, output) {
-        let settled = settle(&mut run, &findings, folder.as_mut(), output)?;
-        exit = exit.max(settled);
+        let ill = exit == Exit::RigError;
+        match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
+            // What a drive does wrong is the drive's fault, whatever came of it.
+            Exit::Failed => exit = Exit::Failed,
+            other => exit = exit.max(other),
+        }
     }
     for gap in measured(&mut run) {
         output.say(&gap);

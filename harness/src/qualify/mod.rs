@@ -10,5 +10,5 @@ mod profile;
 
 pub use diagnose::deviating;
 pub use hypothesis::{Evidence, Hypothesis, explaining};
-pub use probes::{Probe, hypotheses, probes};
+pub use probes::{Probe, conversations, hypotheses, probes};
 pub use profile::{Profile, ProfileError, Settled};

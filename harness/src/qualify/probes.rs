@@ -6,8 +6,15 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use harness_proto::novobus::properties::PROPERTIES;
 use include_dir::{Dir, include_dir};
+use std::collections::BTreeSet;
 
 static FILES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/novobus");
+
+static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/novobus");
+
+/// What stands for a drive's number in a conversation that is played for several: the first ones, the middle one and the
+/// last one.
+const EACH: &str = "{drive}";
 
 /// Times that a time-out may have, in milliseconds (ND21 9.9: 10 to 20).
 const TIME_OUTS: std::ops::RangeInclusive<u64> = 10..=20;
@@ -37,7 +44,7 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
             None => None,
             Some(text) => {
                 let source = Source {
-                    name: format!("probe {}", property.name),
+                    name: format!("probe-{}", property.name),
                     text: text.into(),
                 };
                 Some(Entry::new(source, Some(drives))?)
@@ -51,6 +58,43 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
         });
     }
     Ok(probes)
+}
+
+/// The conversations of a qualification that the model alone judges, for a ring of `drives`, by their names.
+///
+/// # Errors
+/// One of them has mistakes.
+pub fn conversations(drives: u8) -> Result<Vec<Entry>, Box<Problems>> {
+    let mut files: Vec<_> = CONVERSATIONS.files().collect();
+    files.sort_by_key(|file| file.path().to_owned());
+    let named = files.into_iter().filter_map(|file| {
+        let name = file.path().file_stem()?.to_str()?;
+        Some((name, file.contents_utf8()?))
+    });
+    let mut entries = Vec::new();
+    for (name, text) in named {
+        let each: Vec<u8> = match text.contains(EACH) {
+            false => vec![0],
+            true => [0, 1, drives / 2, drives.saturating_sub(1)]
+                .into_iter()
+                .filter(|drive| *drive < drives)
+                .collect::<BTreeSet<_>>()
+                .into_iter()
+                .collect(),
+        };
+        for drive in each {
+            let several = text.contains(EACH);
+            let source = Source {
+                name: match several {
+                    true => format!("qualify-{name}-drive-{drive}"),
+                    false => format!("qualify-{name}"),
+                },
+                text: text.replace(EACH, &drive.to_string()).into(),
+            };
+            entries.push(Entry::new(source, Some(drives))?);
+        }
+    }
+    Ok(entries)
 }
 
 /// What a property may be: every drive alike, and then one drive otherwise than the others.

@@ -175,7 +175,13 @@ impl<'s> Run<'s> {
         let outcome = play_one(&mut recording, plan, &way);
         let rings = way.rings.len();
         let traces = (0..rings).map(|ring| recording.trace(ring)).collect();
-        let mut outcome = outcome.map_err(|(ring, ill)| self.session.ill(ring, ill))?;
+        let mut outcome = match outcome {
+            Ok(outcome) => outcome,
+            Err((ring, ill)) if self.session.ill_as_well() => {
+                Outcome::rig_error(self.session.ill(ring, ill).to_string())
+            }
+            Err((ring, ill)) => return Err(self.session.ill(ring, ill)),
+        };
         let ports = self.session.link().inner_mut().ports_mut();
         let unplaced = ports.map_or(0, crate::link::StreamLink::take_unplaced);
         let conversations = Conversation::all(&both.events, self.byte_time, simulated);

@@ -35,6 +35,8 @@ pub struct Options {
     pub wait: Duration,
     /// Whether motors may turn, where the rig's file allows it too.
     pub allow_motion: bool,
+    /// Whether a ring that is ill is taken all the same, to find out what it is.
+    pub ill_as_well: bool,
     /// Set by whoever wants the program to end.
     pub interrupt: Arc<AtomicBool>,
 }
@@ -156,6 +158,7 @@ pub struct Session {
     rings: Vec<RingSize>,
     started: Instant,
     allow_motion: bool,
+    ill_as_well: bool,
     ended: bool,
     // Given back in this order.
     _ports: Vec<PortLock>,
@@ -201,6 +204,7 @@ impl Session {
             rings,
             started: Instant::now(),
             allow_motion: options.allow_motion,
+            ill_as_well: options.ill_as_well,
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
             ended: true,
             _ports: opened.locks,
@@ -208,7 +212,13 @@ impl Session {
         };
         session.listen()?;
         if rig.file.health.before || !rig.is_simulated() {
-            session.health()?;
+            match session.health() {
+                Err(SessionError::Ill { ill, .. })
+                    if options.ill_as_well && !matches!(ill, Unhealthy::Trouble(_)) => {}
+                other => {
+                    other?;
+                }
+            }
         }
         session.ended = rig.is_simulated();
         Ok(session)
@@ -230,6 +240,12 @@ impl Session {
     #[must_use]
     pub fn limits(&self) -> Limits {
         limits(&self.rig, self.allow_motion)
+    }
+
+    /// Whether it goes on although a ring is ill.
+    #[must_use]
+    pub fn ill_as_well(&self) -> bool {
+        self.ill_as_well
     }
 
     /// Its guarded link.
