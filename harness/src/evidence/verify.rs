@@ -101,8 +101,8 @@ pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
                 Some(format!("{file} is not the text that was played")),
             ),
             Ok(text) => {
-                let (outcome, diverged) = again(&recorded, &text, &header, &rig, &mut own);
-                if diverged {
+                let (outcome, stale) = again(&recorded, &text, &header, &rig, &mut own);
+                if stale {
                     own = fresh()?;
                 }
                 recorded.compare(&outcome)
@@ -227,19 +227,18 @@ fn again(
         Ok(outcome) => outcome,
         Err((_, ill)) => Outcome::rig_error(ill.to_string()),
     };
-    let conversations =
-        Conversation::all(&recorded.events, header.rate.byte_time(), header.simulated);
-    let comparisons: Vec<_> = conversations
-        .iter()
-        .map(|conversation| twin.follow(conversation, header.exactness))
-        .collect();
+    let all = Conversation::all(&recorded.events, header.rate.byte_time(), header.simulated);
+    let (conversations, anew) = header.way.compared(all, header.exactness);
+    if anew && let Ok(fresh) = self::twin(rig, &known(rig)) {
+        *twin = fresh;
+    }
+    let (comparisons, stale) = twin.follow_all(&conversations, header.exactness);
     let unplaced = recorded
         .verdict
         .as_ref()
         .map_or(0, |(.., unplaced)| *unplaced);
     judge(&mut outcome, &comparisons, unplaced, &rig.file.deviation);
-    let diverged = comparisons.iter().any(|c| c.divergence.is_some());
-    (outcome, diverged)
+    (outcome, stale)
 }
 
 impl Recorded {

@@ -52,8 +52,7 @@ fn judge(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -
         timely: true,
         ..Evidence::default()
     };
-    for conversation in conversations {
-        let comparison = twin.follow(conversation, exactness);
+    for comparison in twin.follow_all(conversations, exactness).0 {
         if comparison.divergence.is_some() {
             return None;
         }

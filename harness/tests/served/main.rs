@@ -14,7 +14,7 @@ use ring::Served;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-fn link(served: &Served) -> StreamLink {
+fn link(served: &Served, marks: bool) -> StreamLink {
     let wires = served
         .endpoints
         .iter()
@@ -23,7 +23,7 @@ fn link(served: &Served) -> StreamLink {
             let settings = PortSettings {
                 endpoint: endpoint.clone(),
                 rate: Rate::default(),
-                marks: served.marks,
+                marks,
                 low_latency: false,
             };
             let wire = open(&settings).unwrap_or_else(|error| panic!("{endpoint}: {error}"));
@@ -77,7 +77,7 @@ fn all_that_fit(transport: &str, marks: bool, largest: u8) -> usize {
             continue;
         }
         let served = Served::start(model, &sizes, transport, marks, &[]);
-        let mut link = link(&served);
+        let mut link = link(&served, marks);
         for entry in entries {
             let outcome = play_on(&mut link, &entry);
             match outcome.verdict {

@@ -10,7 +10,6 @@ pub(crate) struct Served {
     pub(crate) child: Child,
     pub(crate) endpoints: Vec<Endpoint>,
     pub(crate) sizes: Vec<u8>,
-    pub(crate) marks: bool,
     _folder: tempfile::TempDir,
 }
 
@@ -22,6 +21,18 @@ impl Served {
         transport: &str,
         marks: bool,
         more: &[&str],
+    ) -> Self {
+        Self::start_with(model, sizes, transport, marks, more, &[])
+    }
+
+    /// The same with more lines of the header.
+    pub(crate) fn start_with(
+        model: &str,
+        sizes: &[u8],
+        transport: &str,
+        marks: bool,
+        more: &[&str],
+        lines: &[&str],
     ) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let names: Vec<_> = sizes.iter().map(u8::to_string).collect();
@@ -38,6 +49,7 @@ impl Served {
                 _ => format!("drive {ring}0..last input GPIN3 GPIN5 high\n"),
             })
             .collect();
+        let header = header + &lines.join("\n") + "\n";
         std::fs::write(&setup, header).expect("room");
         command.arg("--setup").arg(&setup);
         let mut paths: Vec<PathBuf> = Vec::new();
@@ -73,7 +85,6 @@ impl Served {
             child,
             endpoints,
             sizes: sizes.to_vec(),
-            marks,
             _folder: folder,
         }
     }
