@@ -1,6 +1,8 @@
-//! The built-in scenarios and rigs are embedded: a new file makes the library be built again.
+//! The built-in scenarios, probes and rigs are embedded: a new file makes the library be built again.
 
 fn main() {
     println!("cargo:rerun-if-changed=corpora/scenarios");
+    println!("cargo:rerun-if-changed=corpora/probes");
+    println!("cargo:rerun-if-changed=corpora/qualify");
     println!("cargo:rerun-if-changed=rigs");
 }

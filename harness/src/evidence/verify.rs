@@ -85,7 +85,9 @@ pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
             "the record's first line holds what cannot be".to_owned(),
         )
     })?;
-    verified.complete = whole && matches!(lines.last(), Some(Line::End { .. }));
+    // The sums are written last.
+    verified.complete =
+        whole && path.join(SUMS).exists() && matches!(lines.last(), Some(Line::End { .. }));
     let fresh = || {
         twin(&rig, &known(&rig)).map_err(|problems| {
             EvidenceError::Foreign(path.display().to_string(), problems.to_string())
@@ -95,6 +97,9 @@ pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
     for recorded in group(&lines[1..]) {
         let file = format!("{SCENARIOS}/{}.scn", recorded.name);
         let finding = match std::fs::read_to_string(path.join(&file)) {
+            _ if !is_name(&recorded.name) => {
+                recorded.with("aborted", Some("this is no name of a scenario".to_owned()))
+            }
             Err(error) => recorded.with("aborted", Some(format!("{file}: {error}"))),
             Ok(text) if sum(text.as_bytes()) != recorded.sha256 => recorded.with(
                 "aborted",
@@ -191,6 +196,12 @@ fn group(lines: &[Line]) -> Vec<Recorded> {
     all
 }
 
+/// Whether a name leads to a file of the folder and nowhere else.
+fn is_name(name: &str) -> bool {
+    let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
+    !name.is_empty() && !name.starts_with('.') && name.chars().all(safe)
+}
+
 /// Plays an attempt again from its record, and says whether the twin found something.
 fn again(
     recorded: &Recorded,
@@ -278,8 +289,9 @@ impl Recorded {
 
 /// What is wrong with the files of a folder; nothing where there are no sums, as of a run that did not end.
 fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
-    let Ok(stated) = std::fs::read_to_string(path.join(SUMS)) else {
-        return Ok(Vec::new());
+    let stated = match std::fs::read(path.join(SUMS)) {
+        Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
+        Err(_) => return Ok(Vec::new()),
     };
     let table = |text: &str| -> BTreeMap<String, String> {
         let pairs = text.lines().filter_map(|line| line.split_once("  "));

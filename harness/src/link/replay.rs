@@ -181,7 +181,9 @@ impl Link for Replay {
                 bytes
             }
             other => {
-                self.events.extend(other);
+                if let Some(other) = other {
+                    self.events.push_front(other);
+                }
                 self.otherwise("SYNCO that let the ring spell out its address");
                 Vec::new()
             }

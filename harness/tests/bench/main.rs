@@ -135,6 +135,9 @@ fn a_ring_is_qualified_and_its_evidence_judged_again() {
         changed.replace_range(byte..byte + 2, "5B");
         std::fs::write(&record, changed).expect("room");
         ended(&verify(&folder), 1, "run.jsonl was changed");
+        std::fs::write(&record, &text).expect("room");
+        std::fs::write(folder.join("SHA256SUMS"), [0xFF, 0xFE]).expect("room");
+        ended(&verify(&folder), 1, "was added");
         // A run that was killed leaves half a line, and no sums.
         std::fs::write(&record, &text[..byte]).expect("room");
         std::fs::remove_file(folder.join("SHA256SUMS")).expect("sums");
