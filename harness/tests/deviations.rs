@@ -4,17 +4,16 @@
 //! alone, with `faults` that a bench injects, or only by a `look` into the drive or at its plugs.
 //! `DEVIATIONS=update cargo test --test deviations` plays everything with everything and writes the file anew.
 
+mod blind;
+
+use blind::Blind;
 use harness::library::{Entry, sources};
-use harness::link::{Capability, Line, Link, Moment, PlacedFault, Shown, SimulatedLink};
+use harness::link::{Capability, Line, Link};
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
-use harness_proto::line::Received;
-use harness_proto::novobus::error::BusError;
-use harness_proto::time::{Instant, Span};
 use harness_sim::deviation::{Deviation, deviations};
-use harness_sim::trace::Trace;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -36,66 +35,6 @@ struct Found {
     wire: Option<String>,
     faults: Option<String>,
     look: Option<String>,
-}
-
-/// A simulated link of which only the bytes at the master can be seen.
-struct Blind(SimulatedLink);
-
-impl Line for Blind {
-    fn byte_time(&self) -> Span {
-        self.0.byte_time()
-    }
-    fn now(&self) -> Instant {
-        self.0.now()
-    }
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        self.0.send(ring, bytes)
-    }
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        self.0.receive(ring)
-    }
-    fn wait(&mut self, until: Instant) -> bool {
-        self.0.wait(until)
-    }
-}
-
-impl Link for Blind {
-    fn capabilities(&self) -> &[Capability] {
-        self.0.capabilities()
-    }
-    fn begin(&mut self) {
-        self.0.begin();
-    }
-    fn busy(&self) -> bool {
-        self.0.busy()
-    }
-    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
-        self.0.inject(ring, fault, moment);
-    }
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        self.0.probe(ring, count)
-    }
-    fn error_of(&self, _ring: usize, _drive: u8) -> Option<Option<BusError>> {
-        None
-    }
-    fn shown(&self, _ring: usize, _drive: u8) -> Option<Shown> {
-        None
-    }
-    fn peek(&self, _ring: usize, _drive: u8, _address: u16) -> Option<u8> {
-        None
-    }
-    fn unused_faults(&self) -> Vec<String> {
-        self.0.unused_faults()
-    }
-    fn carried(&self) -> u64 {
-        self.0.carried()
-    }
-    fn drives(&self, ring: usize) -> u8 {
-        self.0.drives(ring)
-    }
-    fn trace(&self, ring: usize) -> Trace {
-        self.0.trace(ring)
-    }
 }
 
 /// How a scenario finds a deviation.

@@ -1,16 +1,13 @@
 //! What is waited for, what is recorded, and what cannot be seen.
 
+use super::blind::Blind;
 use super::drives::{nd21, plain};
 use super::{entry, fails, passes, play, refused};
-use harness::link::{Capability, Line, Link, Moment, PlacedFault, Shown};
 use harness::report::plot::plot;
 use harness::scenario::run::{Outcome, run};
 use harness::scenario::simulate::simulated;
 use harness::scenario::verdict::Verdict;
-use harness_proto::line::Received;
-use harness_proto::novobus::error::BusError;
-use harness_proto::time::{Instant, Span};
-use harness_sim::trace::Trace;
+use harness_proto::time::Span;
 
 #[test]
 fn until_waits_for_what_must_hold() {
@@ -199,66 +196,6 @@ fn records_that_cannot_be_are_refused_and_bounded() {
     assert_eq!(outcome.verdict, Verdict::Aborted);
     let message = outcome.finding.expect("a finding").message;
     assert!(message.contains("more than 1000000 samples"), "{message}");
-}
-
-/// A link that shows nothing of its drives: a ring of which only the master's ends are known.
-struct Blind<L>(L);
-
-impl<L: Link> Line for Blind<L> {
-    fn byte_time(&self) -> Span {
-        self.0.byte_time()
-    }
-    fn now(&self) -> Instant {
-        self.0.now()
-    }
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        self.0.send(ring, bytes)
-    }
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        self.0.receive(ring)
-    }
-    fn wait(&mut self, until: Instant) -> bool {
-        self.0.wait(until)
-    }
-}
-
-impl<L: Link> Link for Blind<L> {
-    fn capabilities(&self) -> &[Capability] {
-        self.0.capabilities()
-    }
-    fn begin(&mut self) {
-        self.0.begin();
-    }
-    fn busy(&self) -> bool {
-        self.0.busy()
-    }
-    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
-        self.0.inject(ring, fault, moment);
-    }
-    fn shown(&self, _: usize, _: u8) -> Option<Shown> {
-        None
-    }
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        self.0.probe(ring, count)
-    }
-    fn error_of(&self, _: usize, _: u8) -> Option<Option<BusError>> {
-        None
-    }
-    fn peek(&self, _: usize, _: u8, _: u16) -> Option<u8> {
-        None
-    }
-    fn unused_faults(&self) -> Vec<String> {
-        self.0.unused_faults()
-    }
-    fn carried(&self) -> u64 {
-        self.0.carried()
-    }
-    fn drives(&self, ring: usize) -> u8 {
-        self.0.drives(ring)
-    }
-    fn trace(&self, ring: usize) -> Trace {
-        self.0.trace(ring)
-    }
 }
 
 fn play_blind(lines: &str) -> Outcome {

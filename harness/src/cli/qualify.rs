@@ -4,6 +4,7 @@
 use super::args::QualifyArguments;
 use super::exit::Exit;
 use super::output::Output;
+use super::rig_failure::find_rig;
 use super::run::{details, line, select};
 use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
@@ -11,7 +12,7 @@ use crate::qualify::{
     Evidence, Hypothesis, Profile, Settled, conversations, deviating, explaining, hypotheses,
     probes,
 };
-use crate::rig::{self, Played, Run, find, state};
+use crate::rig::{Played, Run, state};
 use crate::scenario::verdict::Verdict;
 use crate::twin::Conversation;
 use std::collections::BTreeMap;
@@ -59,16 +60,8 @@ impl Findings {
 
 /// Qualifies a rig.
 pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let rig = match find(&arguments.rig, &rig::find::folder()) {
-        Ok(rig) => rig,
-        Err(rig::FindError::Mistakes(problems)) => {
-            output.mistakes(&problems);
-            return Ok(Exit::Usage);
-        }
-        Err(error) => {
-            output.complain(&error.to_string());
-            return Ok(Exit::Usage);
-        }
+    let Some(rig) = find_rig(&arguments.rig, output) else {
+        return Ok(Exit::Usage);
     };
     let size = rig.file.ring.first.drives;
     let entries = match select(&arguments.selection, Some(size)) {

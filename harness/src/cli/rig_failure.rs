@@ -3,10 +3,26 @@
 use super::exit::Exit;
 use super::output::Output;
 use crate::guard::SafeState;
+use crate::rig::find::folder;
 use crate::rig::lock::LockError;
-use crate::rig::{End, SessionError};
+use crate::rig::{End, FindError, Rig, SessionError, find};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+
+/// The rig of this name; what is wrong with it is told.
+pub(super) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
+    match find(name, &folder()) {
+        Ok(rig) => Some(rig),
+        Err(FindError::Mistakes(problems)) => {
+            output.mistakes(&problems);
+            None
+        }
+        Err(error) => {
+            output.complain(&error.to_string());
+            None
+        }
+    }
+}
 
 /// A flag that SIGINT and SIGTERM set: what is under way ends in the rig's safe state.
 pub(super) fn interrupt_flag() -> Arc<AtomicBool> {

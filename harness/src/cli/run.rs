@@ -3,12 +3,13 @@
 use super::args::{RunArguments, Selection};
 use super::exit::Exit;
 use super::output::Output;
+use super::rig_failure::find_rig;
 use super::run_rig::{Job, work};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
 use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
-use crate::rig::{self, Rig, find};
+use crate::rig::Rig;
 use crate::scenario::parse::parse;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
@@ -53,12 +54,13 @@ pub(super) fn select(
 
 /// Plays scenarios, one line each.
 pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let size = match (&arguments.rig, arguments.ring) {
-        (None, ring) => ring,
-        (Some(name), _) => find(name, &rig::find::folder())
-            .ok()
-            .map(|rig| rig.file.ring.first.drives),
+    let rig = match arguments.rig.as_deref().map(|name| find_rig(name, output)) {
+        None => None,
+        Some(Some(rig)) => Some(rig),
+        Some(None) => return Ok(Exit::Usage),
     };
+    let own = rig.as_ref().map(|rig| rig.file.ring.first.drives);
+    let size = own.or(arguments.ring);
     let entries = match select(&arguments.selection, size) {
         Ok(entries) => entries,
         Err(errors) => {
@@ -71,20 +73,6 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         output.complain("no scenario was selected; `drivebench list` shows what there is");
         return Ok(Exit::NothingSelected);
     }
-    let rig = match &arguments.rig {
-        None => None,
-        Some(name) => match find(name, &rig::find::folder()) {
-            Ok(rig) => Some(rig),
-            Err(rig::FindError::Mistakes(problems)) => {
-                output.mistakes(&problems);
-                return Ok(Exit::Usage);
-            }
-            Err(error) => {
-                output.complain(&error.to_string());
-                return Ok(Exit::Usage);
-            }
-        },
-    };
     let recorded = arguments.evidence.is_some();
     if let Some(rig) = rig.as_ref().filter(|rig| recorded || !rig.is_simulated()) {
         let job = Job {

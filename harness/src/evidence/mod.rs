@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `run.jsonl` | the record: a line an event, written at once, so that a killed run keeps what it saw |
-//! | `rig.toml` | the rig's file as it was |
+//! | `rig.toml` | the rig's file with every default filled in |
 //! | `scenarios/*.scn` | the scenarios as they were |
 //! | `captures/*.json` | what each link carried, in the form of `drivebench trace --format json` |
 //! | `junit.xml`, `report.txt` | the verdicts, for programs and for people |

@@ -5,6 +5,7 @@
 //! so it delays the ring by one byte time and by what the computer needs; [`Delay`] measures the latter.
 
 use super::Trouble;
+use super::stream::stamped;
 use super::tamper::Tamper;
 use crate::port::{Outgoing, Wire};
 use harness_proto::line::{LineError, Received};
@@ -161,12 +162,7 @@ impl InnerLink {
         };
         let result = up.receive(&mut bytes);
         let read = time::Instant::now();
-        let mut left = bytes.len() as u64;
-        for byte in bytes {
-            left -= 1;
-            let before = now.since_start().saturating_sub(byte_time * left);
-            let at = (Instant::START + before).max(self.last_arrival);
-            self.last_arrival = at;
+        for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
             self.carried += 1;
             let seen = if passes {
                 self.pass(at, byte, byte_time, read)

@@ -229,7 +229,10 @@ pub trait Link: Line {
     fn probe(&mut self, ring: usize, count: usize) -> Vec<Received>;
 
     /// Whether a drive is in the error mode, and why; `None` where this cannot be seen.
-    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>>;
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
+        let _unseen = (ring, drive);
+        None
+    }
 
     /// Lets something happen to a drive from outside the bus, now.
     fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
@@ -237,10 +240,16 @@ pub trait Link: Line {
     }
 
     /// What a drive shows outside the bus; `None` where this cannot be seen.
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown>;
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
+        let _unseen = (ring, drive);
+        None
+    }
 
     /// A drive's cell; `None` where this cannot be seen.
-    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8>;
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
+        let _unseen = (ring, drive, address);
+        None
+    }
 
     /// Faults whose moment never came, in words.
     fn unused_faults(&self) -> Vec<String>;

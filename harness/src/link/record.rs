@@ -3,9 +3,8 @@
 //! What a recorded link shows is what a rig shows: bytes and times. Cells, the error mode and what stands outside the
 //! bus are hidden, so that a record suffices to judge a conversation again.
 
-use super::{Capability, Line, Link, Moment, PlacedFault, Shown, Stimulus, Trouble};
+use super::{Capability, Line, Link, Moment, PlacedFault, Stimulus, Trouble};
 use harness_proto::line::Received;
-use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
 
@@ -151,20 +150,8 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         bytes
     }
 
-    fn error_of(&self, _ring: usize, _drive: u8) -> Option<Option<BusError>> {
-        None
-    }
-
     fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
         self.inject(ring, PlacedFault::Stimulus(drive, stimulus), Moment::Now);
-    }
-
-    fn shown(&self, _ring: usize, _drive: u8) -> Option<Shown> {
-        None
-    }
-
-    fn peek(&self, _ring: usize, _drive: u8, _address: u16) -> Option<u8> {
-        None
     }
 
     fn unused_faults(&self) -> Vec<String> {

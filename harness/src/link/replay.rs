@@ -3,9 +3,8 @@
 //! The record's order decides: a byte comes where it came before, behind the same bytes sent. Who sends something
 //! else than was sent then finds the link in trouble. Time is that of the record.
 
-use super::{Capability, Event, Line, Link, Moment, PlacedFault, Shown, Trouble};
+use super::{Capability, Event, Line, Link, Moment, PlacedFault, Trouble};
 use harness_proto::line::{Rate, Received};
-use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
 use std::collections::VecDeque;
@@ -188,18 +187,6 @@ impl Link for Replay {
                 Vec::new()
             }
         }
-    }
-
-    fn error_of(&self, _ring: usize, _drive: u8) -> Option<Option<BusError>> {
-        None
-    }
-
-    fn shown(&self, _ring: usize, _drive: u8) -> Option<Shown> {
-        None
-    }
-
-    fn peek(&self, _ring: usize, _drive: u8, _address: u16) -> Option<u8> {
-        None
     }
 
     fn unused_faults(&self) -> Vec<String> {

@@ -6,10 +6,9 @@
 
 use super::inner::InnerLink;
 use super::tamper::Tamper;
-use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Shown, Trouble, link_name};
+use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name};
 use crate::port::{Outgoing, Wire};
 use harness_proto::line::{Rate, Received};
-use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::link::LineByte;
@@ -335,12 +334,7 @@ impl Ring {
         let mut bytes = Vec::new();
         let result = self.wire.receive(&mut bytes);
         self.unplaced += self.wire.take_unplaced();
-        let mut left = bytes.len() as u64;
-        for byte in bytes {
-            left -= 1;
-            let before = now.since_start().saturating_sub(byte_time * left);
-            let at = (Instant::START + before).max(self.last_arrival);
-            self.last_arrival = at;
+        for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
             self.came += 1;
             self.carried += 1;
             let passed = self.incoming.pass(byte, at);
@@ -521,18 +515,6 @@ impl Link for StreamLink {
         bytes
     }
 
-    fn error_of(&self, _ring: usize, _drive: u8) -> Option<Option<BusError>> {
-        None
-    }
-
-    fn shown(&self, _ring: usize, _drive: u8) -> Option<Shown> {
-        None
-    }
-
-    fn peek(&self, _ring: usize, _drive: u8, _address: u16) -> Option<u8> {
-        None
-    }
-
     fn unused_faults(&self) -> Vec<String> {
         let mut unused = Vec::new();
         for (index, ring) in self.rings.iter().enumerate() {
@@ -589,6 +571,23 @@ impl Link for StreamLink {
             marks: Vec::new(),
         }
     }
+}
+
+/// Bytes that were read together, each with the time at which it came: the last one now, each before it a byte time
+/// sooner, and none before the one that was read last.
+pub(super) fn stamped(
+    bytes: Vec<Received>,
+    now: Instant,
+    byte_time: Span,
+    last: &mut Instant,
+) -> Vec<(Instant, Received)> {
+    let behind = (0..bytes.len() as u64).rev();
+    let stamp = |(byte, behind)| {
+        let at = Instant::START + now.since_start().saturating_sub(byte_time * behind);
+        *last = at.max(*last);
+        (*last, byte)
+    };
+    bytes.into_iter().zip(behind).map(stamp).collect()
 }
 
 /// The drive in front of the `place`-th link of a ring of `drives`; `None` for the master.

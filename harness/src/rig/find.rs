@@ -152,8 +152,11 @@ fn rig_name(path: &Path) -> Option<String> {
     Some(path.file_stem()?.to_str()?.to_owned())
 }
 
-/// The file of a simulated bench of which only the sizes of its rings are said.
-fn simulated(sizes: &str) -> Result<String, String> {
+/// The sizes of the rings of `sim:N` and `sim:N,M`, given what stands behind the colon.
+///
+/// # Errors
+/// What is wrong, in a sentence.
+pub fn sizes(text: &str) -> Result<Vec<u8>, String> {
     let size = |text: &str| {
         let number: u64 = text.parse().map_err(|_| {
             format!("`{text}` is no number of drives: 1 to 250 expected (ND21 8.4)")
@@ -162,7 +165,16 @@ fn simulated(sizes: &str) -> Result<String, String> {
             .map(RingSize::drives)
             .map_err(|error| error.to_string())
     };
-    let sizes = sizes.split(',').map(size).collect::<Result<Vec<_>, _>>()?;
+    let sizes = text.split(',').map(size).collect::<Result<Vec<_>, _>>()?;
+    match sizes.len() {
+        1 | 2 => Ok(sizes),
+        _ => Err("a bench has one ring or two (ND21 12.2)".to_owned()),
+    }
+}
+
+/// The file of a simulated bench of which only the sizes of its rings are said.
+fn simulated(sizes: &str) -> Result<String, String> {
+    let sizes = self::sizes(sizes)?;
     let ring = |number: usize| {
         let drives = sizes[number];
         let prefix = ["", "2:"][number];
@@ -174,10 +186,7 @@ fn simulated(sizes: &str) -> Result<String, String> {
             format!("\"drive {prefix}0..last input GPIN3 GPIN5 high\""),
         )
     };
-    let (rings, setups): (Vec<_>, Vec<_>) = match sizes.len() {
-        count @ 1..=2 => (0..count).map(ring).unzip(),
-        _ => return Err("a bench has one ring or two (ND21 12.2)".to_owned()),
-    };
+    let (rings, setups): (Vec<_>, Vec<_>) = (0..sizes.len()).map(ring).unzip();
     let id: Vec<_> = sizes.iter().map(u8::to_string).collect();
     Ok(format!(
         "schema = 1\n[rig]\nid = \"sim-{}\"\n{}[sim]\nsetup = [{}]\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n",

@@ -10,7 +10,6 @@ use crate::scenario::plan::{Plan, plan};
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use harness_proto::nd21::units::Drive;
-use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use std::path::Path;
 use std::str::FromStr;
@@ -38,19 +37,7 @@ impl FromStr for RigName {
                  sim:N, a simulated ring of N drives (sim:3), and sim:N,M, two of them (sim:2,3)"
             ));
         };
-        let size = |text: &str| {
-            let number: u64 = text.parse().map_err(|_| {
-                format!("`{text}` is no number of drives: 1 to 250 expected (ND21 8.4)")
-            })?;
-            RingSize::new(number)
-                .map(RingSize::drives)
-                .map_err(|error| error.to_string())
-        };
-        let sizes = sizes.split(',').map(size).collect::<Result<Vec<_>, _>>()?;
-        if sizes.len() > 2 {
-            return Err("a bench has one ring or two (ND21 12.2)".to_owned());
-        }
-        Ok(Self::Simulated(sizes))
+        crate::rig::find::sizes(sizes).map(Self::Simulated)
     }
 }
 

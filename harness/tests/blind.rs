@@ -1,0 +1,57 @@
+//! A link of which only the bytes at the master can be seen.
+
+use harness::link::{Capability, Line, Link, Moment, PlacedFault};
+use harness_proto::line::Received;
+use harness_proto::time::{Instant, Span};
+use harness_sim::trace::Trace;
+
+/// A link that shows nothing of its drives: a ring of which only the master's ends are known.
+pub(crate) struct Blind<L>(pub(crate) L);
+
+impl<L: Link> Line for Blind<L> {
+    fn byte_time(&self) -> Span {
+        self.0.byte_time()
+    }
+    fn now(&self) -> Instant {
+        self.0.now()
+    }
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        self.0.send(ring, bytes)
+    }
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        self.0.receive(ring)
+    }
+    fn wait(&mut self, until: Instant) -> bool {
+        self.0.wait(until)
+    }
+}
+
+impl<L: Link> Link for Blind<L> {
+    fn capabilities(&self) -> &[Capability] {
+        self.0.capabilities()
+    }
+    fn begin(&mut self) {
+        self.0.begin();
+    }
+    fn busy(&self) -> bool {
+        self.0.busy()
+    }
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        self.0.inject(ring, fault, moment);
+    }
+    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+        self.0.probe(ring, count)
+    }
+    fn unused_faults(&self) -> Vec<String> {
+        self.0.unused_faults()
+    }
+    fn carried(&self) -> u64 {
+        self.0.carried()
+    }
+    fn drives(&self, ring: usize) -> u8 {
+        self.0.drives(ring)
+    }
+    fn trace(&self, ring: usize) -> Trace {
+        self.0.trace(ring)
+    }
+}
