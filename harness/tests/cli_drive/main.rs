@@ -127,7 +127,7 @@ fn benches_and_drives_that_are_not_there_are_refused() {
     for (line, part) in [
         (
             "read 0 nist --rig cabinet",
-            "benches with real drives come later",
+            "the commands on drives know simulated benches only",
         ),
         ("read 0 nist --rig cabinet", "sim:3"),
         ("read 0 nist --rig sim:", "no number of drives"),

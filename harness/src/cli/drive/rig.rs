@@ -1,4 +1,4 @@
-//! Benches by name. Until there are others, simulated ones: `sim:3`, and `sim:2,3` with two rings.
+//! The benches that commands on drives know, simulated ones as yet: `sim:3`, and `sim:2,3` with two rings.
 
 use super::args::RigArguments;
 use super::failure::Failure;
@@ -33,7 +33,7 @@ impl FromStr for RigName {
     fn from_str(text: &str) -> Result<Self, String> {
         let Some(sizes) = text.strip_prefix("sim:") else {
             return Err(format!(
-                "there is no bench `{text}`: benches with real drives come later; until then there are \
+                "there is no bench `{text}`: the commands on drives know simulated benches only, as yet: \
                  sim:N, a simulated ring of N drives (sim:3), and sim:N,M, two of them (sim:2,3)"
             ));
         };
