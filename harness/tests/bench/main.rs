@@ -6,7 +6,7 @@ mod ring;
 
 use harness::port::Endpoint;
 use ring::Served;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -73,6 +73,17 @@ fn finish(mut child: Child) -> Output {
         std::thread::sleep(Duration::from_millis(20));
     }
     child.wait_with_output().expect("its output")
+}
+
+/// Waits until the first scenario has been played, whatever the machine is busy with: the rig is in use then, and more are to come.
+#[track_caller]
+fn playing(child: &mut Child) {
+    let out = child.stdout.as_mut().expect("its output");
+    let mut byte = [0];
+    while byte != *b"\n" {
+        out.read_exact(&mut byte)
+            .expect("a line for the first scenario");
+    }
 }
 
 fn verify(folder: &Path) -> Output {
@@ -284,11 +295,11 @@ fn an_interruption_ends_in_the_safe_state() {
     for name in ["-INT", "-TERM"] {
         let served = Served::start("nd21", &[2], "tcp", true, &[]);
         let desk = Desk::of(&served);
-        let child = desk
+        let mut child = desk
             .command(&["run", "--allow-motion"])
             .spawn()
             .expect("the program");
-        std::thread::sleep(Duration::from_millis(700));
+        playing(&mut child);
         signal(&child, name);
         let output = finish(child);
         ended(&output, 130, "2 drives are stopped, standing and blocked");
@@ -299,11 +310,11 @@ fn an_interruption_ends_in_the_safe_state() {
 fn a_port_that_vanishes_ends_the_run() {
     let mut served = Served::start("nd21", &[2], "tcp", true, &[]);
     let desk = Desk::of(&served);
-    let child = desk
+    let mut child = desk
         .command(&["run", "--allow-motion"])
         .spawn()
         .expect("the program");
-    std::thread::sleep(Duration::from_millis(700));
+    playing(&mut child);
     let _gone = served.child.kill();
     let output = finish(child);
     ended(&output, 7, "the safe state is NOT confirmed");
