@@ -48,7 +48,7 @@ fn no_answer() -> Error {
 }
 
 /// Sends some bytes and then the telegram that counts; `None` where nothing sensible comes back.
-fn count_behind(link: &mut dyn Line, ring: usize, before: &[u8]) -> Option<RingSize> {
+pub(crate) fn count_behind(link: &mut dyn Line, ring: usize, before: &[u8]) -> Option<RingSize> {
     let mut bytes = before.to_vec();
     bytes.extend([SYNCO, SYNCO]);
     bytes.extend(COUNT);

@@ -19,6 +19,7 @@ mod s_ramp;
 mod scope;
 
 pub use axis::Axis;
+pub(crate) use discovery::count_behind;
 pub use discovery::{Identity, Recovery, State, count_drives, recover};
 pub use error::Error;
 pub use s_ramp::SkStatus;

@@ -86,6 +86,12 @@ impl<L: Line> Guarded<L> {
         }
     }
 
+    /// Whether every drive waits for a telegram, as far as what was sent tells.
+    #[must_use]
+    pub fn at_rest(&self) -> bool {
+        self.trouble().is_none() && self.rings.iter().all(|ring| ring.guard.at_rest())
+    }
+
     /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](super::safe_state).
     pub fn reset_after_denial(&mut self) {
         self.trouble = None;

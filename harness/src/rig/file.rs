@@ -427,6 +427,9 @@ pub struct Health {
     pub before: bool,
     /// Between scenarios; default true.
     pub between: bool,
+    /// Whether a ring that this program left at rest is opened without the check sequence, whose zeros put every drive in
+    /// error 0504 and stop its motor (ND21 9.8); default false. For rigs whose port no other program uses.
+    pub quiet: bool,
     /// How often, before the rig is called ill: 1 to 10; default 2.
     #[schemars(range(min = 1, max = 10))]
     pub attempts: u8,
@@ -437,6 +440,7 @@ impl Default for Health {
         Self {
             before: true,
             between: true,
+            quiet: false,
             attempts: 2,
         }
     }

@@ -7,7 +7,7 @@ use super::hook::{self, HookError};
 use super::lock::{LockError, PortLock, RigLock};
 use super::open::{OpenRigError, open};
 use super::state;
-use crate::bus::recover;
+use crate::bus::{Axis, count_behind, recover};
 use crate::guard::{Guarded, SafeState, safe_state};
 use crate::link::{Line, Link, StreamLink, Trouble};
 use harness_proto::line::Received;
@@ -20,8 +20,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// How long a rig is listened to before anything is sent.
+/// How long a rig must be silent before anything is sent.
 const LISTEN: Span = Span::from_millis(40);
+
+/// How long what was sent may be on its way round a ring of 250 drives, adapters counted (ND21 8.2).
+const LONGEST_ROUND: Span = Span::from_millis(1_000);
 
 /// Bytes of somebody else's that are shown.
 const SHOWN: usize = 8;
@@ -160,6 +163,8 @@ pub struct Session {
     allow_motion: bool,
     ill_as_well: bool,
     ended: bool,
+    /// What the check at its opening found.
+    opening: Option<Health>,
     // Given back in this order.
     _ports: Vec<PortLock>,
     _lock: Option<RigLock>,
@@ -207,17 +212,16 @@ impl Session {
             ill_as_well: options.ill_as_well,
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
             ended: true,
+            opening: None,
             _ports: opened.locks,
             _lock: lock,
         };
         session.listen()?;
-        if rig.file.health.before || !rig.is_simulated() {
+        if !session.opens_quietly() && (rig.file.health.before || !rig.is_simulated()) {
             match session.health() {
                 Err(SessionError::Ill { ill, .. })
                     if options.ill_as_well && !matches!(ill, Unhealthy::Trouble(_)) => {}
-                other => {
-                    other?;
-                }
+                other => session.opening = Some(other?),
             }
         }
         session.ended = rig.is_simulated();
@@ -236,6 +240,14 @@ impl Session {
         &self.rings
     }
 
+    /// Its drives, ring after ring.
+    #[must_use]
+    pub fn axes(&self) -> Vec<Axis> {
+        let rings = self.rings.iter().enumerate();
+        let drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
+        drives.filter_map(|(ring, k)| Axis::new(ring, k)).collect()
+    }
+
     /// What its file and the command line allow together.
     #[must_use]
     pub fn limits(&self) -> Limits {
@@ -246,6 +258,12 @@ impl Session {
     #[must_use]
     pub fn ill_as_well(&self) -> bool {
         self.ill_as_well
+    }
+
+    /// What the health check at its opening found; `None` where there was none, or where it found a ring ill.
+    #[must_use]
+    pub fn opening(&self) -> Option<&Health> {
+        self.opening.as_ref()
     }
 
     /// Its guarded link.
@@ -270,15 +288,50 @@ impl Session {
         if self.rig.is_simulated() {
             return Ok(());
         }
-        let end = self.link.now() + LISTEN;
-        while self.link.now() < end && self.link.wait(end) {}
-        for ring in 0..self.rings.len() {
-            let bytes = self.take(ring);
-            if !bytes.is_empty() {
-                return Err(self.ill(ring, Unhealthy::talking(&bytes)));
+        let mut heard = vec![Vec::new(); self.rings.len()];
+        let end = self.link.now() + LONGEST_ROUND;
+        let mut silent = self.link.now() + LISTEN;
+        while self.link.now() < silent && self.link.wait(silent) {
+            for (ring, heard) in heard.iter_mut().enumerate() {
+                let before = heard.len();
+                heard.extend(self.take(ring));
+                // It may be what is left of a conversation whose bench was killed.
+                if heard.len() > before {
+                    silent = self.link.now() + LISTEN;
+                }
+            }
+            if self.link.now() > end {
+                break;
             }
         }
-        Ok(())
+        if self.link.now() <= end {
+            return Ok(());
+        }
+        match heard.iter().position(|heard| !heard.is_empty()) {
+            Some(ring) => Err(self.ill(ring, Unhealthy::talking(&heard[ring]))),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether the rig was left at rest and its drives answer: then they are asked nothing more, and go on as they are.
+    fn opens_quietly(&mut self) -> bool {
+        if self.rig.is_simulated() {
+            return false;
+        }
+        let left = state::folder().is_ok_and(|folder| state::take_rest(&folder, self.rig.id()));
+        if !left || !self.rig.file.health.quiet {
+            return false;
+        }
+        self.link.assume_fresh();
+        let counted = |session: &mut Self, ring: usize, size: RingSize| {
+            count_behind(&mut session.link, ring, &[]) == Some(size)
+        };
+        let rings = self.rings.clone();
+        let sound = (0..)
+            .zip(rings)
+            .all(|(ring, size)| counted(self, ring, size));
+        self.link.begin();
+        sound
     }
 
     fn take(&mut self, ring: usize) -> Vec<Received> {
@@ -317,6 +370,19 @@ impl Session {
         self.end(true)
     }
 
+    /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn.
+    #[must_use]
+    pub fn release(mut self) -> End {
+        self.ended = true;
+        let mut end = End {
+            safe: None,
+            remarks: Vec::new(),
+        };
+        self.come_home();
+        self.run_last_hooks(false, &mut end);
+        end
+    }
+
     fn end(&mut self, error: bool) -> End {
         let mut end = End {
             safe: None,
@@ -332,6 +398,7 @@ impl Session {
             self.link.begin();
             self.link.reset_after_denial();
             end.safe = Some(safe_state(&mut self.link, &self.rings));
+            self.come_home();
             let order = self.rig.file.safe_state.order.clone();
             if order.contains(&SafeStep::PowerOff) {
                 for (name, power) in &self.rig.file.power {
@@ -342,17 +409,34 @@ impl Session {
                 }
             }
         }
-        let hooks = self.rig.file.hooks.clone();
+        self.run_last_hooks(error, &mut end);
+        end
+    }
+
+    /// Waits until what was sent has come round, and keeps that the rig is left at rest where it is.
+    fn come_home(&mut self) {
+        let end = self.link.now() + LONGEST_ROUND;
+        while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
+        if self.rig.is_simulated() || !self.link.at_rest() || self.link.busy() {
+            return;
+        }
+        if let Ok(folder) = state::folder() {
+            // Where it cannot be kept, the next one sends the check sequence.
+            let _unkept = state::left_at_rest(&folder, self.rig.id());
+        }
+    }
+
+    fn run_last_hooks(&self, error: bool, end: &mut End) {
+        let hooks = &self.rig.file.hooks;
         let after = [
-            ("after", hooks.after),
-            ("on_error", hooks.on_error.filter(|_| error)),
+            ("after", hooks.after.as_ref()),
+            ("on_error", hooks.on_error.as_ref().filter(|_| error)),
         ];
         for (name, entry) in after {
-            if let Err(error) = run_hook(&self.rig, name, entry.as_ref()) {
+            if let Err(error) = run_hook(&self.rig, name, entry) {
                 end.remarks.push(error.to_string());
             }
         }
-        end
     }
 }
 

@@ -1,7 +1,7 @@
 //! Simulated rigs: what their drives are before anything is sent.
 
 use super::check::Rig;
-use super::file::RigFile;
+use super::file::{DriveEntry, RigFile};
 use crate::scenario::expression::{Expression, Located};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::{Plan, plan};
@@ -9,6 +9,9 @@ use crate::scenario::problem::{Problems, Span};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{Drives, Scenario, Setup, SetupKind};
 use harness_sim::drive::Model;
+
+/// The types of the device that a header knows, and a model of a rig's file begins with behind `ND21-`.
+const TYPES: [&str; 4] = ["5605", "5610", "5615", "5620"];
 
 impl Rig {
     /// The setup of a simulated rig, as `scenario::simulate::bench` takes it: whole ND21s where its file names
@@ -33,8 +36,10 @@ impl Rig {
 pub(super) fn settle(name: &str, file: &RigFile, more: &[String]) -> Result<Plan, Problems> {
     let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
     let sizes: Vec<_> = rings.map(|ring| ring.drives).collect();
+    let types: Vec<_> = file.drive.iter().filter_map(type_line).collect();
     let own = file.sim.iter().flat_map(|sim| &sim.setup);
-    let lines: Vec<_> = own.chain(more).map(String::as_str).collect();
+    let all = types.iter().chain(own).chain(more);
+    let lines: Vec<_> = all.map(String::as_str).collect();
     let source = Source {
         name: name.to_owned(),
         text: lines.join("\n").into(),
@@ -42,6 +47,15 @@ pub(super) fn settle(name: &str, file: &RigFile, more: &[String]) -> Result<Plan
     let mut scenario = parse_setup(&source, &sizes)?;
     all_nd21(&mut scenario);
     plan(&scenario, &source, None)
+}
+
+/// The line of a header with the type of the device that a rig's file names (ND21 2.1): the scales of its currents depend
+/// on it.
+fn type_line(drive: &DriveEntry) -> Option<String> {
+    let model = drive.model.as_deref()?.strip_prefix("ND21-")?;
+    let known = TYPES.iter().find(|known| model.starts_with(*known))?;
+    let ring = if drive.ring == 2 { "2:" } else { "" };
+    Some(format!("drive {ring}{} type {known}", drive.address))
 }
 
 /// Makes every drive a whole ND21, where the header names no model at all.

@@ -2,7 +2,7 @@
 //!
 //! The folder is `$DRIVEBENCH_STATE`, else `/run/lock/drivebench`, which all users of a machine share, else
 //! `$XDG_RUNTIME_DIR/drivebench`, else `drivebench-UID` in the folder for temporary files. Of each rig it has
-//! `ID.lock`, which is never removed, and `ID.quarantine` while the rig must not be used.
+//! `ID.lock`, which is never removed, `ID.quarantine` while the rig must not be used, and `ID.rest` where it was left at rest.
 
 use super::check::Rig;
 use super::file::Quarantine;
@@ -158,6 +158,34 @@ pub(super) fn read(file: &File) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.take(MAX_SIZE).read_to_end(&mut bytes)?;
     Ok(bytes)
+}
+
+/// What changes when the machine is started anew.
+fn boot() -> String {
+    let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id");
+    boot.map_or_else(|_| String::new(), |boot| boot.trim().to_owned())
+}
+
+fn rest_file(folder: &Path, id: &str) -> PathBuf {
+    folder.join(format!("{id}.rest"))
+}
+
+/// Keeps that a rig was left with every drive waiting for a sync byte and none in the middle of a command.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn left_at_rest(folder: &Path, id: &str) -> io::Result<()> {
+    std::fs::write(rest_file(folder, id), boot())
+}
+
+/// Whether a rig was left so since the machine was started. It is asked once: whoever asks is about to send something.
+pub fn take_rest(folder: &Path, id: &str) -> bool {
+    let path = rest_file(folder, id);
+    let kept = std::fs::read_to_string(&path);
+    // What cannot be removed would be believed again later.
+    let taken = std::fs::remove_file(path).is_ok();
+    let boot = boot();
+    taken && !boot.is_empty() && kept.is_ok_and(|kept| kept == boot)
 }
 
 fn quarantine_file(folder: &Path, id: &str) -> PathBuf {

@@ -1,6 +1,7 @@
 //! The bench end to end: a ring that another process serves, the program as a process of its own, and everything that can go
 //! wrong between them.
 
+mod commands;
 #[path = "../served/ring.rs"]
 mod ring;
 
@@ -262,19 +263,8 @@ fn one_at_a_time_and_never_in_quarantine() {
         .command(&["run", "--allow-motion"])
         .spawn()
         .expect("the program");
-    // Until the first one has it.
-    std::thread::sleep(Duration::from_millis(300));
-    let busy = loop {
-        let second = desk.run(&["run", "9.2-synco"]);
-        if second.status.code() == Some(75) {
-            break second;
-        }
-        assert!(
-            first.try_wait().expect("a process").is_none(),
-            "{}",
-            said(&second)
-        );
-    };
+    playing(&mut first);
+    let busy = desk.run(&["run", "9.2-synco"]);
     ended(&busy, 75, "held by");
     // kill -9: the lock goes with the process, and the ring is brought back by the next.
     signal(&first, "-KILL");

@@ -66,7 +66,7 @@ pub enum DriveCommand {
     /// Reset drives: what is not in their EEPROM is lost (ND21 12.7).
     Reset(MoveArguments),
     /// Confirm the errors of drives (ND21 14.10.1).
-    DeleteError(SelectArguments),
+    DeleteError(DeleteErrorArguments),
     /// Bring a ring back from the error mode and count its drives (ND21 9.8, 9.3).
     #[command(after_help = RECOVER_JSON)]
     Recover(RecoverArguments),
@@ -78,13 +78,26 @@ pub enum DriveCommand {
 /// Which bench.
 #[derive(Clone, Debug, Args)]
 pub struct RigArguments {
-    /// The bench: sim:N, a simulated ring of N drives (sim:3 where nothing is said), or sim:N,M, two of them.
+    /// The bench: a file, a name that `rig list` shows, sim:N for a simulated ring of N drives (sim:3 where nothing is said),
+    /// or sim:N,M for two of them.
     #[arg(long, value_name = "NAME")]
     pub rig: Option<RigName>,
-    /// Put a simulated bench into the state that the header of a scenario describes; its steps are ignored.
+    /// Put the bench sim:N into the state that the header of a scenario describes; its steps are ignored.
     /// Without it all inputs GPIN3 and GPIN5 are high.
     #[arg(long, value_name = "FILE")]
     pub setup: Option<PathBuf>,
+    /// How long to wait for a bench that somebody else has, such as 30s.
+    #[arg(long = "wait-for-rig", value_name = "TIME", value_parser = duration, default_value = "0ms")]
+    pub patience: Span,
+}
+
+/// For commands that change something on drives with ports.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct HoldArguments {
+    /// Leave the drives as the command leaves them. Without it a bench with ports ends every command that changes
+    /// something in its safe state: stopped, standing and blocked. Motors may go on turning, and nobody looks after them.
+    #[arg(long)]
+    pub hold: bool,
 }
 
 /// In which form.
@@ -123,11 +136,14 @@ pub struct WriteArguments {
     #[arg(value_name = "CELL=VALUE", required = true)]
     pub values: Vec<String>,
     /// Write although it can make a motor turn.
-    #[arg(long = "move")]
+    #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
+    /// What becomes of the drives afterwards.
+    #[command(flatten)]
+    pub hold: HoldArguments,
 }
 
 /// For `info`.
@@ -212,6 +228,9 @@ pub struct LoadArguments {
     /// Write into the EEPROM too, so that a reset does not undo it (ProgParam, ND21 14.10.5.4).
     #[arg(long)]
     pub store: bool,
+    /// What becomes of the drives afterwards.
+    #[command(flatten)]
+    pub hold: HoldArguments,
 }
 
 /// The flanks of a trigger.
@@ -261,7 +280,7 @@ pub struct ScopeArguments {
     #[arg(long, value_name = "CELL=VALUE")]
     pub then: Vec<String>,
     /// Write `--then` although it can make the motor turn.
-    #[arg(long = "move")]
+    #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,
     /// Write the measurements into this file too.
     #[arg(long, value_name = "FILE")]
@@ -269,6 +288,9 @@ pub struct ScopeArguments {
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
+    /// What becomes of the drives afterwards.
+    #[command(flatten)]
+    pub hold: HoldArguments,
 }
 
 /// For `position`.
@@ -294,14 +316,17 @@ pub struct PositionArguments {
     #[arg(long, value_name = "SPEED", value_parser = speed)]
     pub speed: Option<Quantity>,
     /// Let the motor turn.
-    #[arg(long = "move")]
+    #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
+    /// What becomes of the drives afterwards.
+    #[command(flatten)]
+    pub hold: HoldArguments,
 }
 
-/// For `stop`, `block` and `delete-error`.
+/// For `stop` and `block`.
 #[derive(Debug, Args)]
 pub struct SelectArguments {
     /// Which drives.
@@ -312,6 +337,17 @@ pub struct SelectArguments {
     pub rig: RigArguments,
 }
 
+/// For `delete-error`.
+#[derive(Debug, Args)]
+pub struct DeleteErrorArguments {
+    /// Which drives.
+    #[command(flatten)]
+    pub select: SelectArguments,
+    /// Let the motors turn: a drive that is released goes on when its error is confirmed. Needed on a bench with ports.
+    #[arg(long = "move", visible_alias = "allow-motion")]
+    pub leave: bool,
+}
+
 /// For `go` and `reset`.
 #[derive(Debug, Args)]
 pub struct MoveArguments {
@@ -319,8 +355,11 @@ pub struct MoveArguments {
     #[command(flatten)]
     pub select: SelectArguments,
     /// Let the motors turn.
-    #[arg(long = "move")]
+    #[arg(long = "move", visible_alias = "allow-motion")]
     pub leave: bool,
+    /// What becomes of the drives afterwards.
+    #[command(flatten)]
+    pub hold: HoldArguments,
 }
 
 /// For `recover`.

@@ -1,12 +1,15 @@
 //! `drivebench go`, `stop`, `block`, `reset`, `delete-error`: the modes of drives (ND21 11.8, 14.10).
 
-use super::args::{MoveArguments, SelectArguments};
+use super::args::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use super::axes;
 use super::failure::Failure;
-use super::rig::{self, Bench};
+use super::rig::{self, Bench, RigName, Use};
 use crate::bus::{Axis, Bus, Error};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::link::Line;
+use crate::rig::Session;
+use crate::scenario::run::reset_drives;
 use harness_proto::time::Span;
 
 /// How long a drive is given before it is looked at: some of its cycles of 432 us (4.1).
@@ -23,57 +26,113 @@ pub(super) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit,
 
 /// Resets drives.
 pub(super) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
-    with_leave(
-        arguments,
+    let Some(RigName::Named(_)) = &arguments.select.rig.rig else {
+        let reset: Call = |bus, axis| bus.reset(axis);
+        return with_leave(arguments, output, "reset", reset, RESET);
+    };
+    let first = |session: &mut Session, output: &mut Output| {
+        let drives = axes::select(&arguments.select.drives, &session.axes())?;
+        warn(arguments, &drives, "reset", output)?;
+        let drives: Vec<_> = drives
+            .iter()
+            .map(|axis| (axis.ring(), axis.drive()))
+            .collect();
+        // Behind a reset nobody knows where drives are: the check sequence (9.8) follows, which is not the master's to send.
+        reset_drives(session.link(), &drives).map_err(|why| denied(session, why))
+    };
+    let what = leave_to(arguments, "reset");
+    rig::on_after(
+        &arguments.select.rig,
+        what,
         output,
-        "reset",
-        |bus, axis| bus.reset(axis),
-        RESET,
+        first,
+        |bench, output| {
+            let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
+            each(bench, &drives, output, |_, _| Ok(()), CYCLES)
+        },
     )
+}
+
+/// Why a reset came to nothing.
+fn denied(session: &mut Session, why: String) -> Failure {
+    match session.link().trouble() {
+        Some(trouble) => Error::Link(trouble.clone()).into(),
+        None => Failure::drive(why),
+    }
+}
+
+fn leave_to(arguments: &MoveArguments, purpose: &'static str) -> Use {
+    Use {
+        purpose,
+        moves: arguments.leave,
+        holds: arguments.hold.hold,
+    }
 }
 
 /// Stops drives.
 pub(super) fn stop(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let (bench, drives) = selected(arguments)?;
-    each(&bench, &drives, output, |bus, axis| bus.stop(axis), CYCLES)
+    quietly(arguments, output, Use::look("stop"), |bus, axis| {
+        bus.stop(axis)
+    })
 }
 
 /// Blocks drives.
 pub(super) fn block(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let (bench, drives) = selected(arguments)?;
-    each(&bench, &drives, output, |bus, axis| bus.block(axis), CYCLES)
+    quietly(arguments, output, Use::look("block"), |bus, axis| {
+        bus.block(axis)
+    })
 }
 
 /// Confirms errors.
 pub(super) fn delete_error(
-    arguments: &SelectArguments,
+    arguments: &DeleteErrorArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let (bench, drives) = selected(arguments)?;
-    each(
-        &bench,
-        &drives,
-        output,
-        |bus, axis| bus.delete_error(axis),
-        CYCLES,
-    )
+    let what = Use {
+        moves: arguments.leave,
+        ..Use::look("delete-error")
+    };
+    quietly(&arguments.select, output, what, |bus, axis| {
+        bus.delete_error(axis)
+    })
 }
 
-fn selected(arguments: &SelectArguments) -> Result<(Bench, Vec<Axis>), Failure> {
-    let bench = rig::open(&arguments.rig)?;
-    let drives = axes::select(&arguments.drives, &bench.bus.axes())?;
-    Ok((bench, drives))
+/// For what makes no motor turn.
+fn quietly(
+    arguments: &SelectArguments,
+    output: &mut Output,
+    what: Use,
+    call: Call,
+) -> Result<Exit, Failure> {
+    rig::on(&arguments.rig, what, output, |bench, output| {
+        let drives = axes::select(&arguments.drives, &bench.bus.axes())?;
+        each(bench, &drives, output, call, CYCLES)
+    })
 }
 
 /// Says what can move before it can, and refuses it without a leave.
 fn with_leave(
     arguments: &MoveArguments,
     output: &mut Output,
-    what: &str,
+    what: &'static str,
     call: Call,
     wait: Span,
 ) -> Result<Exit, Failure> {
-    let (bench, drives) = selected(&arguments.select)?;
+    let as_what = leave_to(arguments, what);
+    rig::on(&arguments.select.rig, as_what, output, |bench, output| {
+        let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
+        warn(arguments, &drives, what, output)?;
+        each(bench, &drives, output, call, wait)
+    })
+}
+
+/// Says what can move, and refuses it without a leave.
+fn warn(
+    arguments: &MoveArguments,
+    drives: &[Axis],
+    what: &str,
+    output: &mut Output,
+) -> Result<(), Failure> {
     let names: Vec<_> = drives.iter().map(Axis::to_string).collect();
     let (s, their) = if drives.len() == 1 {
         ("", "its motor")
@@ -87,7 +146,7 @@ fn with_leave(
         )));
     }
     output.say(&format!("{warning}\n"));
-    each(&bench, &drives, output, call, wait)
+    Ok(())
 }
 
 /// Orders it of every drive first, and then says how each is. One that does not answer does not keep the

@@ -14,6 +14,8 @@ pub(super) enum Failure {
     Output(std::io::Error),
     /// What is wrong, in a sentence, with the exit code for it.
     Said(Exit, String),
+    /// What is wrong has been told.
+    Told(Exit),
     /// There is no file, or it has mistakes.
     File(LibraryError),
     /// The driver gave up.
@@ -42,6 +44,7 @@ impl Failure {
                 output.complain(message);
                 *exit
             }
+            Self::Told(exit) => *exit,
             Self::File(error) => {
                 output.library_error(error);
                 Exit::Usage

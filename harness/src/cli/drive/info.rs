@@ -1,11 +1,11 @@
 //! `drivebench info`: which drives there are, and how they are.
 
 use super::args::{Form, InfoArguments};
+use super::axes;
 use super::cell::{Found, find};
 use super::failure::Failure;
 use super::read::columns;
-use super::rig::Bench;
-use super::{axes, rig};
+use super::rig::{self, Bench, Use};
 use crate::bus::{Axis, Identity, State};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
@@ -30,7 +30,15 @@ struct Drive<'a> {
 
 /// Shows drives.
 pub(super) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let bench = rig::open(&arguments.rig)?;
+    rig::on(
+        &arguments.rig,
+        Use::look("info"),
+        output,
+        |bench, output| show(arguments, bench, output),
+    )
+}
+
+fn show(arguments: &InfoArguments, bench: &Bench, output: &mut Output) -> Result<Exit, Failure> {
     let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let locations = cells(&CELLS.map(str::to_owned))?;
     // A long ring answers slowly, and people want to see that something happens.
@@ -40,7 +48,7 @@ pub(super) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exi
         let identities = bench.bus.identities(some)?;
         for (axis, identity) in some.iter().zip(identities) {
             bar.set_message(format!("drive {axis}"));
-            drives.push(drive(&bench, *axis, identity, &locations)?);
+            drives.push(drive(bench, *axis, identity, &locations)?);
             bar.inc(1);
         }
     }

@@ -4,7 +4,7 @@ use super::args::{LoadArguments, ParamsArguments, ParamsCommand};
 use super::cell::{self, Found, find, hex};
 use super::failure::Failure;
 use super::params_file::{self, Entry, parameters};
-use super::rig::{self, Bench};
+use super::rig::{self, Bench, Use};
 use super::{axes, file};
 use crate::bus::Axis;
 use crate::cli::exit::Exit;
@@ -19,14 +19,32 @@ use harness_proto::nd21::{PARAMETERS, ee};
 /// Does what one of the commands says.
 pub(super) fn params(command: &ParamsCommand, output: &mut Output) -> Result<Exit, Failure> {
     match command {
-        ParamsCommand::Save(arguments) => save(arguments, output),
-        ParamsCommand::Load(arguments) => load(arguments, output),
-        ParamsCommand::Diff(arguments) => diff(arguments, output),
+        ParamsCommand::Save(arguments) => {
+            let look = Use::look("params save");
+            rig::on(&arguments.rig, look, output, |bench, output| {
+                save(arguments, bench, output)
+            })
+        }
+        ParamsCommand::Load(arguments) => {
+            let what = Use {
+                purpose: "params load",
+                moves: arguments.yes,
+                holds: arguments.hold.hold || !arguments.yes,
+            };
+            compare(&arguments.params, what, output, |comparison, output| {
+                load(arguments, comparison, output)
+            })
+        }
+        ParamsCommand::Diff(arguments) => {
+            let look = Use::look("params diff");
+            compare(arguments, look, output, |comparison, output| {
+                diff(arguments, comparison, output)
+            })
+        }
     }
 }
 
-fn save(arguments: &ParamsArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let bench = rig::open(&arguments.rig)?;
+fn save(arguments: &ParamsArguments, bench: &Bench, output: &mut Output) -> Result<Exit, Failure> {
     let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
     let units = bench.units(axis)?;
     let locations = parameters();
@@ -47,21 +65,37 @@ fn save(arguments: &ParamsArguments, output: &mut Output) -> Result<Exit, Failur
 }
 
 /// A drive and a file beside each other.
-struct Comparison {
-    bench: Bench,
+struct Comparison<'b> {
+    bench: &'b Bench,
     axis: Axis,
     /// What the scales depend on now, and when the file is loaded.
     units: [Drive; 2],
     entries: Vec<(Entry, Vec<u8>)>,
 }
 
-impl Comparison {
-    fn new(arguments: &ParamsArguments, output: &mut Output) -> Result<Self, Failure> {
-        let source = Source::read(&arguments.file).map_err(|error| Failure::File(error.into()))?;
-        let bench = rig::open(&arguments.rig)?;
+/// Reads the file, opens the bench, and does something with both.
+fn compare(
+    arguments: &ParamsArguments,
+    what: Use,
+    output: &mut Output,
+    act: impl FnOnce(&Comparison<'_>, &mut Output) -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    let source = Source::read(&arguments.file).map_err(|error| Failure::File(error.into()))?;
+    rig::on(&arguments.rig, what, output, |bench, output| {
+        act(&Comparison::new(arguments, &source, bench, output)?, output)
+    })
+}
+
+impl<'b> Comparison<'b> {
+    fn new(
+        arguments: &ParamsArguments,
+        source: &Source,
+        bench: &'b Bench,
+        output: &mut Output,
+    ) -> Result<Self, Failure> {
         let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
         let now = bench.units(axis)?;
-        let (entries, then) = params_file::read(&source, now)?;
+        let (entries, then) = params_file::read(source, now)?;
         let all = parameters().len();
         if entries.len() < all {
             output.say(&format!(
@@ -109,8 +143,11 @@ impl Comparison {
     }
 }
 
-fn diff(arguments: &ParamsArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let comparison = Comparison::new(arguments, output)?;
+fn diff(
+    arguments: &ParamsArguments,
+    comparison: &Comparison<'_>,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let axis = comparison.axis;
     let mut count = 0;
     for (entry, [held, wanted]) in comparison.differences() {
@@ -130,9 +167,12 @@ fn diff(arguments: &ParamsArguments, output: &mut Output) -> Result<Exit, Failur
     Ok(exit)
 }
 
-fn load(arguments: &LoadArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let comparison = Comparison::new(&arguments.params, output)?;
-    let (bench, axis) = (&comparison.bench, comparison.axis);
+fn load(
+    arguments: &LoadArguments,
+    comparison: &Comparison<'_>,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let (bench, axis) = (comparison.bench, comparison.axis);
     let mut changes = Vec::new();
     for (entry, [held, wanted]) in comparison.differences() {
         let name = entry.location.name();
@@ -175,7 +215,7 @@ fn load(arguments: &LoadArguments, output: &mut Output) -> Result<Exit, Failure>
     })?;
     let mut words = format!("drive {axis}: {count} parameter{s} written and read back");
     if arguments.store {
-        store(&comparison)?;
+        store(comparison)?;
         words.push_str(", all stored in the EEPROM");
     }
     output.result(&format!("{words}\n"))?;
@@ -220,8 +260,8 @@ fn verify(
 
 /// Stores the parameters: FF60-FF7F as a whole (ProgParam, 14.10.5.4), the others of the file byte by byte, and
 /// the date of the change, as 14.8.4 wants it.
-fn store(comparison: &Comparison) -> Result<(), Failure> {
-    let (bench, axis) = (&comparison.bench, comparison.axis);
+fn store(comparison: &Comparison<'_>) -> Result<(), Failure> {
+    let (bench, axis) = (comparison.bench, comparison.axis);
     bench.bus.ram_to_eeprom(axis)?;
     let written = comparison.entries.iter().map(|(entry, _)| entry);
     let written: Vec<_> = written

@@ -4,7 +4,7 @@ use super::args::PositionArguments;
 use super::axes;
 use super::cell::find;
 use super::failure::Failure;
-use super::rig::{self, Bench};
+use super::rig::{self, Bench, Use};
 use crate::bus::Axis;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
@@ -34,14 +34,28 @@ pub(super) fn position(
     arguments: &PositionArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
-    let bench = rig::open(&arguments.rig)?;
+    let what = Use {
+        purpose: "position",
+        moves: arguments.leave,
+        holds: arguments.hold.hold,
+    };
+    rig::on(&arguments.rig, what, output, |bench, output| {
+        turn(arguments, bench, output)
+    })
+}
+
+fn turn(
+    arguments: &PositionArguments,
+    bench: &Bench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
     let run = settle(arguments, axis, bench.units(axis)?)?;
     let [place, speed] = [
-        run.cell(&bench, "position")?,
+        run.cell(bench, "position")?,
         match arguments.speed {
             Some(speed) => speed.to_string(),
-            None => run.cell(&bench, "ps_v0")?,
+            None => run.cell(bench, "ps_v0")?,
         },
     ];
     let warning = format!(
@@ -53,11 +67,11 @@ pub(super) fn position(
             "{warning}; nothing was moved, add --move to allow it"
         )));
     }
-    run.check(&bench)?;
+    run.check(bench)?;
     output.say(&format!("{warning}\n"));
     let bar = spinner(output.progress);
     let start = bench.bus.now();
-    let end = run.play(&bench, &bar);
+    let end = run.play(bench, &bar);
     bar.finish_and_clear();
     if let Err(failure) = end {
         // Whatever it was: nothing may go on turning behind the back of whoever reads this.
@@ -70,7 +84,7 @@ pub(super) fn position(
         return Ok(exit);
     }
     let took = bench.bus.now().since(start);
-    let place = run.cell(&bench, "position")?;
+    let place = run.cell(bench, "position")?;
     output.result(&format!("drive {axis} stands at {place} after {took}\n"))?;
     Ok(Exit::Passed)
 }

@@ -1,23 +1,35 @@
 //! `drivebench read`: cells of drives, with their units and bits.
 
 use super::args::{Form, ReadArguments};
+use super::axes;
 use super::cell::{Found, find};
 use super::failure::Failure;
-use super::{axes, rig};
+use super::rig::{self, Bench, Use};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::scenario::argument::{Memory, cells};
+use crate::scenario::argument::{Location, Memory, cells};
 use serde_json::json;
 
 /// Reads cells and shows them.
 pub(super) fn read(arguments: &ReadArguments, output: &mut Output) -> Result<Exit, Failure> {
     let cells = cells(&arguments.cells)?;
-    let bench = rig::open(&arguments.rig)?;
+    let look = Use::look("read");
+    rig::on(&arguments.rig, look, output, |bench, output| {
+        show(arguments, &cells, bench, output)
+    })
+}
+
+fn show(
+    arguments: &ReadArguments,
+    cells: &[Location],
+    bench: &Bench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let drives = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let mut found = Vec::new();
     for axis in drives {
         let units = bench.units(axis)?;
-        for cell in &cells {
+        for cell in cells {
             found.push(find(&bench.bus, (axis, units), cell)?);
         }
     }

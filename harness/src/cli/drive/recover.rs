@@ -3,18 +3,49 @@
 
 use super::args::{Form, RecoverArguments};
 use super::failure::Failure;
-use super::rig;
+use super::rig::{self, RigName, Use};
 use crate::bus::{self, Axis, Recovery};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::link::Line;
 use serde_json::json;
 
 /// Brings every ring of a bench back.
 pub(super) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let (plan, mut link) = rig::link(&arguments.rig)?;
-    let found: Vec<_> = (0..plan.rings.len())
-        .map(|ring| bus::recover(&mut link, ring))
-        .collect();
+    let Some(RigName::Named(name)) = &arguments.rig.rig else {
+        let (plan, mut link) = rig::link(&arguments.rig, output)?;
+        return show(arguments, &every(&mut link, plan.rings.len()), output);
+    };
+    let rig = rig::named(name, &arguments.rig, output)?;
+    let mut session = rig::take(&rig, &arguments.rig, Use::look("recover"), true)?;
+    let rings = session.rings().len();
+    let before = session.opening().cloned();
+    let mut found = every(session.link(), rings);
+    // What drives spelled out before the rig was opened.
+    for (ring, drive) in before.into_iter().flat_map(|health| health.reported) {
+        if let Some(recovery) = found.get_mut(ring) {
+            recovery.before = recovery.before.or(Some(drive));
+        }
+    }
+    let trouble = session.link().trouble().cloned();
+    for remark in session.release().remarks {
+        output.complain(&remark);
+    }
+    match trouble {
+        Some(trouble) => Err(bus::Error::Link(trouble).into()),
+        None => show(arguments, &found, output),
+    }
+}
+
+fn every(link: &mut dyn Line, rings: usize) -> Vec<Recovery> {
+    (0..rings).map(|ring| bus::recover(link, ring)).collect()
+}
+
+fn show(
+    arguments: &RecoverArguments,
+    found: &[Recovery],
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     match arguments.format {
         Form::Text => {
             for (ring, recovery) in found.iter().enumerate() {

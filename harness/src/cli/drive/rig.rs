@@ -1,18 +1,26 @@
-//! The benches that commands on drives know, simulated ones as yet: `sim:3`, and `sim:2,3` with two rings.
+//! The benches that commands on drives work on: `sim:3`, and `sim:2,3` with two rings, set up anew for every command; or a rig by its
+//! file or name, taken and given back as `run --rig` does.
 
 use super::args::RigArguments;
 use super::failure::Failure;
 use crate::bus::{Axis, Bus, Options};
-use crate::link::SimulatedLink;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::cli::rig_failure::{exit_of, find_rig, interrupt_flag, tell_end};
+use crate::link::{Line, SimulatedLink, Trouble};
 use crate::rig::sim::all_nd21;
+use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
+use harness_proto::nd21::ram;
 use harness_proto::nd21::units::Drive;
+use harness_proto::novobus::error::BusError;
 use harness_proto::time::Span;
 use std::path::Path;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// The drives of a simulated bench of which nothing else is said: released and started by their inputs.
 const RELEASED: &str = "drive 0..last input GPIN3 GPIN5 high\n";
@@ -20,24 +28,48 @@ const RELEASED: &str = "drive 0..last input GPIN3 GPIN5 high\n";
 /// How long a simulated bench has been switched on when a command comes to it: the self-tests are over (11.8).
 const WARM: Span = Span::from_millis(200);
 
+/// How long a drive is given to take a confirmation: some of its cycles of 432 us (4.1).
+const CYCLES: Span = Span::from_millis(5);
+
 /// The name of a bench.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RigName {
     /// Simulated rings of so many drives.
     Simulated(Vec<u8>),
+    /// A file, or a name that `rig list` shows.
+    Named(String),
 }
 
 impl FromStr for RigName {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let Some(sizes) = text.strip_prefix("sim:") else {
-            return Err(format!(
-                "there is no bench `{text}`: the commands on drives know simulated benches only, as yet: \
-                 sim:N, a simulated ring of N drives (sim:3), and sim:N,M, two of them (sim:2,3)"
-            ));
-        };
-        crate::rig::find::sizes(sizes).map(Self::Simulated)
+        match text.strip_prefix("sim:") {
+            Some(sizes) => crate::rig::find::sizes(sizes).map(Self::Simulated),
+            None => Ok(Self::Named(text.to_owned())),
+        }
+    }
+}
+
+/// What a command does with a bench.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Use {
+    /// Its name; others who want the bench are told.
+    pub(super) purpose: &'static str,
+    /// Motors may turn, as far as the command line goes.
+    pub(super) moves: bool,
+    /// The drives stay as they are behind a good end: nothing was changed, or so it was asked for.
+    pub(super) holds: bool,
+}
+
+impl Use {
+    /// For a command that changes nothing.
+    pub(super) const fn look(purpose: &'static str) -> Self {
+        Self {
+            purpose,
+            moves: false,
+            holds: true,
+        }
     }
 }
 
@@ -56,22 +88,162 @@ impl Bench {
             ..self.plan.units(axis.ring(), axis.drive())
         })
     }
+
+    /// The zeros of the check sequence (9.8), with which a rig is opened, put every drive in error. Before a command that may
+    /// move drives it is confirmed, with a nominal speed of 0: a drive that was in go stands there, released.
+    fn confirm_bus_errors(&self, as_what: Use, output: &mut Output) -> Result<(), Failure> {
+        let mut confirmed = Vec::new();
+        for axis in self.bus.axes() {
+            let error = self.bus.state(axis)?.error;
+            if BusError::from_code(error).is_none() {
+                continue;
+            }
+            if as_what.moves {
+                self.bus.write_word(axis, ram::NSOLL, 0)?;
+                self.bus.delete_error(axis)?;
+            }
+            confirmed.push(axis.to_string());
+        }
+        if confirmed.is_empty() {
+            return Ok(());
+        }
+        let end = match as_what.moves {
+            true => "; it was confirmed, and their nominal speed is 0 now",
+            false => "",
+        };
+        output.say(&format!(
+            "the check sequence has put drive {} in error 0504 (ND21 9.8){end}\n",
+            confirmed.join(", ")
+        ));
+        // `Status` follows in the drive's next cycles.
+        self.bus.run(CYCLES);
+        Ok(())
+    }
 }
 
-/// Opens a bench.
-pub(super) fn open(arguments: &RigArguments) -> Result<Bench, Failure> {
-    let (plan, link) = link(arguments)?;
-    let bus = Bus::open(Box::new(link), &plan.rings, Options::default())?;
-    bus.run(WARM);
-    Ok(Bench { bus, plan })
+/// Opens a bench, does something on it, and gives it back: with its drives as they are where `as_what` says so and all went
+/// well, or where nothing was done; in its safe state otherwise.
+pub(super) fn on(
+    arguments: &RigArguments,
+    as_what: Use,
+    output: &mut Output,
+    act: impl FnOnce(&Bench, &mut Output) -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    on_after(arguments, as_what, output, |_, _| Ok(()), act)
 }
 
-/// The link to a bench, with nothing sent on it.
-pub(super) fn link(arguments: &RigArguments) -> Result<(Plan, SimulatedLink), Failure> {
-    let given = arguments
-        .rig
-        .as_ref()
-        .map(|RigName::Simulated(sizes)| sizes);
+/// The same, with something done to a rig before its master begins: what leaves no master knowing where the drives are.
+pub(super) fn on_after(
+    arguments: &RigArguments,
+    as_what: Use,
+    output: &mut Output,
+    first: impl FnOnce(&mut Session, &mut Output) -> Result<(), Failure>,
+    act: impl FnOnce(&Bench, &mut Output) -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    let Some(RigName::Named(name)) = &arguments.rig else {
+        let (plan, link) = link(arguments, output)?;
+        let bus = Bus::open(Box::new(link), &plan.rings, Options::default())?;
+        bus.run(WARM);
+        return act(&Bench { bus, plan }, output);
+    };
+    let rig = named(name, arguments, output)?;
+    let plan = rig.plan()?;
+    let mut session = take(&rig, arguments, as_what, false)?;
+    let done = first(&mut session, output);
+    let sizes = session.rings().to_vec();
+    let shared = Shared::new(session);
+    let result = done.and_then(|()| {
+        let bus = Bus::open(Box::new(shared.line()), &sizes, Options::default())?;
+        let bench = Bench { bus, plan };
+        let ready = bench.confirm_bus_errors(as_what, output);
+        let result = ready.and_then(|()| act(&bench, output));
+        bench.bus.close();
+        result
+    });
+    give_back(&shared, as_what, result, output)
+}
+
+/// Takes a rig for a command.
+pub(super) fn take(
+    rig: &Rig,
+    arguments: &RigArguments,
+    as_what: Use,
+    ill_as_well: bool,
+) -> Result<Session, Failure> {
+    let options = rig::Options {
+        purpose: as_what.purpose.to_owned(),
+        wait: Duration::from_nanos(arguments.patience.as_nanos()),
+        allow_motion: as_what.moves,
+        ill_as_well,
+        interrupt: interrupt_flag(),
+    };
+    Session::open(rig, &options).map_err(|error| Failure::Said(exit_of(&error), error.to_string()))
+}
+
+/// The rig of this name.
+pub(super) fn named(
+    name: &str,
+    arguments: &RigArguments,
+    output: &mut Output,
+) -> Result<Rig, Failure> {
+    if arguments.setup.is_some() {
+        return Err(Failure::refused(
+            "--setup is for sim:N; what stands in a rig's file is set up by its [sim] setup",
+        ));
+    }
+    find_rig(name, output).ok_or(Failure::Told(Exit::Usage))
+}
+
+/// Gives a rig back and tells how.
+fn give_back(
+    rig: &Shared,
+    as_what: Use,
+    result: Result<Exit, Failure>,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let trouble = rig
+        .with(|session| session.link().trouble().cloned())
+        .flatten();
+    let sound = trouble.is_none();
+    let interrupted = trouble == Some(Trouble::Interrupted);
+    let mut unwritten = None;
+    let (exit, leave) = match result {
+        Ok(exit) => (exit, as_what.holds),
+        // What cannot be or has no leave was refused before anything was done.
+        Err(failure @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
+            (failure.tell(output), true)
+        }
+        Err(Failure::Output(error)) => {
+            unwritten = Some(error);
+            (Exit::RigError, false)
+        }
+        Err(failure) => (failure.tell(output), false),
+    };
+    let exit = if interrupted { Exit::Interrupted } else { exit };
+    let end = if leave && sound {
+        rig.release()
+    } else {
+        rig.close(exit == Exit::RigError)
+    };
+    let exit = end.map_or(exit, |end| tell_end(&end, exit, output));
+    unwritten.map_or(Ok(exit), |error| Err(Failure::Output(error)))
+}
+
+/// The simulated drives of a bench, with nothing sent to them. A rig with ports is stood in for by its simulated likeness.
+pub(super) fn link(
+    arguments: &RigArguments,
+    output: &mut Output,
+) -> Result<(Plan, SimulatedLink), Failure> {
+    let given = match &arguments.rig {
+        Some(RigName::Named(name)) => {
+            let plan = named(name, arguments, output)?.plan()?;
+            let mut link = simulate::bench(&plan);
+            link.stop_recording();
+            return Ok((plan, link));
+        }
+        Some(RigName::Simulated(sizes)) => Some(sizes),
+        None => None,
+    };
     let sizes = given.cloned().unwrap_or_else(|| vec![3]);
     let source = match &arguments.setup {
         Some(path) => read(path)?,

@@ -3,7 +3,7 @@
 use super::args::{Edge, ScopeArguments};
 use super::cell::Found;
 use super::failure::Failure;
-use super::rig::{self, Bench};
+use super::rig::{self, Bench, Use};
 use super::signal::Signal;
 use super::write::Orders;
 use super::{axes, file};
@@ -11,8 +11,9 @@ use crate::bus::{Axis, Error, Measurement, Scope, Trigger};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::report::plot::plot;
-use crate::scenario::argument::assignments;
+use crate::scenario::argument::{Location, assignments};
 use crate::scenario::run::{Record, Sample};
+use crate::scenario::syntax::Written;
 use harness_proto::nd21::units::{self, Scale, UnitError, Value, scope_period_us, trigger_delay};
 use harness_proto::time::{Instant, Span};
 use std::fmt::Write as _;
@@ -35,19 +36,35 @@ pub(super) fn scope(arguments: &ScopeArguments, output: &mut Output) -> Result<E
         .map(|name| Signal::new(name))
         .collect::<Result<Vec<_>, _>>()?;
     let then = assignments(&arguments.then)?;
-    let bench = rig::open(&arguments.rig)?;
+    let what = Use {
+        purpose: "scope",
+        moves: arguments.leave,
+        holds: arguments.hold.hold || then.is_empty(),
+    };
+    rig::on(&arguments.rig, what, output, |bench, output| {
+        record(arguments, &signals, &then, bench, output)
+    })
+}
+
+fn record(
+    arguments: &ScopeArguments,
+    signals: &[Signal],
+    then: &[(Location, Written)],
+    bench: &Bench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
     let units = bench.units(axis)?;
-    let scope = settle(arguments, &signals, units)?;
-    let texts = (&arguments.then[..], &then[..]);
-    let orders = Orders::new(&bench, axis, texts, arguments.leave, output)?;
+    let scope = settle(arguments, signals, units)?;
+    let texts = (&arguments.then[..], then);
+    let orders = Orders::new(bench, axis, texts, arguments.leave, output)?;
     bench.bus.start_scope(axis, &scope)?;
-    orders.write(&bench)?;
-    let measurements = finish(&bench, axis, &scope, arguments.wait)?;
+    orders.write(bench)?;
+    let measurements = finish(bench, axis, &scope, arguments.wait)?;
     let recording = Recording {
         axis,
         units,
-        signals: &signals,
+        signals,
         scope,
         measurements,
     };

@@ -177,7 +177,7 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, Place)>, 
 
 /// Serves the rings of a simulated bench.
 pub(super) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
-    let (plan, link) = rig::link(&arguments.rig)?;
+    let (plan, link) = rig::link(&arguments.rig, output)?;
     let pace = match arguments.pace {
         Speed::Line => Pace::Line,
         Speed::Free => Pace::Free,

@@ -4,7 +4,7 @@ use super::args::{WatchArguments, WatchForm};
 use super::axes;
 use super::cell::{Found, find};
 use super::failure::Failure;
-use super::rig::{self, Bench};
+use super::rig::{self, Bench, Use};
 use crate::bus::Axis;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
@@ -23,7 +23,18 @@ pub(super) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<E
             "--every must be longer than nothing, and --for at most {MOST} times as long"
         )));
     }
-    let bench = rig::open(&arguments.rig)?;
+    let look = Use::look("watch");
+    rig::on(&arguments.rig, look, output, |bench, output| {
+        show(arguments, &cells, bench, output)
+    })
+}
+
+fn show(
+    arguments: &WatchArguments,
+    cells: &[Location],
+    bench: &Bench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let drives = axes
         .into_iter()
@@ -31,14 +42,14 @@ pub(super) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<E
         .collect::<Result<Vec<_>, Failure>>()?;
     let again = arguments.format == WatchForm::Text && output.terminal;
     if arguments.format == WatchForm::Csv {
-        output.result(&heading(&drives, &cells))?;
+        output.result(&heading(&drives, cells))?;
     }
     let start = bench.bus.now();
     let end = start + arguments.length;
     let mut next = start;
     loop {
         let at = bench.bus.now().since(start);
-        let found = look(&bench, &drives, &cells)?;
+        let found = look(bench, &drives, cells)?;
         let line = match arguments.format {
             WatchForm::Text => line(at, &found),
             WatchForm::Csv => row(at, &found),

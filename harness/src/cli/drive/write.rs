@@ -4,7 +4,7 @@ use super::args::WriteArguments;
 use super::axes;
 use super::cell::{self, Found, find, hex};
 use super::failure::Failure;
-use super::rig::{self, Bench};
+use super::rig::{self, Bench, Use};
 use crate::bus::Axis;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
@@ -94,12 +94,27 @@ impl Orders {
 /// Writes cells and shows them before and after.
 pub(super) fn write(arguments: &WriteArguments, output: &mut Output) -> Result<Exit, Failure> {
     let values = assignments(&arguments.values)?;
-    let bench = rig::open(&arguments.rig)?;
+    let what = Use {
+        purpose: "write",
+        moves: arguments.leave,
+        holds: arguments.hold.hold,
+    };
+    rig::on(&arguments.rig, what, output, |bench, output| {
+        change(arguments, &values, bench, output)
+    })
+}
+
+fn change(
+    arguments: &WriteArguments,
+    values: &[(Location, Written)],
+    bench: &Bench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let drives = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let mut orders = Vec::new();
     for axis in drives {
-        let texts = (&arguments.values[..], &values[..]);
-        orders.push(Orders::new(&bench, axis, texts, arguments.leave, output)?);
+        let texts = (&arguments.values[..], values);
+        orders.push(Orders::new(bench, axis, texts, arguments.leave, output)?);
     }
     let mut exit = Exit::Passed;
     for orders in &orders {

@@ -14,6 +14,6 @@ mod record;
 pub use bytes::{Shown, show};
 pub use now::{Now, now};
 pub use outcome::{Difference, Finding, Outcome};
-pub use over_bus::{play_over_bus, start_anew};
+pub use over_bus::{play_over_bus, reset_drives, start_anew};
 pub use player::{AtFinding, lacks, needs, play, run};
 pub use record::{MAX_SAMPLES, Record, Sample};

@@ -163,10 +163,18 @@ const SELF_TEST: Span = Span::from_millis(10_000);
 /// # Errors
 /// The first drive that does not come back, in a sentence.
 pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String> {
-    link.begin();
     let drives = |(ring, size): (usize, &RingSize)| (0..size.drives()).map(move |k| (ring, k));
     let all: Vec<_> = rings.iter().enumerate().flat_map(drives).collect();
-    for (ring, drive) in &all {
+    reset_drives(link, &all)
+}
+
+/// The same for some drives: their rings, counted from 0, and their addresses.
+///
+/// # Errors
+/// The first drive that does not come back, in a sentence.
+pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), String> {
+    link.begin();
+    for (ring, drive) in all {
         let cell = Before {
             ring: *ring,
             drive: *drive,
@@ -181,7 +189,7 @@ pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String>
         settle(link);
     }
     let end = link.now() + SELF_TEST;
-    for (ring, drive) in all {
+    for &(ring, drive) in all {
         let cell = Before {
             ring,
             drive,

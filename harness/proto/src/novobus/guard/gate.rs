@@ -136,6 +136,12 @@ impl Guard {
         matches!(self.state, State::Doubt(_)) && !self.limits.allow_everything()
     }
 
+    /// Whether every drive waits for a sync byte, and none has a command in part, as far as the bytes that have passed tell.
+    #[must_use]
+    pub fn at_rest(&self) -> bool {
+        self.state == State::Sync && self.halves.iter().all(|half| half.length == 0)
+    }
+
     /// The drives may stand anywhere from now on: something has happened to what was sent, or one was switched on.
     pub fn doubt(&mut self) {
         self.state = State::Doubt(Doubt::default());
@@ -195,9 +201,15 @@ impl Guard {
         {
             return Err(Cause::TooMany { most });
         }
-        if self.limits.allow_everything() {
-            return Ok(Next::to(self.state));
+        match self.next(byte) {
+            // Where everything is allowed, what cannot be followed passes all the same.
+            Err(_) if self.limits.allow_everything() => Ok(Next::to(in_doubt(byte))),
+            next => next,
         }
+    }
+
+    /// What follows behind a byte, where no check sequence is hidden in it.
+    fn next(&self, byte: u8) -> Result<Next, Cause> {
         let next = self.follow(byte)?;
         let shift = self.tails[0].shift(byte);
         let shift = shift.or_else(|| self.tails[1].shift(byte).filter(|_| byte != PAUSE));

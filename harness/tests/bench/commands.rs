@@ -1,0 +1,130 @@
+//! The commands on drives, on a ring that another process serves: one process a command, as a person types them.
+
+use super::ring::Served;
+use super::{Desk, ended, finish, playing, said, signal};
+
+const SAFE: &str = "2 drives are stopped, standing and blocked";
+
+fn desk(quiet: bool) -> (Served, Desk) {
+    let served = Served::start("nd21", &[2], "tcp", true, &[]);
+    let desk = Desk::of(&served);
+    if quiet {
+        let path = desk.path("desk.toml");
+        let text = std::fs::read_to_string(&path).expect("a rig");
+        let text = text.replace("[limits]", "[health]\nquiet = true\n[limits]");
+        std::fs::write(path, text).expect("room");
+    }
+    (served, desk)
+}
+
+#[track_caller]
+fn shows(desk: &Desk, command: &str, words: &str) {
+    let arguments: Vec<_> = command.split(' ').collect();
+    ended(&desk.run(&arguments), 0, words);
+}
+
+/// What only looks leaves drives as they are; what changes them ends in the safe state (ND21 11.8).
+#[test]
+fn every_command_on_a_ring_behind_a_port() {
+    let (_served, desk) = desk(false);
+    shows(&desk, "read all nist Status", "0 rpm");
+    let look = desk.run(&["read", "0", "Status"]);
+    assert!(!said(&look).contains("safe state"), "{}", said(&look));
+    shows(&desk, "info", "2 drives on the bus");
+    ended(&desk.run(&["go", "0"]), 2, "add --move");
+    // The zeros of the check sequence put drives in error (9.8), and what may move confirms it.
+    shows(
+        &desk,
+        "go 0 --move",
+        "error 0504 (ND21 9.8); it was confirmed",
+    );
+    shows(&desk, "go 0 --move", "drive 0 is in go");
+    shows(&desk, "go 0 --move", SAFE);
+    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    shows(&desk, "position 0 --by 2turns --init --move", "stands at");
+    shows(&desk, "write 0 nsoll=0rpm --move", "nsoll: 0000");
+    // Behind a reset the guard knows no more where drives are; the next telegram passes all the same (9.8, 10.5).
+    shows(&desk, "reset 0..1 --move", "drive 1 is in go");
+    shows(&desk, "stop all", "drive 1 is in");
+    shows(&desk, "block 0", "drive 0 is in");
+    ended(&desk.run(&["delete-error", "all"]), 2, "allow_motion");
+    shows(&desk, "delete-error all --move", "drive 1 is in block");
+    shows(&desk, "recover", "2 drives answer");
+    shows(&desk, "scope 0 nist", "recorded at once");
+    shows(&desk, "watch 0 nist --for 50ms --every 10ms", "nist 0 rpm");
+    let file = desk.path("drive.toml");
+    let file = file.to_str().expect("a name");
+    shows(
+        &desk,
+        &format!("params save 0 {file}"),
+        "32 parameters saved",
+    );
+    shows(&desk, &format!("params diff 0 {file}"), "are equal");
+}
+
+/// A ring that was left at rest is opened without a zero, and a motor that was left turning turns on.
+#[test]
+fn quietly_from_command_to_command() {
+    let (_served, desk) = desk(true);
+    shows(&desk, "delete-error all --move", "drive 0 is in go");
+    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    let write = "write 0 nsoll=500rpm --move --hold";
+    shows(&desk, write, "075F (499.88 rpm)");
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    shows(&desk, "read 0 nist", "499.88 rpm");
+    // Whoever is killed leaves nothing that would be believed.
+    let mut watch = desk
+        .command(&["watch", "0", "nist", "--for", "30s"])
+        .spawn()
+        .expect("the program");
+    playing(&mut watch);
+    signal(&watch, "-KILL");
+    let _gone = watch.wait();
+    shows(&desk, "read 0 Status", "error 0504 (ND21 9.8)");
+}
+
+#[test]
+fn an_interrupted_command_ends_in_the_safe_state() {
+    let (mut served, desk) = desk(true);
+    shows(&desk, "delete-error all --move", "drive 0 is in go");
+    shows(&desk, "write 0 nsoll=500rpm --move --hold", "499.88 rpm");
+    let watch = || {
+        let arguments = ["watch", "0", "nist", "--for", "30s"];
+        let mut child = desk.command(&arguments).spawn().expect("the program");
+        playing(&mut child);
+        child
+    };
+    let child = watch();
+    // Who comes meanwhile is told.
+    ended(&desk.run(&["read", "0", "nist"]), 75, "held by");
+    signal(&child, "-INT");
+    ended(&finish(child), 130, SAFE);
+    let child = watch();
+    let _gone = served.child.kill();
+    ended(&finish(child), 7, "the safe state is NOT confirmed");
+}
+
+/// Nothing that the rig's file does not allow, whatever the command line says.
+#[test]
+fn the_rigs_limits_hold_for_commands() {
+    let (_served, desk) = desk(false);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig");
+    let (text, _) = text.split_once("[limits]").expect("limits");
+    std::fs::write(&path, text).expect("room");
+    for command in [
+        "go 0 --move",
+        "reset 0 --move",
+        "write 0 EE_pole=06 --move",
+        "position 0 --to 1turns --init --move",
+    ] {
+        let arguments: Vec<_> = command.split(' ').collect();
+        let output = desk.run(&arguments);
+        ended(&output, 2, "needs `allow_");
+        ended(&output, 2, SAFE);
+    }
+    let missing = ["read", "0", "nist", "--rig", "no-such-rig"];
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    let output = command.args(missing).output().expect("the program");
+    ended(&output, 2, "no rig of that name");
+}
