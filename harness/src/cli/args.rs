@@ -263,7 +263,7 @@ fn ring_size(text: &str) -> Result<u8, String> {
 }
 
 /// A time such as `30s`; at most a day.
-fn duration(text: &str) -> Result<Duration, String> {
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
     const LONGEST: Duration = Duration::from_secs(24 * 3_600);
     let time: Time = text
         .parse()

@@ -12,6 +12,7 @@ mod manual;
 mod output;
 mod qualify;
 mod rig;
+mod rig_check;
 mod rig_failure;
 mod run;
 mod run_rig;

@@ -2,6 +2,7 @@
 
 use super::exit::Exit;
 use super::output::Output;
+use super::rig_check::{CheckRigArguments, check};
 use crate::rig::file::Quarantine;
 use crate::rig::find::{self, FindError, Place};
 use crate::rig::lock::{self, LockError, Standing};
@@ -28,6 +29,9 @@ pub enum RigCommand {
     },
     /// Print the JSON schema of bench files.
     Schema,
+    /// Open a bench, lock it, count its drives, read who they are, and measure how long a byte takes round its rings. The drives
+    /// are left as they are; exit code 3 where something is not as its file says.
+    Check(CheckRigArguments),
     /// Propose a block of a bench's file for each serial port of this machine; no port is opened.
     Scan,
     /// Keep a bench for yourself until `rig unlock`; other users get exit code 75.
@@ -118,6 +122,9 @@ fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure
     let text = match command {
         RigCommand::List { format } => list(*format, &folder()?),
         RigCommand::Show { rig } => show(&find(rig)?)?,
+        RigCommand::Check(arguments) => {
+            return check(arguments, output).map_err(Failure::Output);
+        }
         RigCommand::Schema => format!("{:#}\n", schema()),
         RigCommand::Scan => {
             let ports = scan::scan(Path::new("/"));

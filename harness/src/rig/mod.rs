@@ -6,6 +6,7 @@
 
 mod check;
 mod ends;
+pub mod figures;
 pub mod file;
 pub mod find;
 pub mod hook;

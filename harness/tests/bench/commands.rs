@@ -104,6 +104,40 @@ fn an_interrupted_command_ends_in_the_safe_state() {
     ended(&finish(child), 7, "the safe state is NOT confirmed");
 }
 
+/// A rig says of itself what is so, and what its file says otherwise.
+#[test]
+fn a_rig_is_checked() {
+    let (_served, desk) = desk(false);
+    let path = desk.path("desk.toml");
+    let name = path.to_str().expect("a name");
+    let check = |more: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.args(["rig", "check", name]).args(more);
+        command.env("DRIVEBENCH_STATE", desk.path("state"));
+        command.output().expect("the program")
+    };
+    let output = check(&[]);
+    ended(
+        &output,
+        0,
+        "a byte takes 0.573 ms round the ring (ND21 8.2)",
+    );
+    ended(&output, 0, "drive 1: serial 000001");
+    let output = check(&["--format", "json"]);
+    let figures: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let ring = &figures["rings"][0];
+    let middle = ring["middle_ms"].as_f64().expect("a time");
+    assert!((0.5..50.0).contains(&middle), "{ring}");
+    assert_eq!(ring["lost"], 0);
+    assert_eq!(figures["drives"][1]["serial_number"], 1);
+    let text = std::fs::read_to_string(&path).expect("a rig");
+    let other = text.clone() + "[[drive]]\naddress = 1\nserial = \"4711\"\n";
+    std::fs::write(&path, other).expect("room");
+    ended(&check(&[]), 3, "the rig's file says 4711");
+    std::fs::write(&path, text.replace("drives = 2", "drives = 3")).expect("room");
+    ended(&check(&[]), 3, "the ring has 2 drives");
+}
+
 /// Nothing that the rig's file does not allow, whatever the command line says.
 #[test]
 fn the_rigs_limits_hold_for_commands() {

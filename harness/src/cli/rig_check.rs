@@ -1,0 +1,192 @@
+//! `drivebench rig check`: a bench is opened, its drives are counted and read, its line is measured.
+
+use super::exit::Exit;
+use super::output::Output;
+use super::rig::ListFormat;
+use super::rig_failure::{exit_of, find_rig, interrupt_flag, tell_end};
+use super::run::progress_bar;
+use crate::bus::Error;
+use crate::link::Trouble;
+use crate::rig::figures::{Figures, RingFigures, measure};
+use crate::rig::{Options, Rig, Session};
+use clap::Args;
+use harness_proto::time::Span;
+use serde_json::json;
+use std::fmt::Write as _;
+use std::time::Duration;
+
+/// For `rig check`.
+#[derive(Debug, Args)]
+pub struct CheckRigArguments {
+    /// A name, a file, or sim:N.
+    pub rig: String,
+    /// How long to wait for a rig that somebody else has, such as 30s.
+    #[arg(long, value_name = "TIME", value_parser = super::args::duration)]
+    pub wait: Option<Duration>,
+    /// In which form.
+    #[arg(long, value_enum, default_value_t = ListFormat::Text)]
+    pub format: ListFormat,
+}
+
+/// Opens a bench and says what it shows.
+pub(super) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let Some(rig) = find_rig(&arguments.rig, output) else {
+        return Ok(Exit::Usage);
+    };
+    let options = Options {
+        purpose: "rig check".to_owned(),
+        wait: arguments.wait.unwrap_or_default(),
+        interrupt: interrupt_flag(),
+        ..Options::default()
+    };
+    let session = match Session::open(&rig, &options) {
+        Ok(session) => session,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(exit_of(&error));
+        }
+    };
+    let all = rig.rings().map(|(_, ring)| usize::from(ring.drives)).sum();
+    let bar = progress_bar(all, output.progress);
+    let measured = measure(session, &mut |axis| {
+        bar.set_message(format!("drive {axis}"));
+        bar.inc(1);
+    });
+    bar.finish_and_clear();
+    let (measured, end) = measured;
+    let ended = |exit, output: &mut Output| match &end {
+        Some(end) => tell_end(end, exit, output),
+        None => exit,
+    };
+    let figures = match measured {
+        Ok(figures) => figures,
+        Err(error) => {
+            output.complain(&format!("failed to read the drives: {error}"));
+            let exit = match error {
+                Error::Link(Trouble::Interrupted) => Exit::Interrupted,
+                _ => Exit::RigError,
+            };
+            return Ok(ended(exit, output));
+        }
+    };
+    let text = match arguments.format {
+        ListFormat::Text => text(&rig, &figures),
+        ListFormat::Json => format!("{:#}\n", object(&rig, &figures)),
+    };
+    output.result(&text)?;
+    let mut exit = Exit::Passed;
+    for ring in figures.rings.iter().filter(|ring| ring.lost > 0) {
+        output.complain(&format!(
+            "{} of {} SYNCO did not come back as they were sent (ND21 9.2)",
+            ring.lost,
+            ring.lost + ring.rounds.len()
+        ));
+        exit = Exit::RigError;
+    }
+    for drive in &figures.drives {
+        if let Some(contradiction) = &drive.contradiction {
+            output.complain(&format!("drive {}: {contradiction}", drive.axis));
+            exit = Exit::RigError;
+        }
+    }
+    Ok(ended(exit, output))
+}
+
+fn ms(span: Span) -> String {
+    format!("{:.3}", span.as_millis_f64())
+}
+
+fn text(rig: &Rig, figures: &Figures) -> String {
+    let mut text = String::new();
+    for ((number, ring), found) in rig.rings().zip(&figures.rings) {
+        let drives = found.size.drives();
+        let s = if drives == 1 { "" } else { "s" };
+        let port = ring.endpoint.port.as_ref();
+        let port = port.map_or(String::new(), |port| format!(" {port}"));
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(
+            text,
+            "ring {number} ({}{port}, {} baud 8O1): {drives} drive{s}",
+            ring.endpoint.transport.name(),
+            ring.endpoint.line.baud()
+        );
+        let _infallible = writeln!(text, "  {}", line_of(found));
+    }
+    for (ring, drive) in &figures.reported {
+        let _infallible = writeln!(
+            text,
+            "ring {}: drive {drive} had spelled out its address: a fault in front of it before the check (ND21 9.7)",
+            ring + 1
+        );
+    }
+    let corrected = figures.corrected;
+    let _infallible = writeln!(text, "errors corrected while drives were read: {corrected}");
+    for drive in &figures.drives {
+        let serial = drive.identity.serial_number;
+        let serial = serial.map_or("no serial number".to_owned(), |n| format!("serial {n:06}"));
+        let error = drive.state.error_in_words();
+        let _infallible = writeln!(
+            text,
+            "drive {}: {serial}, EE_Version {:02X}, {} h, in {}{}",
+            drive.axis,
+            drive.identity.ee_version,
+            drive.identity.hours.0,
+            drive.state.mode(),
+            error.map_or(String::new(), |error| format!(", {error}"))
+        );
+    }
+    text
+}
+
+fn line_of(ring: &RingFigures) -> String {
+    let nominal = ms(ring.nominal);
+    let errors = ring.line_errors;
+    match ring.spread() {
+        None => {
+            format!("nothing came round, {nominal} ms by the rule of 8.2; {errors} line errors")
+        }
+        Some([least, middle, most]) => format!(
+            "a byte takes {nominal} ms round the ring (ND21 8.2); measured {} to {}, {} in the middle; {errors} line errors",
+            ms(least),
+            ms(most),
+            ms(middle)
+        ),
+    }
+}
+
+fn object(rig: &Rig, figures: &Figures) -> serde_json::Value {
+    let rings: Vec<_> = figures
+        .rings
+        .iter()
+        .map(|ring| {
+            let spread = ring.spread().map(|spread| spread.map(Span::as_millis_f64));
+            json!({
+                "drives": ring.size.drives(),
+                "nominal_ms": ring.nominal.as_millis_f64(),
+                "least_ms": spread.map(|spread| spread[0]),
+                "middle_ms": spread.map(|spread| spread[1]),
+                "most_ms": spread.map(|spread| spread[2]),
+                "lost": ring.lost,
+                "line_errors": ring.line_errors,
+            })
+        })
+        .collect();
+    let drives: Vec<_> = figures
+        .drives
+        .iter()
+        .map(|drive| {
+            json!({
+                "axis": drive.axis.to_string(),
+                "serial_number": drive.identity.serial_number,
+                "ee_version": format!("{:02X}", drive.identity.ee_version),
+                "hours": drive.identity.hours.0,
+                "mode": drive.state.mode(),
+                "error": drive.state.error_in_words(),
+                "contradiction": drive.contradiction,
+            })
+        })
+        .collect();
+    json!({
+        "schema": 1, "rig": rig.id(), "rings": rings, "corrected": figures.corrected, "drives": drives,
+    })
+}
