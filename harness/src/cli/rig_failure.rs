@@ -52,6 +52,14 @@ pub(super) fn tell_end(end: &End, exit: Exit, output: &mut Output) -> Exit {
     for remark in &end.remarks {
         output.complain(remark);
     }
+    for power in &end.power {
+        output.complain(power);
+    }
+    let exit = if end.power.is_empty() {
+        exit
+    } else {
+        Exit::NotSafe
+    };
     match &end.safe {
         Some(safe @ SafeState::NotConfirmed(_)) => {
             output.complain(&safe.to_string());

@@ -12,4 +12,4 @@ mod safe_state;
 
 pub use guarded::Guarded;
 pub use harness_proto::novobus::guard::{Denial, Guard, Limits, Need};
-pub use safe_state::{MOST_STANDING, NotSafe, SafeState, safe_state};
+pub use safe_state::{NotSafe, SafeState, SafeStep, Standing, safe_state};

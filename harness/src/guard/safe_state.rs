@@ -5,6 +5,7 @@ use crate::link::{Line, Trouble};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::ram;
+use harness_proto::nd21::units::speed_from_raw;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
@@ -12,12 +13,38 @@ use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
 use harness_proto::time::{Instant, Span};
 use std::fmt;
 
-/// The highest raw `nist` at which a motor counts as standing: 10.6 rpm in the range of 12000 rpm (ND21 14.5.3.1).
-pub const MOST_STANDING: u16 = 20;
-/// How long a motor may take to stop on its ramp.
-const TIME_TO_STOP: Span = Span::from_millis(10_000);
 /// How often a ring is brought back before it counts as lost (ND21 9.8; three are the most that were ever needed).
 const ATTEMPTS: u8 = 3;
+
+/// What a drive is told on its way to the safe state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SafeStep {
+    /// To stop on its ramp, and to stand.
+    Stop,
+    /// To give no torque, with a nominal speed of 0.
+    Block,
+}
+
+/// How drives are taken to their safe state, and when they count as standing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// What they are told, in this order.
+    pub order: Vec<SafeStep>,
+    /// The speed below which a motor counts as standing, in rpm.
+    pub rpm: f64,
+    /// How long it may take to stand.
+    pub within: Span,
+}
+
+impl Default for Standing {
+    fn default() -> Self {
+        Self {
+            order: vec![SafeStep::Stop, SafeStep::Block],
+            rpm: 5.0,
+            within: Span::from_millis(5_000),
+        }
+    }
+}
 
 /// Whether the bench is in its safe state.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,17 +89,17 @@ impl fmt::Display for SafeState {
 /// Brings every drive of the rings to its safe state and reads it back; a guarded line lets all of it pass, behind a
 /// denial after [`Guarded::reset_after_denial`](super::Guarded::reset_after_denial).
 ///
-/// A ring is brought back first (9.8), whatever was half-sent. Then all drives get the software stop, which
-/// ends every motion on its ramp (11.8), each is waited for until `nist` is within [`MOST_STANDING`], and the nominal speed 0 and the
-/// software block follow, on a drive that does not stand as well. Confirmed is a drive whose `Flags` show stop and block (14.4.2) and
+/// A ring is brought back first (9.8), whatever was half-sent. Then all drives get the first of the steps, each is seen to do it, and
+/// the next follows, on a drive that does not stand as well. The software stop ends every motion on its ramp (11.8); with the
+/// software block goes the nominal speed 0. Confirmed is a drive whose `Flags` show what it was told (14.4.2) and
 /// that stands. A ring that does not answer is given the stops all the same, as drives in front of a break hear
 /// them.
 ///
-/// It ends within about 15 seconds a ring and 10 a drive that does not stop.
-pub fn safe_state(line: &mut dyn Line, rings: &[RingSize]) -> SafeState {
+/// It ends within about 15 seconds a ring, and the time to stand a step for a drive that does not stop.
+pub fn safe_state(line: &mut dyn Line, rings: &[RingSize], standing: &Standing) -> SafeState {
     let mut not_safe = Vec::new();
     for (ring, &size) in rings.iter().enumerate() {
-        not_safe.extend(ring_to_safe_state(line, ring, size));
+        not_safe.extend(ring_to_safe_state(line, ring, size, standing));
     }
     if not_safe.is_empty() {
         SafeState::Confirmed(rings.to_vec())
@@ -81,7 +108,12 @@ pub fn safe_state(line: &mut dyn Line, rings: &[RingSize]) -> SafeState {
     }
 }
 
-fn ring_to_safe_state(line: &mut dyn Line, ring: usize, size: RingSize) -> Vec<NotSafe> {
+fn ring_to_safe_state(
+    line: &mut dyn Line,
+    ring: usize,
+    size: RingSize,
+    standing: &Standing,
+) -> Vec<NotSafe> {
     let all = |why: String| {
         let axes = (0..size.drives()).filter_map(|drive| Axis::new(ring, drive));
         let not_safe = axes.map(|axis| NotSafe {
@@ -105,21 +137,30 @@ fn ring_to_safe_state(line: &mut dyn Line, ring: usize, size: RingSize) -> Vec<N
     };
     // The bus has one ring, whichever it is of the bench.
     let axes = || (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
-    let stopped: Vec<_> = axes().map(|axis| bus.stop(axis)).collect();
-    let mut not_safe = Vec::new();
-    for (axis, stopped) in axes().zip(stopped) {
-        let stands = stopped.and_then(|()| wait_until_standing(&bus, axis));
-        let blocked = block(&bus, axis);
-        let why = match (stands, blocked) {
-            (Ok(()), Ok(())) => continue,
-            (Err(error), _) | (_, Err(error)) => error.to_string(),
-        };
-        if let Some(axis) = Axis::new(ring, axis.drive()) {
-            not_safe.push(NotSafe { axis, why });
+    let axes: Vec<_> = axes().collect();
+    let mut why: Vec<Option<String>> = vec![None; axes.len()];
+    let mut told = 0;
+    for step in &standing.order {
+        let ordered: Vec<_> = axes.iter().map(|axis| order(&bus, *axis, *step)).collect();
+        told |= step.flag();
+        // Standing is waited for once: a drive that does not stop is not waited for again.
+        for ((axis, ordered), why) in axes.iter().zip(ordered).zip(&mut why) {
+            let within = match why {
+                None => standing.within,
+                Some(_) => FLAGS,
+            };
+            let seen = ordered.and_then(|()| see(&bus, *axis, told, standing.rpm, within));
+            *why = why.take().or(seen.err().map(|error| error.to_string()));
         }
     }
     bus.close();
-    not_safe
+    let not_safe = axes.iter().zip(why).filter_map(|(axis, why)| {
+        Some(NotSafe {
+            axis: Axis::new(ring, axis.drive())?,
+            why: why?,
+        })
+    });
+    not_safe.collect()
 }
 
 /// Ends what was half-sent and brings the ring back (ND21 9.8).
@@ -174,39 +215,52 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
     while line.now() < sent && line.wait(sent) {}
 }
 
-fn wait_until_standing(bus: &Bus<'_>, axis: Axis) -> Result<(), Error> {
-    let end = bus.now() + TIME_TO_STOP;
-    loop {
-        let speed = bus.read_word(axis, ram::NIST)?.cast_signed();
-        if speed.unsigned_abs() <= MOST_STANDING {
-            return Ok(());
-        }
-        if bus.now() >= end {
-            return Err(Error::TimeOut {
-                waited: TIME_TO_STOP,
-                what: format!("drive {axis} to stand (nist is {speed:04X})"),
-            });
+/// How long `Flags` may take to follow: they do in the drive's next cycle.
+const FLAGS: Span = Span::from_millis(500);
+
+impl SafeStep {
+    /// What `Flags` show of it (14.4.2).
+    const fn flag(self) -> u8 {
+        match self {
+            Self::Stop => flags::STOP,
+            Self::Block => flags::BLOCK,
         }
     }
 }
 
-fn block(bus: &Bus<'_>, axis: Axis) -> Result<(), Error> {
-    bus.write_word(axis, ram::NSOLL, 0)?;
-    bus.block(axis)?;
-    let wanted = flags::STOP | flags::BLOCK;
-    // `Flags` follow in the drive's next cycle.
-    let end = bus.now() + Span::from_millis(500);
+fn order(bus: &Bus<'_>, axis: Axis, step: SafeStep) -> Result<(), Error> {
+    match step {
+        SafeStep::Stop => bus.stop(axis),
+        SafeStep::Block => {
+            bus.write_word(axis, ram::NSOLL, 0)?;
+            bus.block(axis)
+        }
+    }
+}
+
+/// Waits until a drive shows what it was told, and stands.
+fn see(bus: &Bus<'_>, axis: Axis, told: u8, rpm: f64, within: Span) -> Result<(), Error> {
+    let range = bus.speed_range(axis)?;
+    let begin = bus.now();
+    let mut stood = None;
     loop {
         let found = bus.read_byte(axis, ram::FLAGS)?;
-        let speed = bus.read_word(axis, ram::NIST)?.cast_signed();
-        if found & wanted == wanted && speed.unsigned_abs() <= MOST_STANDING {
+        let raw = bus.read_word(axis, ram::NIST)?.cast_signed();
+        let speed = speed_from_raw(raw, range).to_f64();
+        let now = bus.now();
+        stood = (speed.abs() <= rpm).then(|| stood.unwrap_or(now));
+        if stood.is_some() && found & told == told {
             return Ok(());
         }
-        if bus.now() >= end {
+        let late = match stood {
+            None => now >= begin + within,
+            Some(stood) => now >= stood + FLAGS,
+        };
+        if late {
             return Err(Error::TimeOut {
-                waited: Span::from_millis(500),
+                waited: now.since(begin),
                 what: format!(
-                    "drive {axis} to be stopped and blocked (Flags are {found:02X}, nist is {speed:04X})"
+                    "drive {axis} to do as told and to stand (Flags are {found:02X}, {told:02X} of them told; nist is {speed:.1} rpm)"
                 ),
             });
         }

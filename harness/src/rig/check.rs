@@ -1,6 +1,6 @@
 //! From the text of a rig file to a [`Rig`]: every mistake is found here, before a port is opened.
 
-use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, Transport};
+use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
 use super::schema::{compare, span_of};
 use super::sim::settle;
 use super::values::{ValueError, Wire};
@@ -204,6 +204,7 @@ impl Check<'_> {
         for (index, interlock) in file.interlock.iter().enumerate() {
             self.interlock(&["interlock".into(), index.into()], interlock);
         }
+        self.safe_state();
         self.programs();
         self.quarantine();
         self.setup(source);
@@ -221,6 +222,28 @@ impl Check<'_> {
                 format!("`{id}` is no id"),
                 expected,
             );
+        }
+    }
+
+    /// Telegrams come before the power goes, and each step once.
+    fn safe_state(&mut self) {
+        let order = &self.file.safe_state.order;
+        for (index, step) in order.iter().enumerate() {
+            let path = ["safe_state".into(), "order".into(), index.into()];
+            if order[..index].contains(step) {
+                self.wrong(
+                    &path,
+                    "this step stands there twice",
+                    "each step once expected",
+                );
+            } else if *step == SafeStep::PowerOff && index + 1 < order.len() {
+                let expected =
+                    "`power-off` as the last step expected: drives without power hear nothing";
+                self.wrong(&path, "something stands behind power-off", expected);
+            } else if *step == SafeStep::PowerOff && self.file.power.is_empty() {
+                let expected = "a table [power.NAME] expected beside it";
+                self.wrong(&path, "there is no power to switch off", expected);
+            }
         }
     }
 

@@ -4,11 +4,13 @@
 //! of a text with its place, and [`find`](mod@find) a rig by its name. [`lock`] says who holds a rig or a port, [`state`] where
 //! that is kept, and which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
 
+mod around;
 mod check;
 mod ends;
 pub mod figures;
 pub mod file;
 pub mod find;
+mod health;
 pub mod hook;
 pub mod lock;
 mod open;
@@ -24,8 +26,9 @@ pub mod values;
 pub use check::{Rig, parse};
 pub use ends::Ends;
 pub use find::{FindError, find};
+pub use health::{Health, Unhealthy, examine};
 pub use open::OpenRigError;
 pub use run::{Attempt, Keeper, Played, Run, Way, play_one};
 pub use schema::schema;
-pub use session::{End, Health, Options, Session, SessionError, Unhealthy, examine};
+pub use session::{End, Options, Session, SessionError};
 pub use shared::{Shared, SharedLine};

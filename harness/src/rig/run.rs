@@ -3,7 +3,8 @@
 
 use super::Rig;
 use super::file::Deviation;
-use super::session::{Session, SessionError, Unhealthy, examine};
+use super::health::{Unhealthy, examine};
+use super::session::{Session, SessionError};
 use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;

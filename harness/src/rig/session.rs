@@ -1,21 +1,21 @@
 //! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
 
 use super::Rig;
+use super::around::Around;
 use super::ends::Ends;
-use super::file::{HookEntry, SafeStep};
-use super::hook::{self, HookError};
+use super::file;
+use super::health::{Health, Unhealthy, examine};
+use super::hook::HookError;
 use super::lock::{LockError, PortLock, RigLock};
 use super::open::{OpenRigError, open};
 use super::state;
-use crate::bus::{Axis, count_behind, recover};
-use crate::guard::{Guarded, SafeState, safe_state};
-use crate::link::{Line, Link, StreamLink, Trouble};
+use crate::bus::{Axis, count_behind};
+use crate::guard::{Guarded, SafeState, SafeStep, Standing, safe_state};
+use crate::link::{Line, Link, StreamLink};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
-use std::fmt::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -25,9 +25,6 @@ const LISTEN: Span = Span::from_millis(40);
 
 /// How long what was sent may be on its way round a ring of 250 drives, adapters counted (ND21 8.2).
 const LONGEST_ROUND: Span = Span::from_millis(1_000);
-
-/// Bytes of somebody else's that are shown.
-const SHOWN: usize = 8;
 
 /// How a rig is used.
 #[derive(Clone, Debug, Default)]
@@ -93,62 +90,13 @@ pub enum SessionError {
     },
 }
 
-/// What is wrong with a ring.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Unhealthy {
-    /// Bytes come although the bench sends nothing.
-    #[error(
-        "{count} bytes came although nothing was sent ({bytes}): another master on this line, drives that miss their bytes (ND21 9.9), or noise"
-    )]
-    Talking {
-        /// How many.
-        count: usize,
-        /// The first of them.
-        bytes: String,
-    },
-    /// Nothing comes back.
-    #[error(
-        "nothing comes back: the ring is open, a drive has no power, or this is another port (ND21 8.2)"
-    )]
-    Silent,
-    /// What comes back is no ring's answer.
-    #[error(
-        "what comes back is no answer of a ring: {bytes}; is the other end a master, or another rate?"
-    )]
-    Foreign {
-        /// The first bytes.
-        bytes: String,
-    },
-    /// A drive reports an error behind the check sequence.
-    #[error("the ring does not come back: drive {0} reports a fault in front of it (ND21 9.7)")]
-    Broken(u8),
-    /// Another number of drives.
-    #[error("the ring has {found} drives, the rig's file says {stated}")]
-    Size {
-        /// How many answered.
-        found: u8,
-        /// How many the file says.
-        stated: u8,
-    },
-    /// The link.
-    #[error("{0}")]
-    Trouble(Trouble),
-}
-
-/// What a healthy ring showed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Health {
-    /// How many drives each ring has.
-    pub rings: Vec<RingSize>,
-    /// Drives that reported a fault before the ring was brought back: ring and drive.
-    pub reported: Vec<(usize, u8)>,
-}
-
 /// How a session ended.
 #[derive(Debug)]
 pub struct End {
     /// Whether every drive stands and is blocked; `None` for rings that are simulated in the program.
     pub safe: Option<SafeState>,
+    /// Power that was to be switched off and is not known to be, in sentences.
+    pub power: Vec<String>,
     /// What else went wrong on the way out, in sentences.
     pub remarks: Vec<String>,
 }
@@ -166,6 +114,7 @@ pub struct Session {
     /// What the check at its opening found.
     opening: Option<Health>,
     // Given back in this order.
+    around: Around,
     _ports: Vec<PortLock>,
     _lock: Option<RigLock>,
 }
@@ -194,7 +143,10 @@ impl Session {
             }
             Some(RigLock::acquire(rig, &options.purpose, options.wait)?)
         };
-        run_hook(rig, "before", rig.file.hooks.before.as_ref())?;
+        let around = Around::begin(rig).map_err(|error| SessionError::Hook {
+            rig: rig.id().to_owned(),
+            error,
+        })?;
         let opened = open(rig, options.interrupt.clone()).map_err(|error| SessionError::Open {
             rig: rig.id().to_owned(),
             error: Box::new(error),
@@ -213,6 +165,7 @@ impl Session {
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
             ended: true,
             opening: None,
+            around,
             _ports: opened.locks,
             _lock: lock,
         };
@@ -225,6 +178,7 @@ impl Session {
             }
         }
         session.ended = rig.is_simulated();
+        session.around.used();
         Ok(session)
     }
 
@@ -376,16 +330,18 @@ impl Session {
         self.ended = true;
         let mut end = End {
             safe: None,
+            power: Vec::new(),
             remarks: Vec::new(),
         };
         self.come_home();
-        self.run_last_hooks(false, &mut end);
+        end.remarks = self.around.end(false);
         end
     }
 
     fn end(&mut self, error: bool) -> End {
         let mut end = End {
             safe: None,
+            power: Vec::new(),
             remarks: Vec::new(),
         };
         if std::mem::replace(&mut self.ended, true) && !self.rig.is_simulated() {
@@ -397,19 +353,17 @@ impl Session {
             }
             self.link.begin();
             self.link.reset_after_denial();
-            end.safe = Some(safe_state(&mut self.link, &self.rings));
+            let wanted = self.rig.file.safe_state.clone();
+            let standing = standing(&wanted);
+            if !standing.order.is_empty() {
+                end.safe = Some(safe_state(&mut self.link, &self.rings, &standing));
+            }
             self.come_home();
-            let order = self.rig.file.safe_state.order.clone();
-            if order.contains(&SafeStep::PowerOff) {
-                for (name, power) in &self.rig.file.power {
-                    let what = format!("power {name} off");
-                    if let Err(error) = hook::run(&self.rig, &what, &power.off, power.timeout.0) {
-                        end.remarks.push(format!("{what}: {error}"));
-                    }
-                }
+            if wanted.order.contains(&file::SafeStep::PowerOff) {
+                end.power = self.around.power_off();
             }
         }
-        self.run_last_hooks(error, &mut end);
+        end.remarks = self.around.end(error);
         end
     }
 
@@ -425,19 +379,6 @@ impl Session {
             let _unkept = state::left_at_rest(&folder, self.rig.id());
         }
     }
-
-    fn run_last_hooks(&self, error: bool, end: &mut End) {
-        let hooks = &self.rig.file.hooks;
-        let after = [
-            ("after", hooks.after.as_ref()),
-            ("on_error", hooks.on_error.as_ref().filter(|_| error)),
-        ];
-        for (name, entry) in after {
-            if let Err(error) = run_hook(&self.rig, name, entry) {
-                end.remarks.push(error.to_string());
-            }
-        }
-    }
 }
 
 impl Drop for Session {
@@ -449,104 +390,17 @@ impl Drop for Session {
     }
 }
 
-/// Brings every ring back (9.8), counts its drives, and compares.
-///
-/// # Errors
-/// The first ring that is ill, and what is wrong with it.
-pub fn examine(
-    link: &mut dyn Link,
-    rings: &[RingSize],
-    attempts: u8,
-) -> Result<Health, (usize, Unhealthy)> {
-    let mut health = Health {
-        rings: rings.to_vec(),
-        reported: Vec::new(),
+/// What a rig's file says of its safe state, as far as drives go.
+fn standing(wanted: &file::SafeState) -> Standing {
+    let step = |step: &file::SafeStep| match step {
+        file::SafeStep::Stop => Some(SafeStep::Stop),
+        file::SafeStep::Block => Some(SafeStep::Block),
+        file::SafeStep::PowerOff => None,
     };
-    link.begin();
-    for (ring, size) in rings.iter().enumerate() {
-        let mut left = attempts.max(1);
-        loop {
-            // Behind it commands pass the guard.
-            let sent = link.send(ring, &CHECK_SEQUENCE);
-            while link.now() < sent && link.wait(sent) {}
-            match examine_once(link, ring, *size) {
-                Ok(reported) => {
-                    health.reported.extend(reported.map(|drive| (ring, drive)));
-                    break;
-                }
-                Err(ill) => {
-                    left -= 1;
-                    if left == 0 || link.trouble().is_some() {
-                        return Err((ring, ill));
-                    }
-                }
-            }
-        }
-    }
-    link.begin();
-    Ok(health)
-}
-
-/// One ring, once; the drive that reported a fault before.
-fn examine_once(
-    link: &mut dyn Link,
-    ring: usize,
-    stated: RingSize,
-) -> Result<Option<u8>, Unhealthy> {
-    let recovery = recover(link, ring);
-    if let Some(trouble) = link.trouble() {
-        return Err(Unhealthy::Trouble(trouble.clone()));
-    }
-    match recovery.drives {
-        Some(found) if found == stated => Ok(recovery.before),
-        Some(found) => Err(Unhealthy::Size {
-            found: found.drives(),
-            stated: stated.drives(),
-        }),
-        None => {
-            let bytes = link.probe(ring, 4 * usize::from(stated.drives()) + 8);
-            Err(match (recovery.after, bytes.is_empty()) {
-                (Some(drive), _) => Unhealthy::Broken(drive),
-                (None, true) => Unhealthy::Silent,
-                (None, false) => Unhealthy::Foreign {
-                    bytes: shown(&bytes),
-                },
-            })
-        }
-    }
-}
-
-impl Unhealthy {
-    fn talking(bytes: &[Received]) -> Self {
-        Self::Talking {
-            count: bytes.len(),
-            bytes: shown(bytes),
-        }
-    }
-}
-
-fn shown(bytes: &[Received]) -> String {
-    let mut text = String::new();
-    for byte in bytes.iter().take(SHOWN) {
-        // Writing to a String cannot fail.
-        let _infallible = write!(text, "{:02X} ", byte.byte);
-    }
-    if bytes.len() > SHOWN {
-        text.push_str("...");
-    }
-    text.trim_end().to_owned()
-}
-
-fn run_hook(rig: &Rig, name: &str, entry: Option<&HookEntry>) -> Result<(), SessionError> {
-    let Some(entry) = entry else {
-        return Ok(());
-    };
-    match hook::run(rig, name, &entry.command, entry.timeout.0) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(SessionError::Hook {
-            rig: rig.id().to_owned(),
-            error: Box::new(error),
-        }),
+    Standing {
+        order: wanted.order.iter().filter_map(step).collect(),
+        rpm: wanted.speed_tolerance.0,
+        within: Span::from_nanos(u64::try_from(wanted.within.0.as_nanos()).unwrap_or(u64::MAX)),
     }
 }
 

@@ -162,3 +162,55 @@ fn the_rigs_limits_hold_for_commands() {
     let output = command.args(missing).output().expect("the program");
     ended(&output, 2, "no rig of that name");
 }
+
+/// Power goes on before the ports are opened and off behind the last telegram; hooks run around, also where nothing answers.
+#[test]
+fn power_and_hooks_stand_around_a_use() {
+    let (mut served, desk) = desk(false);
+    let path = desk.path("desk.toml");
+    let log = desk.path("log");
+    let (log, state) = (log.display(), desk.path("power"));
+    let state = state.display();
+    let say = |what: &str| format!("[\"sh\", \"-c\", \"echo {what} >> {log}\"]");
+    let switch = |what: &str, how: &str| {
+        format!("[\"sh\", \"-c\", \"echo {what} >> {log}; {how} {state}\"]")
+    };
+    let text = std::fs::read_to_string(&path).expect("a rig")
+        + &format!(
+            "[power.main]\non = {}\noff = {}\nstatus = [\"test\", \"-e\", \"{state}\"]\n\
+             [hooks.before]\ncommand = {}\n[hooks.after]\ncommand = {}\n[hooks.on_error]\ncommand = {}\n\
+             [safe_state]\norder = [\"stop\", \"block\", \"power-off\"]\nspeed_tolerance = \"20rpm\"\nwithin = \"3s\"\n",
+            switch("on", "touch"),
+            switch("off", "rm -f"),
+            say("before"),
+            say("after"),
+            say("error")
+        );
+    std::fs::write(&path, &text).expect("room");
+    let said = || {
+        let text = std::fs::read_to_string(desk.path("log")).expect("a log");
+        std::fs::remove_file(desk.path("log")).expect("a log");
+        text.lines().collect::<Vec<_>>().join(" ")
+    };
+    shows(&desk, "go 0 --move", SAFE);
+    assert_eq!(said(), "before on off after");
+    // What only looks leaves the power on, and nobody switches on what is on.
+    shows(&desk, "read 0 nist", "0 rpm");
+    shows(&desk, "read 0 nist", "0 rpm");
+    assert_eq!(said(), "before on after before after");
+    // A switch that does not switch: nobody may rely on it.
+    let stuck = text.replace("rm -f", "true");
+    std::fs::write(&path, stuck).expect("room");
+    ended(
+        &desk.run(&["go", "0", "--move"]),
+        7,
+        "power main off: it is still on",
+    );
+    std::fs::write(&path, text).expect("room");
+    shows(&desk, "go 0 --move", SAFE);
+    let _log = said();
+    let _gone = served.child.kill();
+    let _gone = served.child.wait();
+    assert_eq!(desk.run(&["read", "0", "nist"]).status.code(), Some(3));
+    assert_eq!(said(), "before on off after error");
+}

@@ -2,7 +2,7 @@
 
 use super::{axis, bus, guarded, ring, size};
 use harness::bus::Bus;
-use harness::guard::{Guarded, Limits, SafeState, safe_state};
+use harness::guard::{Guarded, Limits, SafeState, Standing, safe_state};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::{Mode, Position};
@@ -54,7 +54,7 @@ fn word(line: &Guarded<SimulatedLink>, drive: u8, address: u16) -> i16 {
 #[test]
 fn turning_motors_stand_and_are_blocked() {
     let mut line = in_motion();
-    let state = safe_state(&mut line, &[size(3)]);
+    let state = safe_state(&mut line, &[size(3)], &Standing::default());
     assert_eq!(state, SafeState::Confirmed(vec![size(3)]));
     for drive in 0..3 {
         assert!(word(&line, drive, ram::NIST).abs() <= 20);
@@ -73,7 +73,7 @@ fn half_a_telegram_does_not_keep_it_away() {
     assert!(line.trouble().is_some());
     assert_eq!(line.peek(0, 1, ram::STATUS), before);
     line.reset_after_denial();
-    let state = safe_state(&mut line, &[size(2)]);
+    let state = safe_state(&mut line, &[size(2)], &Standing::default());
     assert_eq!(state, SafeState::Confirmed(vec![size(2)]), "{state}");
 }
 
@@ -82,7 +82,8 @@ fn a_drive_without_power_is_named() {
     let mut line = in_motion();
     line.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
     let begin = line.now();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(3)]) else {
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(3)], &Standing::default())
+    else {
         panic!("confirmed");
     };
     assert_eq!(drives.len(), 3);
@@ -102,7 +103,7 @@ fn a_cut_ring_is_not_confirmed() {
     let mut line = in_motion();
     line.inject(0, PlacedFault::Link(0, LinkFault::Cut), Moment::Now);
     let begin = line.now();
-    let state = safe_state(&mut line, &[size(3)]);
+    let state = safe_state(&mut line, &[size(3)], &Standing::default());
     assert!(matches!(&state, SafeState::NotConfirmed(drives) if drives.len() == 3));
     assert!(state.to_string().contains("NOT confirmed"));
     assert!(line.now().since(begin) < Span::from_millis(15_000));
@@ -130,7 +131,7 @@ fn a_motion_of_the_positioning_controller_ends() {
         bus.close();
     }
     assert!(word(&line, 0, ram::NIST).abs() > 200);
-    let state = safe_state(&mut line, &[size(1)]);
+    let state = safe_state(&mut line, &[size(1)], &Standing::default());
     assert_eq!(state, SafeState::Confirmed(vec![size(1)]), "{state}");
     let end = line.now() + Span::from_millis(1_000);
     while line.now() < end && line.wait(end) {}
@@ -149,11 +150,12 @@ fn two_rings() {
     }
     assert_eq!(line.trouble(), None);
     line.reset_after_denial();
-    let state = safe_state(&mut line, &rings);
+    let state = safe_state(&mut line, &rings, &Standing::default());
     assert_eq!(state, SafeState::Confirmed(rings.to_vec()), "{state}");
     line.inject(1, PlacedFault::Drive(2, DriveFault::Off), Moment::Now);
     line.reset_after_denial();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &rings) else {
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &rings, &Standing::default())
+    else {
         panic!("confirmed");
     };
     assert!(drives.iter().all(|drive| drive.axis.ring() == 1));
@@ -166,7 +168,8 @@ fn plain_drives_are_not_confirmed() {
     let bench = Bench::one(Ring::new(size(2), Rate::Baud38400, plain));
     let mut line = Guarded::new(SimulatedLink::new(bench), Limits::default());
     let begin = line.now();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(2)]) else {
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(2)], &Standing::default())
+    else {
         panic!("confirmed");
     };
     assert_eq!(drives.len(), 2);

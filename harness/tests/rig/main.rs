@@ -252,6 +252,16 @@ fn mistakes_are_shown_with_line_and_column() {
             "an input that is not there",
             serial("[[interlock]]\ndrive = 0\ninput = \"GPIN9\"\nlevel = \"high\""),
         ),
+        (
+            "telegrams behind the power",
+            serial(
+                "[power.main]\non = [\"on\"]\noff = [\"off\"]\n[safe_state]\norder = [\"power-off\", \"stop\"]",
+            ),
+        ),
+        (
+            "no power to switch off",
+            serial("[safe_state]\norder = [\"stop\", \"stop\", \"power-off\"]"),
+        ),
         ("no command", serial("[hooks.before]\ncommand = []")),
         (
             "a command as one text",

@@ -1,0 +1,150 @@
+//! Whether a ring is sound and as large as its rig's file says.
+
+use crate::bus::recover;
+use crate::link::{Link, Trouble};
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use std::fmt::Write as _;
+
+/// Bytes of somebody else's that are shown.
+const SHOWN: usize = 8;
+
+/// What is wrong with a ring.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unhealthy {
+    /// Bytes come although the bench sends nothing.
+    #[error(
+        "{count} bytes came although nothing was sent ({bytes}): another master on this line, drives that miss their bytes (ND21 9.9), or noise"
+    )]
+    Talking {
+        /// How many.
+        count: usize,
+        /// The first of them.
+        bytes: String,
+    },
+    /// Nothing comes back.
+    #[error(
+        "nothing comes back: the ring is open, a drive has no power, or this is another port (ND21 8.2)"
+    )]
+    Silent,
+    /// What comes back is no ring's answer.
+    #[error(
+        "what comes back is no answer of a ring: {bytes}; is the other end a master, or another rate?"
+    )]
+    Foreign {
+        /// The first bytes.
+        bytes: String,
+    },
+    /// A drive reports an error behind the check sequence.
+    #[error("the ring does not come back: drive {0} reports a fault in front of it (ND21 9.7)")]
+    Broken(u8),
+    /// Another number of drives.
+    #[error("the ring has {found} drives, the rig's file says {stated}")]
+    Size {
+        /// How many answered.
+        found: u8,
+        /// How many the file says.
+        stated: u8,
+    },
+    /// The link.
+    #[error("{0}")]
+    Trouble(Trouble),
+}
+
+/// What a healthy ring showed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Health {
+    /// How many drives each ring has.
+    pub rings: Vec<RingSize>,
+    /// Drives that reported a fault before the ring was brought back: ring and drive.
+    pub reported: Vec<(usize, u8)>,
+}
+
+/// Brings every ring back (9.8), counts its drives, and compares.
+///
+/// # Errors
+/// The first ring that is ill, and what is wrong with it.
+pub fn examine(
+    link: &mut dyn Link,
+    rings: &[RingSize],
+    attempts: u8,
+) -> Result<Health, (usize, Unhealthy)> {
+    let mut health = Health {
+        rings: rings.to_vec(),
+        reported: Vec::new(),
+    };
+    link.begin();
+    for (ring, size) in rings.iter().enumerate() {
+        let mut left = attempts.max(1);
+        loop {
+            // Behind it commands pass the guard.
+            let sent = link.send(ring, &CHECK_SEQUENCE);
+            while link.now() < sent && link.wait(sent) {}
+            match examine_once(link, ring, *size) {
+                Ok(reported) => {
+                    health.reported.extend(reported.map(|drive| (ring, drive)));
+                    break;
+                }
+                Err(ill) => {
+                    left -= 1;
+                    if left == 0 || link.trouble().is_some() {
+                        return Err((ring, ill));
+                    }
+                }
+            }
+        }
+    }
+    link.begin();
+    Ok(health)
+}
+
+/// One ring, once; the drive that reported a fault before.
+fn examine_once(
+    link: &mut dyn Link,
+    ring: usize,
+    stated: RingSize,
+) -> Result<Option<u8>, Unhealthy> {
+    let recovery = recover(link, ring);
+    if let Some(trouble) = link.trouble() {
+        return Err(Unhealthy::Trouble(trouble.clone()));
+    }
+    match recovery.drives {
+        Some(found) if found == stated => Ok(recovery.before),
+        Some(found) => Err(Unhealthy::Size {
+            found: found.drives(),
+            stated: stated.drives(),
+        }),
+        None => {
+            let bytes = link.probe(ring, 4 * usize::from(stated.drives()) + 8);
+            Err(match (recovery.after, bytes.is_empty()) {
+                (Some(drive), _) => Unhealthy::Broken(drive),
+                (None, true) => Unhealthy::Silent,
+                (None, false) => Unhealthy::Foreign {
+                    bytes: shown(&bytes),
+                },
+            })
+        }
+    }
+}
+
+impl Unhealthy {
+    pub(super) fn talking(bytes: &[Received]) -> Self {
+        Self::Talking {
+            count: bytes.len(),
+            bytes: shown(bytes),
+        }
+    }
+}
+
+fn shown(bytes: &[Received]) -> String {
+    let mut text = String::new();
+    for byte in bytes.iter().take(SHOWN) {
+        // Writing to a String cannot fail.
+        let _infallible = write!(text, "{:02X} ", byte.byte);
+    }
+    if bytes.len() > SHOWN {
+        text.push_str("...");
+    }
+    text.trim_end().to_owned()
+}
