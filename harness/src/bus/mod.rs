@@ -175,7 +175,9 @@ impl<'l> Bus<'l> {
         let mut pump = self.lock();
         let end = pump.now() + span;
         while pump.now() < end && pump.halt().is_none() {
-            pump.step(end);
+            pump.pause();
+            let due = pump.pause_due().unwrap_or(end);
+            pump.step(due.min(end));
         }
     }
 
@@ -194,6 +196,7 @@ impl<'l> Bus<'l> {
     pub fn start(&self, axis: Axis, job: impl FnOnce(u8) -> Job) -> Result<Order, Error> {
         let ring = axis.ring();
         let mut pump = self.lock();
+        pump.pause();
         match pump.submit(ring, job(axis.drive())) {
             None => Err(Error::Value(format!("the bus has no ring {}", ring + 1))),
             // A bus that was stopped is not the job's fault.

@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 /// The most lines of the log that wait to be fetched.
 const MOST_LINES: usize = 256;
 
+/// How long what is under way may take to come home before a pause.
+const PAUSE: Span = Span::from_millis(500);
+
 struct Ring {
     master: Master,
     /// When the line is free for the next byte.
@@ -193,6 +196,21 @@ impl<'l> Pump<'l> {
         while self.link.now() < until && self.link.trouble().is_none() {
             self.link.wait(until);
             self.poll();
+        }
+    }
+
+    /// When the link wants a pause next.
+    pub(super) fn pause_due(&self) -> Option<Instant> {
+        self.link.pause_due()
+    }
+
+    /// Where the link wants a pause and no job is on its way, lets what is under way come home and gives it one.
+    pub(super) fn pause(&mut self) {
+        let now = self.link.now();
+        let due = self.link.pause_due().is_some_and(|due| due <= now);
+        if due && self.rings.iter().all(|ring| ring.master.jobs() == 0) {
+            self.drain(now + PAUSE);
+            self.link.pause();
         }
     }
 

@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         return Ok(Exit::NothingSelected);
     }
     let recorded = arguments.evidence.is_some();
-    if let Some(rig) = rig.as_ref().filter(|rig| recorded || !rig.is_simulated()) {
+    if let Some(rig) = rig.as_ref().filter(|rig| recorded || !rig.is_bare()) {
         let job = Job {
             purpose: "run",
             allow_motion: arguments.allow_motion,

@@ -90,10 +90,16 @@ pub(super) fn work(
             return Err(error);
         }
     };
-    let interrupted = session.link().trouble() == Some(&Trouble::Interrupted);
-    let exit = if interrupted { Exit::Interrupted } else { exit };
+    let exit = match session.link().trouble() {
+        Some(Trouble::Interrupted) => Exit::Interrupted,
+        Some(Trouble::Interlock(why)) => {
+            output.complain(why);
+            Exit::Interlock
+        }
+        _ => exit,
+    };
     let end = match exit {
-        Exit::RigError => session.close_with_error(),
+        Exit::RigError | Exit::Interlock => session.close_with_error(),
         _ => session.close(),
     };
     let exit = tell_end(&end, exit, output);
@@ -209,7 +215,7 @@ pub(super) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
     }
     matches!(
         session.link().trouble(),
-        Some(Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interrupted)
+        Some(Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interlock(_) | Trouble::Interrupted)
     )
 }
 

@@ -266,6 +266,7 @@ impl Line {
                     Trouble::Denied(_) => "denied",
                     Trouble::Lost(_) => "lost",
                     Trouble::Garbled(_) => "garbled",
+                    Trouble::Interlock(_) => "interlock",
                     Trouble::Interrupted => "interrupted",
                 }
                 .to_owned(),
@@ -315,6 +316,7 @@ impl Line {
                 "denied" => Trouble::Denied(text.clone()),
                 "lost" => Trouble::Lost(text.clone()),
                 "garbled" => Trouble::Garbled(text.clone()),
+                "interlock" => Trouble::Interlock(text.clone()),
                 "interrupted" => Trouble::Interrupted,
                 _ => return None,
             }),

@@ -1,9 +1,12 @@
 //! A line or a link behind a guard.
 
+use super::Watch;
 use crate::link::{
     Capability, DriveFault, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus, Trouble,
 };
+use crate::scenario::run::read_byte;
 use harness_proto::line::Received;
+use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::error::BusError;
@@ -24,6 +27,9 @@ pub struct Guarded<L> {
     capabilities: Vec<Capability>,
     /// When the present conversation began, on the guard's clock, which is never set back.
     origin: Instant,
+    watch: Option<Box<dyn Watch>>,
+    /// A fault has been put on a link in the present conversation.
+    faulty: bool,
 }
 
 #[derive(Debug)]
@@ -64,6 +70,8 @@ impl<L: Line> Guarded<L> {
             trouble: None,
             capabilities: Vec::new(),
             origin: Instant::START,
+            watch: None,
+            faulty: false,
         }
     }
 
@@ -94,7 +102,9 @@ impl<L: Line> Guarded<L> {
 
     /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](super::safe_state).
     pub fn reset_after_denial(&mut self) {
-        self.trouble = None;
+        if !matches!(self.trouble, Some(Trouble::Interlock(_))) {
+            self.trouble = None;
+        }
         for ring in &mut self.rings {
             ring.guard.reset_after_denial();
         }
@@ -108,6 +118,49 @@ impl<L: Line> Guarded<L> {
     /// The link behind the guard, for what sends nothing. Bytes sent past the guard are nobody's to judge.
     pub(crate) fn inner_mut(&mut self) -> &mut L {
         &mut self.inner
+    }
+
+    /// Lets somebody look at drives from now on, in every [pause](Line::pause). What was seen to be wrong before is forgotten: on the way
+    /// to the safe state nobody looks, and nothing may stop it.
+    pub fn set_watch(&mut self, watch: Option<Box<dyn Watch>>) {
+        self.watch = watch;
+        if matches!(self.trouble, Some(Trouble::Interlock(_))) {
+            self.trouble = None;
+        }
+    }
+
+    /// Looks now, and puts the link in [trouble](Trouble::Interlock) where something must not go on.
+    pub fn look(&mut self, look: impl FnOnce(&mut dyn Line) -> Result<(), String>) {
+        if self.trouble().is_some() {
+            return;
+        }
+        let kept: Vec<_> = self.rings.iter().map(|ring| ring.guard.kept()).collect();
+        if let Err(why) = look(self) {
+            self.trouble = Some(Trouble::Interlock(why));
+        }
+        for (ring, kept) in kept.into_iter().enumerate() {
+            let changed = |ring: &&Ring| ring.guard.kept() != kept;
+            let Some(size) = self.rings.get(ring).filter(changed).map(|ring| ring.size) else {
+                continue;
+            };
+            let drive = kept.map(|kept| kept.wrapping_add(size.drives()));
+            if let Some(drive) = drive.filter(|drive| *drive < size.drives()) {
+                // A short address goes on from the drive that it went on from before (9.2).
+                let _again = read_byte(self, size.drives(), (ring, drive), ram::STATUS);
+            }
+        }
+    }
+
+    /// Whether drives can be asked something in between, so that nothing is changed by it.
+    fn can_pause(&self) -> bool {
+        let restorable = |ring: &Ring| {
+            let drive = ring
+                .guard
+                .kept()
+                .map(|kept| kept.wrapping_add(ring.size.drives()));
+            drive.is_none_or(|drive| drive < ring.size.drives())
+        };
+        !self.faulty && self.at_rest() && self.rings.iter().all(restorable)
     }
 
     /// The time on the guard's clock.
@@ -192,6 +245,23 @@ impl<L: Link> Guarded<L> {
 }
 
 impl<L: Line> Line for Guarded<L> {
+    fn pause_due(&self) -> Option<Instant> {
+        let due = self.watch.as_ref()?.due()?;
+        let since = due.since_start().saturating_sub(self.origin.since_start());
+        Some(Instant::START + since)
+    }
+
+    fn pause(&mut self) {
+        let now = self.guard_time();
+        if !self.can_pause() {
+            return;
+        }
+        if let Some(mut watch) = self.watch.take() {
+            self.look(|line| watch.look(now, line));
+            self.watch = Some(watch);
+        }
+    }
+
     fn byte_time(&self) -> Span {
         self.inner.byte_time()
     }
@@ -253,6 +323,7 @@ impl<L: Link> Link for Guarded<L> {
     fn begin(&mut self) {
         self.origin = self.guard_time();
         self.inner.begin();
+        self.faulty = false;
         for ring in &mut self.rings {
             ring.sent = 0;
             ring.damaged.clear();
@@ -276,6 +347,7 @@ impl<L: Link> Link for Guarded<L> {
     }
 
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        self.faulty |= !matches!(fault, PlacedFault::Stimulus(..));
         if !self.limits.allow_everything() {
             match self.verdict(ring, fault, moment) {
                 Verdict::Harmless => {}

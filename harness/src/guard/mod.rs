@@ -9,7 +9,9 @@
 
 mod guarded;
 mod safe_state;
+mod watch;
 
 pub use guarded::Guarded;
 pub use harness_proto::novobus::guard::{Denial, Guard, Limits, Need};
 pub use safe_state::{NotSafe, SafeState, SafeStep, Standing, safe_state};
+pub use watch::Watch;

@@ -118,6 +118,8 @@ pub enum Trouble {
     Lost(String),
     /// What came over the port is no stream of this kind: the other end does not mark, or marks were cut.
     Garbled(String),
+    /// An interlock of the rig's file does not hold.
+    Interlock(String),
     /// Somebody wants the program to end.
     Interrupted,
 }
@@ -125,7 +127,9 @@ pub enum Trouble {
 impl fmt::Display for Trouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Denied(text) | Self::Lost(text) | Self::Garbled(text) => f.write_str(text),
+            Self::Denied(text) | Self::Lost(text) | Self::Garbled(text) | Self::Interlock(text) => {
+                f.write_str(text)
+            }
             Self::Interrupted => f.write_str("interrupted"),
         }
     }
@@ -154,6 +158,16 @@ pub trait Line: Send {
     fn trouble(&self) -> Option<&Trouble> {
         None
     }
+
+    /// When this line wants a pause next, on its own clock: a moment in which nobody has anything under way, and in which it asks
+    /// drives something by itself. `None` where it never does.
+    fn pause_due(&self) -> Option<Instant> {
+        None
+    }
+
+    /// Nothing is under way, everything that came has been fetched, and whoever talks waits: the line may ask what it wants to know.
+    /// Behind it drives are as they were, and which drive was addressed last too; only time has passed.
+    fn pause(&mut self) {}
 
     /// How far ahead of the line a driver may hand over its bytes: where time is real, a busy computer would leave
     /// gaps between them.
@@ -186,6 +200,14 @@ impl<L: Line + ?Sized> Line for &mut L {
 
     fn trouble(&self) -> Option<&Trouble> {
         (**self).trouble()
+    }
+
+    fn pause_due(&self) -> Option<Instant> {
+        (**self).pause_due()
+    }
+
+    fn pause(&mut self) {
+        (**self).pause();
     }
 
     fn lead(&self) -> Span {

@@ -104,6 +104,15 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         self.link.trouble()
     }
 
+    fn pause_due(&self) -> Option<Instant> {
+        self.link.pause_due()
+    }
+
+    fn pause(&mut self) {
+        self.link.pause();
+        self.tell();
+    }
+
     fn lead(&self) -> Span {
         self.link.lead()
     }

@@ -12,6 +12,7 @@ pub mod file;
 pub mod find;
 mod health;
 pub mod hook;
+mod interlock;
 pub mod lock;
 mod open;
 pub(crate) mod run;

@@ -168,6 +168,11 @@ impl<'s> Run<'s> {
         let way = self.way();
         let simulated = self.session.rig().is_simulated();
         self.session.link().reset_after_denial();
+        if !self.session.rig().file.interlock.is_empty() {
+            // What the scenario before has left may answer nothing.
+            self.session.health()?;
+            self.session.look_at_interlocks();
+        }
         let mut both = Both {
             events: Vec::new(),
             sink,

@@ -6,11 +6,12 @@ use super::ends::Ends;
 use super::file;
 use super::health::{Health, Unhealthy, examine};
 use super::hook::HookError;
+use super::interlock::Interlocks;
 use super::lock::{LockError, PortLock, RigLock};
 use super::open::{OpenRigError, open};
 use super::state;
 use crate::bus::{Axis, count_behind};
-use crate::guard::{Guarded, SafeState, SafeStep, Standing, safe_state};
+use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, safe_state};
 use crate::link::{Line, Link, StreamLink};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -178,6 +179,9 @@ impl Session {
             }
         }
         session.ended = rig.is_simulated();
+        let watch = Interlocks::of(rig).map(|watch| Box::new(watch) as Box<dyn Watch>);
+        session.link.set_watch(watch);
+        session.look_at_interlocks();
         session.around.used();
         Ok(session)
     }
@@ -302,6 +306,15 @@ impl Session {
         examine(&mut self.link, &self.rings, attempts).map_err(|(ring, ill)| self.ill(ring, ill))
     }
 
+    /// Looks at every interlock; one that does not hold, or whose drive does not answer, is [trouble](crate::link::Trouble::Interlock) of the
+    /// link from then on. Nothing is under way.
+    pub fn look_at_interlocks(&mut self) {
+        if let Some(mut interlocks) = Interlocks::of(&self.rig) {
+            self.link.look(|line| interlocks.look_at_all(line));
+            self.link.begin();
+        }
+    }
+
     /// The error for a ring that [`examine`] found ill.
     #[must_use]
     pub fn ill(&self, ring: usize, ill: Unhealthy) -> SessionError {
@@ -347,6 +360,8 @@ impl Session {
         if std::mem::replace(&mut self.ended, true) && !self.rig.is_simulated() {
             return end;
         }
+        // On the way to the safe state nothing may stop it.
+        self.link.set_watch(None);
         if !self.rig.is_simulated() {
             if let Some(ports) = self.link.inner_mut().ports_mut() {
                 ports.resume();

@@ -112,6 +112,16 @@ impl Line for SharedLine {
         self.trouble.as_ref()
     }
 
+    fn pause_due(&self) -> Option<Instant> {
+        lock(&self.session)
+            .as_mut()
+            .and_then(|session| session.link().pause_due())
+    }
+
+    fn pause(&mut self) {
+        self.with((), |line| line.pause());
+    }
+
     fn lead(&self) -> Span {
         self.lead
     }

@@ -1,7 +1,7 @@
 //! Simulated rigs: what their drives are before anything is sent.
 
 use super::check::Rig;
-use super::file::{DriveEntry, RigFile};
+use super::file::{DriveEntry, Hooks, RigFile};
 use crate::scenario::expression::{Expression, Located};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::{Plan, plan};
@@ -14,6 +14,23 @@ use harness_sim::drive::Model;
 const TYPES: [&str; 4] = ["5605", "5610", "5615", "5620"];
 
 impl Rig {
+    /// Whether it is simulated and its file says no more than how large its rings are and which inputs are connected, so that every
+    /// scenario may bring drives of its own.
+    #[must_use]
+    pub fn is_bare(&self) -> bool {
+        let file = &self.file;
+        let is_input = |line: &String| {
+            let mut words = line.split_whitespace().skip(2);
+            words.next() == Some("input")
+        };
+        self.is_simulated()
+            && file.interlock.is_empty()
+            && file.deviation.is_empty()
+            && file.power.is_empty()
+            && file.hooks == Hooks::default()
+            && file.sim.iter().flat_map(|sim| &sim.setup).all(is_input)
+    }
+
     /// The setup of a simulated rig, as `scenario::simulate::bench` takes it: whole ND21s where its file names
     /// no model.
     ///

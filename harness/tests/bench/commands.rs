@@ -214,3 +214,69 @@ fn power_and_hooks_stand_around_a_use() {
     assert_eq!(desk.run(&["read", "0", "nist"]).status.code(), Some(3));
     assert_eq!(said(), "before on off after error");
 }
+
+const INTERLOCK: &str = "[[interlock]]\ndrive = 0\ncell = \"nist\"\nmin = \"-300rpm\"\nmax = \"300rpm\"\nevery = \"50ms\"\n\
+                         message = \"the belt comes off\"\n";
+
+const FASTER: &str = "title faster\nsource nd21 14.5.3.1\nring 2\nwait 20ms\nwrite-byte 0 errorcode = AF\nwrite-word 0 nsoll = {}\nwait 3s\n\
+                      ? drive 0 nist = 136rpm +-20rpm\n";
+
+/// An interlock that trips in the middle of a run ends it, with the drives in their safe state.
+#[test]
+fn an_interlock_trips() {
+    let (_served, desk) = desk(false);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig");
+    std::fs::write(&path, text.clone() + INTERLOCK).expect("room");
+    let scenario = desk.path("faster.scn");
+    let name = scenario.to_str().expect("a name");
+    let run = |speed: &str| {
+        std::fs::write(&scenario, FASTER.replace("{}", speed)).expect("room");
+        desk.run(&["run", name, "--allow-motion"])
+    };
+    ended(&run("0200"), 0, "1 passed");
+    let fast = run("075F");
+    let words = "interlock on nist of drive 0 (the belt comes off):";
+    ended(&fast, 6, words);
+    ended(&fast, 6, "at least -300 and at most 300 must it be");
+    ended(&fast, 6, SAFE);
+    // The driver's own commands are watched as well.
+    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    let arguments = ["position", "0", "--by", "100turns", "--init", "--move"];
+    let output = desk.run(&arguments);
+    ended(&output, 6, words);
+    ended(&output, 6, SAFE);
+    // An input that is not as it must be lets nothing begin.
+    let input = "[[interlock]]\ndrive = 1\ninput = \"GPIN4\"\nlevel = \"high\"\n";
+    std::fs::write(&path, text + input).expect("room");
+    for arguments in [&["run", "9.2-synco"][..], &["read", "0", "nist"]] {
+        let output = desk.run(arguments);
+        ended(
+            &output,
+            6,
+            "interlock on GPIN4 of drive 1: it is low, high must it be",
+        );
+        ended(&output, 6, SAFE);
+    }
+}
+
+/// The same in virtual time: where it trips is no accident.
+#[test]
+fn an_interlock_of_a_simulated_rig_trips() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rig = folder.path().join("rig.toml");
+    let text = "schema = 1\n[rig]\nid = \"sim\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n[limits]\nallow_motion = true\n[sim]\n\
+                setup = [\"drive 0..last input GPIN3 GPIN5 high\"]\n";
+    std::fs::write(&rig, text.to_owned() + INTERLOCK).expect("room");
+    let scenario = folder.path().join("faster.scn");
+    let run = |speed: &str| {
+        std::fs::write(&scenario, FASTER.replace("{}", speed)).expect("room");
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.arg("run").arg(&scenario).arg("--rig").arg(&rig);
+        command.output().expect("the program")
+    };
+    ended(&run("0200"), 0, "1 passed");
+    let first = run("075F");
+    ended(&first, 6, "the belt comes off");
+    assert_eq!(said(&first), said(&run("075F")));
+}

@@ -99,6 +99,29 @@ impl Input {
         self.place().pin
     }
 
+    /// The port in which the drive shows it (14.7.1).
+    #[must_use]
+    pub fn port(self) -> u16 {
+        self.place().shown.map_or(PORT_2, |(address, _)| address)
+    }
+
+    /// Whether it is at 5 to 24 V where its [port](Self::port) holds `byte`; `None` where the code of an internal error stands in the
+    /// place of the end switches (14.7.1).
+    #[must_use]
+    pub fn level_in(self, byte: u8) -> Option<bool> {
+        if let Some((_, bit)) = self.place().shown {
+            return Some(byte >> bit & 1 == 0);
+        }
+        let levels = [[0, 0], [0, 1], [1, 0], [1, 1]];
+        let [n, p] = levels
+            .into_iter()
+            .find(|[n, p]| END_SWITCH_CODES[*n][*p] == byte & 0x0F)?;
+        Some(match self {
+            Self::EschN => n == 1,
+            _ => p == 1,
+        })
+    }
+
     /// The input of this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
@@ -217,6 +240,25 @@ mod tests {
                 assert_eq!(code >> i & 1, *bit, "N {n} P {p} bit {i}");
             }
         }
+    }
+
+    /// What the ports show is what is read from them (14.7.1).
+    #[test]
+    fn every_level_is_read_back() {
+        for levels in 0..1024 {
+            let inputs = Inputs(levels);
+            let ports = inputs.ports(None);
+            for input in Input::ALL {
+                let port = ports.iter().find(|(address, ..)| *address == input.port());
+                let byte = port.expect("a port").1;
+                assert_eq!(
+                    input.level_in(byte),
+                    Some(inputs.is_high(input)),
+                    "{input:?}"
+                );
+            }
+        }
+        assert_eq!(Input::EschP.level_in(0x04), None);
     }
 
     /// ND21 14.7.1, 14.11.12: an internal error overwrites the code of the end switches.

@@ -67,6 +67,7 @@ fn exit(error: &bus::Error) -> Exit {
         | bus::Error::TimeOut { .. } => Exit::Failed,
         bus::Error::Refused(_) | bus::Error::Value(_) | bus::Error::Open(_) => Exit::Usage,
         bus::Error::Link(Trouble::Interrupted) => Exit::Interrupted,
+        bus::Error::Link(Trouble::Interlock(_)) => Exit::Interlock,
         bus::Error::Link(Trouble::Denied(_)) => Exit::Usage,
         bus::Error::Link(_)
         | bus::Error::Unknown(_)

@@ -223,7 +223,7 @@ fn give_back(
     let end = if leave && sound {
         rig.release()
     } else {
-        rig.close(exit == Exit::RigError)
+        rig.close(matches!(exit, Exit::RigError | Exit::Interlock))
     };
     let exit = end.map_or(exit, |end| tell_end(&end, exit, output));
     unwritten.map_or(Ok(exit), |error| Err(Failure::Output(error)))

@@ -53,6 +53,14 @@ impl Line for Through<'_, '_> {
         self.halted.as_ref().or_else(|| self.runner.link.trouble())
     }
 
+    fn pause_due(&self) -> Option<Instant> {
+        self.runner.link.pause_due()
+    }
+
+    fn pause(&mut self) {
+        self.runner.pause();
+    }
+
     fn lead(&self) -> time::Span {
         self.runner.link.lead()
     }

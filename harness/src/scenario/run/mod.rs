@@ -14,6 +14,7 @@ mod record;
 pub use bytes::{Shown, show};
 pub use now::{Now, now};
 pub use outcome::{Difference, Finding, Outcome};
+pub(crate) use over_bus::read_byte;
 pub use over_bus::{play_over_bus, reset_drives, start_anew};
 pub use player::{AtFinding, lacks, needs, play, run};
 pub use record::{MAX_SAMPLES, Record, Sample};

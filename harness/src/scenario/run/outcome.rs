@@ -110,7 +110,7 @@ impl Stop {
     /// The bench's fault; a denied command and an interruption are nobody's.
     pub(super) fn trouble(span: Span, trouble: &Trouble) -> Self {
         let verdict = match trouble {
-            Trouble::Lost(_) | Trouble::Garbled(_) => Verdict::RigError,
+            Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interlock(_) => Verdict::RigError,
             Trouble::Denied(_) | Trouble::Interrupted => Verdict::Aborted,
         };
         Self {

@@ -6,7 +6,7 @@
 use super::bytes::{matches, resolve};
 use super::outcome::Outcome;
 use super::player::{AtFinding, Runner, lacks, play};
-use crate::link::Link;
+use crate::link::{Line, Link};
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use harness_proto::line::Received;
 use harness_proto::nd21;
@@ -101,10 +101,21 @@ impl Runner<'_> {
 /// Sends a command to a drive and gives the data of its answer; `None` where it does not answer as ND21 10.1 and 10.2
 /// say.
 fn exchange(link: &mut dyn Link, ring: usize, drive: u8, command: Command) -> Option<Vec<u8>> {
-    let exchange = Exchange::new(link.drives(ring), drive, command)?;
+    let drives = link.drives(ring);
+    exchange_in(link, drives, (ring, drive), command)
+}
+
+/// The same in a ring of `drives`.
+fn exchange_in(
+    link: &mut dyn Line,
+    drives: u8,
+    (ring, drive): (usize, u8),
+    command: Command,
+) -> Option<Vec<u8>> {
+    let exchange = Exchange::new(drives, drive, command)?;
     while link.receive(ring).is_some() {}
     let sent = link.send(ring, &exchange.bytes);
-    let end = sent + link.byte_time() * (2 * u64::from(link.drives(ring)) + 4) + PATIENCE;
+    let end = sent + link.byte_time() * (2 * u64::from(drives) + 4) + PATIENCE;
     let mut received: Vec<(Instant, Received)> = Vec::new();
     while received.len() < exchange.expected.len() {
         match link.receive(ring) {
@@ -123,6 +134,18 @@ fn exchange(link: &mut dyn Link, ring: usize, drive: u8, command: Command) -> Op
     }
     let data = exchange.data.iter().map(|place| received[*place].1.byte);
     Some(data.collect())
+}
+
+/// Reads a byte of RAM of a drive, given its ring and its place in a ring of `drives`, by a telegram of its own (10.1); `None` where it
+/// does not answer as it must. What was received before and not fetched is lost.
+pub(crate) fn read_byte(
+    line: &mut dyn Line,
+    drives: u8,
+    place: (usize, u8),
+    address: u16,
+) -> Option<u8> {
+    let read = exchange_in(line, drives, place, Command::ReadByte { address })?;
+    read.first().copied()
 }
 
 /// Plays a plan on drives that only their bus leads to: cells of the header are set before, and set back behind it.

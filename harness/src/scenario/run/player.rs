@@ -19,6 +19,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// bit/s, with the longest delays.
 const MAX_ROUND: time::Span = time::Span::from_millis(3_600_000);
 
+/// How long a link may need for a pause.
+const PAUSE: time::Span = time::Span::from_millis(50);
+
 /// Bytes that no line asks for shown at most.
 const UNASKED: usize = 16;
 
@@ -311,10 +314,24 @@ impl Runner<'_> {
         Some(byte)
     }
 
-    /// Lets time pass up to `until`.
+    /// Lets time pass up to `until`, with a pause for the link where it wants one and there is room for it.
     pub(super) fn pass_until(&mut self, until: Instant) {
         while self.link.now() < until && self.full.is_none() {
-            self.wait(until);
+            let due = self.link.pause_due();
+            let due = due.filter(|due| *due + PAUSE < until && !self.link.busy());
+            if due.is_some_and(|due| due <= self.link.now()) {
+                self.pause();
+                continue;
+            }
+            self.wait(due.map_or(until, |due| due.min(until)));
+        }
+    }
+
+    /// Lets the link ask drives what it wants to know, if nothing is under way. No line asks for what comes.
+    pub(super) fn pause(&mut self) {
+        self.fetch();
+        if !self.link.busy() {
+            self.link.pause();
         }
     }
 

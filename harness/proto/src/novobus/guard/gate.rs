@@ -142,6 +142,12 @@ impl Guard {
         self.state == State::Sync && self.halves.iter().all(|half| half.length == 0)
     }
 
+    /// The address byte that a short address goes on from (9.2); `None` where no short address is valid.
+    #[must_use]
+    pub const fn kept(&self) -> Option<u8> {
+        self.kept
+    }
+
     /// The drives may stand anywhere from now on: something has happened to what was sent, or one was switched on.
     pub fn doubt(&mut self) {
         self.state = State::Doubt(Doubt::default());

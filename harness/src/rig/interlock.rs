@@ -1,0 +1,196 @@
+//! Interlocks: what must hold of drives throughout a run, asked over the bus while nothing else is under way.
+
+use super::file::{Condition, Level};
+use super::{Rig, file};
+use crate::guard::Watch;
+use crate::link::Line;
+use crate::scenario::quantity::shown;
+use crate::scenario::run::read_byte;
+use harness_proto::nd21::cells::Cell;
+use harness_proto::nd21::io::Input;
+use harness_proto::nd21::ram;
+use harness_proto::nd21::units::{Drive, SpeedRange, Value};
+use harness_proto::time::{Instant, Span};
+
+/// The interlocks of a rig, and when each is looked at next.
+#[derive(Debug)]
+pub(super) struct Interlocks {
+    all: Vec<Entry>,
+}
+
+#[derive(Debug)]
+struct Entry {
+    ring: usize,
+    drive: u8,
+    /// How many drives the ring has.
+    drives: u8,
+    condition: Condition,
+    every: Span,
+    /// On a clock that is never set back.
+    next: Instant,
+    message: Option<String>,
+    /// What the scale of the cell depends on: the type of the device.
+    units: Drive,
+    /// And the range of speeds, for which the drive is asked once (14.3.2).
+    range: Option<SpeedRange>,
+}
+
+impl Interlocks {
+    /// Those of a rig; `None` where it has none.
+    pub(super) fn of(rig: &Rig) -> Option<Self> {
+        let plan = rig.plan().ok()?;
+        let entry = |entry: &file::Interlock| {
+            let ring = usize::from(entry.ring.checked_sub(1)?);
+            let every = u64::try_from(entry.every.0.as_nanos()).unwrap_or(u64::MAX);
+            Some(Entry {
+                ring,
+                drive: entry.drive,
+                drives: plan.rings.get(ring)?.drives(),
+                condition: entry.condition()?,
+                every: Span::from_nanos(every),
+                next: Instant::START,
+                message: entry.message.clone(),
+                units: plan.units(ring, entry.drive),
+                range: None,
+            })
+        };
+        let all: Vec<_> = rig.file.interlock.iter().filter_map(entry).collect();
+        (!all.is_empty()).then_some(Self { all })
+    }
+
+    /// Looks at every interlock. Nobody has just been looked at, and drives must answer.
+    ///
+    /// # Errors
+    /// The first that does not hold, or whose drive does not answer, in a sentence.
+    pub(super) fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), String> {
+        for entry in &mut self.all {
+            if entry.look(line)?.is_none() {
+                return Err(format!(
+                    "{}: the drive does not answer, so that nobody knows",
+                    entry.words()
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Watch for Interlocks {
+    fn due(&self) -> Option<Instant> {
+        self.all.iter().map(|entry| entry.next).min()
+    }
+
+    fn look(&mut self, now: Instant, line: &mut dyn Line) -> Result<(), String> {
+        for entry in self.all.iter_mut().filter(|entry| entry.next <= now) {
+            entry.next = now + entry.every;
+            // In the middle of a scenario a drive may be silent on purpose; between scenarios it must answer.
+            entry.look(line)?;
+        }
+        Ok(())
+    }
+}
+
+impl Entry {
+    fn words(&self) -> String {
+        let ring = if self.ring == 0 { "" } else { "2:" };
+        let what = match self.condition {
+            Condition::Cell { cell, .. } => cell.printed,
+            Condition::Input { input, .. } => input.name(),
+        };
+        let message = self.message.as_ref();
+        let message = message.map_or(String::new(), |message| format!(" ({message})"));
+        format!("interlock on {what} of drive {ring}{}{message}", self.drive)
+    }
+
+    /// Looks at it; `None` where the drive does not answer.
+    ///
+    /// # Errors
+    /// It does not hold, in a sentence.
+    fn look(&mut self, line: &mut dyn Line) -> Result<Option<()>, String> {
+        let found = match self.condition {
+            Condition::Cell { cell, min, max } => self.look_at_cell(line, cell, (min, max)),
+            Condition::Input { input, level } => self.look_at_input(line, input, level),
+        };
+        match found {
+            Some(Ok(())) => Ok(Some(())),
+            Some(Err(why)) => Err(format!("{}: {why}", self.words())),
+            None => Ok(None),
+        }
+    }
+
+    fn read(&self, line: &mut dyn Line, address: u16) -> Option<u8> {
+        read_byte(line, self.drives, (self.ring, self.drive), address)
+    }
+
+    /// Whether the value of a cell is within its bounds; `None` where the drive does not answer.
+    fn look_at_cell(
+        &mut self,
+        line: &mut dyn Line,
+        cell: &Cell,
+        (min, max): (Option<f64>, Option<f64>),
+    ) -> Option<Result<(), String>> {
+        if self.range.is_none() {
+            let byte = self.read(line, ram::SW_VERSION2)?;
+            self.range = Some(SpeedRange::from_sw_version2(byte));
+        }
+        let units = Drive {
+            range: self.range?,
+            ..self.units
+        };
+        let addresses = (cell.address..=u16::MAX).take(usize::from(cell.size));
+        let bytes: Vec<u8> = addresses
+            .map(|address| self.read(line, address))
+            .collect::<Option<_>>()?;
+        let number = |value| match value {
+            Value::Exact(number) => Some(number.to_f64()),
+            Value::Approximate(number) => Some(number),
+            _ => None,
+        };
+        let (value, words) = match cell.scale {
+            Some(scale) => match scale.value(&bytes, units) {
+                Some(Ok(value)) => (number(value), shown(value, scale)),
+                // What has no meaning is within no bounds.
+                _ => (None, format!("{bytes:02X?}, which has no meaning,")),
+            },
+            None => {
+                let number = bytes
+                    .iter()
+                    .fold(0_u32, |n, byte| n << 8 | u32::from(*byte));
+                (Some(f64::from(number)), number.to_string())
+            }
+        };
+        let within = value.is_some_and(|value| {
+            min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max)
+        });
+        if within {
+            return Some(Ok(()));
+        }
+        let bounds = [("at least", min), ("at most", max)]
+            .into_iter()
+            .filter_map(|(name, bound)| Some(format!("{name} {}", bound?)));
+        let bounds: Vec<_> = bounds.collect();
+        Some(Err(format!(
+            "{words} was read, {} must it be",
+            bounds.join(" and ")
+        )))
+    }
+
+    /// Whether an input is at its level (14.7.1); `None` where the drive does not answer.
+    fn look_at_input(
+        &self,
+        line: &mut dyn Line,
+        input: Input,
+        level: Level,
+    ) -> Option<Result<(), String>> {
+        let byte = self.read(line, input.port())?;
+        let name = |high: bool| if high { "high" } else { "low" };
+        let wanted = level == Level::High;
+        Some(match input.level_in(byte) {
+            Some(high) if high == wanted => Ok(()),
+            Some(high) => Err(format!("it is {}, {} must it be", name(high), name(wanted))),
+            None => Err(format!(
+                "{byte:02X} in its place is the code of an internal error"
+            )),
+        })
+    }
+}
