@@ -23,6 +23,8 @@ pub(super) const SUMS: &str = "SHA256SUMS";
 pub(super) const RECORD: &str = "run.jsonl";
 /// The file of the rig.
 pub(super) const RIG: &str = "rig.toml";
+/// The profile that the rig's file names.
+const KNOWN_PROFILE: &str = "known-profile.toml";
 /// The folder of scenarios.
 pub(super) const SCENARIOS: &str = "scenarios";
 /// The folder of captures.
@@ -96,7 +98,10 @@ impl Folder {
             fs::create_dir_all(path.join(folder)).map_err(failed)?;
         }
         let file = fs::File::create(path.join(RECORD)).map_err(failed)?;
-        let rig = toml::to_string(&about.rig.file)?;
+        let mut rig = about.rig.file.clone();
+        // The profile goes into the folder too, so that it stands for itself.
+        rig.rig.profile = about.rig.profile.as_ref().map(|_| KNOWN_PROFILE.to_owned());
+        let rig = toml::to_string(&rig)?;
         let started = state::utc(SystemTime::now());
         let mut folder = Self {
             path: path.to_owned(),
@@ -107,6 +112,9 @@ impl Folder {
             report: String::new(),
         };
         folder.write(RIG, &rig)?;
+        if let Some(profile) = &about.rig.profile {
+            folder.write(KNOWN_PROFILE, &profile.text)?;
+        }
         folder.write("versions.json", &versions(&started))?;
         let rings: Vec<u8> = about.rig.rings().map(|(_, ring)| ring.drives).collect();
         let names = about.capabilities.iter().map(|own| own.name().to_owned());

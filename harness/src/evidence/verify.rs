@@ -75,7 +75,7 @@ pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
     let (lines, whole) = read(&text(RECORD)?)?;
     let rig_text = text(RIG)?;
     let rig = parse(&Source {
-        name: RIG.to_owned(),
+        name: path.join(RIG).display().to_string(),
         text: rig_text.clone().into(),
     })
     .map_err(|problems| EvidenceError::Foreign(path.display().to_string(), problems.to_string()))?;

@@ -6,9 +6,8 @@
 mod diagnose;
 mod hypothesis;
 mod probes;
-mod profile;
 
+pub use crate::rig::{Profile, ProfileError, Settled};
 pub use diagnose::deviating;
 pub use hypothesis::{Evidence, Hypothesis, explaining};
 pub use probes::{Probe, conversations, hypotheses, probes};
-pub use profile::{Profile, ProfileError, Settled};

@@ -1,8 +1,8 @@
 //! From the text of a rig file to a [`Rig`]: every mistake is found here, before a port is opened.
 
 use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
+use super::profile::KnownProfile;
 use super::schema::{compare, span_of};
-use super::sim::settle;
 use super::values::{ValueError, Wire};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::quantity::{Dimension, parse as quantity};
@@ -23,6 +23,8 @@ pub struct Rig {
     pub origin: String,
     /// What its file says.
     pub file: RigFile,
+    /// The profile that it names, read.
+    pub profile: Option<KnownProfile>,
 }
 
 impl Rig {
@@ -68,13 +70,14 @@ pub fn parse(source: &Source) -> Result<Rig, Problems> {
         file: &file,
         problems: Vec::new(),
     };
-    check.all(source);
+    let profile = check.all(source);
     if !check.problems.is_empty() {
         return Err(problems(check.problems));
     }
     Ok(Rig {
         origin: source.name.clone(),
         file,
+        profile,
     })
 }
 
@@ -118,7 +121,7 @@ pub(super) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
 
 /// A step on the way to a value: a key or a number in a list.
 #[derive(Clone, Copy)]
-enum Step<'a> {
+pub(super) enum Step<'a> {
     Key(&'a str),
     Index(usize),
 }
@@ -135,15 +138,15 @@ impl From<usize> for Step<'_> {
     }
 }
 
-struct Check<'a> {
+pub(super) struct Check<'a> {
     table: &'a Spanned<DeTable<'a>>,
-    file: &'a RigFile,
-    problems: Vec<Problem>,
+    pub(super) file: &'a RigFile,
+    pub(super) problems: Vec<Problem>,
 }
 
 impl Check<'_> {
     /// The place of a value, or of the nearest table around it that is there.
-    fn place(&self, path: &[Step<'_>]) -> Span {
+    pub(super) fn place(&self, path: &[Step<'_>]) -> Span {
         let mut span = span_of(self.table);
         let mut value: Option<&Spanned<DeValue<'_>>> = None;
         for step in path {
@@ -160,7 +163,7 @@ impl Check<'_> {
         span
     }
 
-    fn wrong(
+    pub(super) fn wrong(
         &mut self,
         path: &[Step<'_>],
         message: impl Into<String>,
@@ -170,7 +173,7 @@ impl Check<'_> {
         self.problems.push(problem);
     }
 
-    fn all(&mut self, source: &Source) {
+    fn all(&mut self, source: &Source) -> Option<KnownProfile> {
         let file = self.file;
         debug_assert_eq!(file.schema, SCHEMA);
         self.id();
@@ -207,7 +210,9 @@ impl Check<'_> {
         self.safe_state();
         self.programs();
         self.quarantine();
-        self.setup(source);
+        let profile = self.profile(source);
+        self.setup(source, profile.as_ref());
+        profile
     }
 
     fn id(&mut self) {
@@ -600,33 +605,6 @@ impl Check<'_> {
                 message,
                 "a date such as \"2026-03-14\" expected here",
             );
-        }
-    }
-
-    /// The lines of `[sim]`, in the scenario language.
-    fn setup(&mut self, source: &Source) {
-        let Some(sim) = &self.file.sim else { return };
-        let at = |index: usize| [Step::Key("sim"), Step::Key("setup"), Step::Index(index)];
-        if let Some(index) = sim
-            .setup
-            .iter()
-            .position(|line| line.contains(['\n', '\r']))
-        {
-            self.wrong(
-                &at(index),
-                "this is more than one line",
-                "one line expected here",
-            );
-        } else if let Err(problems) = settle(&source.name, self.file, &[]) {
-            let text = sim.setup.join("\n");
-            for problem in problems.all() {
-                let before = text.get(..problem.span.start).unwrap_or(&text);
-                let span = self.place(&at(before.matches('\n').count()));
-                self.problems.push(Problem {
-                    span,
-                    ..problem.clone()
-                });
-            }
         }
     }
 }

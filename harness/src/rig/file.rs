@@ -81,6 +81,10 @@ pub struct About {
     /// Where it stands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub location: Option<String>,
+    /// What `qualify` has found of its drives: the path of a profile, from the folder of this file. Simulated drives behave so,
+    /// and so does the model beside real ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
     /// Words by which rigs are chosen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 32))]

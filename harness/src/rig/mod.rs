@@ -6,6 +6,7 @@
 
 mod around;
 mod check;
+mod check_sim;
 mod ends;
 pub mod figures;
 pub mod file;
@@ -15,6 +16,7 @@ pub mod hook;
 mod interlock;
 pub mod lock;
 mod open;
+mod profile;
 pub(crate) mod run;
 pub mod scan;
 mod schema;
@@ -29,6 +31,7 @@ pub use ends::Ends;
 pub use find::{FindError, find};
 pub use health::{Health, Unhealthy, examine};
 pub use open::OpenRigError;
+pub use profile::{KnownProfile, Profile, ProfileError, Settled};
 pub use run::{Attempt, Keeper, Played, Run, Way, play_one};
 pub use schema::schema;
 pub use session::{End, Options, Session, SessionError};

@@ -2,6 +2,7 @@
 
 use super::check::Rig;
 use super::file::{DriveEntry, Hooks, RigFile};
+use super::profile::KnownProfile;
 use crate::scenario::expression::{Expression, Located};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::{Plan, plan};
@@ -28,6 +29,7 @@ impl Rig {
             && file.deviation.is_empty()
             && file.power.is_empty()
             && file.hooks == Hooks::default()
+            && self.profile.is_none()
             && file.sim.iter().flat_map(|sim| &sim.setup).all(is_input)
     }
 
@@ -37,7 +39,7 @@ impl Rig {
     /// # Errors
     /// None of a rig that was read: its lines were settled then.
     pub fn plan(&self) -> Result<Plan, Problems> {
-        settle(&self.origin, &self.file, &[])
+        self.plan_with(&[])
     }
 
     /// The same with more lines of a header behind those of the file.
@@ -45,18 +47,34 @@ impl Rig {
     /// # Errors
     /// The lines have mistakes.
     pub fn plan_with(&self, more: &[String]) -> Result<Plan, Problems> {
-        settle(&self.origin, &self.file, more)
+        let (lines, _) = lines(&self.file, self.profile.as_ref(), more);
+        settle(&self.origin, &self.file, &lines)
     }
 }
 
-/// Settles the lines of `[sim]`. The places of mistakes are in those lines, joined by line ends.
-pub(super) fn settle(name: &str, file: &RigFile, more: &[String]) -> Result<Plan, Problems> {
+/// The header lines of a rig: the types of its devices, its profile, those of `[sim]`, and more; and how many stand in front of those
+/// of `[sim]`.
+pub(super) fn lines(
+    file: &RigFile,
+    profile: Option<&KnownProfile>,
+    more: &[String],
+) -> (Vec<String>, usize) {
+    let mut lines: Vec<_> = file.drive.iter().filter_map(type_line).collect();
+    lines.extend(
+        profile
+            .into_iter()
+            .flat_map(|profile| profile.lines.clone()),
+    );
+    let before = lines.len();
+    lines.extend(file.sim.iter().flat_map(|sim| sim.setup.clone()));
+    lines.extend_from_slice(more);
+    (lines, before)
+}
+
+/// Settles header lines for a rig's rings. The places of mistakes are in the lines joined by line ends.
+pub(super) fn settle(name: &str, file: &RigFile, lines: &[String]) -> Result<Plan, Problems> {
     let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
     let sizes: Vec<_> = rings.map(|ring| ring.drives).collect();
-    let types: Vec<_> = file.drive.iter().filter_map(type_line).collect();
-    let own = file.sim.iter().flat_map(|sim| &sim.setup);
-    let all = types.iter().chain(own).chain(more);
-    let lines: Vec<_> = all.map(String::as_str).collect();
     let source = Source {
         name: name.to_owned(),
         text: lines.join("\n").into(),

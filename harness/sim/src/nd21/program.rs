@@ -619,7 +619,10 @@ impl Memory for Program {
         self.stir();
     }
 
+    /// The program begins anew, and its cycle with it.
     fn reset(&mut self) {
+        self.next_cycle = self.now + CYCLE;
+        self.due = Instant::START;
         self.start();
     }
 

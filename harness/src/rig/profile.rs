@@ -35,6 +35,15 @@ pub struct Settled {
     pub setup: Vec<String>,
 }
 
+/// A profile that a rig's file names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KnownProfile {
+    /// Its text.
+    pub text: String,
+    /// The header lines that make drives behave so.
+    pub lines: Vec<String>,
+}
+
 /// Why a text is no profile.
 #[derive(Debug, thiserror::Error)]
 pub enum ProfileError {
