@@ -27,6 +27,7 @@ pub struct Guarded<L> {
     capabilities: Vec<Capability>,
     /// When the present conversation began, on the guard's clock, which is never set back.
     origin: Instant,
+    refused: usize,
     watch: Option<Box<dyn Watch>>,
     /// A fault has been put on a link in the present conversation.
     faulty: bool,
@@ -70,6 +71,7 @@ impl<L: Line> Guarded<L> {
             trouble: None,
             capabilities: Vec::new(),
             origin: Instant::START,
+            refused: 0,
             watch: None,
             faulty: false,
         }
@@ -277,6 +279,7 @@ impl<L: Line> Line for Guarded<L> {
             self.deny(format!("ring {} is not in the rig's file", ring + 1));
             return now;
         };
+        self.refused = bytes.len();
         if self.trouble.is_some() {
             return now;
         }
@@ -291,11 +294,16 @@ impl<L: Line> Line for Guarded<L> {
                 }
             }
         }
+        self.refused = bytes.len() - admitted;
         let end = self.inner.send(ring, &bytes[..admitted]);
         if let Some(denial) = denial {
             self.deny(format!("ring {}: {denial}", ring + 1));
         }
         end
+    }
+
+    fn refused(&self) -> usize {
+        self.refused
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {

@@ -147,6 +147,11 @@ pub trait Line: Send {
     /// have left.
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant;
 
+    /// How many of the bytes of the last [`Self::send`] were not taken: those from the first that was denied on.
+    fn refused(&self) -> usize {
+        0
+    }
+
     /// The next byte received that nobody has fetched.
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)>;
 
@@ -188,6 +193,10 @@ impl<L: Line + ?Sized> Line for &mut L {
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         (**self).send(ring, bytes)
+    }
+
+    fn refused(&self) -> usize {
+        (**self).refused()
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {

@@ -83,7 +83,11 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         let end = self.link.send(ring, bytes);
-        self.sink.take(&Event::Sent(ring, end, bytes.to_vec()));
+        let taken = bytes.len().saturating_sub(self.link.refused());
+        if taken > 0 {
+            self.sink
+                .take(&Event::Sent(ring, end, bytes[..taken].to_vec()));
+        }
         self.tell();
         end
     }

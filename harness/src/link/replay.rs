@@ -64,6 +64,12 @@ impl Replay {
         self.trouble.get_or_insert(Trouble::Garbled(text));
     }
 
+    /// Whether the second event is a denial.
+    fn denied_behind(&self) -> bool {
+        let behind = self.events.get(1);
+        matches!(behind, Some(Event::Trouble(Trouble::Denied(_))))
+    }
+
     fn trouble_comes(&mut self) {
         if let Some(Event::Trouble(trouble)) = self.events.front() {
             self.trouble = Some(trouble.clone());
@@ -91,6 +97,19 @@ impl Line for Replay {
                 self.events.pop_front();
                 self.trouble_comes();
                 end
+            }
+            // What was denied was not sent.
+            Some(Event::Sent(own, end, sent))
+                if *own == ring && bytes.starts_with(sent) && self.denied_behind() =>
+            {
+                let end = *end;
+                self.events.pop_front();
+                self.trouble_comes();
+                end
+            }
+            Some(Event::Trouble(Trouble::Denied(_))) => {
+                self.trouble_comes();
+                self.now
             }
             _ => {
                 self.otherwise("what is sent");

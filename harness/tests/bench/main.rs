@@ -4,6 +4,7 @@
 mod commands;
 #[path = "../served/ring.rs"]
 mod ring;
+mod simulated;
 
 use harness::port::Endpoint;
 use ring::Served;

@@ -78,6 +78,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         // What is under way still tells something, and nothing more is sent.
         stop.finding.in_error = runner.in_error();
         runner.settle();
+        runner.come_home();
         runner.complete(&mut stop.finding);
     }
     let remarks = runner
@@ -339,6 +340,13 @@ impl Runner<'_> {
     pub(super) fn settle(&mut self) {
         let end = self.link.now() + MAX_ROUND;
         while self.link.busy() && self.link.now() < end && self.wait(end) {}
+        self.fetch();
+    }
+
+    /// The same where the link is in trouble of a kind that lets what was sent before come round: a denial, an interlock.
+    fn come_home(&mut self) {
+        let end = self.link.now() + MAX_ROUND;
+        while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
         self.fetch();
     }
 
