@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 /// The most lines of the log that wait to be fetched.
 const MOST_LINES: usize = 256;
 
+/// How much later than the ring needs a byte may come where time is real: a busy computer stands still for longer than a ring does.
+const BUSY_HOST: Span = Span::from_millis(400);
+
 /// How long what is under way may take to come home before a pause.
 const PAUSE: Span = Span::from_millis(500);
 
@@ -34,6 +37,14 @@ pub(super) struct Pump<'l> {
 impl<'l> Pump<'l> {
     pub(super) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: Options) -> Self {
         let now = link.now();
+        // A byte that is only late must not count as lost: the recovery stops every drive.
+        let options = Options {
+            slack: match link.lead() {
+                Span::ZERO => options.slack,
+                _ => options.slack.max(BUSY_HOST),
+            },
+            ..options
+        };
         let rate = Rate::ALL
             .into_iter()
             .find(|rate| rate.byte_time() == link.byte_time())

@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::output::Output;
 use super::rig::ListFormat;
-use super::rig_failure::{exit_of, find_rig, interrupt_flag, tell_end};
+use super::rig_failure::{alarm, exit_of, find_rig, interrupt_flag, tell_end};
 use super::run::progress_bar;
 use crate::bus::Error;
 use crate::link::Trouble;
@@ -37,6 +37,7 @@ pub(super) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::
         purpose: "rig check".to_owned(),
         wait: arguments.wait.unwrap_or_default(),
         interrupt: interrupt_flag(),
+        alarm: alarm(),
         ..Options::default()
     };
     let session = match Session::open(&rig, &options) {

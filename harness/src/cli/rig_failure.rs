@@ -5,9 +5,11 @@ use super::output::Output;
 use crate::guard::SafeState;
 use crate::rig::find::folder;
 use crate::rig::lock::LockError;
-use crate::rig::{End, FindError, Rig, SessionError, find};
+use crate::rig::{Alarm, End, FindError, Rig, SessionError, find};
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 /// The rig of this name; what is wrong with it is told.
 pub(super) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
@@ -34,6 +36,22 @@ pub(super) fn interrupt_flag() -> Arc<AtomicBool> {
     flag
 }
 
+/// What a program does that hangs: it says so, and ends with the exit code for drives that nobody knows to stand.
+pub(super) fn alarm() -> Alarm {
+    Alarm::new(|why| {
+        let why = format!("error: {why}\n");
+        // Standard error may be what hangs.
+        let said = std::thread::spawn(move || {
+            let _nobody_reads = std::io::stderr().write_all(why.as_bytes());
+        });
+        let end = Instant::now() + Duration::from_secs(1);
+        while !said.is_finished() && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        std::process::exit(i32::from(Exit::NotSafe as u8));
+    })
+}
+
 /// The exit code for a rig that cannot be used.
 pub(super) fn exit_of(error: &SessionError) -> Exit {
     match error {
@@ -43,6 +61,7 @@ pub(super) fn exit_of(error: &SessionError) -> Exit {
         | SessionError::State(_)
         | SessionError::Open { .. }
         | SessionError::Hook { .. }
+        | SessionError::Watchdog(_)
         | SessionError::Ill { .. } => Exit::RigError,
     }
 }

@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::output::Output;
 use super::qualify::{Findings, settle};
-use super::rig_failure::{exit_of, interrupt_flag, tell_end};
+use super::rig_failure::{alarm, exit_of, interrupt_flag, tell_end};
 use super::run::{details, line, progress_bar, summary};
 use crate::evidence::{About, EvidenceError, Folder};
 use crate::library::Entry;
@@ -67,6 +67,7 @@ pub(super) fn work(
         allow_motion: job.allow_motion,
         ill_as_well: job.qualify,
         interrupt: interrupt_flag(),
+        alarm: alarm(),
     };
     let mut session = match Session::open(rig, &options) {
         Ok(session) => session,

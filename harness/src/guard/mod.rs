@@ -13,5 +13,5 @@ mod watch;
 
 pub use guarded::Guarded;
 pub use harness_proto::novobus::guard::{Denial, Guard, Limits, Need};
-pub use safe_state::{NotSafe, SafeState, SafeStep, Standing, safe_state};
+pub use safe_state::{NotSafe, SafeState, SafeStep, Standing, blind_stop, safe_state};
 pub use watch::Watch;

@@ -190,11 +190,9 @@ fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), St
     Err(why)
 }
 
-/// Software stop to every drive, nominal speed 0 behind it, without an answer (ND21 14.10).
-fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
-    if matches!(line.trouble(), Some(Trouble::Lost(_))) {
-        return;
-    }
+/// The check sequence (9.8) and the software stop for every drive of a ring (14.10): for whoever can wait for no answer.
+#[must_use]
+pub fn blind_stop(size: RingSize) -> Vec<u8> {
     let mut bytes = CHECK_SEQUENCE.to_vec();
     let stop = Command::Or {
         address_low: ram::STATUS.to_be_bytes()[1],
@@ -203,7 +201,7 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
     let net = stop.encode();
     let length = u8::try_from(net.len()).unwrap_or(u8::MAX);
     let Ok(header) = Header::new(Addressing::AddressFollows, false, length) else {
-        return;
+        return bytes;
     };
     for drive in 0..size.drives() {
         if let Ok(address) = size.address_byte(drive) {
@@ -211,7 +209,14 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
             bytes.extend(&net[..]);
         }
     }
-    let sent = line.send(ring, &bytes);
+    bytes
+}
+
+fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
+    if matches!(line.trouble(), Some(Trouble::Lost(_))) {
+        return;
+    }
+    let sent = line.send(ring, &blind_stop(size));
     while line.now() < sent && line.wait(sent) {}
 }
 

@@ -7,7 +7,7 @@
 use super::inner::InnerLink;
 use super::tamper::Tamper;
 use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name};
-use crate::port::{Outgoing, Wire};
+use crate::port::{LastWords, Outgoing, Wire};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
@@ -17,7 +17,7 @@ use rustix::event::{Timespec, poll};
 use rustix::io::Errno;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time;
 
 /// How far ahead of the line bytes are given to the operating system.
@@ -51,6 +51,8 @@ pub struct StreamLink {
     /// Faults that wait for their time, in order of it.
     scheduled: VecDeque<(Instant, usize, usize, LinkFault)>,
     interrupt: Arc<AtomicBool>,
+    /// Goes up with every look at the ports.
+    beats: Arc<AtomicU64>,
     trouble: Option<Trouble>,
     recording: bool,
     tolerance: Span,
@@ -115,6 +117,7 @@ impl StreamLink {
             capabilities,
             scheduled: VecDeque::new(),
             interrupt,
+            beats: Arc::default(),
             trouble: None,
             recording: true,
             tolerance: TOLERANCE,
@@ -124,6 +127,23 @@ impl StreamLink {
     /// Sets how exact times are taken to be.
     pub fn set_time_tolerance(&mut self, tolerance: Span) {
         self.tolerance = tolerance;
+    }
+
+    /// A count that goes up while whoever uses this link lives.
+    #[must_use]
+    pub fn beats(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.beats)
+    }
+
+    /// Bytes for each ring that somebody else can send when the owner of this link does not move any more.
+    ///
+    /// # Errors
+    /// There is no descriptor left.
+    pub fn last_words(&self, bytes: impl Fn(usize) -> Vec<u8>) -> std::io::Result<Vec<LastWords>> {
+        let rings = self.rings.iter().enumerate();
+        rings
+            .map(|(ring, own)| own.wire.last_words(&bytes(ring)))
+            .collect()
     }
 
     /// Keeps no record of what the links carry from now on.
@@ -169,6 +189,7 @@ impl StreamLink {
 
     /// Lets due faults happen, gives the operating system what is due, and takes what has come.
     fn pump(&mut self) {
+        self.beats.fetch_add(1, Ordering::Relaxed);
         let now = self.now();
         while let Some(&(at, ring, link, fault)) = self.scheduled.front()
             && at <= now

@@ -13,10 +13,12 @@
 //! | `pty`, `tcp` with plain bytes | none | no | no |
 //! | `rfc2217` | that there was one, not at which byte | no | no |
 
+mod last_words;
 mod open;
 mod rfc2217;
 mod serial;
 mod wire;
 
+pub use last_words::{LastWords, Unsaid};
 pub use open::{Endpoint, OpenError, PortSettings, open};
 pub use wire::{Abilities, Outgoing, Wire};

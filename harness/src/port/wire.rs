@@ -1,5 +1,6 @@
 //! One stream with its coding.
 
+use super::last_words::LastWords;
 use super::rfc2217::Telnet;
 use super::serial::Serial;
 use crate::link::Trouble;
@@ -95,6 +96,26 @@ impl Wire {
     #[must_use]
     pub fn fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
+    }
+
+    /// Bytes that somebody else can send when the owner of this wire does not move any more, coded as it codes them.
+    ///
+    /// # Errors
+    /// There is no descriptor left.
+    pub fn last_words(&self, bytes: &[u8]) -> std::io::Result<LastWords> {
+        let coded = bytes.iter().flat_map(|&byte| match &self.coding {
+            Coding::Plain | Coding::Serial(..) => vec![byte],
+            Coding::Marked(_) => mark(Received::good(byte)).as_bytes().to_vec(),
+            Coding::Telnet(telnet) => {
+                let (escaped, length) = telnet.escape(byte);
+                escaped[..length].to_vec()
+            }
+        });
+        Ok(LastWords {
+            bytes: coded.collect(),
+            fd: self.fd.try_clone()?,
+            name: self.name.clone(),
+        })
     }
 
     /// What it shows and does.

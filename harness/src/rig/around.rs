@@ -45,22 +45,7 @@ impl Around {
 
     /// Switches every power off and asks each that can be asked whether it is. What went wrong, in sentences.
     pub(super) fn power_off(&self) -> Vec<String> {
-        let all = self.rig.file.power.iter();
-        all.filter_map(|(name, power)| self.switch_off(name, power))
-            .collect()
-    }
-
-    fn switch_off(&self, name: &str, power: &Power) -> Option<String> {
-        let what = format!("power {name} off");
-        let off = hook::run(&self.rig, &what, &power.off, power.timeout.0);
-        match off
-            .map_err(Box::new)
-            .and_then(|_| is_on(&self.rig, name, power))
-        {
-            Ok(Some(true)) => Some(format!("{what}: it is still on")),
-            Ok(_) => None,
-            Err(error) => Some(format!("{what}: {error}")),
-        }
+        power_off(&self.rig)
     }
 
     /// Runs the hook `after`, and `on_error` after an error. What went wrong, in sentences.
@@ -86,10 +71,27 @@ impl Drop for Around {
         if !self.used {
             for name in &self.switched {
                 let power = self.rig.file.power.get(name);
-                let _told_by_nobody = power.and_then(|power| self.switch_off(name, power));
+                let _told_by_nobody = power.and_then(|power| switch_off(&self.rig, name, power));
             }
         }
         let _told_by_nobody = self.end(true);
+    }
+}
+
+/// Switches every power of a rig off. What went wrong, in sentences.
+pub(super) fn power_off(rig: &Rig) -> Vec<String> {
+    let all = rig.file.power.iter();
+    all.filter_map(|(name, power)| switch_off(rig, name, power))
+        .collect()
+}
+
+fn switch_off(rig: &Rig, name: &str, power: &Power) -> Option<String> {
+    let what = format!("power {name} off");
+    let off = hook::run(rig, &what, &power.off, power.timeout.0);
+    match off.map_err(Box::new).and_then(|_| is_on(rig, name, power)) {
+        Ok(Some(true)) => Some(format!("{what}: it is still on")),
+        Ok(_) => None,
+        Err(error) => Some(format!("{what}: {error}")),
     }
 }
 

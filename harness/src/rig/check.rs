@@ -10,6 +10,7 @@ use crate::scenario::source::Source;
 use harness_proto::nd21::cells::{Cell, RAM, cell};
 use harness_proto::nd21::io::Input;
 use std::collections::BTreeSet;
+use std::time::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -232,6 +233,14 @@ impl Check<'_> {
 
     /// Telegrams come before the power goes, and each step once.
     fn safe_state(&mut self) {
+        if self.file.safe_state.watchdog.0 < Duration::from_secs(1) {
+            let path = ["safe_state".into(), "watchdog".into()];
+            self.wrong(
+                &path,
+                "a computer may be busy for longer",
+                "at least 1s expected here",
+            );
+        }
         let order = &self.file.safe_state.order;
         for (index, step) in order.iter().enumerate() {
             let path = ["safe_state".into(), "order".into(), index.into()];

@@ -411,6 +411,9 @@ pub struct SafeState {
     pub speed_tolerance: Speed,
     /// How long it may take until all drives stand; default 5s.
     pub within: Time,
+    /// How long the program may show no sign of life before the drives are told to stop behind its back; default 10s, at
+    /// least 1s.
+    pub watchdog: Time,
 }
 
 impl Default for SafeState {
@@ -419,6 +422,7 @@ impl Default for SafeState {
             order: vec![SafeStep::Stop, SafeStep::Block],
             speed_tolerance: Speed(5.0),
             within: Time::seconds(5),
+            watchdog: Time::seconds(10),
         }
     }
 }

@@ -25,6 +25,7 @@ mod shared;
 pub(crate) mod sim;
 pub mod state;
 pub mod values;
+mod watchdog;
 
 pub use check::{Rig, parse};
 pub use ends::Ends;
@@ -36,3 +37,4 @@ pub use run::{Attempt, Keeper, Played, Run, Way, play_one};
 pub use schema::schema;
 pub use session::{End, Options, Session, SessionError};
 pub use shared::{Shared, SharedLine};
+pub use watchdog::Alarm;

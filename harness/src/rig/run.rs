@@ -16,6 +16,8 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use harness_sim::deviation;
 use harness_sim::trace::Trace;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How often a scenario is played whose bytes are right and come at other times than the model says.
 const MOST_UNTIMELY: usize = 3;
@@ -59,6 +61,8 @@ pub struct Run<'s> {
     twin: Twin,
     exactness: Exactness,
     byte_time: Span,
+    /// The sign of life of whoever only computes; see the session's watchdog.
+    beats: Option<Arc<AtomicU64>>,
 }
 
 impl<'s> Run<'s> {
@@ -79,6 +83,7 @@ impl<'s> Run<'s> {
                 line_errors,
                 knows_cells: simulated,
             },
+            beats: session.ports().map(|ports| ports.beats()),
             session,
             twin,
             byte_time,
@@ -109,6 +114,9 @@ impl<'s> Run<'s> {
     /// # Errors
     /// The lines have mistakes.
     pub fn twin_with(&self, lines: &[String]) -> Result<Twin, Problems> {
+        if let Some(beats) = &self.beats {
+            beats.fetch_add(1, Ordering::Relaxed);
+        }
         twin(self.session.rig(), lines)
     }
 

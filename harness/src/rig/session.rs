@@ -1,7 +1,7 @@
 //! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
 
 use super::Rig;
-use super::around::Around;
+use super::around::{self, Around};
 use super::ends::Ends;
 use super::file;
 use super::health::{Health, Unhealthy, examine};
@@ -10,8 +10,9 @@ use super::interlock::Interlocks;
 use super::lock::{LockError, PortLock, RigLock};
 use super::open::{OpenRigError, open};
 use super::state;
+use super::watchdog::{Alarm, Watchdog};
 use crate::bus::{Axis, count_behind};
-use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, safe_state};
+use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, StreamLink};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -40,6 +41,8 @@ pub struct Options {
     pub ill_as_well: bool,
     /// Set by whoever wants the program to end.
     pub interrupt: Arc<AtomicBool>,
+    /// What is done when the program shows no sign of life and the drives have been told to stop.
+    pub alarm: Alarm,
 }
 
 /// Why a rig cannot be used.
@@ -63,6 +66,9 @@ pub enum SessionError {
     /// The folder of locks.
     #[error("failed to use the folder of locks: {0}; DRIVEBENCH_STATE names another")]
     State(std::io::Error),
+    /// The watchdog cannot be started.
+    #[error("failed to start the watchdog: {0}")]
+    Watchdog(std::io::Error),
     /// A port.
     #[error("rig {rig}: {error}")]
     Open {
@@ -116,6 +122,8 @@ pub struct Session {
     opening: Option<Health>,
     // Given back in this order.
     around: Around,
+    /// While drives may move.
+    watchdog: Option<Watchdog>,
     _ports: Vec<PortLock>,
     _lock: Option<RigLock>,
 }
@@ -167,6 +175,7 @@ impl Session {
             ended: true,
             opening: None,
             around,
+            watchdog: None,
             _ports: opened.locks,
             _lock: lock,
         };
@@ -183,6 +192,7 @@ impl Session {
         session.link.set_watch(watch);
         session.look_at_interlocks();
         session.around.used();
+        session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
     }
 
@@ -271,6 +281,27 @@ impl Session {
         }
     }
 
+    /// Lets a thread watch that the program lives.
+    fn watched(&mut self, alarm: Alarm) -> Result<Option<Watchdog>, SessionError> {
+        let sizes = self.rings.clone();
+        let Some(ports) = self.link.inner_mut().ports_mut() else {
+            return Ok(None);
+        };
+        let bytes = |ring: usize| sizes.get(ring).map_or(Vec::new(), |size| blind_stop(*size));
+        let beats = ports.beats();
+        let words = ports.last_words(bytes).map_err(SessionError::Watchdog)?;
+        let safe_state = &self.rig.file.safe_state;
+        let limit = safe_state.watchdog.0;
+        let cut = safe_state.order.contains(&file::SafeStep::PowerOff);
+        let rig = self.rig.clone();
+        let then = move || match cut {
+            true => around::power_off(&rig),
+            false => Vec::new(),
+        };
+        let started = Watchdog::start(beats, limit, words, then, alarm);
+        started.map(Some).map_err(SessionError::Watchdog)
+    }
+
     /// Whether the rig was left at rest and its drives answer: then they are asked nothing more, and go on as they are.
     fn opens_quietly(&mut self) -> bool {
         if self.rig.is_simulated() {
@@ -347,6 +378,7 @@ impl Session {
             remarks: Vec::new(),
         };
         self.come_home();
+        self.watchdog = None;
         end.remarks = self.around.end(false);
         end
     }
@@ -374,6 +406,7 @@ impl Session {
                 end.safe = Some(safe_state(&mut self.link, &self.rings, &standing));
             }
             self.come_home();
+            self.watchdog = None;
             if wanted.order.contains(&file::SafeStep::PowerOff) {
                 end.power = self.around.power_off();
             }

@@ -280,3 +280,49 @@ fn an_interlock_of_a_simulated_rig_trips() {
     ended(&first, 6, "the belt comes off");
     assert_eq!(said(&first), said(&run("075F")));
 }
+
+/// A program that hangs (nobody reads what it says, as when a terminal is held) does not let motors turn on.
+#[test]
+fn a_program_that_hangs_is_watched() {
+    let (_served, desk) = desk(true);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig") + "[safe_state]\nwatchdog = \"2s\"\n";
+    std::fs::write(&path, text).expect("room");
+    shows(&desk, "delete-error all --move", "drive 0 is in go");
+    shows(&desk, "write 0 nsoll=500rpm --move --hold", "499.88 rpm");
+    let cells = [
+        "nist", "nsoll", "position", "TempKK", "TempMot", "Status", "Flags",
+    ];
+    let watch = [
+        &["watch", "0"][..],
+        &cells,
+        &["--every", "1ms", "--for", "100s"],
+    ]
+    .concat();
+    let mut child = desk.command(&watch).spawn().expect("the program");
+    // Soon full.
+    let pipe = child.stdout.as_ref().expect("its output");
+    rustix::pipe::fcntl_setpipe_size(pipe, 4_096).expect("a small pipe");
+    let end = std::time::Instant::now() + std::time::Duration::from_secs(60);
+    let status = loop {
+        if let Some(status) = child.try_wait().expect("a process") {
+            break status;
+        }
+        assert!(std::time::Instant::now() < end, "it hangs");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    };
+    let output = child.wait_with_output().expect("its output");
+    assert_eq!(status.code(), Some(7), "{}", said(&output));
+    assert!(
+        said(&output).contains("no sign of life for 2 s"),
+        "{}",
+        said(&output)
+    );
+    // A stop takes its time, and who looks on for so long sees it.
+    shows(
+        &desk,
+        "watch 0 nist Flags --every 2s --for 2s",
+        "nist 0 rpm  Flags",
+    );
+    shows(&desk, "read 0 Flags", "stop");
+}

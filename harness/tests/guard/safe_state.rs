@@ -2,7 +2,7 @@
 
 use super::{axis, bus, guarded, ring, size};
 use harness::bus::Bus;
-use harness::guard::{Guarded, Limits, SafeState, Standing, safe_state};
+use harness::guard::{Guarded, Limits, SafeState, Standing, blind_stop, safe_state};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::{Mode, Position};
@@ -60,6 +60,23 @@ fn turning_motors_stand_and_are_blocked() {
         assert!(word(&line, drive, ram::NIST).abs() <= 20);
         assert_eq!(word(&line, drive, ram::NSOLL), 0);
         assert_eq!(line.peek(0, drive, ram::STATUS).expect("seen") & 0x81, 0x81);
+    }
+}
+
+/// What the watchdog sends past the guard is what the guard lets pass, whatever it allows.
+#[test]
+fn the_last_words_are_allowed() {
+    for drives in [1, 3, 250] {
+        let mut line = guarded(drives, Limits::default());
+        let bytes = blind_stop(size(drives));
+        line.send(0, &bytes);
+        assert_eq!(line.trouble(), None);
+        while line.busy() && line.wait(line.now() + Span::from_millis(1_000)) {}
+        let stopped = |drive: u8| {
+            line.peek(0, drive, ram::STATUS)
+                .is_some_and(|status| status & 0x80 != 0)
+        };
+        assert!((0..size(drives).drives()).all(stopped), "{drives}");
     }
 }
 

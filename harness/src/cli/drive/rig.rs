@@ -6,7 +6,7 @@ use super::failure::Failure;
 use crate::bus::{Axis, Bus, Options};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::cli::rig_failure::{exit_of, find_rig, interrupt_flag, tell_end};
+use crate::cli::rig_failure::{alarm, exit_of, find_rig, interrupt_flag, tell_end};
 use crate::link::{Line, SimulatedLink, Trouble};
 use crate::rig::sim::all_nd21;
 use crate::rig::{self, Rig, Session, Shared};
@@ -176,6 +176,7 @@ pub(super) fn take(
         allow_motion: as_what.moves,
         ill_as_well,
         interrupt: interrupt_flag(),
+        alarm: alarm(),
     };
     Session::open(rig, &options).map_err(|error| Failure::Said(exit_of(&error), error.to_string()))
 }

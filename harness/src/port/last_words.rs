@@ -1,0 +1,61 @@
+//! What is sent to a wire by somebody else than its owner, when the owner does not move any more.
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use std::os::fd::OwnedFd;
+use std::time::{Duration, Instant};
+
+/// How long a wire may take them.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Coded bytes and a descriptor of their own.
+#[derive(Debug)]
+pub struct LastWords {
+    pub(super) fd: OwnedFd,
+    pub(super) name: String,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// They could not be said.
+#[derive(Debug, thiserror::Error)]
+#[error("{name}: {error}")]
+pub struct Unsaid {
+    /// The wire.
+    name: String,
+    /// What the system said.
+    error: std::io::Error,
+}
+
+impl LastWords {
+    /// Sends them, behind whatever the operating system has taken before; at most for two seconds.
+    ///
+    /// # Errors
+    /// The port does not take them.
+    pub fn say(&self) -> Result<(), Unsaid> {
+        self.write().map_err(|error| Unsaid {
+            name: self.name.clone(),
+            error,
+        })
+    }
+
+    fn write(&self) -> std::io::Result<()> {
+        let end = Instant::now() + PATIENCE;
+        let mut rest = &self.bytes[..];
+        while !rest.is_empty() {
+            match rustix::io::write(&self.fd, rest) {
+                Ok(taken) => rest = rest.get(taken..).unwrap_or_default(),
+                Err(Errno::INTR) => {}
+                Err(Errno::AGAIN) if Instant::now() < end => {
+                    let mut fds = [PollFd::new(&self.fd, PollFlags::OUT)];
+                    let nap = Timespec {
+                        tv_sec: 0,
+                        tv_nsec: 50_000_000,
+                    };
+                    poll(&mut fds, Some(&nap))?;
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
+    }
+}
