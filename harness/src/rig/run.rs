@@ -175,7 +175,13 @@ impl<'s> Run<'s> {
     ) -> Result<Attempt, SessionError> {
         let way = self.way();
         let simulated = self.session.rig().is_simulated();
-        self.session.link().reset_after_denial();
+        if matches!(self.session.link().trouble(), Some(Trouble::Denied(_))) {
+            // Nobody knows where in a telegram the drives are; where rings are not examined between scenarios, they are now.
+            self.session.link().reset_after_denial();
+            if way.attempts.is_none() {
+                self.session.health()?;
+            }
+        }
         if !self.session.rig().file.interlock.is_empty() {
             // What the scenario before has left may answer nothing.
             self.session.health()?;

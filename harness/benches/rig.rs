@@ -1,0 +1,188 @@
+//! What the bench adds to the time on the wire, and what it costs of a processor, on rings that another process serves at the pace of
+//! the line, 38400 bit/s (ND21 8.1).
+//!
+//! Each conversation is played three times: in virtual time, which is the wire's own; by a program that only writes to the socket and
+//! reads from it, the baseline in the same run; and by the bench, with guard, record, and everything else that a rig has.
+
+#![expect(clippy::print_stdout, reason = "figures are what it is for")]
+
+#[path = "../tests/served/ring.rs"]
+mod ring;
+
+use harness::library::Entry;
+use harness::link::Line;
+use harness::port::Endpoint;
+use harness::rig::{Options, Run, Session, parse};
+use harness::scenario::run::{AtFinding, play};
+use harness::scenario::simulate;
+use harness::scenario::source::Source;
+use harness_proto::time::Span;
+use ring::Served;
+use rustix::time::{ClockId, clock_gettime};
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// How often each is measured; the middle one counts.
+const TIMES: usize = 5;
+
+/// How long a served ring is given to see that its client has gone.
+const TURN: Duration = Duration::from_millis(500);
+
+/// Bytes of a conversation: a second on the wire.
+const BYTES: usize = 3_491;
+
+/// A conversation and the bytes that go out in it.
+struct Case {
+    name: &'static str,
+    text: String,
+    sent: Vec<u8>,
+}
+
+fn cases(drives: u8) -> Vec<Case> {
+    let header = |name: &str| format!("title {name}\nsource nd21 8.1\nring {drives}\n");
+    let idle = "SYNCO without a gap";
+    let mut cases = vec![Case {
+        name: idle,
+        text: format!("{}> 80*{BYTES}\n< 80*{BYTES}\n", header(idle)),
+        sent: vec![0x80; BYTES],
+    }];
+    // An answer takes a whole round: on a long ring there is time for few.
+    let questions = 2_000 / (usize::from(drives) + 8);
+    let reads = "reads, each behind the answer to the one before";
+    // ReadByte FE13 of drive 0 (10.1): 88, its address byte, C0 13 FE, and the checking byte.
+    let telegram = [0x88, 0_u8.wrapping_sub(drives), 0xC0, 0x13, 0xFE, 0xD1];
+    cases.push(Case {
+        name: reads,
+        text: header(reads) + &"read-byte 0 FE13\n".repeat(questions),
+        sent: telegram.repeat(questions),
+    });
+    cases
+}
+
+/// What this process has had of a processor.
+fn processor() -> Duration {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(
+        u64::try_from(time.tv_sec).unwrap_or(0),
+        u32::try_from(time.tv_nsec).unwrap_or(0),
+    )
+}
+
+fn middle(mut all: Vec<(f64, f64)>) -> (f64, f64) {
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all[all.len() / 2]
+}
+
+/// Seconds on a clock, and of a processor.
+fn timed(act: impl FnOnce()) -> (f64, f64) {
+    let (before, begin) = (processor(), Instant::now());
+    act();
+    let took = begin.elapsed();
+    (took.as_secs_f64(), (processor() - before).as_secs_f64())
+}
+
+/// The baseline: everything is written, and read until as much has come back.
+fn bare(stream: &mut TcpStream, case: &Case) -> (f64, f64) {
+    timed(|| {
+        let mut buffer = [0; 4_096];
+        let chunks = match case.name.starts_with("SYNCO") {
+            true => case.sent.len(),
+            false => 6,
+        };
+        for chunk in case.sent.chunks(chunks) {
+            stream.write_all(chunk).expect("room");
+            let mut left = chunk.len();
+            while left > 0 {
+                left -= stream.read(&mut buffer).expect("bytes").min(left);
+            }
+        }
+    })
+}
+
+fn main() {
+    // `cargo test --benches` only wants to know whether it starts.
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    println!(
+        "{:>6}  {:48} {:>9} {:>9} {:>8} {:>9} {:>8} {:>7} {:>7}",
+        "drives", "conversation", "wire", "bare", "added", "bench", "added", "bare", "bench"
+    );
+    println!(
+        "{:>6}  {:48} {:>9} {:>9} {:>8} {:>9} {:>8} {:>7} {:>7}",
+        "", "", "ms", "ms", "", "ms", "", "CPU", "CPU"
+    );
+    for drives in [1, 3, 100, 250] {
+        let served = Served::start("nd21", &[drives], "tcp", false, &[]);
+        let Endpoint::Tcp(address) = &served.endpoints[0] else {
+            unreachable!("a socket");
+        };
+        for case in cases(drives) {
+            let source = Source {
+                name: "bench.scn".to_owned(),
+                text: case.text.clone().into(),
+            };
+            let entry = Entry::new(source, Some(drives)).expect("a scenario");
+            let plan = entry.plan.as_ref().expect("a plan");
+            let mut link = simulate::bench(plan);
+            let virtual_time = play(plan, &mut link, AtFinding::Stop);
+            assert!(virtual_time.finding.is_none(), "{:?}", virtual_time.finding);
+            let wire = virtual_time.took.as_millis_f64() / 1e3;
+            let mut stream = TcpStream::connect(address).expect("a server");
+            stream.set_nodelay(true).expect("no delay");
+            let bare = (0..TIMES).map(|_| bare(&mut stream, &case)).collect();
+            let bare = middle(bare);
+            drop(stream);
+            // A second client is turned away while the first one has not been seen to go.
+            std::thread::sleep(TURN);
+            let bench = middle(on_the_bench(address, served.sizes[0], plan));
+            std::thread::sleep(TURN);
+            let added = |(took, _): (f64, f64)| 100.0 * (took / wire - 1.0);
+            let of_a_core = |(took, cpu): (f64, f64)| 100.0 * cpu / took;
+            println!(
+                "{drives:>6}  {:48} {:9.2} {:9.2} {:7.2}% {:9.2} {:7.2}% {:6.2}% {:6.2}%",
+                case.name,
+                wire * 1e3,
+                bare.0 * 1e3,
+                added(bare),
+                bench.0 * 1e3,
+                added(bench),
+                of_a_core(bare),
+                of_a_core(bench)
+            );
+        }
+    }
+}
+
+/// The conversation on a rig in use: its own time, and what it cost of a processor beside that of the checks around it.
+fn on_the_bench(
+    address: &str,
+    drives: u8,
+    plan: &harness::scenario::plan::Plan,
+) -> Vec<(f64, f64)> {
+    let text = format!(
+        "schema = 1\n[rig]\nid = \"bench\"\n[ring.1]\ndrives = {drives}\ntransport = \"tcp\"\nport = \"{address}\"\n\
+         time_tolerance = \"100ms\"\n[health]\nbetween = false\n"
+    );
+    let rig = parse(&Source {
+        name: "bench.toml".to_owned(),
+        text: text.into(),
+    });
+    let rig = rig.expect("a rig");
+    let mut session = Session::open(&rig, &Options::default()).expect("a rig in use");
+    let mut run = Run::new(&mut session).expect("a model");
+    let measured = (0..TIMES).map(|_| {
+        let mut took = Span::ZERO;
+        let (_, cpu) = timed(|| {
+            let played = run.play(plan, None).expect("a healthy rig");
+            assert!(played.outcome.finding.is_none(), "{:?}", played.outcome);
+            took = played.outcome.took;
+        });
+        (took.as_millis_f64() / 1e3, cpu)
+    });
+    let measured = measured.collect();
+    assert_eq!(session.link().trouble(), None);
+    let _end = session.close();
+    measured
+}
