@@ -24,6 +24,7 @@ const PARITY: LinkFault = LinkFault::Flip(Flips {
     data: 1,
     parity: false,
     stop: false,
+    start: false,
 });
 
 fn link(from: u8, to: u8) -> RingLink {
