@@ -13,7 +13,7 @@ pub mod lock;
 mod open;
 pub(crate) mod run;
 pub mod scan;
-mod schema;
+pub(crate) mod schema;
 mod session;
 pub(crate) mod sim;
 pub mod state;

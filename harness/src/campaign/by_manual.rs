@@ -1,0 +1,246 @@
+//! A conversation in bytes, read and repaired by the manual alone (ND21 9.7, 9.8): the master compares what comes back
+//! with what must, goes on with SYNCO, reads the number of the drive that the ring spells out, sends the check sequence
+//! and repeats the telegrams that were not completed.
+
+use super::class::{Evidence, Wrong};
+use super::conversation::Answers;
+use super::fault::{Case, link_index};
+use super::sound::{Sound, all_back};
+use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use crate::locate::{MAX_ZEROS, locate};
+use harness_proto::line::Received;
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
+use harness_proto::novobus::sync::SYNCO;
+
+/// Byte times in which a ring spells out an address: a telegram is ended first, 25 zeros come at most, and the address
+/// often enough to be believed (9.7).
+const SPELLING: usize = 9 + MAX_ZEROS + 14;
+/// The same behind a time-out: 20 ms of silence twice, and a zero needs a byte time (9.9).
+const SPELLING_AFTER_SILENCE: usize = SPELLING + 150;
+
+/// What the master sent, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Said {
+    /// Why.
+    pub why: &'static str,
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// A conversation that is ready to be disturbed.
+#[derive(Clone, Debug)]
+pub struct ByManual {
+    start: SimulatedLink,
+    answers: Answers,
+    sound: Sound,
+    /// What comes back without a fault, the first time and the second.
+    first: Vec<Received>,
+    second: Vec<Received>,
+    spelling: usize,
+}
+
+/// A ring under a master that goes by the manual.
+struct Play<'a> {
+    of: &'a ByManual,
+    link: SimulatedLink,
+    said: Vec<Said>,
+    evidence: Evidence,
+    /// Data as they were received last, place by place.
+    data: Vec<Option<Received>>,
+}
+
+fn send(link: &mut SimulatedLink, bytes: &[u8]) -> Vec<Received> {
+    let end = link.send(0, bytes);
+    link.run_until(end);
+    std::iter::from_fn(|| link.receive(0).map(|(_, byte)| byte)).collect()
+}
+
+/// What came back for `sent`, without the SYNCO that were under way before it.
+fn behind_synco<'a>(heard: &'a [Received], sent: &[u8]) -> &'a [Received] {
+    let own = sent.iter().take_while(|byte| **byte == SYNCO).count();
+    let all = heard.iter().take_while(|byte| byte.is(SYNCO)).count();
+    &heard[all.saturating_sub(own)..]
+}
+
+impl ByManual {
+    /// Plays the conversation twice without a fault.
+    #[must_use]
+    pub fn new(start: SimulatedLink, bytes: Vec<u8>) -> Self {
+        let drives = start.drives(0);
+        let spelling = if Sound::any_monitors(&start) {
+            SPELLING_AFTER_SILENCE
+        } else {
+            SPELLING
+        };
+        let mut sound = Sound::new(start.clone());
+        let mut link = start.clone();
+        let mut round = |link: &mut SimulatedLink| {
+            let mut heard = Vec::new();
+            let fill = std::iter::repeat_n(SYNCO, usize::from(drives) + 2);
+            for byte in bytes.iter().copied().chain(fill) {
+                heard.extend(send(link, &[byte]));
+                sound.note(link);
+            }
+            heard
+        };
+        let first = round(&mut link);
+        let second = round(&mut link);
+        let second = behind_synco(&second, &bytes).to_vec();
+        let answers = Answers::new(bytes, drives, &first);
+        Self {
+            start,
+            answers,
+            sound,
+            first,
+            second,
+            spelling,
+        }
+    }
+
+    /// The conversation.
+    #[must_use]
+    pub fn answers(&self) -> &Answers {
+        &self.answers
+    }
+
+    /// Plays a case.
+    #[must_use]
+    pub fn play(&self, case: &Case) -> (Evidence, Vec<Said>) {
+        let mut link = self.start.clone();
+        let byte_time = link.byte_time();
+        let mut lasts = 0;
+        for fault in case.faults() {
+            for (distance, what) in fault.what.on_link() {
+                let placed = PlacedFault::Link(fault.link, what);
+                link.inject(0, placed, Moment::Byte(fault.byte + distance));
+            }
+            lasts += fault.what.lasts(byte_time);
+        }
+        let mut play = Play {
+            of: self,
+            link,
+            said: Vec::new(),
+            evidence: Evidence::default(),
+            data: vec![None; self.answers.sent.len()],
+        };
+        play.all(usize::try_from(lasts).unwrap_or(usize::MAX));
+        (play.evidence, play.said)
+    }
+}
+
+impl Play<'_> {
+    fn say(&mut self, why: &'static str, bytes: Vec<u8>) -> Vec<Received> {
+        let heard = send(&mut self.link, &bytes);
+        self.said.push(Said { why, bytes });
+        heard
+    }
+
+    fn drives(&self) -> usize {
+        usize::from(self.of.answers.shape.drives)
+    }
+
+    fn synco(&self, more: usize) -> Vec<u8> {
+        vec![SYNCO; self.drives() + 2 + more]
+    }
+
+    /// Keeps data for the bytes from `from` on, up to `to`.
+    fn keep(&mut self, heard: &[Received], from: usize, to: usize) {
+        for (place, byte) in (from..to.min(self.data.len())).zip(heard) {
+            self.data[place] = Some(*byte);
+        }
+    }
+
+    fn all(&mut self, lasts: usize) {
+        let answers = &self.of.answers;
+        let mut heard = self.say("the conversation", answers.sent.clone());
+        let fill = self.synco(self.of.spelling + lasts);
+        heard.extend(self.say("SYNCO, while the ring spells out an address (9.7)", fill));
+        let wrong = answers.wrong(&heard, 0);
+        self.keep(&heard, 0, wrong.unwrap_or(usize::MAX));
+        self.evidence.confirmed = wrong.is_none();
+        if let Some(wrong) = wrong {
+            self.name(&heard, wrong);
+            self.repair(answers.restart(wrong));
+        }
+        self.evidence.wrong = self.wrong_values();
+        if !self.evidence.confirmed || self.of.sound.waits_as(&self.link) {
+            self.evidence.all_back = all_back(&self.link);
+            return;
+        }
+        // Something is left that only the next telegrams can show.
+        let why = "the conversation once more, without a fault";
+        let mut heard = self.say(why, answers.sent.clone());
+        heard.extend(self.say("SYNCO", self.synco(self.of.spelling)));
+        let heard = behind_synco(&heard, &answers.sent);
+        if let Some(wrong) = answers.wrong(heard, 0) {
+            self.evidence.confirmed = false;
+            if !self.evidence.noticed {
+                self.name(heard, wrong);
+            }
+            self.repair(answers.restart(wrong));
+        }
+        self.evidence.all_back = all_back(&self.link);
+    }
+
+    /// Something is wrong: whom does the master blame?
+    fn name(&mut self, heard: &[Received], wrong: usize) {
+        self.evidence.noticed = true;
+        let drives = self.of.answers.shape.drives;
+        self.evidence.named = match locate(heard, drives) {
+            Some(location) => link_index(drives, location.drive),
+            None => {
+                let damaged = heard.get(wrong).is_some_and(|byte| byte.error.is_some());
+                damaged.then_some(usize::from(drives))
+            }
+        };
+    }
+
+    /// Check sequences, each with the telegrams from `restart` on behind it, until all have been answered. Half as many as
+    /// there are drives and one more suffice; one more still, for faults that last.
+    fn repair(&mut self, restart: usize) {
+        let most = self.drives() / 2 + 2;
+        for _ in 0..most {
+            self.evidence.sequences += 1;
+            let mut heard = self.say("the check sequence (9.8)", CHECK_SEQUENCE.to_vec());
+            let repeated = self.of.answers.sent[restart..].to_vec();
+            heard.extend(self.say("the telegrams that were not completed, repeated", repeated));
+            heard.extend(self.say("SYNCO", self.synco(1)));
+            let is_sequence = |bytes: &[Received]| {
+                let mut pairs = bytes.iter().zip(SEQUENCE);
+                pairs.all(|(received, byte)| received.is(byte))
+            };
+            let whole = heard.windows(SEQUENCE.len()).rposition(is_sequence);
+            let Some(place) = whole else { continue };
+            let behind = &heard[place + SEQUENCE.len()..];
+            let wrong = self.of.answers.wrong(behind, restart);
+            self.keep(behind, restart, wrong.unwrap_or(usize::MAX));
+            if wrong.is_none() {
+                self.evidence.confirmed = true;
+                return;
+            }
+        }
+    }
+
+    /// Cells that hold what they should not, and data that came otherwise.
+    fn wrong_values(&self) -> Vec<Wrong> {
+        let mut wrong = self.of.sound.wrong(&self.link, self.evidence.confirmed);
+        if !self.evidence.confirmed {
+            return wrong;
+        }
+        for (place, drive) in self.of.answers.data() {
+            let right = |round: &[Received]| round.get(place).copied();
+            let Some(received) = self.data[place] else {
+                continue;
+            };
+            let expected = right(&self.of.first);
+            if Some(received) != expected && Some(received) != right(&self.of.second) {
+                wrong.push(Wrong::Answer {
+                    drive,
+                    value: received.byte.into(),
+                    expected: expected.map_or(0, |byte| byte.byte.into()),
+                });
+            }
+        }
+        wrong
+    }
+}
