@@ -45,6 +45,8 @@ struct Play<'a> {
     link: SimulatedLink,
     said: Vec<Said>,
     evidence: Evidence,
+    /// For how many byte times the faults last.
+    lasts: usize,
     /// Data as they were received last, place by place.
     data: Vec<Option<Received>>,
 }
@@ -121,9 +123,10 @@ impl ByManual {
             link,
             said: Vec::new(),
             evidence: Evidence::default(),
+            lasts: usize::try_from(lasts).unwrap_or(usize::MAX),
             data: vec![None; self.answers.sent.len()],
         };
-        play.all(usize::try_from(lasts).unwrap_or(usize::MAX));
+        play.all();
         (play.evidence, play.said)
     }
 }
@@ -139,8 +142,9 @@ impl Play<'_> {
         usize::from(self.of.answers.shape.drives)
     }
 
+    /// SYNCO until what was sent before has come back, however late, and some more.
     fn synco(&self, more: usize) -> Vec<u8> {
-        vec![SYNCO; self.drives() + 2 + more]
+        vec![SYNCO; self.drives() + 2 + self.lasts + more]
     }
 
     /// Keeps data for the bytes from `from` on, up to `to`.
@@ -150,10 +154,10 @@ impl Play<'_> {
         }
     }
 
-    fn all(&mut self, lasts: usize) {
+    fn all(&mut self) {
         let answers = &self.of.answers;
         let mut heard = self.say("the conversation", answers.sent.clone());
-        let fill = self.synco(self.of.spelling + lasts);
+        let fill = self.synco(self.of.spelling);
         heard.extend(self.say("SYNCO, while the ring spells out an address (9.7)", fill));
         let wrong = answers.wrong(&heard, 0);
         self.keep(&heard, 0, wrong.unwrap_or(usize::MAX));

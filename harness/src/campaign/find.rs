@@ -1,7 +1,7 @@
 //! Where campaigns come from: the files that are named, or the built-in ones.
 
-use super::run::{Campaign, LoadError};
-use crate::scenario::problem::nearest;
+use super::run::Campaign;
+use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::source::{Source, SourceError};
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
@@ -23,9 +23,9 @@ pub enum FindError {
     /// A file is no text.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It cannot be played.
+    /// It, or its scenario, has mistakes.
     #[error(transparent)]
-    Load(#[from] LoadError),
+    Mistakes(#[from] Box<Problems>),
 }
 
 /// The names of the built-in campaigns, in order.

@@ -20,4 +20,4 @@ pub mod sound;
 
 pub use class::{Class, Evidence, Wrong};
 pub use fault::Case;
-pub use run::{Campaign, Contradiction, Finished, LoadError, Outcome};
+pub use run::{Campaign, Contradiction, Finished, Outcome};

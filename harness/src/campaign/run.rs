@@ -20,22 +20,6 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// How many cases a thread takes at once.
 const BATCH: usize = 32;
 
-/// Why a campaign cannot be played.
-#[derive(Debug, thiserror::Error)]
-pub enum LoadError {
-    /// Its file, or its scenario, has mistakes.
-    #[error(transparent)]
-    Mistakes(#[from] Box<Problems>),
-    /// Its scenario is not there.
-    #[error("{campaign}: {error}")]
-    Scenario {
-        /// The campaign.
-        campaign: String,
-        /// What is wrong.
-        error: LibraryError,
-    },
-}
-
 /// A campaign that can be played.
 #[derive(Debug)]
 pub struct Campaign {
@@ -106,9 +90,9 @@ impl Campaign {
     ///
     /// # Errors
     /// Mistakes in either, or a scenario that is not there.
-    pub fn load(source: &Source, folder: &Path) -> Result<Self, LoadError> {
+    pub fn load(source: &Source, folder: &Path) -> Result<Self, Box<Problems>> {
         let read = read(source).map_err(Box::new)?;
-        let mistake = |problem: Problem| LoadError::Mistakes(Box::new(read.problems(problem)));
+        let mistake = |problem: Problem| Box::new(read.problems(problem));
         let own = folder.join(&read.file.scenario);
         let path = if own.is_file() {
             own
@@ -116,11 +100,11 @@ impl Campaign {
             PathBuf::from(&read.file.scenario)
         };
         let missing = |error| match error {
-            LibraryError::Mistakes(problems) => LoadError::Mistakes(problems),
-            error => LoadError::Scenario {
-                campaign: source.name.clone(),
-                error,
-            },
+            LibraryError::Mistakes(problems) => problems,
+            error => {
+                let expected = "a built-in scenario, or a file, expected here";
+                mistake(read.wrong(&["scenario"], error.to_string(), expected))
+            }
         };
         let found = sources(std::slice::from_ref(&path)).map_err(missing)?;
         let Ok([scenario]) = <[Source; 1]>::try_from(found) else {

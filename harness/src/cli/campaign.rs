@@ -7,7 +7,7 @@ use super::run::progress_bar;
 use crate::campaign::find::{FindError, find, names};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line, table};
-use crate::campaign::{Campaign, Case, Class, Finished, LoadError};
+use crate::campaign::{Campaign, Case, Class, Finished};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -79,8 +79,7 @@ fn shown(finished: &Finished, only: Option<ClassName>) -> String {
 
 fn complain(error: &FindError, output: &mut Output) {
     match error {
-        FindError::Load(LoadError::Mistakes(problems)) => output.mistakes(problems),
-        FindError::Load(LoadError::Scenario { error, .. }) => output.library_error(error),
+        FindError::Mistakes(problems) => output.mistakes(problems),
         error => output.complain(&error.to_string()),
     }
 }
