@@ -117,7 +117,10 @@ fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
         .partition(|name| name.starts_with("campaigns/"));
     assert_eq!(inputs, outputs);
     // Only the small campaigns have a snapshot; one more shows what is said of files with mistakes.
-    for output in campaigns.iter().filter(|name| *name != "campaigns/mistakes") {
+    for output in campaigns
+        .iter()
+        .filter(|name| *name != "campaigns/mistakes")
+    {
         let campaign = root().join("corpora").join(format!("{output}.toml"));
         assert!(campaign.exists(), "{output}");
     }

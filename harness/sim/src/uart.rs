@@ -63,7 +63,7 @@ impl Uart {
 
 /// The bits of a byte as a transmitter sends them: start, data from the lowest up, odd parity, stop.
 pub(crate) fn bits(byte: u8) -> u16 {
-    let parity = u16::from(byte.count_ones() % 2 == 0);
+    let parity = u16::from(byte.count_ones().is_multiple_of(2));
     u16::from(byte) << 1 | parity << 9 | 1 << 10
 }
 

@@ -33,9 +33,8 @@ pub struct ByManual {
     start: SimulatedLink,
     answers: Answers,
     sound: Sound,
-    /// What comes back without a fault, the first time and the second.
+    /// What comes back without a fault.
     first: Vec<Received>,
-    second: Vec<Received>,
     spelling: usize,
 }
 
@@ -47,8 +46,9 @@ struct Play<'a> {
     evidence: Evidence,
     /// For how many byte times the faults last.
     lasts: usize,
-    /// Data as they were received last, place by place.
-    data: Vec<Option<Received>>,
+    /// What came back at first, as far as it was not repeated: without a fault the first time. What is repeated comes when
+    /// all faults are over, and brings what the cell holds then.
+    kept: Vec<Received>,
 }
 
 fn send(link: &mut SimulatedLink, bytes: &[u8]) -> Vec<Received> {
@@ -86,15 +86,13 @@ impl ByManual {
             heard
         };
         let first = round(&mut link);
-        let second = round(&mut link);
-        let second = behind_synco(&second, &bytes).to_vec();
+        round(&mut link);
         let answers = Answers::new(bytes, drives, &first);
         Self {
             start,
             answers,
             sound,
             first,
-            second,
             spelling,
         }
     }
@@ -124,7 +122,7 @@ impl ByManual {
             said: Vec::new(),
             evidence: Evidence::default(),
             lasts: usize::try_from(lasts).unwrap_or(usize::MAX),
-            data: vec![None; self.answers.sent.len()],
+            kept: Vec::new(),
         };
         play.all();
         (play.evidence, play.said)
@@ -147,25 +145,20 @@ impl Play<'_> {
         vec![SYNCO; self.drives() + 2 + self.lasts + more]
     }
 
-    /// Keeps data for the bytes from `from` on, up to `to`.
-    fn keep(&mut self, heard: &[Received], from: usize, to: usize) {
-        for (place, byte) in (from..to.min(self.data.len())).zip(heard) {
-            self.data[place] = Some(*byte);
-        }
-    }
-
     fn all(&mut self) {
         let answers = &self.of.answers;
         let mut heard = self.say("the conversation", answers.sent.clone());
         let fill = self.synco(self.of.spelling);
         heard.extend(self.say("SYNCO, while the ring spells out an address (9.7)", fill));
         let wrong = answers.wrong(&heard, 0);
-        self.keep(&heard, 0, wrong.unwrap_or(usize::MAX));
         self.evidence.confirmed = wrong.is_none();
-        if let Some(wrong) = wrong {
+        let restart = wrong.map(|wrong| answers.restart(wrong));
+        if let (Some(wrong), Some(restart)) = (wrong, restart) {
             self.name(&heard, wrong);
-            self.repair(answers.restart(wrong));
+            self.repair(restart);
         }
+        heard.truncate(restart.unwrap_or(answers.sent.len()));
+        self.kept = heard;
         self.evidence.wrong = self.wrong_values();
         if !self.evidence.confirmed || self.of.sound.waits_as(&self.link) {
             self.evidence.all_back = all_back(&self.link);
@@ -190,12 +183,12 @@ impl Play<'_> {
     fn name(&mut self, heard: &[Received], wrong: usize) {
         self.evidence.noticed = true;
         let drives = self.of.answers.shape.drives;
-        self.evidence.named = match locate(heard, drives) {
-            Some(location) => link_index(drives, location.drive),
-            None => {
-                let damaged = heard.get(wrong).is_some_and(|byte| byte.error.is_some());
-                damaged.then_some(usize::from(drives))
-            }
+        // No drive passes a damaged byte on: a line error at the master happened on the last link.
+        let damaged = heard.get(wrong).is_some_and(|byte| byte.error.is_some());
+        self.evidence.named = if damaged {
+            Some(usize::from(drives))
+        } else {
+            locate(heard, drives).and_then(|location| link_index(drives, location.drive))
         };
     }
 
@@ -217,7 +210,6 @@ impl Play<'_> {
             let Some(place) = whole else { continue };
             let behind = &heard[place + SEQUENCE.len()..];
             let wrong = self.of.answers.wrong(behind, restart);
-            self.keep(behind, restart, wrong.unwrap_or(usize::MAX));
             if wrong.is_none() {
                 self.evidence.confirmed = true;
                 return;
@@ -232,16 +224,14 @@ impl Play<'_> {
             return wrong;
         }
         for (place, drive) in self.of.answers.data() {
-            let right = |round: &[Received]| round.get(place).copied();
-            let Some(received) = self.data[place] else {
-                continue;
-            };
-            let expected = right(&self.of.first);
-            if Some(received) != expected && Some(received) != right(&self.of.second) {
+            let both = (self.kept.get(place), self.of.first.get(place));
+            if let (Some(received), Some(expected)) = both
+                && received != expected
+            {
                 wrong.push(Wrong::Answer {
                     drive,
                     value: received.byte.into(),
-                    expected: expected.map_or(0, |byte| byte.byte.into()),
+                    expected: expected.byte.into(),
                 });
             }
         }

@@ -10,6 +10,9 @@ use harness_proto::novobus::sync::{Addressing, SyncByte};
 use harness_sim::drive::Model;
 use std::collections::BTreeMap;
 
+/// The most bytes, or calls, of a conversation: it is played again for every case.
+const MAX_LENGTH: usize = 4096;
+
 /// What the master says.
 #[derive(Clone, Debug)]
 pub enum Talk {
@@ -56,6 +59,12 @@ pub fn talk(plan: &Plan) -> Result<Talk, Problem> {
             }
             PlannedAction::Master(_, all) => calls.push(all.clone()),
             _ => return refused(step.span, "a campaign does not play this"),
+        }
+        if bytes.len().max(calls.iter().map(Vec::len).sum()) > MAX_LENGTH {
+            let message = format!(
+                "more than {MAX_LENGTH} bytes or calls in a conversation that is played for every case"
+            );
+            return refused(step.span, &message);
         }
         if !bytes.is_empty() && !calls.is_empty() {
             return refused(

@@ -6,6 +6,7 @@ use harness_proto::time::Span;
 use harness_sim::fault::Flips;
 use std::fmt;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// A bit of a byte on the line (ND21 8.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -80,6 +81,17 @@ pub fn wire_index(drives: u8, wire: Wire) -> Option<usize> {
         Some(drive) => link_index(drives, drive),
         None => Some(usize::from(drives)),
     }
+}
+
+/// The most byte times that one gap may last.
+pub const MAX_GAP: u16 = 1000;
+
+/// The longest delay or break.
+pub const LONGEST: Duration = Duration::from_secs(1);
+
+fn time(text: &str) -> Result<Time, ()> {
+    let time: Time = text.parse().map_err(|_| ())?;
+    if time.0 > LONGEST { Err(()) } else { Ok(time) }
 }
 
 fn span(time: Time) -> Span {
@@ -184,9 +196,12 @@ impl FromStr for What {
                         .map(Self::Insert)
                         .map_err(|_| ())
                 }
-                "gap" => value.parse().map(Self::Gap).map_err(|_| ()),
-                "delay" => value.parse().map(Self::Delay).map_err(|_| ()),
-                "break" => value.parse().map(Self::Break).map_err(|_| ()),
+                "gap" => match value.parse() {
+                    Ok(bytes @ 1..=MAX_GAP) => Ok(Self::Gap(bytes)),
+                    _ => Err(()),
+                },
+                "delay" => time(value).map(Self::Delay),
+                "break" => time(value).map(Self::Break),
                 _ => Err(()),
             };
         }
@@ -294,6 +309,9 @@ mod tests {
             "98->97:1:8",
             "1->0:1:p+",
             "1->0:1:insert-+1",
+            "1->0:1:gap-1001",
+            "1->0:1:gap-0",
+            "1->0:1:delay-2s",
         ] {
             assert!(Case::from_name(name, 100).is_err(), "{name}");
         }

@@ -1,7 +1,7 @@
 //! What may stand in a campaign file (`corpora/campaigns/*.toml`), and the check of a text.
 
 use super::class::Class;
-use super::fault::{Bit, wire_index};
+use super::fault::{Bit, LONGEST, MAX_GAP, wire_index};
 use crate::rig::schema::{Step, compare, place, syntax};
 use crate::rig::values::{Time, Wire};
 use crate::scenario::problem::{Problem, Problems};
@@ -13,12 +13,6 @@ use toml::de::DeTable;
 
 /// The most cases of a campaign: each is kept with its outcome.
 pub const MAX_CASES: u64 = 1_000_000;
-
-/// The most byte times that one fault may last.
-const MAX_GAP: u16 = 1000;
-
-/// The longest delay or break.
-const LONGEST: std::time::Duration = std::time::Duration::from_millis(1000);
 
 /// A campaign file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -11,6 +11,7 @@ use crate::library::{Entry, LibraryError, sources};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
+use crate::scenario::syntax::{Setup, SetupKind};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -124,6 +125,15 @@ impl Campaign {
                 vec![problem],
             ))
         };
+        let deviates = |setup: &&Setup| matches!(setup.what, SetupKind::Deviates(_));
+        if let Some(setup) = entry.scenario.setups.iter().find(deviates) {
+            let message = "what a wrong drive does is no measure of the bus";
+            return Err(own(Problem::new(
+                setup.span,
+                message,
+                "drives by the manual expected in a campaign",
+            )));
+        }
         let Some(plan) = &entry.plan else {
             let message = "its bus is not built yet";
             return Err(mistake(read.wrong(
