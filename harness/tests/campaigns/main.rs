@@ -81,6 +81,7 @@ fn every_campaign_pins_every_figure_and_the_page_shows_them() {
             sum += count;
         }
         assert_eq!(sum, cases, "{name}");
+        assert_eq!(built_in(name).cases.len() as u64, cases, "{name}");
         assert!(page.contains(&row), "the page has no row\n{row}");
     }
 }
@@ -220,4 +221,25 @@ fn names_that_are_not_there() {
             .contains("did you mean `9.6-single-bits`?"),
         "{error}"
     );
+}
+
+/// The figures of a map of links and bytes: each case at each of its places.
+#[test]
+fn cases_by_link_and_byte() {
+    let finished = run(&built_in("9.9-silence"));
+    let map = finished.by_place();
+    // Four links, 21 bytes, and eleven faults at each.
+    assert_eq!(map.len(), 4 * 21);
+    assert!(
+        map.values()
+            .all(|classes| classes.values().sum::<u64>() == 11)
+    );
+    let of = |class| {
+        map.values()
+            .filter_map(|classes| classes.get(&class))
+            .sum::<u64>()
+    };
+    for class in Class::ALL {
+        assert_eq!(of(class), finished.count(class), "{class}");
+    }
 }
