@@ -65,9 +65,10 @@ fn behind_synco<'a>(heard: &'a [Received], sent: &[u8]) -> &'a [Received] {
 }
 
 impl ByManual {
-    /// Plays the conversation twice without a fault.
+    /// Plays the conversation twice without a fault. `None` where the second time leaves something else than the first: a
+    /// master that repeats telegrams would do so too.
     #[must_use]
-    pub fn new(start: SimulatedLink, bytes: Vec<u8>) -> Self {
+    pub fn new(start: SimulatedLink, bytes: Vec<u8>) -> Option<Self> {
         let drives = start.drives(0);
         let spelling = if Sound::any_monitors(&start) {
             SPELLING_AFTER_SILENCE
@@ -86,15 +87,19 @@ impl ByManual {
             heard
         };
         let first = round(&mut link);
+        let once = link.clone();
         round(&mut link);
+        if !sound.wrong(&once, true).is_empty() {
+            return None;
+        }
         let answers = Answers::new(bytes, drives, &first);
-        Self {
+        Some(Self {
             start,
             answers,
             sound,
             first,
             spelling,
-        }
+        })
     }
 
     /// The conversation.

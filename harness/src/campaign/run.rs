@@ -150,7 +150,13 @@ impl Campaign {
         let drives = plan.rings.first().map_or(0, |ring| ring.drives());
         let (played, shape) = match talk(plan).map_err(own)? {
             Talk::Bytes(bytes) => {
-                let by_manual = ByManual::new(start, bytes);
+                let Some(by_manual) = ByManual::new(start, bytes) else {
+                    let message =
+                        "said twice, the conversation leaves something else than said once";
+                    let expected =
+                        "a conversation whose telegrams can be repeated expected there (ND21 9.8)";
+                    return Err(mistake(read.wrong(&["scenario"], message, expected)));
+                };
                 let shape = by_manual.answers().shape.clone();
                 (Played::ByManual(Box::new(by_manual)), shape)
             }

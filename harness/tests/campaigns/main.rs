@@ -243,3 +243,24 @@ fn cases_by_link_and_byte() {
         assert_eq!(of(class), finished.count(class), "{class}");
     }
 }
+
+/// Process data first go to FF08 and the second time to FF0A: what a repeated telegram does is not what it did.
+#[test]
+fn a_conversation_that_cannot_be_repeated_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenario = "title t\nsource nd21 9.4\nring 1\ndrive 0 memory DataIn = 08\n\
+                    > 85 FF 12 34\n> 8A FF 82 0A 32 FF BD\n";
+    std::fs::write(folder.path().join("twice.scn"), scenario).expect("a file");
+    let path = folder.path().join("twice.toml");
+    let text = "schema = 1\ntitle = \"t\"\nscenario = \"twice.scn\"\nfaults = [\"bits\"]\n";
+    std::fs::write(&path, text).expect("a file");
+    let error = find(&path).expect_err("a mistake");
+    let harness::campaign::find::FindError::Mistakes(problems) = error else {
+        panic!("{error}");
+    };
+    let message = &problems.all()[0].message;
+    assert_eq!(
+        message,
+        "said twice, the conversation leaves something else than said once"
+    );
+}
