@@ -4,5 +4,6 @@ fn main() {
     println!("cargo:rerun-if-changed=corpora/scenarios");
     println!("cargo:rerun-if-changed=corpora/probes");
     println!("cargo:rerun-if-changed=corpora/qualify");
+    println!("cargo:rerun-if-changed=corpora/campaigns");
     println!("cargo:rerun-if-changed=rigs");
 }

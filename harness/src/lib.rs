@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bus;
+pub mod campaign;
 pub mod cli;
 pub mod evidence;
 pub mod guard;

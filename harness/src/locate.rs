@@ -41,12 +41,13 @@ pub fn locate(received: &[Received], drives: u8) -> Option<Location> {
     if last.byte >= drives {
         return None;
     }
-    // Behind a time-out the addresses climb for a byte or two: 00 00 01 02 02 (ND21 9.9).
+    // The addresses climb where a drive further down is done with its 17 zeros before the others: the addressed one is, as it
+    // notices the first zero at once (9.7), and so are those behind a time-out: 00 00 01 02 02 (9.9).
     let mut before = &received[..received.len() - repeats];
     let mut lowest = last.byte;
     while let [rest @ .., byte] = before
         && byte.error.is_none()
-        && (1..lowest).contains(&byte.byte)
+        && (1..=lowest).contains(&byte.byte)
     {
         lowest = byte.byte;
         before = rest;
@@ -58,4 +59,34 @@ pub fn locate(received: &[Received], drives: u8) -> Option<Location> {
         drive: last.byte,
         zeros: Some(zeros as u64),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn located(text: &str, drives: u8) -> Option<Location> {
+        let byte = |word| u8::from_str_radix(word, 16).expect("a byte");
+        let received: Vec<_> = text.split(' ').map(byte).map(Received::good).collect();
+        locate(&received, drives)
+    }
+
+    /// Drive 2 of 3 detects an error at the command byte for drive 0, which notices the zero at once and is done with its 17
+    /// zeros four bytes before drive 1.
+    #[test]
+    fn addresses_that_climb() {
+        let zeros = "00 ".repeat(16);
+        let drive = |drive| {
+            Some(Location {
+                drive,
+                zeros: Some(16),
+            })
+        };
+        assert_eq!(
+            located(&format!("88 00 88 {zeros}01 01 01 01 02 02 02 02"), 3),
+            drive(2)
+        );
+        assert_eq!(located(&format!("88 {zeros}02 02 02 02"), 3), drive(2));
+        assert_eq!(located(&format!("88 {zeros}02 02 01 01 01 01"), 3), None);
+    }
 }

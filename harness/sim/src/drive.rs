@@ -90,6 +90,12 @@ impl Drive {
         }
     }
 
+    /// Its end of the bus.
+    #[must_use]
+    pub fn bus_end(&self) -> &BusEnd {
+        self.inside().0
+    }
+
     /// Its end of the bus, and the memory on which that works.
     pub(crate) fn inside(&self) -> (&BusEnd, &dyn Memory) {
         match self {

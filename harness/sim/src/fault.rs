@@ -13,6 +13,8 @@ pub struct Flips {
     pub parity: bool,
     /// The stop bit.
     pub stop: bool,
+    /// The start bit: the receiver takes a later bit for it, and reads on from there.
+    pub start: bool,
 }
 
 impl Flips {
@@ -23,11 +25,12 @@ impl Flips {
             data: self.data ^ other.data,
             parity: self.parity ^ other.parity,
             stop: self.stop ^ other.stop,
+            start: self.start ^ other.start,
         }
     }
 
     /// What the receiver notices: a stop bit of 0, or an odd number of flips among the data bits and
-    /// the parity bit. An even number goes unnoticed.
+    /// the parity bit. An even number goes unnoticed. Without its start bit a byte is another byte, see `uart`.
     #[must_use]
     pub fn noticed(self) -> Option<LineError> {
         let odd = (self.data.count_ones() + u32::from(self.parity)) % 2 == 1;
@@ -71,6 +74,9 @@ impl fmt::Display for LinkFault {
         match self {
             Self::Flip(flips) => {
                 f.write_str("flip")?;
+                if flips.start {
+                    f.write_str(" b")?;
+                }
                 for bit in 0..8 {
                     if flips.data >> bit & 1 == 1 {
                         write!(f, " {bit}")?;
@@ -179,7 +185,15 @@ mod tests {
 
     #[test]
     fn an_even_number_of_flips_goes_unnoticed() {
-        let flips = |data, parity, stop| Flips { data, parity, stop }.noticed();
+        let flips = |data, parity, stop| {
+            let flips = Flips {
+                data,
+                parity,
+                stop,
+                start: false,
+            };
+            flips.noticed()
+        };
         assert_eq!(flips(0b1, false, false), Some(LineError::Parity));
         assert_eq!(flips(0b11, false, false), None);
         assert_eq!(flips(0b1, true, false), None);

@@ -1,6 +1,7 @@
 //! One link of a ring: a wire that carries one byte at a time, and what can go wrong on it.
 
 use crate::fault::{Flips, LinkFault, Plan};
+use crate::uart::{self, Uart};
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
@@ -142,6 +143,8 @@ pub struct Link {
     plan: Plan<LinkFault>,
     cut: bool,
     opening: Option<Box<Opening>>,
+    /// The receiver, as long as it is out of step (a damaged start bit).
+    out_of_step: Option<Uart>,
     /// Until when the line is held at 0.
     held_until: Instant,
     log: Option<Vec<LineByte>>,
@@ -159,6 +162,7 @@ impl Link {
             plan: Plan::default(),
             cut: false,
             opening: None,
+            out_of_step: None,
             held_until: Instant::START,
             log: Some(Vec::new()),
             arrived: 0,
@@ -313,19 +317,25 @@ impl Link {
     #[inline]
     pub(crate) fn transmit(&mut self, now: Instant, byte: u8, solicited: bool) {
         let start = now.max(self.line_free);
+        let gap = start.since(self.line_free);
         self.line_free = start + self.byte_time;
         self.transmitted += 1;
         let on_wire = UnderWay::whole(self.line_free, byte, solicited);
         match self.plan.take(self.transmitted) {
-            None if !self.cut && start >= self.held_until && self.opening.is_none() => {
+            None if !self.cut
+                && start >= self.held_until
+                && self.opening.is_none()
+                && self.out_of_step.is_none() =>
+            {
                 self.line_up(on_wire);
             }
-            first => self.transmit_damaged(first, start, on_wire.unpack()),
+            first => self.transmit_damaged(first, gap, on_wire.unpack()),
         }
     }
 
     #[cold]
-    fn transmit_damaged(&mut self, first: Option<LinkFault>, start: Instant, mut byte: LineByte) {
+    fn transmit_damaged(&mut self, first: Option<LinkFault>, gap: Span, mut byte: LineByte) {
+        let start = self.line_free - self.byte_time;
         // Several faults at one byte act one after the other, in the order of their lines.
         let mut flips = Flips::default();
         let mut copies = 1;
@@ -367,7 +377,11 @@ impl Link {
         if byte.error == Some(LineError::Break) {
             byte.received = byte.received.map(|_| 0);
         } else {
-            byte.error = byte.error.or(flips.noticed());
+            if flips.start || self.out_of_step.is_some() {
+                self.read_out_of_step(flips, gap, &mut byte);
+            } else {
+                byte.error = byte.error.or(flips.noticed());
+            }
             if start < self.held_until {
                 byte.received = None;
             }
@@ -383,6 +397,41 @@ impl Link {
         if copies == 2 {
             self.deliver(UnderWay::pack(LineByte { sent: None, ..byte }));
         }
+    }
+
+    /// Lets the receiver read what it takes for a byte, bit by bit, as long as it is out of step. What it has half
+    /// read when the line falls silent is read with the next byte.
+    fn read_out_of_step(&mut self, flips: Flips, gap: Span, byte: &mut LineByte) {
+        let mut receiver = self.out_of_step.take().unwrap_or_else(Uart::idle);
+        let bit_time = Span::from_units(self.byte_time.units() / uart::BITS);
+        for _ in 0..(gap.units() / bit_time.units()).min(uart::BITS) {
+            if let Some(read) = receiver.take(true) {
+                self.deliver(UnderWay::pack(LineByte {
+                    at: byte.at - self.byte_time,
+                    sent: None,
+                    received: Some(read.byte),
+                    error: read.error,
+                    solicited: byte.solicited,
+                }));
+            }
+        }
+        // The data bits have been inverted already.
+        let word = uart::bits(byte.sent.unwrap_or_default())
+            ^ (u16::from(byte.received.unwrap_or_default() ^ byte.sent.unwrap_or_default()) << 1)
+            ^ u16::from(flips.start)
+            ^ (u16::from(flips.parity) << 9)
+            ^ (u16::from(flips.stop) << 10);
+        let lost = byte.received.is_none();
+        byte.received = None;
+        for bit in 0..uart::BITS {
+            // Where nothing arrives the line is at rest.
+            if let Some(read) = receiver.take(lost || word >> bit & 1 == 1) {
+                byte.at = self.line_free - bit_time * (uart::BITS - 1 - bit);
+                byte.received = Some(read.byte);
+                byte.error = read.error;
+            }
+        }
+        self.out_of_step = (!receiver.in_step()).then_some(receiver);
     }
 
     /// Lets a byte of the transmitter's go its way.

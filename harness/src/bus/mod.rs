@@ -27,7 +27,7 @@ pub use scope::{Measurement, Scope, Trigger};
 
 use crate::link::Line;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::master::{self, Counters, Job, JobId, Outcome, Phase, Refused};
+use harness_proto::novobus::master::{self, Counters, Event, Job, JobId, Outcome, Phase, Refused};
 use harness_proto::time::{Instant, Span};
 use pump::Pump;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -184,6 +184,25 @@ impl<'l> Bus<'l> {
     /// What happened on the way that no call reports: faults and recoveries, oldest first, in words.
     #[must_use]
     pub fn take_log(&self) -> Vec<String> {
+        let several = self.lock().sizes().len() > 1;
+        let words = |(ring, event): (usize, Event)| {
+            let words = match event {
+                Event::Disturbed { fault, attempt } => format!("recovery {attempt}: {fault}"),
+                Event::Recovered { attempts } => {
+                    format!("the ring is back after {attempts} recoveries")
+                }
+                Event::Stopped(stop) => stop.to_string(),
+                Event::Ended { .. } | Event::Ready | Event::Round { .. } => return None,
+            };
+            let ring = several.then(|| format!("ring {}: ", ring + 1));
+            Some(ring.unwrap_or_default() + &words)
+        };
+        self.take_events().into_iter().filter_map(words).collect()
+    }
+
+    /// The same as events, with the ring of each, counted from 0.
+    #[must_use]
+    pub fn take_events(&self) -> Vec<(usize, Event)> {
         self.lock().take_log()
     }
 

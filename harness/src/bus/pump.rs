@@ -10,7 +10,7 @@ use harness_proto::novobus::master::{
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeMap;
 
-/// The most lines of the log that wait to be fetched.
+/// The most events that wait to be fetched.
 const MOST_LINES: usize = 256;
 
 /// How much later than the ring needs a byte may come where time is real: a busy computer stands still for longer than a ring does.
@@ -31,7 +31,8 @@ struct Ring {
 pub(super) struct Pump<'l> {
     link: Box<dyn Line + 'l>,
     rings: Vec<Ring>,
-    log: Vec<String>,
+    /// What happened that no job reports, oldest first, with the number of the ring.
+    log: Vec<(usize, Event)>,
 }
 
 impl<'l> Pump<'l> {
@@ -130,14 +131,13 @@ impl<'l> Pump<'l> {
         }
     }
 
-    pub(super) fn take_log(&mut self) -> Vec<String> {
+    pub(super) fn take_log(&mut self) -> Vec<(usize, Event)> {
         std::mem::take(&mut self.log)
     }
 
     /// Takes what has come and does what is due, without letting time pass.
     pub(super) fn poll(&mut self) {
         let now = self.link.now();
-        let several = self.rings.len() > 1;
         for (index, ring) in self.rings.iter_mut().enumerate() {
             while let Some((at, received)) = self.link.receive(index) {
                 ring.master.handle_byte(at, received);
@@ -146,31 +146,20 @@ impl<'l> Pump<'l> {
                 ring.master.handle_timeout(now);
             }
             while let Some(event) = ring.master.poll_event() {
-                let line = match event {
+                match &event {
                     Event::Ended { id, outcome } => {
                         // A result that was given up is dropped.
-                        if let Some(result) = ring.results.get_mut(&id) {
-                            *result = Some(outcome);
+                        if let Some(result) = ring.results.get_mut(id) {
+                            *result = Some(outcome.clone());
                         }
                         continue;
                     }
-                    Event::Disturbed { fault, attempt } => format!("recovery {attempt}: {fault}"),
-                    Event::Recovered { attempts } => {
-                        format!("the ring is back after {attempts} recoveries")
-                    }
-                    Event::Stopped(stop) => {
-                        ring.stopped = Some(stop);
-                        stop.to_string()
-                    }
+                    Event::Stopped(stop) => ring.stopped = Some(*stop),
+                    Event::Disturbed { .. } | Event::Recovered { .. } => {}
                     Event::Ready | Event::Round { .. } => continue,
-                };
-                let prefix = if several {
-                    format!("ring {}: ", index + 1)
-                } else {
-                    String::new()
-                };
+                }
                 if self.log.len() < MOST_LINES {
-                    self.log.push(format!("{prefix}{line}"));
+                    self.log.push((index, event));
                 }
             }
         }

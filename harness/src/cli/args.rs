@@ -1,5 +1,6 @@
 //! The command line.
 
+use super::campaign::ClassName;
 use super::drive::DriveCommand;
 use super::exit::Exit;
 use super::rig::RigCommand;
@@ -74,6 +75,8 @@ pub enum Command {
         #[command(subcommand)]
         command: RigCommand,
     },
+    /// Play a conversation again and again, each time with another fault, and count what comes of it.
+    Campaign(CampaignArguments),
     /// Show the ways in which a simulated drive can deviate from the manual.
     Deviations(DeviationsArguments),
     /// Commands on a bus.
@@ -203,6 +206,26 @@ pub struct CellsArguments {
     pub eeprom: bool,
 }
 
+/// For `campaign`.
+#[derive(Clone, Debug, Args)]
+pub struct CampaignArguments {
+    /// Files, or names of built-in campaigns; all built-in ones where none is given.
+    #[arg(value_name = "NAME|FILE")]
+    pub campaigns: Vec<PathBuf>,
+    /// In which form.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    pub format: Format,
+    /// Show the cases of this class, one line each.
+    #[arg(long, value_name = "CLASS", value_enum)]
+    pub only: Option<ClassName>,
+    /// Play nothing but this case, and print the scenario that replays it: LINK:BYTE:WHAT, such as 98->97:10:0.
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
+    pub case: Option<String>,
+    /// On how many threads; on all cores where nothing is said. The outcome is the same.
+    #[arg(long, value_name = "NUMBER", value_parser = threads)]
+    pub threads: Option<usize>,
+}
+
 /// For `deviations`.
 #[derive(Clone, Debug, Args)]
 pub struct DeviationsArguments {
@@ -251,6 +274,15 @@ pub struct Rows {
     pub first: usize,
     /// The last.
     pub last: usize,
+}
+
+/// A number of threads.
+fn threads(text: &str) -> Result<usize, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number| (1..=256).contains(number));
+    number.ok_or_else(|| "1 to 256 expected".to_owned())
 }
 
 fn ring_size(text: &str) -> Result<u8, String> {

@@ -9,7 +9,8 @@ use std::process::ExitCode;
 pub enum Exit {
     /// Everything passed.
     Passed = 0,
-    /// A drive behaved otherwise than the scenario or the command says, or differs from a file.
+    /// A drive behaved otherwise than the scenario or the command says, or differs from a file; a campaign has another figure
+    /// than it pins.
     Failed = 1,
     /// Wrong usage, a file with mistakes, or a motion or a change without the leave for it.
     Usage = 2,
@@ -34,7 +35,8 @@ impl Exit {
     pub const HELP: &str = "\
 Exit codes:
   0  everything passed
-  1  a drive behaved otherwise than a scenario or a command says, or differs from a file
+  1  a drive behaved otherwise than a scenario or a command says, or differs from a file; a campaign
+     has another figure than it pins
   2  wrong usage, a file with mistakes, a scenario that could not be played to its end (aborted), or something
      that needs --move or --yes
   3  the bench itself failed

@@ -1,6 +1,7 @@
 //! The command line of `drivebench`: standard output is for results, standard error for people.
 
 mod args;
+mod campaign;
 mod cells;
 mod check;
 mod deviations;
@@ -67,6 +68,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify { folder } => verify::verify(&folder, output),
         Command::Rig { command } => rig::rig(&command, output),
+        Command::Campaign(arguments) => campaign::campaign(&arguments, output),
         Command::Deviations(arguments) => deviations::deviations(&arguments, output),
         Command::Drive(command) => drive::drive(&command, output),
         Command::Completions { shell } => man::completions(shell, output),

@@ -187,7 +187,9 @@ fn fault(what: LinkFault) -> (String, u64) {
             let bits = u64::from(flips.data);
             (
                 "flip",
-                bits | u64::from(flips.parity) << 8 | u64::from(flips.stop) << 9,
+                bits | u64::from(flips.parity) << 8
+                    | u64::from(flips.stop) << 9
+                    | u64::from(flips.start) << 10,
             )
         }
         LinkFault::Replace(byte) => ("replace", byte.into()),
@@ -210,6 +212,7 @@ fn unfault((kind, number): &(String, u64)) -> Option<LinkFault> {
             data: byte,
             parity: number >> 8 & 1 == 1,
             stop: number >> 9 & 1 == 1,
+            start: number >> 10 & 1 == 1,
         }),
         "replace" => LinkFault::Replace(byte),
         "drop" => LinkFault::Drop,

@@ -71,6 +71,12 @@ impl SimulatedLink {
         }
     }
 
+    /// A drive, past its bus.
+    #[must_use]
+    pub fn drive(&self, ring: usize, drive: u8) -> Option<&Drive> {
+        self.ring(ring)?.drive(drive)
+    }
+
     /// Listens on a link from now on, counted from the master's outgoing one: [`Self::fetch`] gives what arrives there.
     pub fn tap(&mut self, ring: usize, link: usize) {
         if let Some(ring) = self.bench.ring_mut(ring) {

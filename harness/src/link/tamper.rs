@@ -147,11 +147,11 @@ pub fn needs_line_errors(fault: LinkFault) -> bool {
     }
 }
 
-/// Whether no UART can be made to do it: a wrong stop bit, an overrun.
+/// Whether no UART can be made to do it: a wrong start or stop bit, an overrun.
 #[must_use]
 pub fn only_simulated(fault: LinkFault) -> bool {
     match fault {
-        LinkFault::Flip(flips) => flips.noticed() == Some(LineError::Framing),
+        LinkFault::Flip(flips) => flips.start || flips.noticed() == Some(LineError::Framing),
         LinkFault::Overrun => true,
         _ => false,
     }

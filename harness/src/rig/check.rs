@@ -2,7 +2,7 @@
 
 use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
 use super::profile::KnownProfile;
-use super::schema::{compare, span_of};
+use super::schema::{Step, compare, place, schema, syntax};
 use super::values::{ValueError, Wire};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::quantity::{Dimension, parse as quantity};
@@ -12,7 +12,7 @@ use harness_proto::nd21::io::Input;
 use std::collections::BTreeSet;
 use std::time::Duration;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
 /// The longest id of a rig.
 const MAX_ID: usize = 64;
@@ -61,7 +61,7 @@ pub fn parse(source: &Source) -> Result<Rig, Problems> {
         Problems::new(&source.name, source.text.clone(), problems)
     };
     let table = DeTable::parse(&source.text).map_err(|e| problems(vec![syntax(&e)]))?;
-    let mistakes = compare(&table);
+    let mistakes = compare(&schema(), "a rig file", &table);
     if !mistakes.is_empty() {
         return Err(problems(mistakes));
     }
@@ -80,19 +80,6 @@ pub fn parse(source: &Source) -> Result<Rig, Problems> {
         file,
         profile,
     })
-}
-
-fn syntax(error: &toml::de::Error) -> Problem {
-    let span = error.span().unwrap_or_default();
-    let span = Span {
-        start: span.start,
-        end: span.end,
-    };
-    Problem::new(
-        span,
-        error.message().replace('\n', ", "),
-        "TOML expected here",
-    )
 }
 
 /// A bound of an interlock, in the unit of its cell's scale.
@@ -120,25 +107,6 @@ pub(super) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     }
 }
 
-/// A step on the way to a value: a key or a number in a list.
-#[derive(Clone, Copy)]
-pub(super) enum Step<'a> {
-    Key(&'a str),
-    Index(usize),
-}
-
-impl<'a> From<&'a str> for Step<'a> {
-    fn from(key: &'a str) -> Self {
-        Self::Key(key)
-    }
-}
-
-impl From<usize> for Step<'_> {
-    fn from(index: usize) -> Self {
-        Self::Index(index)
-    }
-}
-
 pub(super) struct Check<'a> {
     table: &'a Spanned<DeTable<'a>>,
     pub(super) file: &'a RigFile,
@@ -148,20 +116,7 @@ pub(super) struct Check<'a> {
 impl Check<'_> {
     /// The place of a value, or of the nearest table around it that is there.
     pub(super) fn place(&self, path: &[Step<'_>]) -> Span {
-        let mut span = span_of(self.table);
-        let mut value: Option<&Spanned<DeValue<'_>>> = None;
-        for step in path {
-            let next = match (step, value.map(Spanned::get_ref)) {
-                (Step::Key(key), None) => self.table.get_ref().get(*key),
-                (Step::Key(key), Some(DeValue::Table(table))) => table.get(*key),
-                (Step::Index(index), Some(DeValue::Array(array))) => array.get(*index),
-                _ => None,
-            };
-            let Some(next) = next else { break };
-            span = span_of(next);
-            value = Some(next);
-        }
-        span
+        place(self.table, path)
     }
 
     pub(super) fn wrong(
@@ -170,7 +125,7 @@ impl Check<'_> {
         message: impl Into<String>,
         expected: impl Into<String>,
     ) {
-        let problem = Problem::new(self.place(path), message, expected);
+        let problem = Problem::new(place(self.table, path), message, expected);
         self.problems.push(problem);
     }
 
@@ -483,7 +438,7 @@ impl Check<'_> {
             (Some(name), None) => {
                 let Some(cell) = cell(name) else {
                     let known: Vec<_> = RAM.iter().map(|cell| cell.printed).collect();
-                    let place = self.place(&at("cell"));
+                    let place = place(self.table, &at("cell"));
                     let problem = Problem::new(
                         place,
                         format!("there is no cell `{name}`"),
@@ -526,7 +481,7 @@ impl Check<'_> {
                 if Input::from_name(name).is_none() {
                     let known = Input::ALL.map(Input::name);
                     let problem = Problem::new(
-                        self.place(&at("input")),
+                        place(self.table, &at("input")),
                         format!("there is no input `{name}`"),
                         format!("one of {} expected here", known.join(", ")),
                     );

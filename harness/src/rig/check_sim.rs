@@ -1,8 +1,9 @@
 //! The part of the check that simulated drives are made of: the profile that a rig names, and the lines of `[sim]`.
 
-use super::check::{Check, Step};
+use super::check::Check;
 use super::file::Sim;
 use super::profile::{KnownProfile, Profile};
+use super::schema::Step;
 use super::sim::{lines, settle};
 use crate::scenario::problem::Problem;
 use crate::scenario::source::Source;

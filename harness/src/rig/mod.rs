@@ -19,7 +19,7 @@ mod open;
 mod profile;
 pub(crate) mod run;
 pub mod scan;
-mod schema;
+pub(crate) mod schema;
 mod session;
 mod shared;
 pub(crate) mod sim;

@@ -1,4 +1,4 @@
-//! The JSON schema of a rig file, and the check of a text against it: unknown keys, missing keys, wrong types,
+//! The JSON schema of a rig file, and the check of a text against a schema: unknown keys, missing keys, wrong types,
 //! numbers out of their range. All mistakes at once, each with its place.
 
 use super::file::RigFile;
@@ -18,7 +18,7 @@ pub fn schema() -> Value {
 }
 
 /// A place of a TOML value.
-pub(super) fn span_of<T>(value: &Spanned<T>) -> Span {
+pub(crate) fn span_of<T>(value: &Spanned<T>) -> Span {
     let range = value.span();
     Span {
         start: range.start,
@@ -26,19 +26,71 @@ pub(super) fn span_of<T>(value: &Spanned<T>) -> Span {
     }
 }
 
-/// Compares a document with the schema.
-pub(super) fn compare(table: &Spanned<DeTable<'_>>) -> Vec<Problem> {
-    let root = schema();
+/// Compares a document with the schema of such a file, which messages call `whole`.
+pub(crate) fn compare(root: &Value, whole: &str, table: &Spanned<DeTable<'_>>) -> Vec<Problem> {
     let mut walk = Walk {
-        root: &root,
+        root,
+        whole,
         problems: Vec::new(),
     };
-    walk.table(&root, table.get_ref(), span_of(table), "", 0);
+    walk.table(root, table.get_ref(), span_of(table), "", 0);
     walk.problems
+}
+
+/// A step on the way to a value: a key or a number in a list.
+#[derive(Clone, Copy)]
+pub(crate) enum Step<'a> {
+    Key(&'a str),
+    Index(usize),
+}
+
+impl<'a> From<&'a str> for Step<'a> {
+    fn from(key: &'a str) -> Self {
+        Self::Key(key)
+    }
+}
+
+impl From<usize> for Step<'_> {
+    fn from(index: usize) -> Self {
+        Self::Index(index)
+    }
+}
+
+/// The place of a value, or of the nearest table around it that is there.
+pub(crate) fn place(table: &Spanned<DeTable<'_>>, path: &[Step<'_>]) -> Span {
+    let mut span = span_of(table);
+    let mut value: Option<&Spanned<DeValue<'_>>> = None;
+    for step in path {
+        let next = match (step, value.map(Spanned::get_ref)) {
+            (Step::Key(key), None) => table.get_ref().get(*key),
+            (Step::Key(key), Some(DeValue::Table(table))) => table.get(*key),
+            (Step::Index(index), Some(DeValue::Array(array))) => array.get(*index),
+            _ => None,
+        };
+        let Some(next) = next else { break };
+        span = span_of(next);
+        value = Some(next);
+    }
+    span
+}
+
+/// What is no TOML at all.
+pub(crate) fn syntax(error: &toml::de::Error) -> Problem {
+    let span = error.span().unwrap_or_default();
+    let span = Span {
+        start: span.start,
+        end: span.end,
+    };
+    Problem::new(
+        span,
+        error.message().replace('\n', ", "),
+        "TOML expected here",
+    )
 }
 
 struct Walk<'a> {
     root: &'a Value,
+    whole: &'a str,
     problems: Vec<Problem>,
 }
 
@@ -71,7 +123,7 @@ impl<'a> Walk<'a> {
         depth: usize,
     ) {
         let what = match path {
-            "" => "a rig file".to_owned(),
+            "" => self.whole.to_owned(),
             path => format!("[{path}]"),
         };
         let properties = schema["properties"].as_object();

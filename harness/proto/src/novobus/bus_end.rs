@@ -133,6 +133,17 @@ impl BusEnd {
         }
     }
 
+    /// Whether it will answer everything to come as `other` will, the times of 9.9 left aside: both wait for the same
+    /// byte, with the same command half received.
+    #[must_use]
+    pub fn waits_as(&self, other: &Self) -> bool {
+        self.state == other.state
+            && self.short_address_valid == other.short_address_valid
+            && self.channel == other.channel
+            && self.properties == other.properties
+            && self.rules == other.rules
+    }
+
     /// The same with other properties and rules, now and after every reset; for wrong drives.
     pub fn amend(&mut self, amend: impl FnOnce(&mut Properties, &mut Rules)) {
         amend(&mut self.properties, &mut self.rules);

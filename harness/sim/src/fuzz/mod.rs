@@ -119,8 +119,7 @@ pub fn ring(data: &[u8]) {
             let data = 1 << kind;
             let flips = Flips {
                 data,
-                parity: false,
-                stop: false,
+                ..Flips::default()
             };
             (
                 LinkFault::Flip(flips),

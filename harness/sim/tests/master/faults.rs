@@ -52,6 +52,7 @@ fn link_fault(random: &mut Random, noticed: &mut Noticed) -> LinkFault {
             stop: true,
             data: byte,
             parity: false,
+            start: false,
         }),
         6 => {
             noticed.shift = false;

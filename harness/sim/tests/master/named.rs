@@ -24,6 +24,7 @@ const PARITY: LinkFault = LinkFault::Flip(Flips {
     data: 1,
     parity: false,
     stop: false,
+    start: false,
 });
 
 fn link(from: u8, to: u8) -> RingLink {
@@ -503,5 +504,26 @@ fn every_ring_size_starts() {
         couple.steps(drives as usize + 10);
         assert_eq!(couple.master.phase(), Phase::Running, "{drives}");
         assert_eq!(couple.master.counters().disturbed, 0);
+    }
+}
+
+/// A start bit that is lost before the master puts its own receiver out of step: it reads 01 out of every SYNCO, which
+/// looks like the address of drive 1. But the first byte that it read had a line error, and no drive passes one on.
+#[test]
+fn a_master_out_of_step_blames_its_own_link() {
+    let start = LinkFault::Flip(Flips {
+        start: true,
+        ..Flips::default()
+    });
+    for byte in 1..=12 {
+        let mut couple = Couple::plain(3, Options::default()).ready();
+        couple.submit(Job::new(1, READ));
+        couple.ring.arm_link(3, 6 + byte, start);
+        couple.steps(600);
+        let named = faults(&couple);
+        let inner = |fault: &Fault| matches!(fault, Fault::Damaged(link) if link.to != End::Master);
+        assert_eq!(named.iter().find(|fault| inner(fault)), None, "byte {byte}");
+        assert!(!named.is_empty(), "byte {byte}");
+        assert!(couple.healthy(), "byte {byte}");
     }
 }

@@ -104,6 +104,7 @@ fn noticed_faults() -> Vec<LinkFault> {
             data: 0,
             parity,
             stop,
+            start: false,
         }));
     }
     all.push(LinkFault::Overrun);

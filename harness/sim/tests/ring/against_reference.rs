@@ -152,7 +152,12 @@ fn fault(random: &mut Random) -> (LinkFault, reference::Fault) {
             };
             let (parity, stop) = (random.below(8) == 0, random.below(8) == 0);
             (
-                LinkFault::Flip(Flips { data, parity, stop }),
+                LinkFault::Flip(Flips {
+                    data,
+                    parity,
+                    stop,
+                    start: false,
+                }),
                 reference::Fault::Flip(data, parity, stop),
             )
         }
@@ -261,8 +266,7 @@ fn line_errors_have_names() {
         2,
         LinkFault::Flip(Flips {
             data: 1,
-            parity: false,
-            stop: false,
+            ..Flips::default()
         }),
     );
     ring.arm_link(
@@ -270,8 +274,8 @@ fn line_errors_have_names() {
         3,
         LinkFault::Flip(Flips {
             data: 1,
-            parity: false,
             stop: true,
+            ..Flips::default()
         }),
     );
     ring.arm_link(1, 4, LinkFault::Break(Span::from_micros(300)));

@@ -12,6 +12,7 @@ const PARITY: LinkFault = LinkFault::Flip(Flips {
     data: 1,
     parity: false,
     stop: false,
+    start: false,
 });
 
 /// More than any case needs.

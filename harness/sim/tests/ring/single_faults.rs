@@ -74,6 +74,33 @@ fn every_single_bit_is_located_and_one_check_sequence_heals() {
     assert_eq!(most_zeros, 23);
 }
 
+/// A start bit that is lost puts the receiver out of step; the zeros of a check sequence bring it back (ND21 8.1, 9.8).
+#[test]
+fn every_lost_start_bit_is_noticed_and_check_sequences_heal() {
+    let start = Flips {
+        start: true,
+        ..Flips::default()
+    };
+    for drives in 1..=4u8 {
+        let stream = mixed_stream(ring(drives).size());
+        for link in 0..=usize::from(drives) {
+            for byte in 1..=stream.len() as u64 {
+                let mut ring = ring(drives);
+                let sound = exchange(&mut ring.clone(), &stream);
+                ring.arm_link(link, byte, LinkFault::Flip(start));
+                let heard = exchange(&mut ring, &stream);
+                let place = || format!("ring {drives}, link {link}, byte {byte}");
+                assert_ne!(heard, sound, "{}", place());
+                exchange(&mut ring, &CHECK_SEQUENCE);
+                exchange(&mut ring, &CHECK_SEQUENCE);
+                assert!(healthy(&ring), "{}", place());
+                let back = exchange(&mut ring, &[SYNCO, SYNCO]);
+                assert_eq!(back, [Received::good(SYNCO); 2], "{}", place());
+            }
+        }
+    }
+}
+
 /// A healthy ring changes nothing but address bytes and answers (ND21 9, 9.3).
 #[test]
 fn a_healthy_ring_changes_nothing_but_addresses_and_answers() {

@@ -299,9 +299,9 @@ fn link_fault(scanner: &mut Scanner<'_>) -> Result<LinkFaultKind, Problem> {
     })
 }
 
-/// Bits 0 to 7, `p` and `s`.
+/// Bits 0 to 7, `p`, `s` and `b`.
 fn flips(scanner: &mut Scanner<'_>) -> Result<Flips, Problem> {
-    let expected = "a bit: 0 to 7, p (parity) or s (stop)";
+    let expected = "a bit: 0 to 7, p (parity), s (stop) or b (start)";
     let mut flips = Flips::default();
     if scanner.at_end() {
         return Err(scanner.unexpected(expected));
@@ -315,6 +315,10 @@ fn flips(scanner: &mut Scanner<'_>) -> Result<Flips, Problem> {
             },
             Some('s') => Flips {
                 stop: true,
+                ..Flips::default()
+            },
+            Some('b') => Flips {
+                start: true,
                 ..Flips::default()
             },
             Some(digit @ '0'..='7') => Flips {
@@ -346,6 +350,7 @@ fn merge(a: Flips, b: Flips) -> Flips {
         data: a.data | b.data,
         parity: a.parity | b.parity,
         stop: a.stop | b.stop,
+        start: a.start | b.start,
     }
 }
 

@@ -166,12 +166,12 @@ impl Evidence {
         drive: Option<u8>,
     ) -> Fault {
         match spelled {
-            Spelled::Address(drive) if silent => Fault::Broken(RingLink::into(ring, drive)),
-            Spelled::Address(drive) => Fault::Damaged(RingLink::into(ring, drive)),
-            // What only the master heard wrong happened on the last link.
+            // What only the master heard wrong happened on the last link: no drive passes a damaged byte on.
             _ if self.received.first().is_some_and(|r| r.error.is_some()) => {
                 Fault::Damaged(RingLink::last())
             }
+            Spelled::Address(drive) if silent => Fault::Broken(RingLink::into(ring, drive)),
+            Spelled::Address(drive) => Fault::Damaged(RingLink::into(ring, drive)),
             Spelled::Nothing => Fault::Silent,
             Spelled::Sound => self.compare(ring, drive),
             Spelled::Noise => Fault::Unclear,

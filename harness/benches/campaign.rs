@@ -1,0 +1,66 @@
+//! How long a case of a campaign takes: a ring is copied, disturbed, read, repaired and compared.
+//!
+//! `ring` is the baseline: the same ring is copied and carries the same bytes, and nobody looks. The difference is
+//! what the campaign itself costs.
+
+use divan::counter::ItemsCount;
+use harness::campaign::find::find;
+use harness::campaign::{Campaign, Case};
+use harness::link::Line;
+use harness::scenario::simulate::bench;
+use std::path::Path;
+
+const CAMPAIGNS: [&str; 3] = [
+    "9.6-single-bits",
+    "9.7-single-bits",
+    "9.8-driver-single-bits",
+];
+
+/// Every so many-th case, so that links and bytes of all kinds are among them.
+const STRIDE: usize = 97;
+
+fn main() {
+    divan::main();
+}
+
+fn load(name: &str) -> (Campaign, Vec<Case>) {
+    let campaign = find(Path::new(name)).expect("a built-in campaign");
+    let cases = campaign.cases.iter().step_by(STRIDE).take(32);
+    let cases = cases.copied().collect();
+    (campaign, cases)
+}
+
+#[divan::bench(args = CAMPAIGNS)]
+fn cases(bencher: divan::Bencher<'_, '_>, name: &str) {
+    let (campaign, cases) = load(name);
+    bencher
+        .counter(ItemsCount::new(cases.len()))
+        .bench_local(|| {
+            let classes = cases.iter().map(|case| campaign.play(case));
+            classes.filter(Result::is_ok).count()
+        });
+}
+
+#[divan::bench(args = CAMPAIGNS[..2].iter())]
+fn ring(bencher: divan::Bencher<'_, '_>, name: &str) {
+    let (campaign, cases) = load(name);
+    let mut start = bench(campaign.entry.plan.as_ref().expect("a plan"));
+    start.stop_recording();
+    let said: Vec<Vec<u8>> = cases
+        .iter()
+        .map(|case| {
+            let (_, said) = campaign.play(case).expect("a class");
+            said.into_iter().flat_map(|said| said.bytes).collect()
+        })
+        .collect();
+    bencher
+        .counter(ItemsCount::new(cases.len()))
+        .bench_local(|| {
+            for bytes in &said {
+                let mut link = start.clone();
+                let end = link.send(0, bytes);
+                link.run_until(end);
+                while link.receive(0).is_some() {}
+            }
+        });
+}

@@ -1,0 +1,23 @@
+//! Campaigns: one conversation, disturbed at every link, byte and bit, or at a sample of them, and what came of it.
+//!
+//! [`file`](mod@file) says what stands in a campaign file, [`plan`] makes the list of cases of it, a pure function of the file, the
+//! ring and the conversation. [`conversation`] takes what the master says out of a scenario. [`by_manual`] plays it as the
+//! manual describes a master (ND21 9.7, 9.8), [`by_driver`] lets the driver play it. [`class`](mod@class) says what the outcomes are, and
+//! [`report`] shows them; [`replay`] prints one case as a scenario.
+
+pub mod by_driver;
+pub mod by_manual;
+pub mod class;
+pub mod conversation;
+pub mod fault;
+pub mod file;
+pub mod find;
+pub mod plan;
+pub mod replay;
+pub mod report;
+mod run;
+pub mod sound;
+
+pub use class::{Class, Evidence, Wrong};
+pub use fault::Case;
+pub use run::{Campaign, Contradiction, Finished, Outcome};

@@ -1,0 +1,115 @@
+//! The cells of a ring, beside those of the ring without a fault.
+
+use super::class::Wrong;
+use crate::link::{Link, SimulatedLink};
+use harness_proto::nd21::ram::{BUS_ADDR, ERRORCODE};
+use harness_sim::cells::Cells;
+use harness_sim::device::Device;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What drives hold, and held, without a fault.
+#[derive(Clone, Debug)]
+pub struct Sound {
+    end: SimulatedLink,
+    /// Every value that a cell had on the way, where it had several.
+    history: BTreeMap<(u8, u16), BTreeSet<u8>>,
+}
+
+/// The first cell of RAM and the last of the registers (ND21 10.1).
+const CELLS: std::ops::RangeInclusive<u16> = 0xFD80..=0xFFFF;
+
+fn drives(link: &SimulatedLink) -> std::ops::Range<u8> {
+    0..link.drives(0)
+}
+
+fn cells(link: &SimulatedLink, drive: u8) -> Option<&Cells> {
+    Some(link.drive(0, drive)?.cells())
+}
+
+/// The addresses at which two drives differ. What a drive notes of an error of the bus (14.10.1) and for whom it took the
+/// last telegram (9.2) is no damage.
+fn differences(a: &Cells, b: &Cells) -> Vec<u16> {
+    if a == b {
+        return Vec::new();
+    }
+    let noted = ERRORCODE..=ERRORCODE + 1;
+    CELLS
+        .filter(|address| a.peek(*address) != b.peek(*address))
+        .filter(|address| !noted.contains(address) && *address != BUS_ADDR)
+        .collect()
+}
+
+impl Sound {
+    /// Begins with a ring as it is before anything is sent.
+    #[must_use]
+    pub fn new(start: SimulatedLink) -> Self {
+        Self {
+            end: start,
+            history: BTreeMap::new(),
+        }
+    }
+
+    /// Notes what drives hold now.
+    pub fn note(&mut self, now: &SimulatedLink) {
+        for drive in drives(now) {
+            let (Some(before), Some(cells)) = (cells(&self.end, drive), cells(now, drive)) else {
+                continue;
+            };
+            for address in differences(before, cells) {
+                let values = self.history.entry((drive, address)).or_default();
+                values.extend([before.peek(address), cells.peek(address)]);
+            }
+        }
+        self.end = now.clone();
+    }
+
+    /// What drives hold that they should not. Where not every job is `confirmed`, a cell may hold whatever it held on the way.
+    #[must_use]
+    pub fn wrong(&self, now: &SimulatedLink, confirmed: bool) -> Vec<Wrong> {
+        let mut wrong = Vec::new();
+        for drive in drives(now) {
+            let (Some(sound), Some(cells)) = (cells(&self.end, drive), cells(now, drive)) else {
+                continue;
+            };
+            for address in differences(sound, cells) {
+                let value = cells.peek(address);
+                let held = self.history.get(&(drive, address));
+                if confirmed || held.is_none_or(|values| !values.contains(&value)) {
+                    wrong.push(Wrong::Cell {
+                        drive,
+                        address,
+                        value,
+                        expected: sound.peek(address),
+                    });
+                }
+            }
+        }
+        wrong
+    }
+
+    /// Whether every drive waits for the same as without a fault: then all that follows is the same.
+    #[must_use]
+    pub fn waits_as(&self, now: &SimulatedLink) -> bool {
+        drives(now).all(|drive| {
+            let (Some(sound), Some(drive)) = (self.end.drive(0, drive), now.drive(0, drive)) else {
+                return false;
+            };
+            drive.bus_end().waits_as(sound.bus_end())
+                && drive.peek(BUS_ADDR) == sound.peek(BUS_ADDR)
+        })
+    }
+
+    /// Whether any drive watches for silence (9.9).
+    #[must_use]
+    pub fn any_monitors(link: &SimulatedLink) -> bool {
+        use harness_proto::nd21::{bits::flags2::MONITORING, ram::FLAGS2};
+        let monitors = |cells: &Cells| cells.peek(FLAGS2) & MONITORING != 0;
+        drives(link).any(|drive| cells(link, drive).is_some_and(monitors))
+    }
+}
+
+/// Whether no drive is in the error mode.
+#[must_use]
+pub fn all_back(link: &SimulatedLink) -> bool {
+    drives(link).all(|drive| link.drive(0, drive).is_some_and(|drive| !drive.in_error()))
+}

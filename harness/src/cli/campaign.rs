@@ -1,0 +1,143 @@
+//! `drivebench campaign`.
+
+use super::args::{CampaignArguments, Format};
+use super::exit::Exit;
+use super::output::Output;
+use super::run::progress_bar;
+use crate::campaign::find::{FindError, find, names};
+use crate::campaign::replay::scenario;
+use crate::campaign::report::{json, line, table};
+use crate::campaign::{Campaign, Case, Class, Finished};
+use clap::ValueEnum;
+use std::path::PathBuf;
+
+/// Plays campaigns.
+pub(super) fn campaign(
+    arguments: &CampaignArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let wanted = if arguments.campaigns.is_empty() {
+        names().into_iter().map(PathBuf::from).collect()
+    } else {
+        arguments.campaigns.clone()
+    };
+    let mut campaigns = Vec::new();
+    for name in &wanted {
+        match find(name) {
+            Ok(campaign) => campaigns.push(campaign),
+            Err(error) => {
+                complain(&error, output);
+                return Ok(Exit::Usage);
+            }
+        }
+    }
+    if let Some(name) = &arguments.case {
+        return replay(name, &campaigns, output);
+    }
+    let threads = arguments
+        .threads
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+    let mut all = Vec::new();
+    for campaign in &campaigns {
+        let bar = progress_bar(campaign.cases.len(), output.progress);
+        bar.set_message(campaign.name.clone());
+        let finished = campaign.run(threads, &|done| bar.inc(done));
+        bar.finish_and_clear();
+        match finished {
+            Ok(finished) => {
+                if arguments.format == Format::Table {
+                    output.result(&shown(&finished, arguments.only))?;
+                }
+                all.push(finished);
+            }
+            Err(contradiction) => {
+                output.complain(&contradiction.to_string());
+                return Ok(Exit::RigError);
+            }
+        }
+    }
+    if arguments.format == Format::Json {
+        output.result(&format!(
+            "{}\n",
+            json(&all, arguments.only.map(Class::from))
+        ))?;
+    }
+    let differs = all.iter().any(|finished| !finished.differs().is_empty());
+    Ok(if differs { Exit::Failed } else { Exit::Passed })
+}
+
+fn shown(finished: &Finished, only: Option<ClassName>) -> String {
+    let Some(only) = only.map(Class::from) else {
+        return table(finished) + "\n";
+    };
+    let outcomes = finished.outcomes.iter();
+    let wanted = outcomes.filter(|outcome| outcome.class == only);
+    wanted
+        .map(|outcome| line(outcome, finished.drives))
+        .collect()
+}
+
+fn complain(error: &FindError, output: &mut Output) {
+    match error {
+        FindError::Mistakes(problems) => output.mistakes(problems),
+        error => output.complain(&error.to_string()),
+    }
+}
+
+/// Prints the scenario of one case.
+fn replay(name: &str, campaigns: &[Campaign], output: &mut Output) -> std::io::Result<Exit> {
+    let [campaign] = campaigns else {
+        output.complain("--case needs the one campaign that it belongs to");
+        return Ok(Exit::Usage);
+    };
+    let case = match Case::from_name(name, campaign.shape.drives) {
+        Ok(case) => case,
+        Err(wrong) => {
+            output.complain(&wrong);
+            return Ok(Exit::Usage);
+        }
+    };
+    match scenario(campaign, &case) {
+        Ok(text) => {
+            output.result(&text)?;
+            Ok(Exit::Passed)
+        }
+        Err(contradiction) => {
+            output.complain(&contradiction.to_string());
+            Ok(Exit::RigError)
+        }
+    }
+}
+
+/// The classes on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ClassName {
+    /// Nobody noticed, nothing is different.
+    Harmless,
+    /// The damaged link was named, everything is back.
+    Located,
+    /// No link was named, everything is back.
+    Recovered,
+    /// A sound link was named, everything is back.
+    Mislocated,
+    /// Noticed, and not everything is back.
+    NotRecovered,
+    /// Noticed and repaired, but a cell is wrong.
+    Corrupted,
+    /// Nobody noticed, and a value is wrong.
+    SilentCorruption,
+}
+
+impl From<ClassName> for Class {
+    fn from(name: ClassName) -> Self {
+        match name {
+            ClassName::Harmless => Self::Harmless,
+            ClassName::Located => Self::Located,
+            ClassName::Recovered => Self::Recovered,
+            ClassName::Mislocated => Self::Mislocated,
+            ClassName::NotRecovered => Self::NotRecovered,
+            ClassName::Corrupted => Self::Corrupted,
+            ClassName::SilentCorruption => Self::SilentCorruption,
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! `drivebench campaign` as a stranger uses it.
+
+use serde_json::Value;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+fn drivebench(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(arguments)
+        .current_dir(std::env::temp_dir())
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts")
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).expect("text")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).expect("text")
+}
+
+/// Two bits of one byte of process data, on one link.
+fn file(test: &str, more: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("campaign-{test}"));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join("a.toml");
+    let text = format!(
+        "schema = 1\ntitle = \"t\"\nscenario = \"9.6-every-write\"\nfaults = [\"bits\"]\n\
+         links = [\"master->2\"]\nbytes = \"35\"\npairs = \"byte\"\n{more}"
+    );
+    std::fs::write(&path, text).expect("a file");
+    path
+}
+
+#[test]
+fn a_pinned_figure_decides_the_exit_code() {
+    // C(8,2) pairs of data bits and 8 of a data bit with the parity bit leave the parity right.
+    let right = file("right", "[expect]\ncases = 55\nsilent-corruption = 36\n");
+    let output = drivebench(&["campaign", right.to_str().expect("plain")]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(stderr(&output), "");
+    let wrong = file("wrong", "[expect]\nsilent-corruption = 0\n");
+    let output = drivebench(&["campaign", wrong.to_str().expect("plain")]);
+    assert_eq!(output.status.code(), Some(1));
+    let differs = "differs: silent-corruption is 36, the file pins 0";
+    assert!(stdout(&output).contains(differs), "{}", stdout(&output));
+}
+
+#[test]
+fn every_case_for_tools_and_one_class_for_people() {
+    let path = file("json", "");
+    let path = path.to_str().expect("plain");
+    let output = drivebench(&["campaign", path, "--format", "json"]);
+    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let cases = json["campaigns"][0]["cases"].as_array().expect("cases");
+    assert_eq!((json["schema"].as_u64(), cases.len()), (Some(1), 55));
+    let silent = |case: &&Value| case["class"] == "silent-corruption";
+    let first = cases.iter().find(silent).expect("a silent case");
+    assert_eq!(first["case"], "master->2:35:0+master->2:35:1");
+    assert_eq!(first["wrong"][0]["address"], 0xFF6A);
+    assert_eq!(first["wrong"][0]["value"], 0x11);
+    let output = drivebench(&["campaign", path, "--only", "silent-corruption"]);
+    assert_eq!(stdout(&output).lines().count(), 36);
+    let line = "silent-corruption  master->2:35:0+master->2:35:1 drive 2: FF6A";
+    assert!(stdout(&output).starts_with(line), "{}", stdout(&output));
+}
+
+#[test]
+fn one_case_as_a_scenario_that_trace_plays() {
+    let case = "98->97:10:0";
+    let output = drivebench(&["campaign", "9.7-single-bits", "--case", case]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let replay = file("replay", "").with_file_name("case.scn");
+    std::fs::write(&replay, stdout(&output)).expect("a file");
+    let output = drivebench(&["trace", replay.to_str().expect("plain"), "--rows", "9..13"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    // The rows that the manual prints in 9.7.
+    let table = stdout(&output);
+    let row = |start: &str| {
+        table.lines().any(|line| {
+            line.split_whitespace()
+                .collect::<Vec<_>>()
+                .join(" ")
+                .starts_with(start)
+        })
+    };
+    assert!(row("10 13 13 13 12~ !00 00 00"), "{table}");
+    assert!(row("11 FE FE FE 00 !00 00"), "{table}");
+}
+
+#[test]
+fn wrong_usage_says_what_to_do() {
+    for (arguments, text) in [
+        (
+            &["campaign", "9.7-singel-bits"][..],
+            "did you mean `9.7-single-bits`?",
+        ),
+        (
+            &["campaign", "--case", "98->97:10:0"],
+            "--case needs the one campaign",
+        ),
+        (
+            &["campaign", "9.7-single-bits", "--case", "98->96:10:0"],
+            "LINK:BYTE:WHAT is expected",
+        ),
+        (
+            &["campaign", "9.7-single-bits", "--threads", "0"],
+            "1 to 256",
+        ),
+    ] {
+        let output = drivebench(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            stderr(&output).contains(text),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+    }
+}

@@ -1,0 +1,266 @@
+//! Campaigns: files with mistakes, the same bytes from every run, the figures of the small ones, the page with the figures of
+//! all, and a judge that shares no code with the one under test.
+
+mod cli;
+mod judge;
+
+use harness::campaign::find::{find, names};
+use harness::campaign::report::{json, table};
+use harness::campaign::{Campaign, Case, Class, Finished, Wrong};
+use harness::library::Entry;
+use harness::link::{Line, Link};
+use harness::scenario::problem::Problems;
+use harness::scenario::run::{AtFinding, play};
+use harness::scenario::simulate::simulated;
+use harness::scenario::source::Source;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn built_in(name: &str) -> Campaign {
+    find(Path::new(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn load(text: &str) -> Result<Campaign, Box<Problems>> {
+    let source = Source {
+        name: "a.toml".to_owned(),
+        text: text.into(),
+    };
+    Campaign::load(&source, Path::new(""))
+}
+
+fn run(campaign: &Campaign) -> Finished {
+    campaign.run(2, &|_| {}).expect("every case fits a class")
+}
+
+fn snapshot(name: &str, page: &str) {
+    insta::with_settings!({
+        snapshot_path => root().join("snapshots/campaigns"),
+        prepend_module_to_snapshot => false,
+        omit_expression => true,
+    }, {
+        insta::assert_snapshot!(name, page);
+    });
+}
+
+/// The campaigns that are small enough for a build without optimisation; `.ci/run` plays all of them.
+const SMALL: [&str; 3] = ["9.6-single-bits", "9.6-lost-and-doubled", "9.9-silence"];
+
+#[test]
+fn small_campaigns_have_the_figures_that_they_pin() {
+    for name in SMALL {
+        let finished = run(&built_in(name));
+        assert_eq!(finished.differs(), [], "{name}");
+        snapshot(name, &table(&finished));
+    }
+}
+
+/// A campaign that pins nothing could not fail.
+#[test]
+fn every_campaign_pins_every_figure_and_the_page_shows_them() {
+    let page = root().join("corpora/campaigns/README.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    let names = names();
+    assert!(names.len() >= 9, "{names:?}");
+    for name in names {
+        let text = std::fs::read_to_string(root().join(format!("corpora/campaigns/{name}.toml")));
+        let file: harness::campaign::file::CampaignFile =
+            toml::from_str(&text.expect("a file")).expect("a campaign");
+        let cases = file.expect.cases.unwrap_or_else(|| panic!("{name}"));
+        let mut row = format!("| `{name}` | {cases} |");
+        let mut sum = 0;
+        for class in Class::ALL {
+            let count = file
+                .expect
+                .of(class)
+                .unwrap_or_else(|| panic!("{name}: {class}"));
+            let _infallible = write!(row, " {count} |");
+            sum += count;
+        }
+        assert_eq!(sum, cases, "{name}");
+        assert_eq!(built_in(name).cases.len() as u64, cases, "{name}");
+        assert!(page.contains(&row), "the page has no row\n{row}");
+    }
+}
+
+#[test]
+fn two_runs_give_the_same_bytes_on_any_number_of_threads() {
+    let campaign = built_in("9.9-silence");
+    let text = |threads| {
+        let finished = campaign.run(threads, &|_| {}).expect("classes");
+        let json = json(std::slice::from_ref(&finished), None).to_string();
+        table(&finished) + &json
+    };
+    let one = text(1);
+    assert_eq!(one, text(1));
+    assert_eq!(one, text(3));
+    assert_eq!(one, text(64));
+}
+
+/// Mistakes are shown with the place at which they stand.
+#[test]
+fn files_with_mistakes() {
+    let good = "schema = 1\ntitle = \"t\"\nscenario = \"9.6-every-write\"\nfaults = [\"bits\"]\n";
+    assert_eq!(load(good).expect("a campaign").cases.len(), 4 * 78 * 11);
+    let changed = |from: &str, to: &str| good.replace(from, to);
+    let added = |line: &str| format!("{good}{line}\n");
+    let texts = [
+        changed("schema = 1", "schema = 2"),
+        changed("title", "titel"),
+        changed("\"bits\"", "\"bit\""),
+        changed("[\"bits\"]", "[\"bits\", \"bits\"]"),
+        changed("[\"bits\"]", "[\"gap\"]"),
+        changed("[\"bits\"]", "\"bits\""),
+        changed("[\"bits\"]", "[]"),
+        changed("9.6-every-write", "9.7-no-such"),
+        changed("9.6-every-write", "13.1.1-referencing"),
+        changed("9.6-every-write", "10.1-read-byte-wrong"),
+        added("links = [\"3->2\"]"),
+        added("links = [\"2-1\"]"),
+        added("bytes = \"70..79\""),
+        added("bytes = \"0..7\""),
+        added("bits = [\"9\"]"),
+        added("inserted = [\"80\"]"),
+        added("drives = 251"),
+        added("sample = 0"),
+        added("seed = 7"),
+        added("pairs = \"any\""),
+        added("[expect]\nsilent = 0"),
+        added("[expect]\nlocated = -1"),
+        "schema = 1\nfaults = ".to_owned(),
+        changed(
+            "[\"bits\"]",
+            "[\"insert\", \"delay\"]\ninserted = [\"8\"]\ndelays = [\"2s\"]",
+        ),
+    ];
+    let mut page = String::new();
+    for text in texts {
+        let problems = load(&text).expect_err(&text);
+        for problem in problems.all() {
+            let own = problems.to_string().starts_with("a.toml");
+            let before = text.get(..problem.span.start).filter(|_| own);
+            let place = before.map_or("in its scenario".to_owned(), |before| {
+                let line = before.matches('\n').count() + 1;
+                let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+                format!("a.toml:{line}:{column}")
+            });
+            let _infallible = writeln!(
+                page,
+                "{place}: {}\n    {}",
+                problem.message, problem.expected
+            );
+            if let Some(help) = &problem.help {
+                let _infallible = writeln!(page, "    {help}");
+            }
+        }
+        page.push('\n');
+    }
+    snapshot("mistakes", &page);
+}
+
+/// The text that replays a case gives the bytes that the campaign saw: what the master sent in it, and the same finding
+/// of which drives hold what.
+#[test]
+fn a_replay_is_the_case() {
+    for (name, case) in [
+        ("9.6-single-bits", "2->1:18:b"),
+        ("9.6-two-bits-a-byte", "master->2:35:0+master->2:35:1"),
+        ("9.6-lost-and-doubled", "master->2:18:gap-6"),
+        ("9.9-silence", "2->1:7:delay-25ms"),
+        ("9.8-driver-single-bits", "1->0:30:4"),
+    ] {
+        let campaign = built_in(name);
+        let case = Case::from_name(case, campaign.shape.drives).expect("a case");
+        let (outcome, _) = campaign.play(&case).expect("a class");
+        let text = harness::campaign::replay::scenario(&campaign, &case).expect("a text");
+        let source = Source {
+            name: "replay".to_owned(),
+            text: text.clone().into(),
+        };
+        let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{text}\n{:#?}", p.all()));
+        let plan = entry.plan.as_ref().expect("a plan");
+        let mut link = simulated(plan);
+        let played = play(plan, &mut link, AtFinding::GoOn);
+        assert!(played.remarks.is_empty(), "{name}: {:?}", played.remarks);
+        for wrong in &outcome.evidence.wrong {
+            let Wrong::Cell {
+                drive,
+                address,
+                value,
+                ..
+            } = wrong
+            else {
+                continue;
+            };
+            assert_eq!(
+                link.peek(0, *drive, *address),
+                Some(*value),
+                "{name}\n{text}"
+            );
+        }
+        let trace = link.trace(0);
+        for fault in case.faults() {
+            let bytes = &trace.links[fault.link].bytes;
+            let byte = bytes[usize::try_from(fault.byte - 1).expect("a byte")];
+            let late = byte.at.since(bytes[0].at) > link.byte_time() * fault.byte;
+            let damaged = byte.sent != byte.received || byte.error.is_some();
+            assert!(damaged || late, "{name}: no fault in the trace\n{text}");
+        }
+    }
+}
+
+#[test]
+fn names_that_are_not_there() {
+    let error = find(&PathBuf::from("9.6-single-bit")).expect_err("no such campaign");
+    assert!(
+        error
+            .to_string()
+            .contains("did you mean `9.6-single-bits`?"),
+        "{error}"
+    );
+}
+
+/// The figures of a map of links and bytes: each case at each of its places.
+#[test]
+fn cases_by_link_and_byte() {
+    let finished = run(&built_in("9.9-silence"));
+    let map = finished.by_place();
+    // Four links, 21 bytes, and eleven faults at each.
+    assert_eq!(map.len(), 4 * 21);
+    assert!(
+        map.values()
+            .all(|classes| classes.values().sum::<u64>() == 11)
+    );
+    let of = |class| {
+        map.values()
+            .filter_map(|classes| classes.get(&class))
+            .sum::<u64>()
+    };
+    for class in Class::ALL {
+        assert_eq!(of(class), finished.count(class), "{class}");
+    }
+}
+
+/// Process data first go to FF08 and the second time to FF0A: what a repeated telegram does is not what it did.
+#[test]
+fn a_conversation_that_cannot_be_repeated_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenario = "title t\nsource nd21 9.4\nring 1\ndrive 0 memory DataIn = 08\n\
+                    > 85 FF 12 34\n> 8A FF 82 0A 32 FF BD\n";
+    std::fs::write(folder.path().join("twice.scn"), scenario).expect("a file");
+    let path = folder.path().join("twice.toml");
+    let text = "schema = 1\ntitle = \"t\"\nscenario = \"twice.scn\"\nfaults = [\"bits\"]\n";
+    std::fs::write(&path, text).expect("a file");
+    let error = find(&path).expect_err("a mistake");
+    let harness::campaign::find::FindError::Mistakes(problems) = error else {
+        panic!("{error}");
+    };
+    let message = &problems.all()[0].message;
+    assert_eq!(
+        message,
+        "said twice, the conversation leaves something else than said once"
+    );
+}
