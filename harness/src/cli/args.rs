@@ -34,6 +34,8 @@ Examples:
   drivebench run my-machine.scn tests/       play a file and all files of a folder
   drivebench trace 9.7-parity-error          the 100-axis table of ND21 9.7
   drivebench trace my.scn --format json      every byte on every link, for tools
+  drivebench trace my.scn --format svg -o my.svg
+                                             a picture of the ring; also vcd, pcapng and csv
   drivebench check my.scn                    look for mistakes, play nothing
   drivebench manual                          which tables of the manual are pinned
   drivebench cells ps_                       the cells of the positioning controller
@@ -172,14 +174,28 @@ pub struct TraceArguments {
     /// A file, or the name of a built-in scenario.
     pub file: PathBuf,
     /// In which form.
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    pub format: Format,
+    #[arg(long, value_enum, default_value_t = TraceFormat::Table)]
+    pub format: TraceFormat,
     /// Play on a ring of this many drives.
     #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
     pub ring: Option<u8>,
-    /// Only these rows of the table, counted from 1.
+    /// How it is shown and where it goes.
+    #[command(flatten)]
+    pub showing: Showing,
+}
+
+/// How a trace is shown, and where it goes.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Showing {
+    /// Only these rows of the table or the picture, counted from 1.
     #[arg(long, value_name = "FIRST..LAST", value_parser = rows)]
     pub rows: Option<Rows>,
+    /// How the picture (svg) is laid out: row n the n-th byte of each link, as in the manual, or every byte at its time.
+    #[arg(long, value_enum, default_value_t = Layout::Index)]
+    pub time: Layout,
+    /// Write into this file, which is there whole or not at all, in place of standard output.
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
 }
 
 /// For `manual`.
@@ -220,6 +236,33 @@ pub enum Format {
     Table,
     /// JSON for tools, described in the documentation.
     Json,
+}
+
+/// The forms of a trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TraceFormat {
+    /// For people: the manual's own table, one column a drive.
+    Table,
+    /// JSON for tools, described in the documentation.
+    Json,
+    /// A picture: drives across, time down, colours for what each did.
+    Svg,
+    /// The lines bit by bit, for logic analysers' programs (sigrok, GTKWave).
+    Vcd,
+    /// A capture for Wireshark; `drivebench dissector` prints what reads it.
+    Pcapng,
+    /// A row a byte.
+    Csv,
+}
+
+/// How the rows of a picture are placed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Layout {
+    /// Row n is the n-th byte of each link.
+    #[default]
+    Index,
+    /// A byte stands where its time is.
+    True,
 }
 
 /// When to do something that suits a terminal.
