@@ -193,6 +193,9 @@ pub struct Showing {
     /// How the picture (svg) is laid out: row n the n-th byte of each link, as in the manual, or every byte at its time.
     #[arg(long, value_enum, default_value_t = Layout::Index)]
     pub time: Layout,
+    /// Of a value change dump (vcd) only the lines: sigrok up to 0.5.2 stops at the first vector.
+    #[arg(long)]
+    pub lines_only: bool,
     /// Write into this file, which is there whole or not at all, in place of standard output.
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,

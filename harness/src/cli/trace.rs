@@ -8,7 +8,8 @@ use crate::library::{Entry, sources};
 use crate::report::plot::plots;
 use crate::report::svg::{Options, Scale, svg};
 use crate::report::table::{LEGEND, Part, table, wires};
-use crate::report::{csv, json, pcapng, vcd};
+use crate::report::vcd::{self, Signals};
+use crate::report::{csv, json, pcapng};
 use crate::scenario::run::{AtFinding, Record};
 use harness_proto::line::Rate;
 use harness_sim::trace::Trace;
@@ -126,7 +127,14 @@ fn write(
     match format {
         TraceFormat::Json => json::write(shown.traces, shown.records, out),
         TraceFormat::Csv => csv::write(shown.traces, out),
-        TraceFormat::Vcd => vcd::write(shown.traces, shown.rate, out),
+        TraceFormat::Vcd => {
+            let signals = if showing.lines_only {
+                Signals::Lines
+            } else {
+                Signals::All
+            };
+            vcd::write(shown.traces, shown.rate, signals, out)
+        }
         TraceFormat::Pcapng => pcapng::write(shown.traces, shown.rate, out),
         TraceFormat::Svg => {
             let options = Options {

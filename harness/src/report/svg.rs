@@ -48,7 +48,7 @@ pub struct Options<'o> {
 
 const LEFT: f64 = 64.0;
 const TOP: f64 = 84.0;
-const BOTTOM: f64 = 70.0;
+const BOTTOM: f64 = 64.0;
 const ROW: f64 = 14.0;
 /// The tallest picture by time; a longer run has lower bytes.
 const TALLEST: f64 = 30_000.0;
@@ -274,7 +274,7 @@ fn axis(out: &mut String, place: &Placing) {
             ),
         );
     };
-    label(TOP - 8.0, head);
+    label(TOP - 24.0, head);
     let step = (height / 200.0).ceil().max(1.0);
     match place.scale {
         Scale::Index => {
@@ -348,7 +348,7 @@ fn rectangle(out: &mut String, ring: usize, trace: &Trace, area: &Area, place: &
 }
 
 fn legend(out: &mut String, y: f64) {
-    let mut x = 12.0;
+    let (mut x, mut y) = (12.0, y);
     for state in State::ALL {
         put(
             out,
@@ -363,7 +363,7 @@ fn legend(out: &mut String, y: f64) {
         );
         x += 34.0 + 6.7 * f64::from(u8::try_from(state.name().len()).unwrap_or(u8::MAX));
         if state == State::Addressed {
-            x = 12.0;
+            (x, y) = (12.0, y + 20.0);
         }
     }
     put(

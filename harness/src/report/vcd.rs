@@ -31,19 +31,33 @@ use std::io::Write;
 /// Thirds of a nanosecond in a tick of 100 ns.
 const TICK: u64 = 300;
 
+/// What is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signals {
+    /// The lines, and beside them bytes, status and states as vectors.
+    All,
+    /// The lines alone: sigrok up to 0.5.2 stops at the first vector.
+    Lines,
+}
+
 /// Writes one or two rings of a run.
 ///
 /// # Errors
 /// What the writer says.
-pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Result<()> {
+pub fn write(
+    traces: &[Trace],
+    rate: Rate,
+    signals: Signals,
+    mut out: impl Write,
+) -> std::io::Result<()> {
     let bit = rate.bit_time().units();
     let mut links = Vec::new();
     for (ring, trace) in traces.iter().enumerate() {
         for (link, reader) in trace.links.iter().zip(Reader::all(trace)) {
-            links.push(Drawn::new(ring, link, reader, bit));
+            links.push(Drawn::new(ring, link, reader, (bit, signals)));
         }
     }
-    head(&links, &mut out)?;
+    head(&links, signals, &mut out)?;
     let mut heap: BinaryHeap<Reverse<(u64, usize)>> = BinaryHeap::new();
     for (place, link) in links.iter_mut().enumerate() {
         heap.extend(link.next_tick().map(|tick| Reverse((tick, place))));
@@ -76,25 +90,28 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
     out.flush()
 }
 
-fn head(links: &[Drawn<'_>], out: &mut impl Write) -> std::io::Result<()> {
+fn head(links: &[Drawn<'_>], signals: Signals, out: &mut impl Write) -> std::io::Result<()> {
+    let vectors = signals == Signals::All;
     writeln!(out, "$version drivebench $end\n$timescale 100 ns $end")?;
     for link in links {
         let [line, byte, status, state] = &link.codes;
         let name = &link.name;
         writeln!(out, "$scope module {name} $end")?;
         writeln!(out, "$var wire 1 {line} {name}_line $end")?;
-        writeln!(out, "$var wire 8 {byte} {name}_byte $end")?;
-        writeln!(out, "$var wire 3 {status} {name}_status $end")?;
-        writeln!(out, "$var wire 3 {state} {name}_state $end")?;
+        if vectors {
+            writeln!(out, "$var wire 8 {byte} {name}_byte $end")?;
+            writeln!(out, "$var wire 3 {status} {name}_status $end")?;
+            writeln!(out, "$var wire 3 {state} {name}_state $end")?;
+        }
         writeln!(out, "$upscope $end")?;
     }
     writeln!(out, "$enddefinitions $end\n#0\n$dumpvars")?;
     for link in links {
         let [line, byte, status, state] = &link.codes;
-        writeln!(
-            out,
-            "1{line}\nbxxxxxxxx {byte}\nbxxx {status}\nbxxx {state}"
-        )?;
+        writeln!(out, "1{line}")?;
+        if vectors {
+            writeln!(out, "bxxxxxxxx {byte}\nbxxx {status}\nbxxx {state}")?;
+        }
     }
     writeln!(out, "$end")
 }
@@ -113,6 +130,7 @@ struct Drawn<'t> {
     bytes: std::slice::Iter<'t, LineByte>,
     reader: Reader<'t>,
     bit: u64,
+    vectors: bool,
     /// Until when the line is drawn, in thirds of a nanosecond.
     free: u64,
     changes: VecDeque<(u64, Change)>,
@@ -121,7 +139,12 @@ struct Drawn<'t> {
 }
 
 impl<'t> Drawn<'t> {
-    fn new(ring: usize, link: &'t LinkTrace, reader: Reader<'t>, bit: u64) -> Self {
+    fn new(
+        ring: usize,
+        link: &'t LinkTrace,
+        reader: Reader<'t>,
+        (bit, signals): (u64, Signals),
+    ) -> Self {
         // `98->97` as a word that every program takes for a name.
         let name = name(ring, link).replace("->", "_to_").replace("2:", "ring2_");
         let place = match link.from {
@@ -135,6 +158,7 @@ impl<'t> Drawn<'t> {
             bytes: link.bytes.iter(),
             reader,
             bit,
+            vectors: signals == Signals::All,
             free: 0,
             changes: VecDeque::new(),
             shown: (None, 7, 7),
@@ -219,6 +243,7 @@ impl<'t> Drawn<'t> {
                 text.push_str(line);
                 text.push('\n');
             }
+            Change::Read { .. } if !self.vectors => {}
             Change::Read {
                 byte,
                 status,

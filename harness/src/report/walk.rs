@@ -76,8 +76,10 @@ impl State {
 /// What a byte is, and what its sender was doing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Seen<'t> {
-    /// What it is.
+    /// What it is to its receiver.
     pub meaning: Meaning,
+    /// What it was to its sender: the same where nobody knows better.
+    pub sent: Meaning,
     /// What its sender was doing.
     pub state: State,
     /// What its sender remarked at it.
@@ -87,7 +89,10 @@ pub struct Seen<'t> {
 /// Reads one link of a trace byte by byte: its bytes, and what its sender remarked.
 pub struct Reader<'t> {
     observer: Observer,
+    /// Reads what was sent; a trace that knows what drives remarked knows that as well.
+    sender: Observer,
     from: Option<u8>,
+    to: Option<u8>,
     /// The sender's marks, each with the byte of this link at which it stands.
     marks: std::iter::Peekable<std::vec::IntoIter<(usize, &'t Mark)>>,
     /// Whether the sender is known to be in the error mode; `None` where a trace has no marks at all.
@@ -106,7 +111,9 @@ impl<'t> Reader<'t> {
                 marks.sort_by_key(|(place, _)| *place);
                 Self {
                     observer: Observer::new(link.from, link.to),
+                    sender: Observer::new(link.from, link.to),
                     from: link.from,
+                    to: link.to,
                     marks: marks.into_iter().peekable(),
                     in_error: (known && link.from.is_some()).then_some(false),
                     next: 0,
@@ -140,11 +147,18 @@ impl<'t> Reader<'t> {
             };
             meaning.drive = None;
         }
+        let sent = match (byte.sent, self.in_error) {
+            // What a drive in the error mode sends is nothing to be read.
+            (Some(sent), Some(false)) => self.sender.see(Some(sent), None),
+            _ => meaning,
+        };
         if leaves {
             self.in_error = Some(false);
+            self.sender = Observer::new(self.from, self.to);
         }
         Seen {
-            state: self.state(&meaning),
+            state: self.state(&sent),
+            sent,
             meaning,
             mark: shown,
         }

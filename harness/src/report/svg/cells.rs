@@ -68,8 +68,8 @@ impl Columns {
                     letters: byte
                         .received
                         .map_or("--".to_owned(), |byte| format!("{byte:02X}")),
-                    words: seen.meaning.words(byte.received),
-                    section: seen.meaning.section(),
+                    words: seen.sent.words(byte.sent),
+                    section: seen.sent.section(),
                     remark: marked,
                     fault: byte.sent != byte.received
                         || byte.error.is_some()
