@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bus;
+pub mod capture;
 pub mod cli;
 pub mod evidence;
 pub mod guard;

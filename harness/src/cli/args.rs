@@ -6,6 +6,7 @@ use super::rig::RigCommand;
 use crate::rig::values::{Time, ValueError};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use harness_proto::line::Rate;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -59,6 +60,12 @@ pub enum Command {
     Check(CheckArguments),
     /// Play a scenario and print every byte on every link.
     Trace(TraceArguments),
+    /// Read a capture (pcapng, or the JSON of `trace`): judge it beside the model, show it, or make a scenario of it.
+    Import(ImportArguments),
+    /// Compare two captures or scenarios byte by byte, on every link; exit code 1 where they differ.
+    Diff(DiffArguments),
+    /// Print the dissector that lets Wireshark and tshark read what `trace --format pcapng` writes.
+    Dissector,
     /// Show which tables and examples of the manual are pinned, and the errata ledger.
     Manual(ManualArguments),
     /// Show the drive's cells: address, size, access, unit, meaning and section of the manual.
@@ -201,6 +208,48 @@ pub struct Showing {
     pub output: Option<PathBuf>,
 }
 
+/// For `import`.
+#[derive(Clone, Debug, Args)]
+pub struct ImportArguments {
+    /// The capture: pcapng with one interface a link, named as in 98->97, or the JSON of `trace`.
+    pub file: PathBuf,
+    /// Show it in this form; nothing is judged then.
+    #[arg(long, value_enum, conflicts_with = "scenario")]
+    pub format: Option<TraceFormat>,
+    /// Print a scenario that plays it again.
+    #[arg(long)]
+    pub scenario: bool,
+    /// A scenario whose header says how the drives are: their models, cells and properties.
+    #[arg(long, value_name = "FILE", conflicts_with = "format")]
+    pub setup: Option<PathBuf>,
+    /// How far times may be apart, such as 2ms: real clocks are not exact; 2 ns where nothing is said.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub tolerance: Option<Duration>,
+    /// The rate of the line, where the capture does not say it.
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    pub line: Option<Rate>,
+    /// How it is shown and where it goes.
+    #[command(flatten)]
+    pub showing: Showing,
+}
+
+/// For `diff`.
+#[derive(Clone, Debug, Args)]
+pub struct DiffArguments {
+    /// A capture, a scenario's file, or the name of a built-in scenario.
+    #[arg(value_name = "A")]
+    pub left: PathBuf,
+    /// What it is compared with.
+    #[arg(value_name = "B")]
+    pub right: PathBuf,
+    /// How far times may be apart, such as 2ms; 2 ns where nothing is said.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub tolerance: Option<Duration>,
+    /// The rate of the line, where a capture does not say it.
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    pub line: Option<Rate>,
+}
+
 /// For `manual`.
 #[derive(Clone, Debug, Args)]
 pub struct ManualArguments {
@@ -306,6 +355,12 @@ fn ring_size(text: &str) -> Result<u8, String> {
     harness_proto::novobus::address::RingSize::new(number)
         .map(harness_proto::novobus::address::RingSize::drives)
         .map_err(|error| error.to_string())
+}
+
+fn rate(text: &str) -> Result<Rate, String> {
+    let bits = text.parse().ok();
+    bits.and_then(Rate::from_bits_per_second)
+        .ok_or_else(|| "38400, 19200 or 9600 is expected (ND21 8.3)".to_owned())
 }
 
 /// A time such as `30s`; at most a day.

@@ -49,7 +49,11 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
     let shown = Shown {
         title: &entry.scenario.title,
         traces: &played.traces,
-        rate: entry.plan.as_ref().map(|plan| plan.rate).unwrap_or_default(),
+        rate: entry
+            .plan
+            .as_ref()
+            .map(|plan| plan.rate)
+            .unwrap_or_default(),
         records: &played.outcome.records,
     };
     if !show(&shown, arguments.format, showing, output)? {
@@ -100,7 +104,7 @@ pub(super) fn show(
 }
 
 /// Written beside and then renamed: a file is there whole or not at all.
-fn into_file(
+pub(super) fn into_file(
     path: &Path,
     write: impl FnOnce(BufWriter<&std::fs::File>) -> std::io::Result<()>,
 ) -> std::io::Result<()> {

@@ -22,8 +22,7 @@ use harness_sim::trace::{Mark, Trace};
 use std::io::Write;
 
 /// The first line.
-pub const HEADING: &str =
-    "ring,t_ns,link,n,sent,received,status,role,drive,meaning,section,mark\n";
+pub const HEADING: &str = "ring,t_ns,link,n,sent,received,status,role,drive,meaning,section,mark\n";
 
 /// Writes one or two rings of a run, one behind the other.
 ///

@@ -134,7 +134,9 @@ impl Meaning {
             Role::Pause => "PAUSE".to_owned(),
             Role::Sync => byte.map_or_else(String::new, sync_words),
             Role::Address => format!("address byte{to}"),
-            Role::ProcessData if self.answer => format!("process data from{}", &to[to.len().min(4)..]),
+            Role::ProcessData if self.answer => {
+                format!("process data from{}", &to[to.len().min(4)..])
+            }
             Role::ProcessData => format!("process data{to}"),
             Role::Command => format!("{side} {name}{to}"),
             Role::Parameter => format!("{side} {name}{cell}{to}: parameter"),
@@ -402,12 +404,24 @@ mod tests {
     fn a_read_on_both_sides() {
         let front = [0x88, 0xFE, 0xC0, 0x13, 0xFE, 0xD1, 0x80];
         let command = [
-            "sync", "address", "command", "parameter", "parameter", "check", "synco",
+            "sync",
+            "address",
+            "command",
+            "parameter",
+            "parameter",
+            "check",
+            "synco",
         ];
         assert_eq!(names(None, Some(2), &front), command);
         let behind = [0x88, 0x01, 0xC0, 0x13, 0x88, 0xA5, 0x80];
         let answer = [
-            "sync", "address", "command", "parameter", "data", "check", "synco",
+            "sync",
+            "address",
+            "command",
+            "parameter",
+            "data",
+            "check",
+            "synco",
         ];
         assert_eq!(names(Some(0), None, &behind), answer);
         let mut observer = Observer::new(Some(0), None);

@@ -85,7 +85,10 @@ pub fn svg(traces: &[Trace], options: &Options<'_>) -> String {
     for diagram in &drawn {
         put(
             &mut out,
-            format_args!("<g transform=\"translate(0 {y:.0})\">\n{}</g>\n", diagram.text),
+            format_args!(
+                "<g transform=\"translate(0 {y:.0})\">\n{}</g>\n",
+                diagram.text
+            ),
         );
         y += diagram.height;
     }
@@ -143,7 +146,11 @@ fn diagram(ring: usize, trace: &Trace, options: &Options<'_>) -> Diagram {
         rectangle(&mut text, ring, trace, area, &place);
         if area.fault && faults.len() < 12 {
             let at = name(ring, &trace.links[area.links.start]);
-            let words = if area.remark.is_empty() { &area.status } else { &area.remark };
+            let words = if area.remark.is_empty() {
+                &area.status
+            } else {
+                &area.remark
+            };
             faults.push(format!("{at} byte {}: {words}", area.rows.start + 1));
         }
     }
@@ -379,7 +386,8 @@ fn legend(out: &mut String, y: f64) {
 
 /// What the picture shows, for those who do not see it.
 fn description(traces: &[Trace], drawn: &[Diagram], options: &Options<'_>) -> String {
-    let mut text = String::from("Space-time diagram: the links of the ring across, headed by their senders; ");
+    let mut text =
+        String::from("Space-time diagram: the links of the ring across, headed by their senders; ");
     text.push_str(match options.scale {
         Scale::Index => "downwards the bytes, row n the n-th byte of each link.",
         Scale::Time => "downwards the time.",
@@ -407,7 +415,9 @@ fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
 
 /// Letters, digits, `-` and `_`: what a name of a part may hold.
 fn plain(id: &str) -> String {
-    let kept = id.chars().filter(|c| c.is_ascii_alphanumeric() || "-_".contains(*c));
+    let kept = id
+        .chars()
+        .filter(|c| c.is_ascii_alphanumeric() || "-_".contains(*c));
     let kept: String = kept.take(60).collect();
     if kept.starts_with(|c: char| c.is_ascii_alphabetic()) {
         kept

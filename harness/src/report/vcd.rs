@@ -120,7 +120,11 @@ fn head(links: &[Drawn<'_>], signals: Signals, out: &mut impl Write) -> std::io:
 #[derive(Clone, Copy)]
 enum Change {
     Line(bool),
-    Read { byte: Option<u8>, status: u8, state: u8 },
+    Read {
+        byte: Option<u8>,
+        status: u8,
+        state: u8,
+    },
 }
 
 /// One link on its way through its bytes.
@@ -146,7 +150,9 @@ impl<'t> Drawn<'t> {
         (bit, signals): (u64, Signals),
     ) -> Self {
         // `98->97` as a word that every program takes for a name.
-        let name = name(ring, link).replace("->", "_to_").replace("2:", "ring2_");
+        let name = name(ring, link)
+            .replace("->", "_to_")
+            .replace("2:", "ring2_");
         let place = match link.from {
             None => 250,
             Some(drive) => usize::from(drive),

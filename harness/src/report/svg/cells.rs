@@ -28,8 +28,7 @@ impl Cell {
         !self.fault
             && !other.fault
             && self.remark == other.remark
-            && (self.state, &self.status, &self.words)
-                == (other.state, &other.status, &other.words)
+            && (self.state, &self.status, &self.words) == (other.state, &other.status, &other.words)
     }
 }
 
@@ -58,9 +57,8 @@ impl Columns {
                     continue;
                 }
                 let marked = seen.mark.map_or_else(String::new, remark);
-                let detected = |mark: &harness_sim::trace::Mark| {
-                    mark.marks.contains(Marks::DETECTED)
-                };
+                let detected =
+                    |mark: &harness_sim::trace::Mark| mark.marks.contains(Marks::DETECTED);
                 cells.push(Cell {
                     at: byte.at.since_start().units(),
                     state: seen.state,
@@ -145,7 +143,9 @@ pub(super) fn areas(columns: &Columns, scale: Scale) -> Vec<Area> {
             for column in &mut taken[link..end] {
                 column[row..below].fill(true);
             }
-            let last = links[end - 1].get(below - 1).map_or(cell.at, |last| last.at);
+            let last = links[end - 1]
+                .get(below - 1)
+                .map_or(cell.at, |last| last.at);
             areas.push(Area {
                 links: link..end,
                 rows: columns.first + row..columns.first + below,
