@@ -113,7 +113,10 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
         verdict,
         master,
         links,
-        adopted: told.iter().map(|told| told.cells.len()).sum(),
+        adopted: match options.setup {
+            Some(_) => 0,
+            None => told.iter().map(|told| told.cells.len()).sum(),
+        },
         unforeseen: told.iter().map(|told| told.unforeseen.len()).sum(),
         located: located(capture),
         remarks: outcome.remarks,

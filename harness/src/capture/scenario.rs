@@ -27,7 +27,8 @@ const TITLE: usize = 100;
 pub struct Options<'o> {
     /// What it is called; any text.
     pub title: &'o str,
-    /// A scenario whose header says what is known of the drives: models, cells, properties.
+    /// A scenario whose header says how the drives are: models, cells, properties. Without one they are plain, and hold what they
+    /// first say of their cells.
     pub setup: Option<&'o Source>,
     /// Bytes sent with a smaller gap than this go out without one: real clocks are not exact.
     pub tolerance: Span,
@@ -136,9 +137,18 @@ fn head(
     // Whatever the gaps are, the byte behind them is waited for.
     let millis = capture.end().since_start().as_nanos() / 1_000_000 + 1_000;
     lines.push(format!("deadline {}ms", millis.min(600_000)));
-    if let Some(setup) = options.setup {
-        lines.extend(setup_lines(setup)?);
+    match options.setup {
+        // Who says how the drives are knows what their cells hold.
+        Some(setup) => lines.extend(setup_lines(setup)?),
+        None => lines.extend(cells(rings)),
     }
+    lines.push(String::new());
+    Ok(lines)
+}
+
+/// What cells held before, as far as the drives said it.
+fn cells(rings: &[Ring<'_>]) -> Vec<String> {
+    let mut lines = Vec::new();
     for (index, ring) in rings.iter().enumerate() {
         let prefix = if index == 0 { "" } else { "2:" };
         let mut cells = ring.told.cells.iter().peekable();
@@ -157,8 +167,7 @@ fn head(
             ));
         }
     }
-    lines.push(String::new());
-    Ok(lines)
+    lines
 }
 
 /// One line without what a scenario takes for a comment.

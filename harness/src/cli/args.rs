@@ -219,7 +219,8 @@ pub struct ImportArguments {
     /// Print a scenario that plays it again.
     #[arg(long)]
     pub scenario: bool,
-    /// A scenario whose header says how the drives are: their models, cells and properties.
+    /// A scenario whose header says how the drives are: models, cells, properties. Without one they are plain ones that hold
+    /// what they first say of their cells.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     pub setup: Option<PathBuf>,
     /// How far times may be apart, such as 2ms: real clocks are not exact; 2 ns where nothing is said.
