@@ -41,7 +41,7 @@ pub enum JudgeError {
     #[error(transparent)]
     Sketch(#[from] SketchError),
     /// It has mistakes: with a setup for other rings, or it is longer than a scenario may be.
-    #[error("the capture as a scenario: {0}")]
+    #[error("the capture as a scenario: {}", first(.0))]
     Mistakes(#[from] Box<Problems>),
     /// It is longer than a scenario may be.
     #[error(transparent)]
@@ -49,6 +49,12 @@ pub enum JudgeError {
     /// It could not be played to its end.
     #[error("the model could not play the capture: {0}")]
     Aborted(String),
+}
+
+/// What is wrong first; the text is nobody's to look at.
+fn first(problems: &Problems) -> String {
+    let first = problems.all().first();
+    first.map_or_else(|| problems.to_string(), |first| first.message.clone())
 }
 
 /// Judges a capture; times are compared as far as the tolerance.

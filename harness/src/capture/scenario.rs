@@ -42,6 +42,9 @@ pub enum SketchError {
         "the capture has no link {0}: what the master sent is not known, and nothing can be played"
     )]
     NoMaster(String),
+    /// There is nothing to play.
+    #[error("the master sent nothing in this capture: there is nothing to play")]
+    Silent,
     /// A ring that cannot be.
     #[error("{0}")]
     Ring(String),
@@ -63,6 +66,9 @@ pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, Sket
     let mut rings = Vec::new();
     for (index, trace) in capture.traces.iter().enumerate() {
         rings.push(Ring::of(index, trace)?);
+    }
+    if rings.iter().all(|ring| ring.first.bytes.is_empty()) {
+        return Err(SketchError::Silent);
     }
     let bytes: usize = rings
         .iter()

@@ -62,6 +62,7 @@ pub(super) fn told(size: RingSize, trace: &Trace) -> Told {
 fn of_link(link: &LinkTrace, asked: &[Role]) -> Told {
     let mut reader = Reader {
         told: Told::default(),
+        own: link.from.filter(|_| link.to.is_some()),
         now: BTreeMap::new(),
         open: BTreeMap::new(),
     };
@@ -86,6 +87,8 @@ fn of_link(link: &LinkTrace, asked: &[Role]) -> Told {
 
 struct Reader {
     told: Told,
+    /// The drive that sends on this link, where what was sent is read, and not what arrived.
+    own: Option<u8>,
     /// What a cell holds now: `None` where it was written, and nobody knows how it took that.
     now: BTreeMap<(u8, u16), Option<u8>>,
     /// Data of the answer that each drive is giving: where they stand, the cell, the value.
@@ -101,8 +104,9 @@ impl Reader {
             } if is_data => {
                 let open = self.open.entry(drive).or_default();
                 open.push((index, address, byte));
-                // ReadLong has no checking byte (10.1).
-                if open.len() == 4 {
+                // ReadLong has no checking byte (10.1). What a drive itself sent is not damaged yet, but a zero may be one of
+                // the error mode.
+                if open.len() == 4 || self.own == Some(drive) && byte != 0 {
                     self.settle(drive, None);
                 }
             }

@@ -176,7 +176,8 @@ impl<'t> Drawn<'t> {
             let byte = self.bytes.next()?;
             self.draw(byte);
         }
-        self.changes.front().map(|(at, _)| at / TICK)
+        // A decoder wants to see the line idle before the first start bit, which may be at the very start.
+        self.changes.front().map(|(at, _)| (at / TICK).max(1))
     }
 
     /// The changes of the line for one byte, from its start bit on.
