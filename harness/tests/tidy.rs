@@ -111,7 +111,7 @@ fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
         .iter()
         .map(|p| name(p, "corpora"))
         .collect();
-    let outputs: BTreeSet<_> = files("snapshots", "snap")
+    let outputs: BTreeSet<_> = files("snapshots/scenarios", "snap")
         .iter()
         .map(|p| name(p, "snapshots"))
         .collect();

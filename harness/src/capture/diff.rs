@@ -91,14 +91,14 @@ pub(super) fn compare(
     };
     let rings = left.capture.traces.len().max(right.capture.traces.len());
     for ring in 0..rings {
-        let own = |run: Run<'_>| run.capture.traces.get(ring).unwrap_or(&none).clone();
-        let (a, b) = (own(left), own(right));
+        let a = left.capture.traces.get(ring).unwrap_or(&none);
+        let b = right.capture.traces.get(ring).unwrap_or(&none);
         let find = |trace: &Trace, link: &LinkTrace| {
             let same = |other: &LinkTrace| (other.from, other.to) == (link.from, link.to);
             trace.links.iter().position(same)
         };
         for (at, link) in a.links.iter().enumerate() {
-            let Some(other) = find(&b, link) else {
+            let Some(other) = find(b, link) else {
                 summary
                     .alone
                     .push(format!("{} ({})", name(ring, link), left.name));
@@ -106,14 +106,14 @@ pub(super) fn compare(
             };
             let pair = Pair {
                 ring,
-                a: (&a, at),
-                b: (&b, other),
+                a: (a, at),
+                b: (b, other),
                 tolerance,
                 until,
             };
             pair.compare(&mut summary, ignored);
         }
-        for link in b.links.iter().filter(|link| find(&a, link).is_none()) {
+        for link in b.links.iter().filter(|link| find(a, link).is_none()) {
             summary
                 .alone
                 .push(format!("{} ({})", name(ring, link), right.name));

@@ -2,7 +2,7 @@
 
 use crate::report::pcapng::name;
 use harness_proto::line::{LineError, Rate};
-use harness_proto::time::{Instant, Span};
+use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
 use harness_sim::link::LineByte;
 use harness_sim::trace::LinkTrace;
@@ -27,7 +27,7 @@ pub(super) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
         let own = |fault: LinkFault| format!("! {name} byte {number}: {}", words(fault));
         match (byte.sent, byte.received) {
             (None, Some(_)) if byte.error == Some(LineError::Break) => {
-                let start = before(byte.at, rate.byte_time());
+                let start = byte.at - rate.byte_time();
                 let span = break_span(byte, bytes.get(place + lost), rate);
                 let at = start.since_start().as_nanos();
                 lines.push(format!("! {name} @{at}ns: break {}ns", span.as_nanos()));
@@ -35,18 +35,12 @@ pub(super) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
                 place += lost;
             }
             (None, Some(received)) => {
-                let double = place.checked_sub(1).and_then(|place| bytes.get(place));
-                let again = double.is_some_and(|double| {
-                    double.received == Some(received)
-                        && double.sent.is_some()
-                        && byte.at.since(double.at).units() <= rate.byte_time().units() + 3
-                });
-                if again {
-                    lines.push(own(LinkFault::Duplicate));
+                let before = place.checked_sub(1).and_then(|place| bytes.get(place));
+                lines.push(if doubled(before, byte, rate) {
+                    own(LinkFault::Duplicate)
                 } else {
-                    let next = number + 1;
-                    lines.push(format!("! {name} byte {next}: insert {received:02X}"));
-                }
+                    format!("! {name} byte {}: insert {received:02X}", number + 1)
+                });
             }
             (Some(_), Some(_)) if byte.error == Some(LineError::Break) => {
                 let span = break_span(byte, bytes.get(place + lost), rate);
@@ -76,6 +70,15 @@ pub(super) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
     lines
 }
 
+/// Whether a byte that nobody sent is the one before it once more.
+fn doubled(before: Option<&LineByte>, byte: &LineByte, rate: Rate) -> bool {
+    before.is_some_and(|before| {
+        before.received == byte.received
+            && before.sent.is_some()
+            && byte.at.since(before.at).units() <= rate.byte_time().units() + 3
+    })
+}
+
 /// How one byte became another.
 fn damage(sent: u8, received: u8, error: Option<LineError>) -> Option<LinkFault> {
     let data = sent ^ received;
@@ -100,16 +103,12 @@ fn damage(sent: u8, received: u8, error: Option<LineError>) -> Option<LinkFault>
 
 /// How long a break lasted: until the last byte that was lost had begun, or a moment where none was.
 fn break_span(byte: &LineByte, last: Option<&LineByte>, rate: Rate) -> Span {
-    let start = before(byte.at, rate.byte_time());
+    let start = byte.at - rate.byte_time();
     let until = last
         .filter(|last| last.at > byte.at)
         .map_or(byte.at, |last| last.at);
     let half = rate.bit_time() * 5;
     until.since(start).saturating_sub(half)
-}
-
-fn before(at: Instant, span: Span) -> Instant {
-    at - span
 }
 
 /// As a scenario writes it: times in nanoseconds, not in rounded milliseconds.

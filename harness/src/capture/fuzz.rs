@@ -1,7 +1,7 @@
 //! The body of a fuzz target: any bytes, as a file.
 
 use super::{Options, Run, diff, read, scenario};
-use crate::report::{csv, json, pcapng};
+use crate::report::{csv, json, pcapng, svg, vcd};
 use harness_proto::time::Span;
 
 /// The longest input that is looked at.
@@ -50,8 +50,24 @@ pub fn import(data: &[u8]) {
     }
     let mut sink = std::io::sink();
     let shown = csv::write(&capture.traces, &mut sink)
-        .and_then(|()| json::write(&capture.traces, &[], &mut sink));
+        .and_then(|()| json::write(&capture.traces, &[], &mut sink))
+        .and_then(|()| vcd::write(&capture.traces, capture.rate, vcd::Signals::All, &mut sink));
     assert!(shown.is_ok(), "a sink takes everything");
+    let picture = svg::svg(
+        &capture.traces,
+        &svg::Options {
+            title: "any",
+            id: "any",
+            scale: svg::Scale::Time,
+            rate: capture.rate,
+            rows: None,
+        },
+    );
+    assert!(
+        picture.len() < 3_000_000,
+        "a picture of {} bytes",
+        picture.len()
+    );
     let options = Options {
         title: "any",
         setup: None,

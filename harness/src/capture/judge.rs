@@ -62,26 +62,7 @@ fn first(problems: &Problems) -> String {
 /// # Errors
 /// [`JudgeError`].
 pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeError> {
-    let text = scenario(capture, options)?;
-    let source = Source::from_bytes("the capture".to_owned(), text.into_bytes())?;
-    let entry = Entry::new(source, None)?;
-    let Some(plan) = &entry.plan else {
-        return Err(JudgeError::Aborted("it is of another bus".to_owned()));
-    };
-    let mut link = simulated(plan);
-    let outcome = play(plan, &mut link, AtFinding::GoOn);
-    if matches!(
-        outcome.verdict,
-        Verdict::Aborted | Verdict::Skipped | Verdict::RigError
-    ) {
-        let found = outcome.finding.map(|finding| finding.message);
-        let why = found.or(outcome.remarks.first().cloned());
-        return Err(JudgeError::Aborted(why.unwrap_or_default()));
-    }
-    let model = Capture {
-        rate: plan.rate,
-        traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
-    };
+    let (model, remarks) = model(capture, options)?;
     let told = unforeseen(capture);
     let model = only_captured(&model, capture);
     let behind = |ring: usize, own: &LinkTrace, index: usize| {
@@ -125,8 +106,33 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
         },
         unforeseen: told.iter().map(|told| told.unforeseen.len()).sum(),
         located: located(capture),
-        remarks: outcome.remarks,
+        remarks,
     })
+}
+
+/// What the model does where the same is done to it.
+fn model(capture: &Capture, options: &Options<'_>) -> Result<(Capture, Vec<String>), JudgeError> {
+    let text = scenario(capture, options)?;
+    let source = Source::from_bytes("the capture".to_owned(), text.into_bytes())?;
+    let entry = Entry::new(source, None)?;
+    let Some(plan) = &entry.plan else {
+        return Err(JudgeError::Aborted("it is of another bus".to_owned()));
+    };
+    let mut link = simulated(plan);
+    let outcome = play(plan, &mut link, AtFinding::GoOn);
+    if matches!(
+        outcome.verdict,
+        Verdict::Aborted | Verdict::Skipped | Verdict::RigError
+    ) {
+        let found = outcome.finding.map(|finding| finding.message);
+        let why = found.or(outcome.remarks.first().cloned());
+        return Err(JudgeError::Aborted(why.unwrap_or_default()));
+    }
+    let capture = Capture {
+        rate: plan.rate,
+        traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
+    };
+    Ok((capture, outcome.remarks))
 }
 
 /// The model's links, as far as they were captured.

@@ -18,8 +18,8 @@ use std::ops::Range;
 
 /// The most rows of a diagram; of a longer run the beginning is drawn.
 pub const MAX_ROWS: usize = 4_000;
-/// The most rectangles of a diagram: with the words for each it stays well below 2 MB.
-pub const MAX_AREAS: usize = 9_000;
+/// The most rectangles of a picture: with the words for each it stays well below 2 MB.
+pub const MAX_AREAS: usize = 6_500;
 
 /// How rows are placed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,7 +63,7 @@ pub fn svg(traces: &[Trace], options: &Options<'_>) -> String {
     let drawn: Vec<_> = traces
         .iter()
         .enumerate()
-        .map(|(ring, trace)| diagram(ring, trace, options))
+        .map(|(ring, trace)| diagram(ring, trace, MAX_AREAS / traces.len(), options))
         .collect();
     let width = drawn.iter().map(|d| d.width).fold(700.0, f64::max);
     let height: f64 = drawn.iter().map(|d| d.height).sum::<f64>() + BOTTOM;
@@ -129,14 +129,14 @@ struct Diagram {
     faults: Vec<String>,
 }
 
-fn diagram(ring: usize, trace: &Trace, options: &Options<'_>) -> Diagram {
+fn diagram(ring: usize, trace: &Trace, most: usize, options: &Options<'_>) -> Diagram {
     let count = trace.links.len().max(1);
     #[expect(clippy::cast_precision_loss, reason = "at most 251 columns")]
     let column = ((WIDE - LEFT) / count as f64).clamp(6.0, 48.0);
     let columns = Columns::read(trace, options.rows.clone());
     let all = areas(&columns, options.scale);
-    let cut = columns.cut || all.len() > MAX_AREAS;
-    let areas = &all[..all.len().min(MAX_AREAS)];
+    let cut = columns.cut || all.len() > most;
+    let areas = &all[..all.len().min(most)];
     let place = Placing::new(areas, options, column);
     let mut text = String::new();
     heads(&mut text, trace, column);

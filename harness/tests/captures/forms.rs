@@ -201,33 +201,7 @@ fn the_dump_of_a_line_is_read_back() {
         }
     }
     assert_eq!(edges[0], (0, true), "always #0 first, and idle");
-    let bit = |n: f64| (n * 260.416_67) as u64;
-    let level = |at: u64| edges[edges.partition_point(|(time, _)| *time <= at) - 1].1;
-    let mut read = Vec::new();
-    let mut at = 0;
-    while let Some((start, _)) = edges.iter().find(|(time, level)| *time >= at && !level) {
-        let sample = |n: f64| level(start + bit(n + 0.5));
-        let byte = (0..8)
-            .map(|n| u8::from(sample(f64::from(n) + 1.0)) << n)
-            .sum::<u8>();
-        let ones = byte.count_ones() + u32::from(sample(9.0));
-        let status = match (sample(10.0), ones) {
-            (false, 0) => "break",
-            (false, _) => "framing",
-            (true, ones) if ones % 2 == 0 => "parity",
-            _ => "ok",
-        };
-        read.push((byte, status));
-        at = start + bit(10.6);
-        at = edges
-            .iter()
-            .find(|(time, level)| *time >= at && *level)
-            .map_or(at, |(time, _)| *time)
-            .max(at);
-        if level(start + bit(10.6)) {
-            at = start + bit(10.6);
-        }
-    }
+    let read = uart(&edges);
     let link = &capture.traces[0].links[1];
     let arrived = link.bytes.iter().filter(|byte| byte.received.is_some());
     let expected: Vec<_> = arrived
@@ -241,4 +215,33 @@ fn the_dump_of_a_line_is_read_back() {
     for status in ["parity", "framing", "break"] {
         assert!(read.iter().any(|(_, own)| *own == status), "{status}");
     }
+}
+
+/// A receiver of 8O1 at 38400 bit/s, over edges at ticks of 100 ns.
+fn uart(edges: &[(u64, bool)]) -> Vec<(u8, &'static str)> {
+    let bit = |halves: u64| halves * 1_302_083 / 10_000;
+    let level = |at: u64| edges[edges.partition_point(|(time, _)| *time <= at) - 1].1;
+    let mut read = Vec::new();
+    let mut at = 0;
+    while let Some((start, _)) = edges.iter().find(|(time, level)| *time >= at && !level) {
+        let sample = |place: u64| level(start + bit(2 * place + 1));
+        let byte = (0..8)
+            .map(|place| u8::from(sample(place + 1)) << place)
+            .sum::<u8>();
+        let ones = byte.count_ones() + u32::from(sample(9));
+        let status = match (sample(10), ones) {
+            (false, 0) => "break",
+            (false, _) => "framing",
+            (true, ones) if ones % 2 == 0 => "parity",
+            _ => "ok",
+        };
+        read.push((byte, status));
+        // From the middle of the stop bit on, where the line is idle again.
+        at = start + bit(21);
+        if !level(at) {
+            let idle = edges.iter().find(|(time, level)| *time >= at && *level);
+            at = idle.map_or(u64::MAX, |(time, _)| *time);
+        }
+    }
+    read
 }

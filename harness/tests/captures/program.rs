@@ -154,7 +154,7 @@ fn a_terminal_gets_no_pcapng() {
         .stdin(Stdio::null())
         .output();
     let Ok(output) = output else {
-        println!("skipped: `script` (util-linux) is not installed");
+        super::skip("`script` (util-linux) is not installed");
         return;
     };
     assert_eq!(code(&output), 2, "{}", stdout(&output));

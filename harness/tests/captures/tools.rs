@@ -27,7 +27,9 @@ fn output(program: &str, arguments: &[&str]) -> Option<String> {
                 !required,
                 "{program} is not installed: `bash .ci/tools` does it"
             );
-            println!("skipped: {program} is not installed; `bash .ci/tools` does it");
+            super::skip(&format!(
+                "{program} is not installed; `bash .ci/tools` does it"
+            ));
             None
         }
     }
