@@ -167,7 +167,7 @@ fn hostile_titles_stay_text() {
 fn a_long_run_is_cut() {
     let text = format!(
         "title long\nring 100\n{}",
-        "> 88 9C C0 13 FE D1\n> 80*20\n".repeat(400)
+        "> 88 9C C0 13 FE D1\n> 80*20\n".repeat(120)
     );
     let capture = run(&text);
     for scale in [Scale::Index, Scale::Time] {
