@@ -50,7 +50,7 @@ fn million() -> Vec<Trace> {
 }
 
 /// The baseline: the same bytes, copied as they are.
-#[divan::bench]
+#[divan::bench(sample_count = 10)]
 fn copied(bencher: divan::Bencher<'_, '_>) {
     let traces = million();
     bencher.counter(ItemsCount::new(BYTES)).bench_local(|| {
@@ -67,7 +67,7 @@ fn copied(bencher: divan::Bencher<'_, '_>) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_count = 10)]
 fn pcapng_written(bencher: divan::Bencher<'_, '_>) {
     let traces = million();
     bencher.counter(ItemsCount::new(BYTES)).bench_local(|| {
@@ -77,7 +77,7 @@ fn pcapng_written(bencher: divan::Bencher<'_, '_>) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_count = 10)]
 fn pcapng_read(bencher: divan::Bencher<'_, '_>) {
     let mut file = Vec::new();
     pcapng::write(&million(), Rate::Baud38400, &mut file).expect("a Vec takes everything");
@@ -86,7 +86,7 @@ fn pcapng_read(bencher: divan::Bencher<'_, '_>) {
         .bench_local(|| read(&file, None).expect("a capture"));
 }
 
-#[divan::bench(args = [true, false])]
+#[divan::bench(args = [true, false], sample_count = 10)]
 fn vcd_written(bencher: divan::Bencher<'_, '_>, vectors: bool) {
     let traces = million();
     let signals = if vectors {
@@ -101,7 +101,7 @@ fn vcd_written(bencher: divan::Bencher<'_, '_>, vectors: bool) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_count = 10)]
 fn csv_written(bencher: divan::Bencher<'_, '_>) {
     let traces = million();
     bencher.counter(ItemsCount::new(BYTES)).bench_local(|| {
