@@ -65,7 +65,7 @@ pub fn svg(traces: &[Trace], options: &Options<'_>) -> String {
         .enumerate()
         .map(|(ring, trace)| diagram(ring, trace, MAX_AREAS / traces.len(), options))
         .collect();
-    let width = drawn.iter().map(|d| d.width).fold(700.0, f64::max);
+    let width = drawn.iter().map(|d| d.width).fold(800.0, f64::max);
     let height: f64 = drawn.iter().map(|d| d.height).sum::<f64>() + BOTTOM;
     let id = plain(options.id);
     let title = escape(options.title);
