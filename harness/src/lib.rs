@@ -7,6 +7,7 @@
 
 pub mod bus;
 pub mod campaign;
+pub mod capture;
 pub mod cli;
 pub mod evidence;
 pub mod guard;

@@ -7,6 +7,7 @@ use super::rig::RigCommand;
 use crate::rig::values::{Time, ValueError};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use harness_proto::line::Rate;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -35,6 +36,8 @@ Examples:
   drivebench run my-machine.scn tests/       play a file and all files of a folder
   drivebench trace 9.7-parity-error          the 100-axis table of ND21 9.7
   drivebench trace my.scn --format json      every byte on every link, for tools
+  drivebench trace my.scn --format svg -o my.svg
+                                             a picture of the ring; also vcd, pcapng and csv
   drivebench check my.scn                    look for mistakes, play nothing
   drivebench manual                          which tables of the manual are pinned
   drivebench cells ps_                       the cells of the positioning controller
@@ -58,6 +61,12 @@ pub enum Command {
     Check(CheckArguments),
     /// Play a scenario and print every byte on every link.
     Trace(TraceArguments),
+    /// Read a capture (pcapng, or the JSON of `trace`): judge it beside the model, show it, or make a scenario of it.
+    Import(ImportArguments),
+    /// Compare two captures or scenarios byte by byte, on every link; exit code 1 where they differ.
+    Diff(DiffArguments),
+    /// Print the dissector that lets Wireshark and tshark read what `trace --format pcapng` writes.
+    Dissector,
     /// Show which tables and examples of the manual are pinned, and the errata ledger.
     Manual(ManualArguments),
     /// Show the drive's cells: address, size, access, unit, meaning and section of the manual.
@@ -175,14 +184,74 @@ pub struct TraceArguments {
     /// A file, or the name of a built-in scenario.
     pub file: PathBuf,
     /// In which form.
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    pub format: Format,
+    #[arg(long, value_enum, default_value_t = TraceFormat::Table)]
+    pub format: TraceFormat,
     /// Play on a ring of this many drives.
     #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
     pub ring: Option<u8>,
-    /// Only these rows of the table, counted from 1.
+    /// How it is shown and where it goes.
+    #[command(flatten)]
+    pub showing: Showing,
+}
+
+/// How a trace is shown, and where it goes.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Showing {
+    /// Only these rows of the table or the picture, counted from 1.
     #[arg(long, value_name = "FIRST..LAST", value_parser = rows)]
     pub rows: Option<Rows>,
+    /// How the picture (svg) is laid out: row n the n-th byte of each link, as in the manual, or every byte at its time.
+    #[arg(long, value_enum, default_value_t = Layout::Index)]
+    pub time: Layout,
+    /// Of a value change dump (vcd) only the lines: sigrok up to 0.5.2 stops at the first vector.
+    #[arg(long)]
+    pub lines_only: bool,
+    /// Write into this file, which is there whole or not at all, in place of standard output.
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// For `import`.
+#[derive(Clone, Debug, Args)]
+pub struct ImportArguments {
+    /// The capture: pcapng with one interface a link, named as in 98->97, or the JSON of `trace`.
+    pub file: PathBuf,
+    /// Show it in this form; nothing is judged then.
+    #[arg(long, value_enum, conflicts_with = "scenario")]
+    pub format: Option<TraceFormat>,
+    /// Print a scenario that plays it again.
+    #[arg(long)]
+    pub scenario: bool,
+    /// A scenario whose header says how the drives are: models, cells, properties. Without one they are plain ones that hold
+    /// what they first say of their cells.
+    #[arg(long, value_name = "FILE", conflicts_with = "format")]
+    pub setup: Option<PathBuf>,
+    /// How far times may be apart, such as 2ms: real clocks are not exact; 2 ns where nothing is said.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub tolerance: Option<Duration>,
+    /// The rate of the line, where the capture does not say it.
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    pub line: Option<Rate>,
+    /// How it is shown and where it goes.
+    #[command(flatten)]
+    pub showing: Showing,
+}
+
+/// For `diff`.
+#[derive(Clone, Debug, Args)]
+pub struct DiffArguments {
+    /// A capture, a scenario's file, or the name of a built-in scenario.
+    #[arg(value_name = "A")]
+    pub left: PathBuf,
+    /// What it is compared with.
+    #[arg(value_name = "B")]
+    pub right: PathBuf,
+    /// How far times may be apart, such as 2ms; 2 ns where nothing is said.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub tolerance: Option<Duration>,
+    /// The rate of the line, where a capture does not say it.
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    pub line: Option<Rate>,
 }
 
 /// For `manual`.
@@ -245,6 +314,33 @@ pub enum Format {
     Json,
 }
 
+/// The forms of a trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TraceFormat {
+    /// For people: the manual's own table, one column a drive.
+    Table,
+    /// JSON for tools, described in the documentation.
+    Json,
+    /// A picture: drives across, time down, colours for what each did.
+    Svg,
+    /// The lines bit by bit, for logic analysers' programs (sigrok, GTKWave).
+    Vcd,
+    /// A capture for Wireshark; `drivebench dissector` prints what reads it.
+    Pcapng,
+    /// A row a byte.
+    Csv,
+}
+
+/// How the rows of a picture are placed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Layout {
+    /// Row n is the n-th byte of each link.
+    #[default]
+    Index,
+    /// A byte stands where its time is.
+    True,
+}
+
 /// When to do something that suits a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum When {
@@ -292,6 +388,12 @@ fn ring_size(text: &str) -> Result<u8, String> {
     harness_proto::novobus::address::RingSize::new(number)
         .map(harness_proto::novobus::address::RingSize::drives)
         .map_err(|error| error.to_string())
+}
+
+fn rate(text: &str) -> Result<Rate, String> {
+    let bits = text.parse().ok();
+    bits.and_then(Rate::from_bits_per_second)
+        .ok_or_else(|| "38400, 19200 or 9600 is expected (ND21 8.3)".to_owned())
 }
 
 /// A time such as `30s`; at most a day.

@@ -7,6 +7,7 @@ mod check;
 mod deviations;
 mod drive;
 mod exit;
+mod import;
 mod list;
 mod man;
 mod manual;
@@ -63,6 +64,9 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::List(selection) => list::list(&selection, output),
         Command::Check(arguments) => check::check(&arguments, output),
         Command::Trace(arguments) => trace::trace(&arguments, output),
+        Command::Import(arguments) => import::import(&arguments, output),
+        Command::Diff(arguments) => import::diff(&arguments, output),
+        Command::Dissector => import::dissector(output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),

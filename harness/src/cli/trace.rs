@@ -1,16 +1,20 @@
 //! `drivebench trace`.
 
-use super::args::{Format, TraceArguments};
+use super::args::{Layout, Showing, TraceArguments, TraceFormat};
 use super::exit::Exit;
 use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
 use crate::library::{Entry, sources};
-use crate::report::json;
 use crate::report::plot::plots;
+use crate::report::svg::{Options, Scale, svg};
 use crate::report::table::{LEGEND, Part, table, wires};
-use crate::scenario::run::AtFinding;
+use crate::report::vcd::{self, Signals};
+use crate::report::{csv, json, pcapng};
+use crate::scenario::run::{AtFinding, Record};
+use harness_proto::line::Rate;
 use harness_sim::trace::Trace;
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
+use std::path::Path;
 
 /// Lines about damaged bytes shown below a table.
 const WIRES: usize = 20;
@@ -37,29 +41,130 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
             return Ok(Exit::Usage);
         }
     };
+    let showing = &arguments.showing;
+    if !fits_output(arguments.format, showing, output) {
+        return Ok(Exit::Usage);
+    }
     let played = play_entry(&entry, AtFinding::GoOn);
-    let records = &played.outcome.records;
-    match arguments.format {
-        Format::Json => {
-            let out = BufWriter::new(std::io::stdout().lock());
-            unless_closed(json::write(&played.traces, records, out))?;
-        }
-        Format::Table => {
-            for trace in &played.traces {
-                output.result(&render(trace, arguments))?;
-            }
-            output.result(&plots(records))?;
-        }
+    let shown = Shown {
+        title: &entry.scenario.title,
+        traces: &played.traces,
+        rate: entry
+            .plan
+            .as_ref()
+            .map(|plan| plan.rate)
+            .unwrap_or_default(),
+        records: &played.outcome.records,
+    };
+    if !show(&shown, arguments.format, showing, output)? {
+        return Ok(Exit::RigError);
     }
     output.say(&details(&entry, &played.outcome, &played.traces));
     Ok(Exit::of(&[played.outcome.verdict], false))
 }
 
-fn render(trace: &Trace, arguments: &TraceArguments) -> String {
-    let part = Part {
-        rows: arguments.rows.map(|rows| rows.first - 1..rows.last),
-        ..Part::default()
+/// A run that is to be shown.
+pub(super) struct Shown<'s> {
+    pub(super) title: &'s str,
+    pub(super) traces: &'s [Trace],
+    pub(super) rate: Rate,
+    pub(super) records: &'s [Record],
+}
+
+/// Whether a form can go where it is to go: what is no text is kept from a terminal.
+pub(super) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut Output) -> bool {
+    if format == TraceFormat::Pcapng && showing.output.is_none() && output.terminal {
+        output.complain(
+            "pcapng is no text, and standard output is a terminal; add `--output FILE`, or send it on with `|` or `>`",
+        );
+        return false;
+    }
+    true
+}
+
+/// Shows a run; false where the file could not be written, which has been said then.
+pub(super) fn show(
+    shown: &Shown<'_>,
+    format: TraceFormat,
+    showing: &Showing,
+    output: &mut Output,
+) -> std::io::Result<bool> {
+    let Some(path) = &showing.output else {
+        let out = BufWriter::new(std::io::stdout().lock());
+        unless_closed(write(shown, format, showing, out))?;
+        return Ok(true);
     };
-    let wires = wires(trace, WIRES);
-    format!("{}\n{LEGEND}{wires}", table(trace, &part))
+    match into_file(path, |out| write(shown, format, showing, out)) {
+        Ok(()) => Ok(true),
+        Err(error) => {
+            output.complain(&format!("failed to write {}: {error}", path.display()));
+            Ok(false)
+        }
+    }
+}
+
+/// Written beside and then renamed: a file is there whole or not at all.
+pub(super) fn into_file(
+    path: &Path,
+    write: impl FnOnce(BufWriter<&std::fs::File>) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(format!(".{}.part", std::process::id()));
+    let beside = Path::new(&beside);
+    let written = std::fs::File::create_new(beside)
+        .and_then(|file| write(BufWriter::new(&file)))
+        .and_then(|()| std::fs::rename(beside, path));
+    if written.is_err() {
+        // What is left of it is of no use; where there is nothing, nothing is to be removed.
+        let _gone = std::fs::remove_file(beside);
+    }
+    written
+}
+
+fn write(
+    shown: &Shown<'_>,
+    format: TraceFormat,
+    showing: &Showing,
+    mut out: impl Write,
+) -> std::io::Result<()> {
+    let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
+    match format {
+        TraceFormat::Json => json::write(shown.traces, shown.records, out),
+        TraceFormat::Csv => csv::write(shown.traces, out),
+        TraceFormat::Vcd => {
+            let signals = if showing.lines_only {
+                Signals::Lines
+            } else {
+                Signals::All
+            };
+            vcd::write(shown.traces, shown.rate, signals, out)
+        }
+        TraceFormat::Pcapng => pcapng::write(shown.traces, shown.rate, out),
+        TraceFormat::Svg => {
+            let options = Options {
+                title: shown.title,
+                id: "ring",
+                scale: match showing.time {
+                    Layout::Index => Scale::Index,
+                    Layout::True => Scale::Time,
+                },
+                rate: shown.rate,
+                rows,
+            };
+            out.write_all(svg(shown.traces, &options).as_bytes())?;
+            out.flush()
+        }
+        TraceFormat::Table => {
+            for trace in shown.traces {
+                let part = Part {
+                    rows: rows.clone(),
+                    ..Part::default()
+                };
+                let wires = wires(trace, WIRES);
+                write!(out, "{}\n{LEGEND}{wires}", table(trace, &part))?;
+            }
+            out.write_all(plots(shown.records).as_bytes())?;
+            out.flush()
+        }
+    }
 }

@@ -1,6 +1,12 @@
 //! Reports: pure functions of a finished run.
 
+pub mod csv;
 pub mod json;
+pub mod meaning;
 pub mod mismatch;
+pub mod pcapng;
 pub mod plot;
+pub mod svg;
 pub mod table;
+pub mod vcd;
+pub mod walk;

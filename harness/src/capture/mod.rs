@@ -1,0 +1,275 @@
+//! Captures: what the links of a ring carried, read from a file, whoever wrote it.
+//!
+//! [`read`] takes pcapng of link type 250 and the JSON of `drivebench trace`. A capture can be shown in every form that a run can,
+//! compared with another ([`diff`]), turned into a scenario ([`scenario`]), and so be judged against the model
+//! ([`judge`]): what the master sent and what was damaged on the way is done to a simulated ring, and what came back is
+//! compared.
+//!
+//! Every file gives a capture or says at which place it is none; what a capture takes of memory is bounded by the size
+//! of its file, and that by [`MAX_FILE`].
+
+mod diff;
+mod faults;
+pub mod fuzz;
+mod json;
+mod judge;
+mod pcapng;
+mod scenario;
+mod stimuli;
+
+pub use diff::{Difference, Run, Summary, diff};
+pub use judge::{JudgeError, Judged, judge};
+pub use scenario::{Options, SketchError, scenario};
+
+use harness_proto::line::Rate;
+use harness_proto::novobus::address::MAX_DRIVES;
+use harness_proto::time::{Instant, Span};
+use harness_sim::link::LineByte;
+use harness_sim::trace::{LinkTrace, Mark, Trace};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+/// The longest file that is read, in bytes.
+pub const MAX_FILE: u64 = 256 * 1024 * 1024;
+
+/// What the links of one or two rings carried.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Capture {
+    /// The rate of the line: as the file says, as the times say, or 38400.
+    pub rate: Rate,
+    /// The rings; of each the links that were captured, in ring order.
+    pub traces: Vec<Trace>,
+}
+
+/// Why a file is no capture.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CaptureError {
+    /// It cannot be read.
+    #[error("failed to read {0}: {1}")]
+    File(String, String),
+    /// It is too long.
+    #[error("the file is longer than {MAX_FILE} bytes; cut it into parts")]
+    TooLong,
+    /// It is of another kind.
+    #[error(
+        "neither pcapng nor a trace in JSON: the file begins with {0}; Wireshark writes pcapng with \"Save As\", \
+         `drivebench trace --format json` the other"
+    )]
+    Foreign(String),
+    /// Something in it cannot be.
+    #[error("at byte {offset} of the file: {what}")]
+    At {
+        /// Where, counted from 0.
+        offset: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// Something that it says of a link cannot be.
+    #[error("{place}: {what}")]
+    Link {
+        /// Which link, and which byte of it.
+        place: String,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+/// Reads a file; the rate is taken where it does not say one.
+///
+/// # Errors
+/// [`CaptureError`].
+pub fn read_file(path: &Path, rate: Option<Rate>) -> Result<Capture, CaptureError> {
+    let failed =
+        |error: std::io::Error| CaptureError::File(path.display().to_string(), error.to_string());
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(failed)?;
+    let mut file = file.take(MAX_FILE + 1);
+    file.read_to_end(&mut bytes).map_err(failed)?;
+    read(&bytes, rate)
+}
+
+/// Reads the bytes of a file; the rate is taken where it does not say one.
+///
+/// # Errors
+/// [`CaptureError`], but not that of the file itself.
+pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
+    if bytes.len() as u64 > MAX_FILE {
+        return Err(CaptureError::TooLong);
+    }
+    let text = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+    if bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]) {
+        pcapng::read(bytes, rate)
+    } else if text == Some(&b'{') {
+        json::read(bytes, rate)
+    } else {
+        let begins = bytes.iter().take(8).map(|byte| format!("{byte:02X}"));
+        let begins: Vec<_> = begins.collect();
+        Err(CaptureError::Foreign(match begins.len() {
+            0 => "nothing: it is empty".to_owned(),
+            _ => begins.join(" "),
+        }))
+    }
+}
+
+/// Whether a file looks like a capture, and not like a scenario.
+#[must_use]
+pub fn is_capture(path: &Path) -> bool {
+    let mut start = [0; 4];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read(&mut start));
+    matches!(read, Ok(1..)) && (start == [0x0A, 0x0D, 0x0D, 0x0A] || start[0] == b'{')
+}
+
+/// The ends of a link by its name: `98->97`, `master->99`, `2:0->master`; with the ring, counted from 0.
+fn ends(name: &str) -> Option<(usize, Option<u8>, Option<u8>)> {
+    let (ring, own) = match name.strip_prefix("2:") {
+        Some(own) => (1, own),
+        None => (0, name),
+    };
+    let (from, to) = own.split_once("->")?;
+    let (from, to) = (end(from)?, end(to)?);
+    adjacent(from, to).then_some((ring, from, to))
+}
+
+/// `master`, or a drive's number.
+fn end(text: &str) -> Option<Option<u8>> {
+    if text == "master" {
+        return Some(None);
+    }
+    let number: u16 = text.parse().ok()?;
+    let drive = u8::try_from(number).ok()?;
+    (number < MAX_DRIVES).then_some(Some(drive))
+}
+
+/// Whether a link can have these ends (ND21 8.5).
+fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
+    match (from, to) {
+        (None, Some(_)) | (Some(0), None) => true,
+        (Some(from), Some(to)) => from == to + 1,
+        _ => false,
+    }
+}
+
+/// Puts a capture together of its links.
+#[derive(Default)]
+struct Assembly {
+    /// In ring order: that of falling numbers of the receiver, the master being the last.
+    rings: [BTreeMap<u16, LinkTrace>; 2],
+}
+
+impl Assembly {
+    /// The link with these ends, its bytes so far.
+    fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkTrace {
+        let order = to.map_or(1_000, |drive| 999 - u16::from(drive));
+        self.rings[ring.min(1)].entry(order).or_insert(LinkTrace {
+            from,
+            to,
+            bytes: Vec::new(),
+        })
+    }
+
+    /// The capture; `sizes` where the file says how many drives there are.
+    fn finish(
+        self,
+        sizes: [Option<u8>; 2],
+        marks: [Vec<Mark>; 2],
+        rate: Option<Rate>,
+    ) -> Result<Capture, CaptureError> {
+        let mut traces = Vec::new();
+        for ((links, size), marks) in self.rings.into_iter().zip(sizes).zip(marks) {
+            let links: Vec<_> = links.into_values().collect();
+            let highest = |link: &LinkTrace| link.from.max(link.to).map_or(1, |drive| drive + 1);
+            let Some(least) = links.iter().map(highest).max() else {
+                continue;
+            };
+            let first = links.iter().find(|link| link.from.is_none());
+            let own = first.and_then(|link| link.to).map(|drive| drive + 1);
+            let drives = size.or(own).unwrap_or(least);
+            if drives < least || own.is_some_and(|own| own != drives) {
+                return Err(CaptureError::Link {
+                    place: format!("a ring of {drives} drives"),
+                    what: format!("a link of drive {} is none of it", least - 1),
+                });
+            }
+            traces.push(Trace {
+                drives,
+                links,
+                marks,
+            });
+        }
+        let mut capture = Capture {
+            rate: rate.unwrap_or_default(),
+            traces,
+        };
+        capture.check()?;
+        if rate.is_none() {
+            capture.rate = capture.guessed_rate();
+        }
+        Ok(capture)
+    }
+}
+
+impl Capture {
+    /// Bytes of a link come one after another.
+    fn check(&self) -> Result<(), CaptureError> {
+        for (ring, trace) in self.traces.iter().enumerate() {
+            for link in &trace.links {
+                let early = link.bytes.windows(2).position(|two| two[1].at < two[0].at);
+                if let Some(place) = early {
+                    let name = crate::report::pcapng::name(ring, link);
+                    return Err(CaptureError::Link {
+                        place: format!("link {name}, byte {}", place + 2),
+                        what: "it comes before the byte in front of it".to_owned(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The fastest rate at which no byte comes sooner behind another than it can.
+    fn guessed_rate(&self) -> Rate {
+        let links = self.traces.iter().flat_map(|trace| &trace.links);
+        let gaps = links.flat_map(|link| link.bytes.windows(2));
+        let closest = gaps.map(|two| two[1].at.since(two[0].at)).min();
+        let fits = |rate: &Rate| {
+            let byte = rate.byte_time();
+            // A tenth for clocks that differ.
+            closest.is_some_and(|gap| gap.units() >= byte.units() / 10 * 9)
+        };
+        let slowest_first = Rate::ALL.into_iter().rev();
+        let near = |rate: &Rate| {
+            closest.is_some_and(|gap| gap.units() <= rate.byte_time().units() / 10 * 11)
+        };
+        slowest_first
+            .clone()
+            .find(|rate| fits(rate) && near(rate))
+            .unwrap_or_default()
+    }
+
+    /// How many bytes there are on all links.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let links = self.traces.iter().flat_map(|trace| &trace.links);
+        links.map(|link| link.bytes.len()).sum()
+    }
+
+    /// When the last byte had passed.
+    #[must_use]
+    pub fn end(&self) -> Instant {
+        let links = self.traces.iter().flat_map(|trace| &trace.links);
+        let last = links.filter_map(|link| link.bytes.last());
+        last.map(|byte| byte.at).max().unwrap_or(Instant::START)
+    }
+}
+
+/// A byte of a link, its time in nanoseconds since the start.
+fn line_byte(
+    nanos: u64,
+    sent: Option<u8>,
+    received: Option<u8>,
+    error: Option<harness_proto::line::LineError>,
+) -> LineByte {
+    let at = Instant::START + Span::from_nanos(nanos);
+    LineByte::seen(at, sent, received, error)
+}

@@ -1,0 +1,243 @@
+//! `drivebench import`, `diff` and `dissector`: captures that are read, and what helps to read them elsewhere.
+
+use super::args::{DiffArguments, ImportArguments};
+use super::exit::Exit;
+use super::output::Output;
+use super::run::play_entry;
+use super::trace::{Shown, fits_output, into_file, show};
+use crate::capture::{
+    Capture, Judged, Options, Run, diff as compare, is_capture, judge, read_file, scenario,
+};
+use crate::library::{Entry, sources};
+use crate::link::link_name;
+use crate::scenario::run::AtFinding;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::line::Rate;
+use harness_proto::time::Span;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+use std::time::Duration;
+
+/// The dissector for Wireshark and tshark.
+const DISSECTOR: &str = include_str!("../report/novobus.lua");
+
+/// Prints the dissector.
+pub(super) fn dissector(output: &mut Output) -> std::io::Result<Exit> {
+    output.result(DISSECTOR)?;
+    Ok(Exit::Passed)
+}
+
+/// Reads a capture and judges it, shows it or makes a scenario of it.
+pub(super) fn import(arguments: &ImportArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let path = &arguments.file;
+    let Some(capture) = read(path, arguments.line, output) else {
+        return Ok(Exit::Usage);
+    };
+    let title = title(path);
+    if let Some(format) = arguments.format {
+        let shown = Shown {
+            title: &title,
+            traces: &capture.traces,
+            rate: capture.rate,
+            records: &[],
+        };
+        if !fits_output(format, &arguments.showing, output) {
+            return Ok(Exit::Usage);
+        }
+        let written = show(&shown, format, &arguments.showing, output)?;
+        return Ok(if written {
+            Exit::Passed
+        } else {
+            Exit::RigError
+        });
+    }
+    let setup = match arguments.setup.as_deref().map(Source::read).transpose() {
+        Ok(setup) => setup,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(Exit::Usage);
+        }
+    };
+    let options = Options {
+        title: &title,
+        setup: setup.as_ref(),
+        tolerance: span(arguments.tolerance),
+    };
+    if arguments.scenario {
+        return as_scenario(&capture, &options, arguments, output);
+    }
+    let judged = match judge(&capture, &options) {
+        Ok(judged) => judged,
+        Err(error) => {
+            output.complain(&format!("{}: {error}", path.display()));
+            return Ok(Exit::Usage);
+        }
+    };
+    let line = format!(
+        "{} {title}: {} bytes on {} links in {}\n",
+        output.verdict(judged.verdict).trim_end_matches(' '),
+        capture.bytes(),
+        capture.traces.iter().map(|t| t.links.len()).sum::<usize>(),
+        capture.end(),
+    );
+    output.result(&line)?;
+    output.say(&details(&judged, &capture));
+    Ok(Exit::of(&[judged.verdict], false))
+}
+
+fn read(path: &Path, rate: Option<Rate>, output: &mut Output) -> Option<Capture> {
+    match read_file(path, rate) {
+        Ok(capture) => Some(capture),
+        Err(error) => {
+            output.complain(&format!("{}: {error}", path.display()));
+            None
+        }
+    }
+}
+
+fn as_scenario(
+    capture: &Capture,
+    options: &Options<'_>,
+    arguments: &ImportArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let text = match scenario(capture, options) {
+        Ok(text) => text,
+        Err(error) => {
+            output.complain(&format!("{}: {error}", arguments.file.display()));
+            return Ok(Exit::Usage);
+        }
+    };
+    let Some(path) = &arguments.showing.output else {
+        output.result(&text)?;
+        return Ok(Exit::Passed);
+    };
+    match into_file(path, |mut out| {
+        out.write_all(text.as_bytes()).and_then(|()| out.flush())
+    }) {
+        Ok(()) => Ok(Exit::Passed),
+        Err(error) => {
+            output.complain(&format!("failed to write {}: {error}", path.display()));
+            Ok(Exit::RigError)
+        }
+    }
+}
+
+/// What there is to say about a judgement, for people.
+fn details(judged: &Judged, capture: &Capture) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    if judged.verdict == Verdict::Inconclusive {
+        let missing = capture
+            .traces
+            .iter()
+            .enumerate()
+            .map(|(ring, trace)| link_name(ring, trace.drives, usize::from(trace.drives)));
+        let missing: Vec<_> = missing.collect();
+        let _infallible = writeln!(
+            text,
+            "  note: the master's incoming link ({}) was not captured",
+            missing.join(", ")
+        );
+    }
+    if judged.adopted > 0 {
+        let _infallible = writeln!(
+            text,
+            "  note: {} cells were taken to hold what the drives first said of them",
+            judged.adopted
+        );
+    }
+    if judged.unforeseen > 0 {
+        let _infallible = writeln!(
+            text,
+            "  note: {} bytes are data that changed by themselves, and their checking bytes; they were not compared",
+            judged.unforeseen
+        );
+    }
+    for remark in &judged.remarks {
+        let _infallible = writeln!(text, "  note: {remark}");
+    }
+    if let Some((ring, drive)) = judged.located {
+        let ring = if ring == 0 { "" } else { " of ring 2" };
+        let _infallible = writeln!(
+            text,
+            "  note: the ring spells out drive {drive}{ring}: it saw a fault first (ND21 9.7)"
+        );
+    }
+    if judged.verdict != Verdict::Passed || judged.links.differ > 0 {
+        let shown = judged.links.show("capture", "model");
+        let _infallible = write!(text, "\n{shown}");
+    }
+    text
+}
+
+/// Compares two captures or runs.
+pub(super) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let left = side(&arguments.left, arguments, output);
+    let right = side(&arguments.right, arguments, output);
+    let (Some(left), Some(right)) = (left, right) else {
+        return Ok(Exit::Usage);
+    };
+    let names = [title(&arguments.left), title(&arguments.right)];
+    let summary = compare(
+        Run {
+            name: &names[0],
+            capture: &left,
+        },
+        Run {
+            name: &names[1],
+            capture: &right,
+        },
+        span(arguments.tolerance),
+    );
+    output.result(&summary.show(&names[0], &names[1]).to_string())?;
+    Ok(if summary.same() {
+        Exit::Passed
+    } else {
+        Exit::Failed
+    })
+}
+
+/// A capture, or a scenario that is played.
+fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<Capture> {
+    if is_capture(path) {
+        return read(path, arguments.line, output);
+    }
+    let sources = match sources(&[path.to_owned()]) {
+        Ok(sources) => sources,
+        Err(error) => {
+            output.library_error(&error);
+            return None;
+        }
+    };
+    let Ok([source]) = <[_; 1]>::try_from(sources) else {
+        output.complain("a capture or one scenario is expected, not a folder");
+        return None;
+    };
+    let entry = match Entry::new(source, None) {
+        Ok(entry) => entry,
+        Err(problems) => {
+            output.mistakes(&problems);
+            return None;
+        }
+    };
+    let rate = entry.plan.as_ref().map(|plan| plan.rate);
+    Some(Capture {
+        rate: rate.unwrap_or_default(),
+        traces: play_entry(&entry, AtFinding::GoOn).traces,
+    })
+}
+
+/// The name of a file without its folders.
+fn title(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+fn span(tolerance: Option<Duration>) -> Span {
+    // Times of a capture are cut off to nanoseconds.
+    let nanos = tolerance.map_or(2, |time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
+    Span::from_nanos(nanos)
+}

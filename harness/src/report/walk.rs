@@ -1,0 +1,205 @@
+//! The bytes of a trace in order of time, and what its drives were doing at each.
+
+use super::meaning::{Meaning, Observer, Role};
+use harness_proto::novobus::error_mode::Marks;
+use harness_proto::time::Instant;
+use harness_sim::link::LineByte;
+use harness_sim::trace::{LinkTrace, Mark, Trace};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// The bytes of every link in order of time; at one instant in order of links. Gives the link's place and the byte's.
+pub(crate) fn in_time(links: &[LinkTrace]) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let first = links.iter().enumerate().filter_map(|(place, link)| {
+        let byte = link.bytes.first()?;
+        Some(Reverse((byte.at, place, 0)))
+    });
+    let mut heap: BinaryHeap<Reverse<(Instant, usize, usize)>> = first.collect();
+    std::iter::from_fn(move || {
+        let mut top = heap.peek_mut()?;
+        let Reverse((at, place, index)) = *top;
+        match links[place].bytes.get(index + 1) {
+            // A capture may be out of order: then its own order counts.
+            Some(next) => *top = Reverse((next.at.max(at), place, index + 1)),
+            None => drop(std::collections::binary_heap::PeekMut::pop(top)),
+        }
+        Some((place, index))
+    })
+}
+
+/// What the sender of a byte was doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// It passed on SYNCO or PAUSE.
+    Idle,
+    /// It passed on a telegram for somebody else.
+    Forwarding,
+    /// It is the drive that is meant, and answered.
+    Addressed,
+    /// It sent a zero of the error mode (ND21 9.7).
+    Zero,
+    /// It sent received + 1, which spells out a number (9.7).
+    Counting,
+    /// It passed on, or the master sent, a check sequence (9.8).
+    Sequence,
+    /// Nothing arrived, or what arrived is no telegram.
+    Other,
+}
+
+impl State {
+    /// All of them, in the order of a legend.
+    pub const ALL: [Self; 7] = [
+        Self::Idle,
+        Self::Forwarding,
+        Self::Addressed,
+        Self::Zero,
+        Self::Counting,
+        Self::Sequence,
+        Self::Other,
+    ];
+
+    /// What stands in a legend.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Idle => "normal: SYNCO or PAUSE",
+            Self::Forwarding => "forwarding a telegram",
+            Self::Addressed => "addressed: the drive's answer",
+            Self::Zero => "error mode: zero",
+            Self::Counting => "error mode: received + 1",
+            Self::Sequence => "check sequence",
+            Self::Other => "lost, or no telegram",
+        }
+    }
+}
+
+/// What a byte is, and what its sender was doing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Seen<'t> {
+    /// What it is to its receiver.
+    pub meaning: Meaning,
+    /// What it was to its sender: the same where nobody knows better.
+    pub sent: Meaning,
+    /// What its sender was doing.
+    pub state: State,
+    /// What its sender remarked at it.
+    pub mark: Option<&'t Mark>,
+}
+
+/// Reads one link of a trace byte by byte: its bytes, and what its sender remarked.
+pub struct Reader<'t> {
+    observer: Observer,
+    /// Reads what was sent; a trace that knows what drives remarked knows that as well.
+    sender: Observer,
+    from: Option<u8>,
+    to: Option<u8>,
+    /// The sender's marks, each with the byte of this link at which it stands.
+    marks: std::iter::Peekable<std::vec::IntoIter<(usize, &'t Mark)>>,
+    /// Whether the sender is known to be in the error mode; `None` where a trace has no marks at all.
+    in_error: Option<bool>,
+    next: usize,
+}
+
+impl<'t> Reader<'t> {
+    /// For every link of a trace.
+    pub fn all(trace: &'t Trace) -> Vec<Self> {
+        let known = !trace.marks.is_empty();
+        let links = trace.links.iter();
+        links
+            .map(|link| {
+                let mut marks = placed(link, &trace.marks);
+                marks.sort_by_key(|(place, _)| *place);
+                Self {
+                    observer: Observer::new(link.from, link.to),
+                    sender: Observer::new(link.from, link.to),
+                    from: link.from,
+                    to: link.to,
+                    marks: marks.into_iter().peekable(),
+                    in_error: (known && link.from.is_some()).then_some(false),
+                    next: 0,
+                }
+            })
+            .collect()
+    }
+
+    /// Reads the next byte.
+    pub fn see(&mut self, byte: &LineByte) -> Seen<'t> {
+        let mut meaning = self.observer.see(byte.received, byte.error);
+        let mut shown: Option<&Mark> = None;
+        let mut leaves = false;
+        while let Some((_, mark)) = self.marks.next_if(|(place, _)| *place <= self.next) {
+            if mark.marks.contains(Marks::DETECTED) {
+                self.in_error = Some(true);
+            }
+            leaves |= mark.marks.contains(Marks::RECOVERED);
+            let graver = mark.marks.contains(Marks::DETECTED) || shown.is_none();
+            if graver {
+                shown = Some(mark);
+            }
+        }
+        self.next += 1;
+        if self.in_error == Some(true) && meaning.role != Role::CheckSequence {
+            meaning.role = match byte.received {
+                None => Role::Lost,
+                Some(0) => Role::ErrorZero,
+                Some(_) if byte.error.is_none() => Role::ErrorAddress,
+                Some(_) => Role::Foreign,
+            };
+            meaning.drive = None;
+        }
+        let sent = match (byte.sent, self.in_error) {
+            // What a drive in the error mode sends is nothing to be read.
+            (Some(sent), Some(false)) => self.sender.see(Some(sent), None),
+            _ => meaning,
+        };
+        if leaves {
+            self.in_error = Some(false);
+            self.sender = Observer::new(self.from, self.to);
+        }
+        Seen {
+            state: self.state(&sent),
+            sent,
+            meaning,
+            mark: shown,
+        }
+    }
+
+    fn state(&self, meaning: &Meaning) -> State {
+        match meaning.role {
+            Role::Synco | Role::Pause => State::Idle,
+            Role::CheckSequence => State::Sequence,
+            // The zeros in front of the check sequence.
+            Role::ErrorZero if self.from.is_none() => State::Sequence,
+            Role::ErrorZero => State::Zero,
+            Role::ErrorAddress => State::Counting,
+            Role::Foreign | Role::Lost => State::Other,
+            Role::Sync | Role::Address => State::Forwarding,
+            _ if meaning.drive.is_some() && meaning.drive == self.from => State::Addressed,
+            _ => State::Forwarding,
+        }
+    }
+}
+
+/// The marks of a link's sender, each with the byte of the link at which it stands: the answer to the byte that was
+/// remarked, or the next byte where none was sent (a time-out).
+fn placed<'t>(link: &LinkTrace, marks: &'t [Mark]) -> Vec<(usize, &'t Mark)> {
+    let own: Vec<_> = marks
+        .iter()
+        .filter(|mark| link.from == Some(mark.drive))
+        .collect();
+    if own.is_empty() {
+        return Vec::new();
+    }
+    let sent: Vec<_> = (0..link.bytes.len())
+        .filter(|place| link.bytes[*place].sent.is_some())
+        .collect();
+    own.into_iter()
+        .filter_map(|mark| {
+            let number = match mark.answered_as {
+                Some(number) => usize::try_from(number).ok()?.checked_sub(1)?,
+                None => sent.partition_point(|place| link.bytes[*place].at <= mark.at),
+            };
+            Some((*sent.get(number)?, mark))
+        })
+        .collect()
+}

@@ -1,0 +1,257 @@
+//! Captures beside the model, beside each other, and as scenarios.
+
+use super::{DAMAGED, built_in, pcapng, run, text};
+use harness::capture::{Capture, Options, Run, diff, judge, read, scenario};
+use harness::scenario::source::Source;
+use harness::scenario::verdict::Verdict;
+use harness_proto::line::LineError;
+use harness_proto::time::Span;
+use harness_sim::link::LineByte;
+
+fn options<'o>(setup: Option<&'o Source>) -> Options<'o> {
+    Options {
+        title: "test",
+        setup,
+        tolerance: Span::ZERO,
+    }
+}
+
+fn imported(capture: &Capture) -> Capture {
+    read(&pcapng(capture), None).expect("a capture")
+}
+
+/// Scenarios of the bus, faults on its links included: their captures alone, judged, say that all is by the manual, and as
+/// scenarios they leave the same bytes at the same times.
+#[test]
+fn what_the_model_did_passes() {
+    let names = [
+        "9.7-parity-error",
+        "9.8-check-sequence",
+        "9.8-two-check-sequences",
+        "9.8-three-check-sequences",
+        "10.1-read-byte",
+        "10.1-read-byte-wrong",
+        "10.1-read-word",
+        "10.1-read-long",
+        "10.2-write-word",
+        "10.3-and",
+        "10.3-or-wrong",
+        "10.4-write-io",
+    ];
+    for name in names {
+        let capture = imported(&built_in(name));
+        let judged =
+            judge(&capture, &options(None)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let shown = judged.links.show("capture", "model").to_string();
+        assert_eq!(judged.verdict, Verdict::Passed, "{name}: {shown}");
+        assert_eq!(judged.links.differ, 0, "{name}: {shown}");
+        let text = scenario(&capture, &options(None)).expect("a scenario");
+        let again = run(&text);
+        let (left, right) = (
+            Run {
+                name: "capture",
+                capture: &capture,
+            },
+            Run {
+                name: "again",
+                capture: &again,
+            },
+        );
+        let same = diff(left, right, Span::from_nanos(2));
+        let shown = same.show("capture", "again").to_string();
+        assert!(same.same(), "{name}: {shown}\n{text}");
+    }
+}
+
+/// Every kind of damage is done again.
+#[test]
+fn damage_is_done_again() {
+    let capture = imported(&run(DAMAGED));
+    let text = scenario(&capture, &options(None)).expect("a scenario");
+    for fault in [
+        "byte 3: flip 2",
+        "byte 5: flip p",
+        "byte 7: flip s",
+        "byte 12: overrun",
+        "byte 14: drop",
+        "byte 16: insert 55",
+        "byte 18: replace 81",
+        "byte 20: duplicate",
+        "byte 9: break ",
+    ] {
+        assert!(
+            text.contains(&format!("! 1->0 {fault}")),
+            "{fault}:\n{text}"
+        );
+    }
+    let judged = judge(&capture, &options(None)).expect("judged");
+    let shown = judged.links.show("capture", "model").to_string();
+    assert_eq!(judged.links.differ, 0, "{shown}\n{text}");
+}
+
+/// The drive that the ring spells out at the end is named (ND21 9.7).
+#[test]
+fn the_drive_that_saw_a_fault_is_named() {
+    let capture = imported(&run("title f\nring 3\n! 2->1 byte 3: flip 0\n> 80*40\n"));
+    assert_eq!(
+        judge(&capture, &options(None)).expect("judged").located,
+        Some((0, 1))
+    );
+}
+
+/// A cut cable, and one that is whole again (ND21 9.9 begins so).
+#[test]
+fn a_cut_is_told() {
+    let text = "title cut\nring 3\n! 2->1 byte 4: cut\n! 2->1 byte 16: join\n> 80*20\n";
+    let capture = imported(&run(text));
+    let again = scenario(&capture, &options(None)).expect("a scenario");
+    assert!(
+        again.contains("! 2->1 byte 4: cut") && again.contains("! 2->1 byte 16: join"),
+        "{again}"
+    );
+    assert_eq!(
+        judge(&capture, &options(None))
+            .expect("judged")
+            .links
+            .differ,
+        0
+    );
+}
+
+/// A drive that does not keep to the manual is found, with the byte and the link behind it.
+#[test]
+fn a_wrong_drive_is_found() {
+    let wrong = "title wrong\nring 3\ndrive 1 memory FE13 = 88\ndrive 1 deviates checksum-not-negated\n\
+                 > 88 FE C0 13 FE D1\n";
+    let capture = imported(&run(wrong));
+    let judged = judge(&capture, &options(None)).expect("judged");
+    assert_eq!(judged.verdict, Verdict::Failed);
+    let first = judged.links.first.expect("a difference");
+    assert!(first.link.starts_with("1->0"), "{first:?}");
+}
+
+/// What only one end saw is judged too; without the master's incoming link nothing can be.
+#[test]
+fn a_capture_of_some_links() {
+    let mut capture = imported(&built_in("10.1-read-byte"));
+    let all = capture.traces[0].links.clone();
+    capture.traces[0]
+        .links
+        .retain(|link| link.from.is_none() || link.to.is_none());
+    let judged = judge(&capture, &options(None)).expect("judged");
+    assert_eq!((judged.verdict, judged.links.links), (Verdict::Passed, 2));
+    capture.traces[0].links.retain(|link| link.from.is_none());
+    let judged = judge(&capture, &options(None)).expect("judged");
+    assert_eq!(judged.verdict, Verdict::Inconclusive);
+    capture.traces[0].links = all[1..].to_vec();
+    let error = judge(&capture, &options(None)).expect_err("no stimuli");
+    assert!(error.to_string().contains("no link master->2"), "{error}");
+}
+
+/// Data that change by themselves are told from those that a drive must know.
+#[test]
+fn data_that_change_by_themselves() {
+    let read = "> 88 FE C0 13 FE D1\n";
+    let text = format!(
+        "title changing\nring 3\ndrive 1 memory FE13 = 88\n{}",
+        read.repeat(3)
+    );
+    let mut capture = imported(&run(&text));
+    // The second answer holds another value, with its own checking byte.
+    let last = capture.traces[0].links.last_mut().expect("a link");
+    for (index, byte) in [(10, 0x10), (11, 0x1D)] {
+        let at = last.bytes[index].at;
+        last.bytes[index] = LineByte::seen(at, Some(byte), Some(byte), None);
+    }
+    capture.traces[0]
+        .links
+        .retain(|link| link.from.is_none() || link.to.is_none());
+    let judged = judge(&capture, &options(None)).expect("judged");
+    assert_eq!((judged.verdict, judged.unforeseen), (Verdict::Passed, 2));
+    let text = scenario(&capture, &options(None)).expect("a scenario");
+    assert!(text.contains("88 01 C0 13 xx xx"), "{text}");
+}
+
+/// Whole drives need to be told of: the header of a scenario does it.
+#[test]
+fn with_a_setup() {
+    let name = "14.3.6-ee-selftest";
+    let capture = imported(&built_in(name));
+    let source = Source::from_bytes(name.to_owned(), text(name).into()).expect("a text");
+    let judged = judge(&capture, &options(Some(&source))).expect("judged");
+    let shown = judged.links.show("capture", "model").to_string();
+    assert_eq!(
+        (judged.verdict, judged.adopted),
+        (Verdict::Passed, 0),
+        "{shown}"
+    );
+    let plain = judge(&capture, &options(None)).expect("judged");
+    assert_eq!(plain.verdict, Verdict::Failed);
+}
+
+#[test]
+fn the_first_difference() {
+    let left = run("title a\nring 2\n> 80*8\n");
+    let mut right = left.clone();
+    let byte = &mut right.traces[0].links[2].bytes[5];
+    *byte = LineByte::seen(byte.at, Some(0x80), Some(0x81), Some(LineError::Parity));
+    let (a, b) = (
+        Run {
+            name: "a",
+            capture: &left,
+        },
+        Run {
+            name: "b",
+            capture: &right,
+        },
+    );
+    let summary = diff(a, b, Span::ZERO);
+    let first = summary.first.clone().expect("a difference");
+    assert_eq!(
+        (first.link.as_str(), first.byte, summary.differ),
+        ("0->master", 6, 1)
+    );
+    let shown = summary.show("a", "b").to_string();
+    assert!(
+        shown.contains(">      6  80                    81 parity (sent 80)"),
+        "{shown}"
+    );
+    // Times alone.
+    let mut late = left.clone();
+    let byte = &mut late.traces[0].links[0].bytes[7];
+    byte.at += Span::from_millis(1);
+    let b = Run {
+        name: "b",
+        capture: &late,
+    };
+    assert!(diff(a, b, Span::ZERO).first.expect("a time").only_time);
+    assert!(diff(a, b, Span::from_millis(1)).same());
+    // A link that one side alone has.
+    late.traces[0].links.pop();
+    let b = Run {
+        name: "b",
+        capture: &late,
+    };
+    assert_eq!(diff(a, b, Span::from_millis(1)).alone, ["0->master (a)"]);
+}
+
+/// Titles of files are no lines of a scenario.
+#[test]
+fn hostile_names_stay_titles() {
+    let capture = run("title a\nring 2\n> 80\n");
+    let hostile = Options {
+        title: "x\n> 88\n# y\u{1b}[0m",
+        ..options(None)
+    };
+    let text = scenario(&capture, &hostile).expect("a scenario");
+    assert!(text.starts_with("title   x > 88   y [0m\nring"), "{text:?}");
+    run(&text);
+    // Nothing sent is nothing to play.
+    let mut silent = capture.clone();
+    silent.traces[0]
+        .links
+        .iter_mut()
+        .for_each(|link| link.bytes.clear());
+    let error = scenario(&silent, &options(None)).expect_err("silence");
+    assert!(error.to_string().contains("sent nothing"));
+}
