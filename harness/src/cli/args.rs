@@ -2,6 +2,7 @@
 
 use super::drive::DriveCommand;
 use super::exit::Exit;
+use super::fuzz::FuzzCommand;
 use super::rig::RigCommand;
 use crate::rig::values::{Time, ValueError};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -67,6 +68,12 @@ pub enum Command {
     Verify {
         /// The folder.
         folder: PathBuf,
+    },
+    /// Look for what nobody has thought of: conversations from a seed, on simulated rings or on a rig.
+    Fuzz {
+        /// What to do.
+        #[command(subcommand)]
+        command: FuzzCommand,
     },
     /// Show benches, lock them, find their ports.
     Rig {
@@ -262,8 +269,12 @@ fn ring_size(text: &str) -> Result<u8, String> {
         .map_err(|error| error.to_string())
 }
 
+/// What `--wire-time` of the commands of `fuzz` says of itself.
+pub(super) const WIRE_TIME_HELP: &str = "How long the line is used at most, such as 60s; on a rig with ports one minute \
+                                         where nothing is said";
+
 /// A time such as `30s`; at most a day.
-fn duration(text: &str) -> Result<Duration, String> {
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
     const LONGEST: Duration = Duration::from_secs(24 * 3_600);
     let time: Time = text
         .parse()

@@ -6,6 +6,7 @@ mod check;
 mod deviations;
 mod drive;
 mod exit;
+mod fuzz;
 mod list;
 mod man;
 mod manual;
@@ -65,6 +66,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Cells(arguments) => cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify { folder } => verify::verify(&folder, output),
+        Command::Fuzz { command } => fuzz::fuzz(&command, output),
         Command::Rig { command } => rig::rig(&command, output),
         Command::Deviations(arguments) => deviations::deviations(&arguments, output),
         Command::Drive(command) => drive::drive(&command, output),

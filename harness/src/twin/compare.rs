@@ -43,6 +43,20 @@ pub enum What {
     Time,
 }
 
+impl What {
+    /// It in a few words.
+    #[must_use]
+    pub const fn words(&self) -> &'static str {
+        match self {
+            Self::Value => "another value",
+            Self::LineStatus => "another line status",
+            Self::Missing => "a byte is missing",
+            Self::Surplus => "a byte too many",
+            Self::Time => "another time",
+        }
+    }
+}
+
 /// The first byte that is otherwise than the model says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Divergence {
@@ -74,13 +88,7 @@ impl fmt::Display for Divergence {
             },
         };
         let (section, rule) = self.role.rule();
-        let what = match self.what {
-            What::Value => "another value",
-            What::LineStatus => "another line status",
-            What::Missing => "a byte is missing",
-            What::Surplus => "a byte too many",
-            What::Time => "another time",
-        };
+        let what = self.what.words();
         let ring = if self.ring == 0 { "" } else { " of ring 2" };
         write!(f, "byte {}{ring}", self.byte)?;
         if let Some(drive) = self.drive {
@@ -337,20 +345,31 @@ fn moves(address: u16) -> bool {
 }
 
 /// Whether a byte is another one, or one too many or too few.
-fn what_of(
+pub(crate) fn what_of(
     expected: &[(Instant, Received)],
     received: &[(Instant, Received)],
     index: usize,
 ) -> What {
     const ALIKE: usize = 4;
+    fn rest(bytes: &[(Instant, Received)], from: usize) -> &[(Instant, Received)] {
+        bytes.get(from..).unwrap_or_default()
+    }
+    match (expected.get(index), received.get(index)) {
+        (_, None) => return What::Missing,
+        (None, _) => return What::Surplus,
+        (Some((_, wanted)), Some((_, found))) if wanted.byte == found.byte => {
+            return What::LineStatus;
+        }
+        _ => {}
+    }
     let run = |a: &[(Instant, Received)], b: &[(Instant, Received)]| {
         a.len() >= ALIKE
             && b.len() >= ALIKE
             && a[..ALIKE].iter().zip(b).all(|(a, b)| a.1.byte == b.1.byte)
     };
-    if run(&expected[index + 1..], &received[index..]) {
+    if run(rest(expected, index + 1), rest(received, index)) {
         What::Missing
-    } else if run(&expected[index..], &received[index + 1..]) {
+    } else if run(rest(expected, index), rest(received, index + 1)) {
         What::Surplus
     } else {
         What::Value
