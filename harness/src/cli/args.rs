@@ -3,7 +3,9 @@
 use super::drive::DriveCommand;
 use super::exit::Exit;
 use super::fuzz::FuzzCommand;
+use super::promote::PromoteArguments;
 use super::rig::RigCommand;
+use super::shrink::ShrinkArguments;
 use crate::rig::values::{Time, ValueError};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -75,6 +77,10 @@ pub enum Command {
         #[command(subcommand)]
         command: FuzzCommand,
     },
+    /// Make a finding of `fuzz run` small: what is not needed for it is left out.
+    Shrink(ShrinkArguments),
+    /// Turn a finding into a scenario, an input of the fuzz targets and a snapshot, in a checkout of the repository.
+    Promote(PromoteArguments),
     /// Show benches, lock them, find their ports.
     Rig {
         /// What to do.

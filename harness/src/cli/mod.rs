@@ -11,11 +11,13 @@ mod list;
 mod man;
 mod manual;
 mod output;
+mod promote;
 mod qualify;
 mod rig;
 mod rig_failure;
 mod run;
 mod run_rig;
+mod shrink;
 mod trace;
 mod verify;
 
@@ -67,6 +69,8 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify { folder } => verify::verify(&folder, output),
         Command::Fuzz { command } => fuzz::fuzz(&command, output),
+        Command::Shrink(arguments) => shrink::shrink(&arguments, output),
+        Command::Promote(arguments) => promote::promote(&arguments, output),
         Command::Rig { command } => rig::rig(&command, output),
         Command::Deviations(arguments) => deviations::deviations(&arguments, output),
         Command::Drive(command) => drive::drive(&command, output),

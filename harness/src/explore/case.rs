@@ -257,6 +257,37 @@ impl Command {
         }
     }
 
+    /// The address that is written in it whole; none of the bit commands.
+    #[must_use]
+    pub const fn cell(self) -> Option<u16> {
+        match self {
+            Self::ReadByte { cell }
+            | Self::ReadWord { cell }
+            | Self::ReadLong { cell }
+            | Self::WriteByte { cell, .. }
+            | Self::WriteWord { cell, .. } => Some(cell),
+            _ => None,
+        }
+    }
+
+    /// The same command with the address `new` in place of `old`.
+    #[must_use]
+    pub fn at(mut self, old: u16, new: u16) -> Self {
+        match &mut self {
+            Self::ReadByte { cell }
+            | Self::ReadWord { cell }
+            | Self::ReadLong { cell }
+            | Self::WriteByte { cell, .. }
+            | Self::WriteWord { cell, .. }
+                if *cell == old =>
+            {
+                *cell = new;
+            }
+            _ => {}
+        }
+        self
+    }
+
     /// What the guard calls it.
     #[must_use]
     pub const fn act(self) -> GuardedAct {

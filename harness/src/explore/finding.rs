@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::error::ExploreError;
 use super::files::{read_text, write_whole};
-use super::oracle::Difference;
+use super::oracle::{Difference, answered};
 use super::play::Seen;
 use super::setup::Setup;
 use super::text::{Expected, Page, text};
@@ -152,7 +152,7 @@ fn unknowable(case: &Case, seen: &Seen) -> Vec<usize> {
     let sent: Vec<_> = case.bytes().into_iter().map(|byte| (byte, true)).collect();
     let mut any = Vec::new();
     let mut open = false;
-    for (index, role) in roles(size, &sent).into_iter().enumerate() {
+    for (index, role) in answered(&roles(size, &sent), &sent).enumerate() {
         match role {
             Role::Data { address, .. } => {
                 let known = cell_at(address);

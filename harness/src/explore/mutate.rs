@@ -103,14 +103,10 @@ fn vary(act: &mut Act, maker: &Generator<'_>, dice: &mut Dice) {
 /// Another command to the same cell, or a spoiled one.
 fn like(order: &Order, maker: &Generator<'_>, dice: &mut Dice) -> Order {
     let new = maker.order(dice);
-    let cell = match order.command {
-        Command::ReadByte { cell }
-        | Command::ReadWord { cell }
-        | Command::ReadLong { cell }
-        | Command::WriteByte { cell, .. }
-        | Command::WriteWord { cell, .. } => cell,
-        Command::And { low, .. } | Command::Or { low, .. } => 0xFF00 | u16::from(low),
-        Command::WriteIo { .. } | Command::Reset => return new,
+    let cell = match (order.command.cell(), order.command) {
+        (Some(cell), _) => cell,
+        (None, Command::And { low, .. } | Command::Or { low, .. }) => 0xFF00 | u16::from(low),
+        _ => return new,
     };
     let command = match new.command {
         Command::ReadByte { .. } => Command::ReadByte { cell },

@@ -9,6 +9,7 @@ use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::Instant;
 use harness_sim::reference;
 use harness_sim::trace::Trace;
@@ -90,12 +91,14 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
         Some(index) => (index, twin::what_of(expected, received, index)),
         None => (pairs().position(|(a, b)| a.0 != b.0)?, twin::What::Time),
     };
-    let damaged: BTreeSet<u64> = case.faults().iter().map(|(_, byte, _)| *byte).collect();
+    let faults = case.faults().into_iter();
+    let spoiling = faults.filter(|(.., harm)| !matches!(harm, Harm::Delay(_)));
+    let damaged: BTreeSet<u64> = spoiling.map(|(_, byte, _)| byte).collect();
     let sent: Vec<_> = (1..)
         .zip(case.bytes())
         .map(|(number, byte)| (byte, !damaged.contains(&number)))
         .collect();
-    let role = roles(size, &sent).get(index).copied();
+    let role = answered(&roles(size, &sent), &sent).nth(index);
     let role = role.unwrap_or(Role::Foreign);
     let divergence = twin::Divergence {
         ring: 0,
@@ -108,6 +111,17 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
         drive: role.drive(),
     };
     Some(Difference::from(&divergence))
+}
+
+/// The roles of bytes that are answered: a PAUSE where a sync byte is due is not (ND21 9.2).
+pub(super) fn answered<'a>(
+    roles: &'a [Role],
+    sent: &'a [(u8, bool)],
+) -> impl Iterator<Item = Role> + 'a {
+    let pairs = roles.iter().zip(sent);
+    pairs
+        .filter(|(role, (byte, _))| (**role, *byte) != (Role::Idle, PAUSE))
+        .map(|(role, _)| *role)
 }
 
 /// The first place where a simulated ring of plain drives is otherwise than the reference model; `None` also where the case is

@@ -1,9 +1,12 @@
 //! A case as a scenario: every finding is one.
 
 use super::case::{Act, Case, Harm, Talk, To, What};
+use super::oracle::answered;
 use super::play::Seen;
 use crate::link::link_name;
 use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::role::roles;
 use harness_proto::time::Instant;
 use std::fmt::Write as _;
 
@@ -205,12 +208,17 @@ fn fault(harm: Harm) -> String {
 fn answers(text: &mut String, case: &Case, expected: Expected<'_>) {
     let received = &expected.seen.received;
     let mut from = 0;
-    if received.len() == case.bytes().len() {
-        for act in &case.acts {
-            for part in act.parts(case.drives) {
-                answer(text, received, from..from + part.len(), expected);
-                from += part.len();
-            }
+    let sent: Vec<_> = case.bytes().into_iter().map(|byte| (byte, true)).collect();
+    let roles = RingSize::new(u64::from(case.drives)).map(|size| roles(size, &sent));
+    let roles = roles.unwrap_or_default();
+    if received.len() == answered(&roles, &sent).count() {
+        let mut rest = (&roles[..], &sent[..]);
+        for part in case.acts.iter().flat_map(|act| act.parts(case.drives)) {
+            let (own, later) = (rest.0.split_at(part.len()), rest.1.split_at(part.len()));
+            let count = answered(own.0, later.0).count();
+            answer(text, received, from..from + count, expected);
+            from += count;
+            rest = (own.1, later.1);
         }
     }
     let step = 4 * BYTES_A_LINE;

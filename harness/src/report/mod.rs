@@ -2,5 +2,6 @@
 
 pub mod json;
 pub mod mismatch;
+pub mod page;
 pub mod plot;
 pub mod table;
