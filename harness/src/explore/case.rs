@@ -13,7 +13,7 @@ use harness_sim::fault::Flips;
 use serde::{Deserialize, Serialize};
 
 /// The most acts of a case.
-pub const MOST_ACTS: usize = 24;
+pub const MOST_ACTS: usize = 48;
 
 /// The most bytes that a case sends.
 pub const MOST_BYTES: usize = 400;
@@ -268,6 +268,19 @@ impl Command {
             | Self::WriteWord { cell, .. } => Some(cell),
             _ => None,
         }
+    }
+
+    /// The same command with this in its data, or in the low byte of them.
+    #[must_use]
+    pub const fn with_data(mut self, new: u8) -> Self {
+        match &mut self {
+            Self::WriteByte { data, .. } | Self::And { data, .. } | Self::Or { data, .. } => {
+                *data = new;
+            }
+            Self::WriteWord { data, .. } => *data = *data & 0xFF00 | new as u16,
+            _ => {}
+        }
+        self
     }
 
     /// The same command with the address `new` in place of `old`.

@@ -2,7 +2,9 @@
 
 use super::case::{Act, Case, Command, Damage, Harm, MOST_NET, Order, Spoil, Talk, To, What};
 use super::dice::Dice;
+use super::idiom::Idiom;
 use super::swarm::{Spice, Swarm};
+use harness_proto::nd21::bits::status;
 use harness_proto::nd21::cells::{Access, RAM};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::guard::Limits;
@@ -75,7 +77,7 @@ impl<'s> Generator<'s> {
     pub fn case(&self, dice: &mut Dice) -> Case {
         let mut acts = Vec::new();
         for _ in 0..1 + dice.below(NEW_ACTS) {
-            acts.push(self.act(dice));
+            self.add(&mut acts, dice);
         }
         self.damage(&mut acts, dice);
         self.end(&mut acts, dice);
@@ -84,7 +86,67 @@ impl<'s> Generator<'s> {
             acts,
         };
         self.keep_in_step(&mut case);
+        // Growing beyond the bounds loses the end.
+        while !case.is_bounded() && case.acts.pop().is_some() {}
         case
+    }
+
+    /// Adds an act, or some that belong together.
+    pub fn add(&self, acts: &mut Vec<Act>, dice: &mut Dice) {
+        let possible = Idiom::ALL
+            .iter()
+            .filter(|(_, spice)| self.swarm.has(*spice));
+        let possible: Vec<Idiom> = possible.map(|(idiom, _)| *idiom).collect();
+        match dice.pick(&possible) {
+            Some(idiom) if dice.percent(40) => idiom.play(acts, self, dice),
+            _ => acts.push(self.act(dice)),
+        }
+    }
+
+    /// A drive of the ring.
+    pub(super) fn drive(&self, dice: &mut Dice) -> u8 {
+        dice.below(usize::from(self.scope.drives)) as u8
+    }
+
+    /// All of them.
+    pub(super) fn drives(&self) -> std::ops::Range<u8> {
+        0..self.scope.drives
+    }
+
+    /// The link in front of a drive, where faults can be put on it.
+    pub(super) fn link_before(&self, drive: u8) -> Option<u8> {
+        let link = self.scope.drives.checked_sub(drive + 1)?;
+        self.scope.links.contains(&link).then_some(link)
+    }
+
+    /// Whether the rig allows a command.
+    pub(super) fn allows(&self, command: Command) -> bool {
+        self.scope.limits.missing(command.act().need()).is_none()
+    }
+
+    /// A command that changes something, where the rig allows one.
+    pub(super) fn change(&self, dice: &mut Dice) -> Command {
+        const CHANGES: [Spice; 5] = [
+            Spice::WriteByte,
+            Spice::WriteWord,
+            Spice::And,
+            Spice::Or,
+            Spice::WriteIo,
+        ];
+        let own = self.swarm.of(&CHANGES);
+        for _ in 0..8 {
+            if let Some(spice) = dice.pick(&own) {
+                let command = self.of_kind(*spice, dice);
+                if self.allows(command) {
+                    return command;
+                }
+            }
+        }
+        // Stop and block (ND21 14.10) are always allowed.
+        Command::WriteByte {
+            cell: ram::STATUS,
+            data: status::BLOCK | status::STOP,
+        }
     }
 
     /// Any act.
@@ -187,7 +249,7 @@ impl<'s> Generator<'s> {
                 Some(spice) => self.of_kind(*spice, dice),
                 None => break,
             };
-            if self.scope.limits.missing(command.act().need()).is_none() {
+            if self.allows(command) {
                 return command;
             }
         }
@@ -228,7 +290,7 @@ impl<'s> Generator<'s> {
         }
     }
 
-    fn cell(&self, dice: &mut Dice) -> u16 {
+    pub(super) fn cell(&self, dice: &mut Dice) -> u16 {
         match dice.below(100) {
             0..12 if self.swarm.has(Spice::Forbidden) => EDGES[dice.below(EDGES.len())],
             12..16 if self.swarm.has(Spice::Forbidden) => dice.word(),

@@ -13,6 +13,7 @@ mod error;
 mod files;
 mod finding;
 mod generate;
+mod idiom;
 mod mutate;
 mod novelty;
 mod on_rig;

@@ -24,7 +24,11 @@ fn one(case: &mut Case, other: Option<&Case>, maker: &Generator<'_>, dice: &mut 
     let place = dice.below(case.acts.len() + 1);
     let inside = dice.below(case.acts.len());
     match dice.below(9) {
-        0 => case.acts.insert(place, maker.act(dice)),
+        0 => {
+            let mut new = Vec::new();
+            maker.add(&mut new, dice);
+            case.acts.splice(place..place, new);
+        }
         1 if case.acts.len() > 1 => {
             case.acts.remove(inside);
         }

@@ -58,11 +58,15 @@ pub enum Spice {
     Late,
     /// Drives without power.
     Power,
+    /// Motors that turn (14.10, 14.5.3.1, 13.2).
+    Motion,
+    /// The EEPROM controller (14.10.5).
+    Eeprom,
 }
 
 impl Spice {
     /// All with their names.
-    pub const NAMES: [(&'static str, Self); 25] = [
+    pub const NAMES: [(&'static str, Self); 27] = [
         ("read-byte", Self::ReadByte),
         ("read-word", Self::ReadWord),
         ("read-long", Self::ReadLong),
@@ -88,6 +92,8 @@ impl Spice {
         ("slip", Self::Slip),
         ("late", Self::Late),
         ("power", Self::Power),
+        ("motion", Self::Motion),
+        ("eeprom", Self::Eeprom),
     ];
 
     /// The commands; a conversation has at least one of them.

@@ -17,7 +17,7 @@ use std::fmt::Write as _;
 
 const FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/deviations.toml");
 
-/// How many drives the ring has; the one in the middle deviates.
+/// How many drives the ring has; one of them deviates, another one with each seed.
 const DRIVES: u8 = 3;
 
 /// For `fuzz power`.
@@ -120,15 +120,15 @@ fn counts(
 ) -> Result<Vec<Option<u64>>, ExploreError> {
     let rig = find(&format!("sim:{DRIVES}"), std::path::Path::new(""))
         .map_err(|error| ExploreError::Usage(error.to_string()))?;
-    let planted = Planted {
-        drive: DRIVES / 2,
-        name: deviation.name.to_owned(),
-    };
-    let setup = Setup::of_rig(&rig, &[planted], false);
-    let mut target = OnSim::new(setup.clone());
     let mut counts = Vec::new();
     for seed in 1..=arguments.seeds {
-        let scope = simulated(DRIVES, Limits::unlimited());
+        let planted = Planted {
+            drive: u8::try_from(seed % u64::from(DRIVES)).unwrap_or(0),
+            name: deviation.name.to_owned(),
+        };
+        let setup = Setup::of_rig(&rig, &[planted], false);
+        let mut target = OnSim::new(setup.clone());
+        let scope = simulated(DRIVES, Limits::unlimited(), &setup);
         let about = About {
             schema: About::SCHEMA,
             rig: format!("sim:{DRIVES}"),

@@ -61,12 +61,8 @@ pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
     if rig.is_simulated() {
         let setup = Setup::of_rig(&rig, &[], false);
         let mut target = OnSim::new(setup.clone());
-        let campaign = campaign(
-            arguments,
-            &rig,
-            setup,
-            simulated(drives, Limits::unlimited()),
-        );
+        let scope = simulated(drives, Limits::unlimited(), &setup);
+        let campaign = campaign(arguments, &rig, setup, scope);
         return play(arguments, campaign, cases, &mut target, output);
     }
     let how = Use {

@@ -3,7 +3,7 @@
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{exit_of, interrupt_flag, tell_end};
-use crate::explore::{ExploreError, Scope, Spice};
+use crate::explore::{ExploreError, Scope, Setup, Spice};
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::{Options, Rig, Run, Session};
@@ -77,11 +77,15 @@ pub(crate) fn on_ports(
     Ok(tell_end(&end, exit, output))
 }
 
-/// What cases may have on simulated rings.
-pub(crate) fn simulated(drives: u8, limits: Limits) -> Scope {
+/// What cases may have on simulated rings; plain drives have nothing behind their bus.
+pub(crate) fn simulated(drives: u8, limits: Limits, setup: &Setup) -> Scope {
+    let behind = [Spice::Motion, Spice::Eeprom];
+    let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
     Scope {
         drives,
-        spices: Spice::NAMES.iter().map(|(_, spice)| *spice).collect(),
+        spices: all
+            .filter(|spice| !setup.is_plain() || !behind.contains(spice))
+            .collect(),
         // What is damaged behind the last drive no drive hears.
         links: (0..drives).collect(),
         limits,
@@ -108,6 +112,8 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
         Spice::Reset => limits.reset && limits.motion,
         Spice::ProcessData => limits.motion,
         Spice::WriteIo => limits.outputs,
+        Spice::Motion => limits.motion,
+        Spice::Eeprom => limits.eeprom,
         _ => true,
     };
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);

@@ -174,7 +174,7 @@ fn on_simulated(
         outputs: own.allow_outputs,
         ..Limits::default()
     };
-    let scope = simulated(drives, limits);
+    let scope = simulated(drives, limits, &setup);
     let mut target = OnSim::new(setup.clone());
     let bounds = Bounds {
         cases: arguments.cases.unwrap_or(match arguments.wire_time {
