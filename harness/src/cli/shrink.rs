@@ -2,7 +2,7 @@
 
 use super::args::duration;
 use super::exit::Exit;
-use super::fuzz::{Use, on_ports, tell};
+use super::fuzz::{Use, on_ports, scope, tell};
 use super::output::Output;
 use super::rig_failure::find_rig;
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
@@ -158,7 +158,8 @@ fn on_rig(
     most: u32,
     run: &mut Run<'_>,
 ) -> Result<Shrunk, ExploreError> {
-    let mut target = OnRig::new(run)?;
+    let limits = scope(run).limits;
+    let mut target = OnRig::new(run, limits)?;
     let mut ask = |subject: &Subject| {
         if subject.case.drives != finding.case.drives {
             return Ok(None);

@@ -8,7 +8,6 @@ use super::play::Seen;
 use super::setup::Setup;
 use super::text::{Expected, Page, text};
 use crate::manual::tables;
-use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use serde::{Deserialize, Serialize};
@@ -155,10 +154,7 @@ fn unknowable(case: &Case, seen: &Seen) -> Vec<usize> {
     for (index, role) in answered(&roles(size, &sent), &sent).enumerate() {
         match role {
             Role::Data { address, .. } => {
-                let known = cell_at(address);
-                let own = known.is_none_or(|cell| {
-                    cell.access != Access::Write || cell.section.starts_with("14.4")
-                });
+                let own = crate::twin::unknowable(address);
                 open |= own;
                 if own {
                     any.push(index);

@@ -7,7 +7,7 @@ use super::swarm::{Spice, Swarm};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::cells::{Access, RAM};
 use harness_proto::nd21::ram;
-use harness_proto::novobus::guard::Limits;
+use harness_proto::novobus::guard::{Limits, Need};
 
 /// What cases may have on a rig.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub struct Scope {
     pub links: Vec<u8>,
     /// What may be sent.
     pub limits: Limits,
+    /// Whether the EEPROM is spared, whatever may be sent: what is written there stays (ND21 14.10.5).
+    pub spare_eeprom: bool,
 }
 
 /// The most acts that a new case has in front of its end.
@@ -121,7 +123,9 @@ impl<'s> Generator<'s> {
 
     /// Whether the rig allows a command.
     pub(super) fn allows(&self, command: Command) -> bool {
-        self.scope.limits.missing(command.act().need()).is_none()
+        let need = command.act().need();
+        let eeprom = need.contains(Need::EEPROM) && !need.contains(Need::EVERYTHING);
+        self.scope.limits.missing(need).is_none() && !(eeprom && self.scope.spare_eeprom)
     }
 
     /// A command that changes something, where the rig allows one.

@@ -212,6 +212,7 @@ fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: 
             byte: bytes[own],
         });
     }
+    let cell = order.command.cell();
     let one = Talk {
         to: To::Drive(drive),
         process_data: None,
@@ -219,7 +220,14 @@ fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: 
         room: MOST_NET,
     };
     acts.push(Act::sound(What::Talk(one)));
-    acts.push(Act::sound(What::Synco(1 + dice.below(8) as u8)));
+    match cell.filter(|_| dice.percent(50)) {
+        None => acts.push(Act::sound(What::Synco(1 + dice.below(8) as u8))),
+        Some(cell) => {
+            // Whether it was done all the same (9.6).
+            acts.push(Act::sound(What::Recover));
+            acts.push(talk(drive, Command::ReadByte { cell }));
+        }
+    }
 }
 
 fn sum(command: Command) -> Checksum {
@@ -337,6 +345,7 @@ fn time_out(acts: &mut Vec<Act>, maker: &Generator<'_>, dice: &mut Dice) {
             cell: ram::ERRORCODE,
         },
     ));
+    acts.push(talk(drive, Command::ReadByte { cell: ram::FLAGS2 }));
     let flags = ram::FLAGS2 as u8;
     acts.push(talk(
         drive,

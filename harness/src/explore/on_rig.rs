@@ -15,6 +15,8 @@ use crate::rig::{Attempt, Run, play_one};
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
+use harness_proto::nd21::bits::flags2;
+use harness_proto::nd21::ram;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::time::{Instant, Span};
 
@@ -30,13 +32,12 @@ pub struct OnRig<'r, 's> {
 }
 
 impl<'r, 's> OnRig<'r, 's> {
-    /// Cases on a rig.
+    /// Cases on a rig, within these limits and its own.
     ///
     /// # Errors
     /// Its model cannot be made.
-    pub fn new(run: &'r mut Run<'s>) -> Result<Self, ExploreError> {
+    pub fn new(run: &'r mut Run<'s>, limits: Limits) -> Result<Self, ExploreError> {
         let session = run.session();
-        let limits = session.limits();
         let plan = session.rig().plan_with(&[]).map_err(Box::new)?;
         let mut model = simulate::bench(&plan);
         model.run_until(Instant::START + WARM);
@@ -95,6 +96,14 @@ impl Target for OnRig<'_, '_> {
         });
         rehearsal.took = before.fold(rehearsal.seen.took, |sum, span| sum + span);
         rehearsal.features = features(case, &rehearsal.seen, &trace);
+        let monitors =
+            |drive| guarded.peek(0, drive, ram::FLAGS2).unwrap_or(0) & flags2::MONITORING;
+        let unasked = rehearsal.seen.received.len() > case.bytes().len();
+        if rehearsal.denied.is_none() && (unasked || (0..case.drives).any(|k| monitors(k) != 0)) {
+            // In real time it is a race how a ring comes out of that.
+            let why = "drives would miss bytes and send unasked (ND21 9.9)";
+            rehearsal.denied = Some(why.to_owned());
+        }
         Ok(rehearsal)
     }
 

@@ -4,12 +4,14 @@ use super::follow::Conversation;
 use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at};
+use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::ops::RangeInclusive;
 
 /// The longest run of one byte in which each counts: more than the 25 zeros of 9.7.
 const LONGEST_RUN: usize = 32;
@@ -140,6 +142,8 @@ pub(super) struct Comparer<'a> {
     pub(super) written: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells taken over.
     pub(super) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
+    /// Drives whose outgoing process data (14.10.3) change by themselves.
+    pub(super) moving: BTreeSet<(usize, u8)>,
     pub(super) comparison: Comparison,
 }
 
@@ -258,6 +262,11 @@ impl Comparer<'_> {
                 });
                 true
             }
+            Role::ProcessData { drive: Some(drive) } => {
+                let moves = !self.exactness.knows_cells && self.moving.contains(&(ring, drive));
+                self.comparison.measured += u64::from(moves);
+                moves
+            }
             Role::Check { length, .. } => {
                 let from = (index + 1).saturating_sub(usize::from(length));
                 let bytes = &received[from..index];
@@ -328,20 +337,33 @@ fn collapsed(bytes: &[(Instant, Received)]) -> Vec<(Instant, Received)> {
     kept
 }
 
+/// Whether no model knows what a cell of a real drive holds from one moment to the next.
+pub(crate) fn unknowable(address: u16) -> bool {
+    measured(address) || moves(address)
+}
+
 /// Whether the drive itself writes a cell (14.2: read only), so that no model knows what it holds.
 fn measured(address: u16) -> bool {
     cell_at(address).is_some_and(|cell| cell.access != Access::Write)
 }
 
 /// Whether a cell changes by itself as time goes on, so that a bench that is late by a moment reads something else: states
-/// (14.4), the positioning controller (13.3), the EEPROM controller (14.10.5) and the oscilloscope (14.10.6).
+/// (14.4), the positioning controller (13.3), the EEPROM controller (14.10.5), the oscilloscope (14.10.6), positions (14.5.5), and the
+/// counters and buffers of the drive's program (14.2.1).
 fn moves(address: u16) -> bool {
-    const SECTIONS: [&str; 4] = ["14.4", "13.3", "14.10.5", "14.10.6"];
-    cell_at(address).is_some_and(|cell| {
-        SECTIONS
-            .iter()
-            .any(|section| cell.section.starts_with(section))
-    })
+    const SECTIONS: [&str; 5] = ["14.4", "13.3", "14.10.5", "14.10.6", "14.5.5"];
+    const OWN: [RangeInclusive<u16>; 5] = [
+        ram::I2..=ram::I2 + 3,
+        ram::STACK..=ram::STACK + 95,
+        ram::N_INTEGRATOR..=ram::LAGE0 + 1,
+        ram::ICRA..=ram::ICRA0 + 1,
+        ram::CNT2..=ram::CNT_REVERS,
+    ];
+    OWN.iter().any(|own| own.contains(&address))
+        || cell_at(address).is_some_and(|cell| {
+            let own = |section: &&str| cell.section.starts_with(*section);
+            SECTIONS.iter().any(|section| own(&section))
+        })
 }
 
 /// Whether a byte is another one, or one too many or too few.
@@ -373,5 +395,54 @@ pub(crate) fn what_of(
         What::Surplus
     } else {
         What::Value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::{Line, Link};
+    use crate::scenario::simulate::bench;
+    use crate::scenario::source::Source;
+
+    /// ND21 14.2.1: what a drive changes by itself, while it stands and while it turns, is compared with nobody's.
+    #[test]
+    fn what_changes_by_itself_is_not_compared() {
+        let text = "title x\nring 1\ndrive 0 model nd21\ndrive 0 input GPIN3 GPIN5 high\nwrite-word 0 nsoll = 0400\n";
+        let source = Source {
+            name: "test".to_owned(),
+            text: text.to_owned().into(),
+        };
+        let plan = crate::library::Entry::new(source, None)
+            .expect("no mistakes")
+            .plan;
+        let mut link = bench(&plan.expect("novobus"));
+        // 9.3, 10.2: nsoll of drive 0 becomes 0400.
+        let turn = [0x8C, 0xFF, 0x63, 0x00, 0x04, 0x08, 0xFF, 0x6E];
+        let cells = |link: &crate::link::SimulatedLink| -> Vec<(u16, Option<u8>)> {
+            (0xFD80..=0xFF7F)
+                .map(|cell| (cell, link.peek(0, 0, cell)))
+                .collect()
+        };
+        let mut changed = BTreeSet::new();
+        for sent in [&[][..], &turn] {
+            link.send(0, sent);
+            link.run_until(link.now() + Span::from_millis(10));
+            let before = cells(&link);
+            for _ in 0..300 {
+                link.run_until(link.now() + Span::from_millis(1));
+                let pairs = cells(&link).into_iter().zip(&before);
+                changed.extend(pairs.filter(|(now, was)| now != *was).map(|(now, _)| now.0));
+            }
+        }
+        assert!(
+            changed.contains(&ram::CNT2) && changed.contains(&ram::LAGEIST),
+            "{changed:04X?}"
+        );
+        let compared: Vec<_> = changed
+            .iter()
+            .filter(|cell| !measured(**cell) && !moves(**cell))
+            .collect();
+        assert!(compared.is_empty(), "{compared:04X?}");
     }
 }

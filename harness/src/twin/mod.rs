@@ -8,6 +8,6 @@
 mod compare;
 mod follow;
 
-pub(crate) use compare::what_of;
 pub use compare::{Adopted, Comparison, Divergence, Exactness, What};
+pub(crate) use compare::{unknowable, what_of};
 pub use follow::{Conversation, Done, Twin};

@@ -10,7 +10,7 @@ use super::exit::Exit;
 use super::output::Output;
 use clap::Subcommand;
 
-pub(super) use rig::{Use, on_ports, tell};
+pub(super) use rig::{Use, on_ports, scope, tell};
 
 /// The commands of `fuzz`.
 #[derive(Debug, Subcommand)]

@@ -72,8 +72,9 @@ pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
     };
     on_ports(&rig, &how, output, |run, output| {
         let scope = scope(run);
+        let limits = scope.limits;
         let campaign = campaign(arguments, &rig, Setup::of_ports(), scope);
-        match OnRig::new(run) {
+        match OnRig::new(run, limits) {
             Ok(mut target) => play(arguments, campaign, cases, &mut target, output),
             Err(error) => Ok(tell(&error, output)),
         }

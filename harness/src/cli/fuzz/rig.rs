@@ -7,6 +7,7 @@ use crate::explore::{ExploreError, Scope, Setup, Spice};
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::{Options, Rig, Run, Session};
+use crate::scenario::run::start_anew;
 use harness_proto::novobus::guard::Limits;
 use std::time::Duration;
 
@@ -65,6 +66,7 @@ pub(crate) fn on_ports(
         }
     };
     let interrupted = session.link().trouble() == Some(&Trouble::Interrupted);
+    leave_clean(&mut session, output);
     let end = match worked {
         Ok(Exit::RigError) => session.close_with_error(),
         _ => session.close(),
@@ -75,6 +77,23 @@ pub(crate) fn on_ports(
         worked?
     };
     Ok(tell_end(&end, exit, output))
+}
+
+/// What cases have left in the drives' RAM goes with a reset, where that is allowed.
+fn leave_clean(session: &mut Session, output: &mut Output) {
+    let limits = session.limits();
+    let lost = |trouble: &Trouble| !matches!(trouble, Trouble::Denied(_));
+    if !(limits.reset && limits.motion) || session.link().trouble().is_some_and(lost) {
+        return;
+    }
+    let rings = session.rings().to_vec();
+    let done = match session.health() {
+        Ok(_) => start_anew(session.link(), &rings),
+        Err(error) => Err(error.to_string()),
+    };
+    if let Err(why) = done {
+        output.complain(&format!("the drives were not reset behind the run: {why}"));
+    }
 }
 
 /// What cases may have on simulated rings; plain drives have nothing behind their bus.
@@ -89,14 +108,24 @@ pub(crate) fn simulated(drives: u8, limits: Limits, setup: &Setup) -> Scope {
         // What is damaged behind the last drive no drive hears.
         links: (0..drives).collect(),
         limits,
+        spare_eeprom: false,
     }
 }
 
-/// What cases may have on a rig with ports.
+/// What cases may have on a rig with ports. What a case leaves in a drive's RAM the next reset takes away (ND21 10.5): without leave for
+/// it cases only read, stop and block. The EEPROM is never written.
 pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
     let capabilities = run.capabilities();
     let session = run.session();
-    let limits = session.limits();
+    let own = session.limits();
+    let limits = match own.reset && own.motion {
+        true => own,
+        false => Limits {
+            bytes_per_second: own.bytes_per_second,
+            most_bytes: own.most_bytes,
+            ..Limits::default()
+        },
+    };
     let drives = session.rig().file.ring.first.drives;
     let has = |capability| capabilities.contains(&capability);
     let link = session.link();
@@ -113,7 +142,7 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
         Spice::ProcessData => limits.motion,
         Spice::WriteIo => limits.outputs,
         Spice::Motion => limits.motion,
-        Spice::Eeprom => limits.eeprom,
+        Spice::Eeprom => false,
         _ => true,
     };
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
@@ -122,5 +151,6 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
         spices: all.filter(possible).collect(),
         links,
         limits,
+        spare_eeprom: true,
     }
 }

@@ -121,7 +121,7 @@ pub(super) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
     };
     on_ports(&rig, &how, output, |run, output| {
         let scope = scope(run);
-        let mut target = match OnRig::new(run) {
+        let mut target = match OnRig::new(run, scope.limits) {
             Ok(target) => target,
             Err(error) => return Ok(tell(&error, output)),
         };
