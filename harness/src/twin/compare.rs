@@ -8,6 +8,7 @@ use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -158,9 +159,13 @@ impl Comparer<'_> {
     ) {
         let sent = conversation.sent_in(ring);
         let received = &conversation.received_in(ring);
-        let roles = roles(size, &sent);
+        // A PAUSE where a sync byte is due is swallowed (9.2).
+        let all = roles(size, &sent).into_iter().zip(&sent).enumerate();
+        let answered = all.filter(|(_, (role, (byte, _)))| (*role, *byte) != (Role::Idle, PAUSE));
+        let (places, roles): (Vec<usize>, Vec<Role>) =
+            answered.map(|(place, (role, _))| (place, role)).unzip();
         // A ring that gives back a byte for a byte (9.1) has each role at its place.
-        let aligned = received.len() == sent.len() && expected.len() == sent.len();
+        let aligned = received.len() == roles.len() && expected.len() == roles.len();
         let real_time = self.exactness.tolerance > Span::ZERO;
         let (shorter, short);
         let (expected, received) = if aligned || !real_time {
@@ -172,6 +177,10 @@ impl Comparer<'_> {
         // What was still coming when the conversation ended came a moment sooner or later.
         let tail = conversation.end - self.exactness.tolerance - TAIL;
         let role_at = |index: usize| roles.get(index).copied().unwrap_or(Role::Foreign);
+        let step_at = |index: usize| {
+            let place = places.get(index).copied().unwrap_or(index);
+            conversation.step_at(ring, place)
+        };
         for index in 0..received.len().max(expected.len()) {
             let role = role_at(index);
             let pair = (expected.get(index).copied(), received.get(index).copied());
@@ -180,11 +189,11 @@ impl Comparer<'_> {
                     let found_good = found.error.is_none() || !self.exactness.line_errors;
                     let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
                     let same = wanted.byte == found.byte
-                        || aligned && self.may_differ(ring, role, received, index);
+                        || aligned && self.may_differ(ring, &roles, received, index);
                     self.note_write(ring, role);
                     match (same, wanted_good == found_good) {
                         (true, true) => {
-                            let step = || conversation.step_at(ring, index);
+                            let step = || step_at(index);
                             let pair = ((due, wanted), (at, found));
                             self.time((ring, index), role, step, pair);
                             None
@@ -218,7 +227,7 @@ impl Comparer<'_> {
                     expected: pair.0,
                     received: pair.1,
                     role,
-                    step: conversation.step_at(ring, index),
+                    step: step_at(index),
                     drive: role.drive().or(spelled),
                 };
                 self.comparison.divergence.get_or_insert(found);
@@ -232,12 +241,12 @@ impl Comparer<'_> {
     fn may_differ(
         &mut self,
         ring: usize,
-        role: Role,
+        roles: &[Role],
         received: &[(Instant, Received)],
         index: usize,
     ) -> bool {
         let value = received[index].1.byte;
-        match role {
+        match roles[index] {
             Role::Data {
                 drive: Some(drive),
                 address,
@@ -267,12 +276,16 @@ impl Comparer<'_> {
                 self.comparison.measured += u64::from(moves);
                 moves
             }
-            Role::Check { length, .. } => {
-                let from = (index + 1).saturating_sub(usize::from(length));
-                let bytes = &received[from..index];
-                let sum = bytes
-                    .iter()
-                    .fold(Checksum::EMPTY, |sum, (_, byte)| sum.with(byte.byte));
+            Role::Check { drive, length, .. } => {
+                // A command may be cut over several telegrams (9.5): its bytes need not stand together.
+                let own = |role: &Role| {
+                    matches!(role, Role::Command { .. } | Role::Data { .. })
+                        && role.drive() == drive
+                };
+                let before = roles[..index].iter().zip(received).rev();
+                let before = before.filter(|(role, _)| own(role));
+                let bytes = before.take(usize::from(length).saturating_sub(1));
+                let sum = bytes.fold(Checksum::EMPTY, |sum, (_, (_, byte))| sum.with(byte.byte));
                 sum.minus() == value
             }
             _ => false,
