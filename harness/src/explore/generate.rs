@@ -1,8 +1,9 @@
 //! New cases from numbers: telegrams mostly as they should be, now and then not, and a look at what came of them.
 
-use super::case::{Act, Case, Command, Damage, Harm, MOST_NET, Order, Spoil, Talk, To, What};
+use super::case::{Act, Case, Damage, Harm, MOST_NET, Talk, To, What};
 use super::dice::Dice;
 use super::idiom::Idiom;
+use super::order::{Command, Order, Spoil};
 use super::swarm::{Spice, Swarm};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::cells::{Access, RAM};

@@ -1,8 +1,9 @@
 //! Short plots: acts that belong together, as a master would do them. Single acts in any order come to them too seldom.
 
-use super::case::{Act, Command, Damage, Harm, MOST_NET, Order, Spoil, Talk, To, What};
+use super::case::{Act, Damage, Harm, MOST_NET, Talk, To, What};
 use super::dice::Dice;
 use super::generate::Generator;
+use super::order::{Command, Order, Spoil};
 use super::swarm::Spice;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::{CONFIRM_ERROR, ram};

@@ -19,6 +19,7 @@ mod novelty;
 mod on_rig;
 mod on_sim;
 mod oracle;
+mod order;
 mod play;
 pub mod promote;
 mod record;
@@ -29,9 +30,7 @@ mod target;
 pub mod text;
 
 pub use campaign::{Bounds, Campaign, End, Watcher};
-pub use case::{
-    Act, Case, Command, Damage, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, Order, Spoil, Talk, To, What,
-};
+pub use case::{Act, Case, Damage, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, Talk, To, What};
 pub use dice::Dice;
 pub use error::ExploreError;
 pub use finding::Finding;
@@ -41,6 +40,7 @@ pub use novelty::{MOST_KEPT, Pool, by_novelty, features};
 pub use on_rig::OnRig;
 pub use on_sim::OnSim;
 pub use oracle::{Difference, against_model, against_reference};
+pub use order::{Command, Order, Spoil};
 pub use play::{Seen, play};
 pub use record::{About, Kept, Line, Progress, RECORD, Record, read};
 pub use setup::{Planted, Setup};

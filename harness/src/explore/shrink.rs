@@ -4,9 +4,10 @@
 //! steps is fixed, so it is the same each time. On hardware a run is what it costs, so the steps that take most away come first:
 //! behind the byte that is otherwise nothing is needed, then acts, parts of acts, faults, drives, silence and values.
 
-use super::case::{Act, Case, Command, Harm, MOST_NET, Order, Talk, To, What};
+use super::case::{Act, Case, Harm, MOST_NET, Talk, To, What};
 use super::error::ExploreError;
 use super::oracle::Difference;
+use super::order::{Command, Order};
 use super::setup::Setup;
 use harness_proto::novobus::memory::RAM;
 use std::collections::BTreeSet;

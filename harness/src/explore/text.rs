@@ -16,6 +16,9 @@ const BYTES_A_LINE: usize = 24;
 /// Where a comment begins, if the line is not longer.
 const COMMENT_AT: usize = 32;
 
+/// How long a line of a remark may be.
+const MOST_REMARK: usize = 100;
+
 /// How long a comment may be.
 const MOST_COMMENT: usize = 60;
 
@@ -64,7 +67,7 @@ pub fn text(case: &Case, page: &Page<'_>) -> String {
         let _infallible = writeln!(text, "{line}");
     }
     text.push('\n');
-    for line in page.remarks {
+    for line in page.remarks.iter().flat_map(|remark| wrapped(remark)) {
         let _infallible = writeln!(text, "# {line}");
     }
     let mut faults = case.faults().into_iter();
@@ -84,6 +87,22 @@ pub fn text(case: &Case, page: &Page<'_>) -> String {
         answers(&mut text, case, expected);
     }
     text
+}
+
+/// A remark as lines that are not too long.
+fn wrapped(remark: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in remark.split_whitespace() {
+        match lines.last_mut() {
+            Some(last) if last.is_empty() => last.push_str(word),
+            Some(last) if last.len() + word.len() < MOST_REMARK => {
+                last.push(' ');
+                last.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// Whether every byte that the ring gives back is asked for. Zeros that drives send unasked (9.9) come as long as somebody

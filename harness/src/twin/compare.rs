@@ -159,13 +159,13 @@ impl Comparer<'_> {
     ) {
         let sent = conversation.sent_in(ring);
         let received = &conversation.received_in(ring);
-        // A PAUSE where a sync byte is due is swallowed (9.2).
-        let all = roles(size, &sent).into_iter().zip(&sent).enumerate();
-        let answered = all.filter(|(_, (role, (byte, _)))| (*role, *byte) != (Role::Idle, PAUSE));
-        let (places, roles): (Vec<usize>, Vec<Role>) =
-            answered.map(|(place, (role, _))| (place, role)).unzip();
+        let (places, roles) = answered(size, &sent);
         // A ring that gives back a byte for a byte (9.1) has each role at its place.
         let aligned = received.len() == roles.len() && expected.len() == roles.len();
+        let known = match aligned {
+            true => roles.len(),
+            false => known_places(&sent, &places, expected, received),
+        };
         let real_time = self.exactness.tolerance > Span::ZERO;
         let (shorter, short);
         let (expected, received) = if aligned || !real_time {
@@ -189,7 +189,7 @@ impl Comparer<'_> {
                     let found_good = found.error.is_none() || !self.exactness.line_errors;
                     let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
                     let same = wanted.byte == found.byte
-                        || aligned && self.may_differ(ring, &roles, received, index);
+                        || index < known && self.may_differ(ring, &roles, received, index);
                     self.note_write(ring, role);
                     match (same, wanted_good == found_good) {
                         (true, true) => {
@@ -333,6 +333,36 @@ impl Comparer<'_> {
             });
         }
     }
+}
+
+/// The bytes that are answered, by their places among those sent, and their roles: a PAUSE where a sync byte is due is swallowed (9.2).
+fn answered(size: RingSize, sent: &[(u8, bool)]) -> (Vec<usize>, Vec<Role>) {
+    let all = roles(size, sent).into_iter().zip(sent).enumerate();
+    let answered = all.filter(|(_, (role, (byte, _)))| (*role, *byte) != (Role::Idle, PAUSE));
+    answered.map(|(place, (role, _))| (place, role)).unzip()
+}
+
+/// Up to where each byte received is known to stand for a byte sent, in a ring that does not give back a byte for a byte: up to the
+/// first one that meets a fault, or that is left out of a long run.
+fn known_places(
+    sent: &[(u8, bool)],
+    places: &[usize],
+    expected: &[(Instant, Received)],
+    received: &[(Instant, Received)],
+) -> usize {
+    let damaged = places.iter().position(|place| !sent[*place].1);
+    let known = match damaged {
+        Some(damaged) => damaged,
+        // Without a fault it is the drives that send unasked, or lose bytes.
+        None if expected.len() == places.len() => places.len(),
+        None => 0,
+    };
+    let short = |bytes: &[(Instant, Received)]| {
+        let same = |run: &[(Instant, Received)]| run.iter().all(|byte| byte.1 == run[0].1);
+        let long = bytes.windows(LONGEST_RUN + 1).position(same);
+        long.map_or(usize::MAX, |from| from + LONGEST_RUN)
+    };
+    known.min(short(expected)).min(short(received))
 }
 
 /// Drives that report an error send for ever (9.9), and a real clock does not cut that off at a byte: of a long run of
