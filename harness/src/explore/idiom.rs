@@ -54,7 +54,6 @@ impl Idiom {
     /// Adds its acts.
     pub(super) fn play(self, acts: &mut Vec<Act>, maker: &Generator<'_>, dice: &mut Dice) {
         let drive = maker.drive(dice);
-        let mut to = |command| acts.push(talk(drive, command));
         match self {
             Self::WriteAndRead => write_and_read(acts, drive, maker, dice),
             Self::Exchange => exchange(acts, drive, dice),
@@ -62,57 +61,8 @@ impl Idiom {
             Self::ErrorMode => error_mode(acts, drive, maker, dice),
             Self::AskForError => ask_for_error(acts, drive, maker, dice),
             Self::TimeOut => time_out(acts, maker, dice),
-            Self::Reset => {
-                let cell = maker.cell(dice);
-                to(Command::WriteByte {
-                    cell,
-                    data: dice.byte() | 1,
-                });
-                to(Command::Reset);
-                acts.push(Act::sound(What::Wait(120)));
-                acts.push(talk(drive, Command::ReadByte { cell }));
-            }
-            Self::Eeprom => {
-                let address = u16::from(dice.byte());
-                let data = address << 8 | u16::from(dice.byte());
-                to(Command::WriteWord {
-                    cell: ram::EEPROM_BUFFER,
-                    data,
-                });
-                to(Command::WriteByte {
-                    cell: ram::EEPROM_CONTROL,
-                    data: 0x82,
-                });
-                acts.push(Act::sound(What::Wait(15)));
-                acts.push(talk(
-                    drive,
-                    Command::ReadByte {
-                        cell: ram::EEPROM_CONTROL,
-                    },
-                ));
-                let data = address << 8;
-                acts.push(talk(
-                    drive,
-                    Command::WriteWord {
-                        cell: ram::EEPROM_BUFFER,
-                        data,
-                    },
-                ));
-                acts.push(talk(
-                    drive,
-                    Command::WriteByte {
-                        cell: ram::EEPROM_CONTROL,
-                        data: 0x81,
-                    },
-                ));
-                acts.push(Act::sound(What::Wait(5)));
-                acts.push(talk(
-                    drive,
-                    Command::ReadWord {
-                        cell: ram::EEPROM_BUFFER,
-                    },
-                ));
-            }
+            Self::Reset => reset(acts, drive, maker, dice),
+            Self::Eeprom => eeprom(acts, drive, dice),
             Self::Turn => turn(acts, drive, dice),
             Self::Position => position(acts, drive, dice),
         }
@@ -121,6 +71,47 @@ impl Idiom {
 
 fn talk(drive: u8, command: Command) -> Act {
     Act::sound(What::Talk(Talk::one(To::Drive(drive), command)))
+}
+
+fn reset(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
+    let cell = maker.cell(dice);
+    let data = dice.byte() | 1;
+    acts.push(talk(drive, Command::WriteByte { cell, data }));
+    acts.push(talk(drive, Command::Reset));
+    // The drive tests itself (11.8).
+    acts.push(Act::sound(What::Wait(120)));
+    acts.push(talk(drive, Command::ReadByte { cell }));
+}
+
+fn eeprom(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
+    let address = u16::from(dice.byte()) << 8;
+    let buffer = |data| Command::WriteWord {
+        cell: ram::EEPROM_BUFFER,
+        data,
+    };
+    let control = |data| Command::WriteByte {
+        cell: ram::EEPROM_CONTROL,
+        data,
+    };
+    let buffer_of = |byte| buffer(address | u16::from(byte));
+    acts.push(talk(drive, buffer_of(dice.byte())));
+    acts.push(talk(drive, control(0x82)));
+    acts.push(Act::sound(What::Wait(15)));
+    acts.push(talk(
+        drive,
+        Command::ReadByte {
+            cell: ram::EEPROM_CONTROL,
+        },
+    ));
+    acts.push(talk(drive, buffer_of(0)));
+    acts.push(talk(drive, control(0x81)));
+    acts.push(Act::sound(What::Wait(5)));
+    acts.push(talk(
+        drive,
+        Command::ReadWord {
+            cell: ram::EEPROM_BUFFER,
+        },
+    ));
 }
 
 fn write_and_read(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
@@ -255,7 +246,8 @@ fn error_mode(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut 
     ));
 }
 
-fn ask_for_error(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
+/// Something that a drive takes for an error.
+fn wrong(drive: u8, maker: &Generator<'_>, dice: &mut Dice) -> Act {
     let mut wrong = match dice.below(4) {
         0 => Act::sound(What::Bytes(vec![dice.byte() & 0x7F])),
         1 => talk(
@@ -291,7 +283,11 @@ fn ask_for_error(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &m
                 .map(|link| Damage { link, at, harm }),
         );
     }
-    acts.push(wrong);
+    wrong
+}
+
+fn ask_for_error(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
+    acts.push(wrong(drive, maker, dice));
     acts.push(Act::sound(What::Recover));
     // The drive's own cycle sees it (11.8).
     acts.push(Act::sound(What::Wait(1 + dice.below(3) as u16)));

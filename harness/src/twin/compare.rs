@@ -164,7 +164,7 @@ impl Comparer<'_> {
         let aligned = received.len() == roles.len() && expected.len() == roles.len();
         let known = match aligned {
             true => roles.len(),
-            false => known_places(&sent, &places, expected, received),
+            false => known_places(&sent, (&places, &roles), expected, received),
         };
         let real_time = self.exactness.tolerance > Span::ZERO;
         let (shorter, short);
@@ -215,11 +215,7 @@ impl Comparer<'_> {
                 return;
             }
             if let Some(what) = what {
-                let heard: Vec<_> = expected[..index.min(expected.len())]
-                    .iter()
-                    .map(|(_, byte)| *byte)
-                    .collect();
-                let spelled = locate(&heard, size.drives()).map(|location| location.drive);
+                let heard = &expected[..index.min(expected.len())];
                 let found = Divergence {
                     ring,
                     byte: index + 1,
@@ -228,7 +224,7 @@ impl Comparer<'_> {
                     received: pair.1,
                     role,
                     step: step_at(index),
-                    drive: role.drive().or(spelled),
+                    drive: role.drive().or_else(|| spelled(heard, size)),
                 };
                 self.comparison.divergence.get_or_insert(found);
                 return;
@@ -335,6 +331,12 @@ impl Comparer<'_> {
     }
 }
 
+/// The drive that a ring spells out with these bytes (9.7).
+fn spelled(heard: &[(Instant, Received)], size: RingSize) -> Option<u8> {
+    let heard: Vec<_> = heard.iter().map(|(_, byte)| *byte).collect();
+    locate(&heard, size.drives()).map(|location| location.drive)
+}
+
 /// The bytes that are answered, by their places among those sent, and their roles: a PAUSE where a sync byte is due is swallowed (9.2).
 fn answered(size: RingSize, sent: &[(u8, bool)]) -> (Vec<usize>, Vec<Role>) {
     let all = roles(size, sent).into_iter().zip(sent).enumerate();
@@ -346,16 +348,19 @@ fn answered(size: RingSize, sent: &[(u8, bool)]) -> (Vec<usize>, Vec<Role>) {
 /// first one that meets a fault, or that is left out of a long run.
 fn known_places(
     sent: &[(u8, bool)],
-    places: &[usize],
+    (places, roles): (&[usize], &[Role]),
     expected: &[(Instant, Received)],
     received: &[(Instant, Received)],
 ) -> usize {
     let damaged = places.iter().position(|place| !sent[*place].1);
     let known = match damaged {
         Some(damaged) => damaged,
-        // Without a fault it is the drives that send unasked, or lose bytes.
+        // Without a fault it is the drives that lose bytes, or swallow or send some where they report an error.
         None if expected.len() == places.len() => places.len(),
-        None => 0,
+        None => roles
+            .iter()
+            .position(|role| *role == Role::Foreign)
+            .unwrap_or(0),
     };
     let short = |bytes: &[(Instant, Received)]| {
         let same = |run: &[(Instant, Received)]| run.iter().all(|byte| byte.1 == run[0].1);
