@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::error::ExploreError;
 use super::files::{read_text, write_whole};
-use super::oracle::{Difference, answered};
+use super::oracle::{Difference, answered, sent};
 use super::play::Seen;
 use super::setup::Setup;
 use super::text::{Expected, Page, text};
@@ -148,7 +148,7 @@ fn unknowable(case: &Case, seen: &Seen) -> Vec<usize> {
     let Ok(size) = RingSize::new(u64::from(case.drives)) else {
         return Vec::new();
     };
-    let sent: Vec<_> = case.bytes().into_iter().map(|byte| (byte, true)).collect();
+    let sent = sent(case);
     let mut any = Vec::new();
     let mut open = false;
     for (index, role) in answered(&roles(size, &sent), &sent).enumerate() {

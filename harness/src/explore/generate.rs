@@ -361,7 +361,7 @@ impl<'s> Generator<'s> {
             let synco = 24 + usize::from(self.scope.drives) + dice.below(8);
             acts.push(Act::sound(What::Synco(synco.min(60) as u8)));
         }
-        if kind < 2 || kind >= 4 {
+        if !(2..4).contains(&kind) {
             let may_be_in_error = kind < 2 || dice.percent(30);
             if may_be_in_error {
                 acts.push(Act::sound(What::Recover));

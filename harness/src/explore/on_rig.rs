@@ -15,9 +15,12 @@ use crate::rig::{Attempt, Run, play_one};
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
+use crate::twin::unknowable;
 use harness_proto::nd21::bits::flags2;
 use harness_proto::nd21::ram;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::Limits;
+use harness_proto::novobus::role::{Role, roles};
 use harness_proto::time::{Instant, Span};
 
 /// How long the drives of the model have been switched on: their self-tests are over (ND21 11.8).
@@ -104,6 +107,10 @@ impl Target for OnRig<'_, '_> {
             let why = "drives would miss bytes and send unasked (ND21 9.9)";
             rehearsal.denied = Some(why.to_owned());
         }
+        if rehearsal.denied.is_none() && measures_beside_faults(case) {
+            let why = "what a drive measures cannot be told from what a fault makes of it";
+            rehearsal.denied = Some(why.to_owned());
+        }
         Ok(rehearsal)
     }
 
@@ -159,6 +166,19 @@ impl Target for OnRig<'_, '_> {
             _ => None,
         }
     }
+}
+
+/// Whether a case has faults, and reads what no model knows of a real drive.
+fn measures_beside_faults(case: &Case) -> bool {
+    let Ok(size) = RingSize::new(u64::from(case.drives)) else {
+        return false;
+    };
+    let all: Vec<_> = case.bytes().into_iter().map(|byte| (byte, true)).collect();
+    let unknown = |role: Role| match role {
+        Role::Data { address, .. } => unknowable(address),
+        _ => false,
+    };
+    !case.faults().is_empty() && roles(size, &all).into_iter().any(unknown)
 }
 
 /// The first divergence of an attempt; without one, the first byte at another time, as `play` repeats what was late once.

@@ -91,13 +91,7 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
         Some(index) => (index, twin::what_of(expected, received, index)),
         None => (pairs().position(|(a, b)| a.0 != b.0)?, twin::What::Time),
     };
-    let faults = case.faults().into_iter();
-    let spoiling = faults.filter(|(.., harm)| !matches!(harm, Harm::Delay(_)));
-    let damaged: BTreeSet<u64> = spoiling.map(|(_, byte, _)| byte).collect();
-    let sent: Vec<_> = (1..)
-        .zip(case.bytes())
-        .map(|(number, byte)| (byte, !damaged.contains(&number)))
-        .collect();
+    let sent = sent(case);
     let role = answered(&roles(size, &sent), &sent).nth(index);
     let role = role.unwrap_or(Role::Foreign);
     let divergence = twin::Divergence {
@@ -111,6 +105,16 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
         drive: role.drive(),
     };
     Some(Difference::from(&divergence))
+}
+
+/// The bytes that a case sends, and whether each goes round whole; what comes late is whole.
+pub(super) fn sent(case: &Case) -> Vec<(u8, bool)> {
+    let faults = case.faults().into_iter();
+    let spoiling = faults.filter(|(.., harm)| !matches!(harm, Harm::Delay(_)));
+    let damaged: BTreeSet<u64> = spoiling.map(|(_, byte, _)| byte).collect();
+    let numbered = (1..).zip(case.bytes());
+    let whole = numbered.map(|(number, byte)| (byte, !damaged.contains(&number)));
+    whole.collect()
 }
 
 /// The roles of bytes that are answered: a PAUSE where a sync byte is due is not (ND21 9.2).

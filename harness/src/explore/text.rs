@@ -1,7 +1,7 @@
 //! A case as a scenario: every finding is one.
 
 use super::case::{Act, Case, Harm, Talk, To, What};
-use super::oracle::answered;
+use super::oracle::{answered, sent};
 use super::play::Seen;
 use crate::link::link_name;
 use harness_proto::line::Received;
@@ -227,7 +227,7 @@ fn fault(harm: Harm) -> String {
 fn answers(text: &mut String, case: &Case, expected: Expected<'_>) {
     let received = &expected.seen.received;
     let mut from = 0;
-    let sent: Vec<_> = case.bytes().into_iter().map(|byte| (byte, true)).collect();
+    let sent = sent(case);
     let roles = RingSize::new(u64::from(case.drives)).map(|size| roles(size, &sent));
     let roles = roles.unwrap_or_default();
     if received.len() == answered(&roles, &sent).count() {

@@ -410,7 +410,7 @@ fn moves(address: u16) -> bool {
     OWN.iter().any(|own| own.contains(&address))
         || cell_at(address).is_some_and(|cell| {
             let own = |section: &&str| cell.section.starts_with(*section);
-            SECTIONS.iter().any(|section| own(&section))
+            SECTIONS.iter().any(own)
         })
 }
 

@@ -115,7 +115,19 @@ fn from_a_seed_to_a_scenario() {
     )
     .expect("room");
     ended(&drivebench(&["run", name(&wrong)]), 1, "1 failed");
-    // What the run kept finds it again.
+}
+
+/// What a run has kept is tried on another rig, what shows most first (exit code 1 where something is found).
+#[test]
+fn what_was_kept_is_replayed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("run");
+    let run = ["fuzz", "run", "--cases", "300", "--out"];
+    ended(
+        &drivebench(&[&run[..], &[name(&out)]].concat()),
+        0,
+        "300 cases",
+    );
     let rig = folder.path().join("wrong.toml");
     let lines = "schema = 1\n[rig]\nid = \"wrong\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\n\
                  setup = [\"drive 0..last model plain\", \"drive 1..2 deviates checksum-wrong\"]\n";
@@ -154,6 +166,26 @@ fn a_sound_ring_passes() {
     ended(&drivebench(&arguments), 0, "400 cases");
 }
 
+/// Begins a run and kills it (SIGKILL) when some of it is done.
+fn begin_and_kill(arguments: &[&str], folder: &Path) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program");
+    // Until some of it is done.
+    let record = folder.join(RECORD);
+    let done =
+        || std::fs::read_to_string(&record).is_ok_and(|text| text.contains("\"cases\":300,"));
+    while !done() && child.try_wait().expect("a process").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    child.kill().expect("SIGKILL");
+    let _gone = child.wait().expect("an end");
+}
+
 /// Killed between two cases a run goes on, and comes to what an undisturbed one comes to.
 #[test]
 fn a_killed_run_goes_on() {
@@ -172,22 +204,8 @@ fn a_killed_run_goes_on() {
     let cases = ["--cases", "4000", "--out"];
     let undisturbed = drivebench(&[&run[..], &cases[..], &[name(&whole)]].concat());
     ended(&undisturbed, 1, "4000 cases");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
-        .args([&run[..], &cases[..], &[name(&killed)]].concat())
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program");
-    // Until some of it is done.
+    begin_and_kill(&[&run[..], &cases[..], &[name(&killed)]].concat(), &killed);
     let record = killed.join(RECORD);
-    let done =
-        || std::fs::read_to_string(&record).is_ok_and(|text| text.contains("\"cases\":300,"));
-    while !done() && child.try_wait().expect("a process").is_none() {
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    child.kill().expect("SIGKILL");
-    let _gone = child.wait().expect("an end");
     // Half a line at its end, as a killed writer leaves it.
     let mut text = std::fs::read_to_string(&record).expect("a record");
     text.push_str("{\"kind\":\"kept\",\"num");
@@ -260,7 +278,15 @@ fn what_cannot_be() {
         "has two",
     );
     ended(&run(&["--out", name(&out)]), 0, "60 cases");
-    // A damaged record names the line.
+}
+
+/// A damaged record names the line, and what is no finding says so (exit code 2).
+#[test]
+fn what_is_damaged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("run");
+    let run = |more: &[&str]| drivebench(&[&["fuzz", "run", "--cases", "60"][..], more].concat());
+    ended(&run(&["--out", name(&out)]), 0, "60 cases");
     let record = out.join(RECORD);
     let text = std::fs::read_to_string(&record).expect("a record");
     let damaged = text.replacen("\"kind\":\"swarm\"", "\"kind\":\"storm\"", 1);
@@ -271,6 +297,8 @@ fn what_cannot_be() {
     std::fs::write(&record, [0xFF, 0xFE]).expect("room");
     ended(&run(&["--resume", name(&out)]), 2, "failed to read");
     // Findings that are none.
+    let file = folder.path().join("file");
+    std::fs::write(&file, "x").expect("room");
     let nothing = folder.path().join("finding-000001.json");
     ended(
         &drivebench(&["shrink", name(&nothing)]),
