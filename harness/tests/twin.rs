@@ -165,9 +165,12 @@ fn measured_data_are_nobodys_wherever_they_stand() {
     let lines = ["drive 1 cooler 60C".to_owned()];
     // In the second one a byte behind them is lost.
     let text = "title x\nring 3\n> 81 80\n> 84 FE C0 26\n> 81 80\n> A4 FF E5\n> 81 80*40\n";
-    for fault in ["", "! 2->1 byte 20: drop\n"] {
-        measured_differ(&lines, &format!("{text}{fault}"));
+    for more in ["", "! 2->1 byte 20: drop\n"] {
+        measured_differ(&lines, &format!("{text}{more}"));
     }
+    // A parameter that no drive accepts (10.1), and a PAUSE that is answered in the error mode.
+    let error = "title x\nring 3\n> 88 FE C0 26 FF E5\n> 88 FF C0 DE 2F CD 81\n";
+    measured_differ(&lines, error);
 }
 
 fn measured_differ(lines: &[String], text: &str) {

@@ -357,10 +357,18 @@ fn known_places(
         Some(damaged) => damaged,
         // Without a fault it is the drives that lose bytes, or swallow or send some where they report an error.
         None if expected.len() == places.len() => places.len(),
-        None => roles
-            .iter()
-            .position(|role| *role == Role::Foreign)
-            .unwrap_or(0),
+        // Up to the error: a sync byte, or a byte of a command that is echoed, does not come back as it was.
+        None => {
+            let lost = |(index, role): (usize, &Role)| match role {
+                Role::Foreign => true,
+                Role::Sync | Role::Command { .. } => expected
+                    .get(index)
+                    .is_none_or(|(_, byte)| !byte.is(sent[places[index]].0)),
+                _ => false,
+            };
+            let error = roles.iter().enumerate().position(lost);
+            error.unwrap_or(roles.len())
+        }
     };
     let short = |bytes: &[(Instant, Received)]| {
         let same = |run: &[(Instant, Received)]| run.iter().all(|byte| byte.1 == run[0].1);
