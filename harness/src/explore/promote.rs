@@ -118,7 +118,13 @@ pub fn promote(finding: &Finding, naming: &Naming, top: &Path) -> Result<Promote
     let fails_on_deviating = deviating_fails(finding, &text)?;
     let input = input(&finding.case, &title);
     for (file, text) in files.iter().zip([&text, &input, &snapshot]) {
-        write_whole(file, text)?;
+        if let Err(error) = write_whole(file, text) {
+            // All of them or none: none was there before.
+            for written in &files {
+                let _gone = std::fs::remove_file(written);
+            }
+            return Err(error);
+        }
     }
     Ok(Promoted {
         files,

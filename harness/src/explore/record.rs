@@ -5,8 +5,9 @@
 
 use super::case::Case;
 use super::error::ExploreError;
-use super::files::{read_text, write_whole};
+use super::files::read_text;
 use super::setup::Setup;
+use rustix::fs::FlockOperation;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Write;
@@ -135,6 +136,7 @@ impl Record {
         }
         let path = folder.join(RECORD);
         let file = File::create_new(&path).map_err(|e| ExploreError::file("make", &path, &e))?;
+        hold(&file, folder)?;
         let mut record = Self {
             folder: folder.to_owned(),
             file,
@@ -149,15 +151,15 @@ impl Record {
     /// # Errors
     /// There is none, or a line of it is damaged; half a line at its end is not.
     pub fn resume(folder: &Path) -> Result<(Self, Kept), ExploreError> {
-        let (kept, length) = read(folder)?;
         let path = folder.join(RECORD);
-        let text = read_text(&path)?;
-        if length < text.len() {
-            write_whole(&path, text.get(..length).unwrap_or_default())?;
-        }
+        let (kept, length) = read(folder)?;
         let file = File::options()
             .append(true)
             .open(&path)
+            .map_err(|error| ExploreError::file("write", &path, &error))?;
+        hold(&file, folder)?;
+        // A record only grows: cut off at its last settled line it is as if the rest had never been written.
+        file.set_len(length as u64)
             .map_err(|error| ExploreError::file("write", &path, &error))?;
         let record = Self {
             folder: folder.to_owned(),
@@ -187,6 +189,16 @@ impl Record {
             .and_then(|()| self.file.flush())
             .map_err(|error| failed(&error))
     }
+}
+
+/// Keeps other processes out of a run's folder for as long as its record is open.
+fn hold(file: &File, folder: &Path) -> Result<(), ExploreError> {
+    rustix::fs::flock(file, FlockOperation::NonBlockingLockExclusive).map_err(|_| {
+        ExploreError::Usage(format!(
+            "another process works on the run in {}; wait for its end",
+            folder.display()
+        ))
+    })
 }
 
 /// What a folder holds, and how long its record is up to the last line of progress.

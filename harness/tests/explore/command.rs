@@ -1,7 +1,8 @@
 //! The commands as processes: exit codes, what is kept, and that a killed run goes on.
 
+use crate::about;
 use crate::findings::empty_checkout;
-use harness::explore::{Line, RECORD};
+use harness::explore::{Line, RECORD, Record, Setup};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -278,6 +279,19 @@ fn what_cannot_be() {
         "has two",
     );
     ended(&run(&["--out", name(&out)]), 0, "60 cases");
+}
+
+/// Two processes never work on one run.
+#[test]
+fn one_at_a_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("run");
+    let held = Record::create(&out, &about(&Setup::default(), 1)).expect("room");
+    let resume = ["fuzz", "run", "--cases", "60", "--resume", name(&out)];
+    ended(&drivebench(&resume), 2, "another process works on the run");
+    drop(held);
+    let spices = "begin another run";
+    ended(&drivebench(&resume), 2, spices);
 }
 
 /// A damaged record names the line, and what is no finding says so (exit code 2).

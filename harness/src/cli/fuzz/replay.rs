@@ -135,6 +135,7 @@ fn play(
         output,
         folder: None,
         rounds: false,
+        told: None,
         failed: None,
     };
     let end = campaign.replay(&ordered, target, None, &bounds, &mut telling);

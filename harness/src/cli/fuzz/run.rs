@@ -232,6 +232,7 @@ fn explore(
         output,
         folder: Some(folder.clone()),
         rounds: true,
+        told: None,
         failed: None,
     };
     let end = campaign.run(target, Some(&mut record), bounds, &mut telling);

@@ -3,6 +3,10 @@
 use crate::cli::output::Output;
 use crate::explore::{Campaign, End, Finding, Pool, Progress, Swarm, Watcher};
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// How long the progress is not told again.
+const PAUSE: Duration = Duration::from_secs(1);
 
 /// Tells it: findings on standard output, all else on standard error.
 pub(super) struct Telling<'o> {
@@ -11,6 +15,8 @@ pub(super) struct Telling<'o> {
     pub(super) folder: Option<PathBuf>,
     /// Whether rounds are told.
     pub(super) rounds: bool,
+    /// When the progress was told last.
+    pub(super) told: Option<Instant>,
     /// Why standard output could not be written.
     pub(super) failed: Option<std::io::Error>,
 }
@@ -43,7 +49,8 @@ impl Watcher for Telling<'_> {
     }
 
     fn progress(&mut self, progress: &Progress, pool: &Pool) {
-        if self.output.progress {
+        if self.output.progress && self.told.is_none_or(|told| told.elapsed() >= PAUSE) {
+            self.told = Some(Instant::now());
             self.output.say(&format!(
                 "{} cases, {} kept with {} features\n",
                 progress.cases,
