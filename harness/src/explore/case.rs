@@ -269,6 +269,14 @@ impl Case {
         faults
     }
 
+    /// All commands, in order.
+    pub fn orders(&self) -> impl Iterator<Item = &Order> {
+        self.acts.iter().flat_map(|act| match &act.what {
+            What::Talk(talk) => &talk.orders[..],
+            _ => &[],
+        })
+    }
+
     /// Whether it stays within the bounds of a case.
     #[must_use]
     pub fn is_bounded(&self) -> bool {

@@ -223,7 +223,10 @@ impl Shrinker<'_, '_> {
 
     /// Puts the first cell of the RAM (ND21 10.1) in place of another, in all commands: what is written is read again.
     fn lower_cells(&mut self) -> Result<(), ExploreError> {
-        let cells: BTreeSet<u16> = orders(&self.best.case)
+        let cells: BTreeSet<u16> = self
+            .best
+            .case
+            .orders()
             .filter_map(|o| o.command.cell())
             .collect();
         for cell in cells.into_iter().filter(|cell| *cell > FIRST_CELL) {
@@ -444,14 +447,6 @@ fn shorter(command: Command) -> Vec<Command> {
         ],
         _ => Vec::new(),
     }
-}
-
-/// All commands of a case.
-fn orders(case: &Case) -> impl Iterator<Item = &Order> {
-    case.acts.iter().flat_map(|act| match &act.what {
-        What::Talk(talk) => &talk.orders[..],
-        _ => &[],
-    })
 }
 
 /// The same command with lower values: the data 0 or 1.
