@@ -219,8 +219,18 @@ impl<'s> Generator<'s> {
         match dice.below(100) {
             0..20 if self.swarm.has(Spice::Same) => To::Same,
             20..40 if self.swarm.has(Spice::Next) => To::Next,
-            40..45 if self.swarm.has(Spice::Nobody) => To::Nobody(dice.byte()),
+            40..45 if self.swarm.has(Spice::Nobody) => To::Nobody(self.nobody(dice)),
             _ => To::Drive(drive),
+        }
+    }
+
+    /// An address byte, often one that is counted up through 80 or beyond 00 (ND21 9.3).
+    fn nobody(&self, dice: &mut Dice) -> u8 {
+        let on_the_way = dice.below(usize::from(self.scope.drives)) as u8;
+        match dice.below(4) {
+            0 => 0x7F - on_the_way.min(0x7F),
+            1 => on_the_way,
+            _ => dice.byte(),
         }
     }
 
