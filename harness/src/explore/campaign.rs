@@ -7,11 +7,15 @@ use super::finding::Finding;
 use super::generate::{Generator, Scope};
 use super::mutate::mutate;
 use super::novelty::Pool;
+use super::oracle::Difference;
 use super::record::{About, Kept, Line, Progress, Record};
 use super::swarm::Swarm;
 use super::target::{Rehearsal, Target};
 use harness_proto::time::Span;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
+
+/// So often the same thing may be flaky before it is no longer looked at.
+const SETTLED: u8 = 3;
 
 /// How far a run goes.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +62,8 @@ pub struct Campaign {
     scope: Scope,
     pool: Pool,
     progress: Progress,
-    known: BTreeSet<String>,
+    /// What was found, and how often in vain: what counts is settled.
+    known: BTreeMap<String, u8>,
     /// How many findings count.
     confirmed: usize,
     flaky: usize,
@@ -73,7 +78,7 @@ impl Campaign {
             scope,
             pool: Pool::default(),
             progress: Progress::default(),
-            known: BTreeSet::new(),
+            known: BTreeMap::new(),
             confirmed: 0,
             flaky: 0,
         }
@@ -108,12 +113,20 @@ impl Campaign {
     }
 
     fn note(&mut self, signature: &str, confirmed: bool) {
-        self.known.insert(signature.to_owned());
+        let times = self.known.entry(signature.to_owned()).or_default();
         if confirmed {
+            *times = SETTLED;
             self.confirmed += 1;
         } else {
+            *times += 1;
             self.flaky += 1;
         }
+    }
+
+    /// Whether such a thing was found already, or was flaky often enough.
+    fn is_settled(&self, difference: &Difference) -> bool {
+        let times = self.known.get(&difference.signature());
+        times.is_some_and(|times| *times >= SETTLED)
     }
 
     /// How far it has come.
@@ -272,7 +285,7 @@ impl Campaign {
                     write(record, || Line::Kept { number, new, case })?;
                 }
             }
-            Some(difference) if self.known.contains(&difference.signature()) => {
+            Some(difference) if self.is_settled(&difference) => {
                 self.progress.repeats += 1;
             }
             Some(difference) => {
