@@ -91,30 +91,7 @@ pub fn promote(finding: &Finding, naming: &Naming, top: &Path) -> Result<Promote
         None => format!("Found by fuzzing: {}", finding.difference.kind()),
     };
     let text = finding.scenario(&title, &sources)?;
-    let entry = Entry::new(
-        Source {
-            name: name.clone(),
-            text: text.clone().into(),
-        },
-        None,
-    )?;
-    let Some(plan) = &entry.plan else {
-        return Err(ExploreError::Usage("this bus is not built yet".to_owned()));
-    };
-    let mut link = simulated(plan);
-    let outcome = run(plan, &mut link);
-    if outcome.verdict != Verdict::Passed {
-        let why = outcome.finding.map(|finding| finding.message);
-        return Err(ExploreError::Usage(format!(
-            "the model itself does not pass this scenario ({}: {}); nothing was written",
-            outcome.verdict,
-            why.unwrap_or_default()
-        )));
-    }
-    let snapshot = format!(
-        "---\nsource: harness/tests/scenarios.rs\n---\n{}\n",
-        page(&entry, &outcome, &[link.trace(0)]).trim_end_matches('\n')
-    );
+    let snapshot = snapshot(name, &text)?;
     let fails_on_deviating = deviating_fails(finding, &text)?;
     let input = input(&finding.case, &title);
     for (file, text) in files.iter().zip([&text, &input, &snapshot]) {
@@ -131,6 +108,34 @@ pub fn promote(finding: &Finding, naming: &Naming, top: &Path) -> Result<Promote
         text,
         fails_on_deviating,
     })
+}
+
+/// The snapshot of a scenario, as `cargo test --test scenarios` compares it; the model must pass the scenario.
+fn snapshot(name: &str, text: &str) -> Result<String, ExploreError> {
+    let entry = Entry::new(
+        Source {
+            name: name.to_owned(),
+            text: text.to_owned().into(),
+        },
+        None,
+    )?;
+    let Some(plan) = &entry.plan else {
+        return Err(ExploreError::Usage("this bus is not built yet".to_owned()));
+    };
+    let mut link = simulated(plan);
+    let outcome = run(plan, &mut link);
+    if outcome.verdict != Verdict::Passed {
+        let why = outcome.finding.map(|finding| finding.message);
+        return Err(ExploreError::Usage(format!(
+            "the model itself does not pass this scenario ({}: {}); nothing was written",
+            outcome.verdict,
+            why.unwrap_or_default()
+        )));
+    }
+    Ok(format!(
+        "---\nsource: harness/tests/scenarios.rs\n---\n{}\n",
+        page(&entry, &outcome, &[link.trace(0)]).trim_end_matches('\n')
+    ))
 }
 
 /// The tables that the scenario pins: each is in the catalogue.
