@@ -10,6 +10,7 @@ pub mod campaign;
 pub mod capture;
 pub mod cli;
 pub mod evidence;
+pub mod explore;
 pub mod guard;
 pub mod library;
 pub mod link;

@@ -5,20 +5,12 @@
 
 use harness::library::Entry;
 use harness::link::Link;
-use harness::report::plot::plots;
-use harness::report::table::{LEGEND, Part, table, wires};
+use harness::report::page::page;
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
-use std::fmt::Write as _;
 use std::path::Path;
-
-/// Rows of a table that a snapshot holds at most.
-const ROWS: usize = 120;
-
-/// Columns of a table that a snapshot holds at most.
-const COLUMNS: usize = 20;
 
 fn snapshot(path: &Path) -> datatest_stable::Result<()> {
     let source = Source::read(path)?;
@@ -26,24 +18,8 @@ fn snapshot(path: &Path) -> datatest_stable::Result<()> {
     let plan = entry.plan.as_ref().ok_or("a bus that is not built yet")?;
     let mut link = simulated(plan);
     let outcome = run(plan, &mut link);
-    let mut page = format!("{}\n", entry.scenario.title);
-    for source in &entry.scenario.sources {
-        writeln!(page, "pins {}", source.text)?;
-    }
-    writeln!(page, "{} after {}", outcome.verdict, outcome.took)?;
-    for remark in &outcome.remarks {
-        writeln!(page, "note: {remark}")?;
-    }
-    for ring in 0..plan.rings.len() {
-        let trace = link.trace(ring);
-        let part = Part {
-            at_most: Some(ROWS),
-            columns_at_most: Some(COLUMNS),
-            ..Part::default()
-        };
-        write!(page, "\n{}{}", table(&trace, &part), wires(&trace, 20))?;
-    }
-    write!(page, "\n{LEGEND}{}", plots(&outcome.records))?;
+    let traces: Vec<_> = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+    let page = page(&entry, &outcome, &traces);
 
     let folder = path
         .parent()

@@ -158,3 +158,35 @@ fn a_divergence_says_where() {
     };
     assert_eq!(explaining(&[none], &seen, EXACT, &twin), Ok(Vec::new()));
 }
+
+/// ND21 9.2, 9.5: data that a drive measures are its own, also behind a PAUSE and in a command that is cut over telegrams.
+#[test]
+fn measured_data_are_nobodys_wherever_they_stand() {
+    let lines = ["drive 1 cooler 60C".to_owned()];
+    // In the second one a byte behind them is lost.
+    let text = "title x\nring 3\n> 81 80\n> 84 FE C0 26\n> 81 80\n> A4 FF E5\n> 81 80*40\n";
+    for more in ["", "! 2->1 byte 20: drop\n"] {
+        measured_differ(&lines, &format!("{text}{more}"));
+    }
+    // A parameter that no drive accepts (10.1), and a PAUSE that is answered in the error mode.
+    let error = "title x\nring 3\n> 88 FE C0 26 FF E5\n> 88 FF C0 DE 2F CD 81\n";
+    measured_differ(&lines, error);
+}
+
+fn measured_differ(lines: &[String], text: &str) {
+    let (_, mut link) = model(lines);
+    let plan = entry(text).plan.expect("novobus");
+    let seen = conversations(&plan, &mut link);
+    let (plan, link) = model(&[]);
+    let real = Exactness {
+        knows_cells: false,
+        tolerance: Span::from_millis(3),
+        ..EXACT
+    };
+    let mut twin = Twin::new(link, &plan.rings);
+    let comparisons: Vec<_> = seen.iter().map(|one| twin.follow(one, real)).collect();
+    let measured: u64 = comparisons.iter().map(|one| one.measured).sum();
+    let divergence = comparisons.iter().find_map(|one| one.divergence.as_ref());
+    assert_eq!(divergence, None, "{}", divergence.expect("one"));
+    assert_eq!(measured, 1);
+}

@@ -90,11 +90,13 @@ fn damage(sent: u8, received: u8, error: Option<LineError>) -> Option<LinkFault>
             data,
             parity: !odd,
             stop: false,
+            start: false,
         }),
         Some(LineError::Framing) => LinkFault::Flip(Flips {
             data,
             parity: false,
             stop: true,
+            start: false,
         }),
         Some(LineError::Overrun) => LinkFault::Overrun,
         Some(LineError::Break) => return None,

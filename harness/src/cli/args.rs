@@ -3,7 +3,10 @@
 use super::campaign::ClassName;
 use super::drive::DriveCommand;
 use super::exit::Exit;
+use super::fuzz::FuzzCommand;
+use super::promote::PromoteArguments;
 use super::rig::RigCommand;
+use super::shrink::ShrinkArguments;
 use crate::rig::values::{Time, ValueError};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -78,6 +81,16 @@ pub enum Command {
         /// The folder.
         folder: PathBuf,
     },
+    /// Look for what nobody has thought of: conversations from a seed, on simulated rings or on a rig.
+    Fuzz {
+        /// What to do.
+        #[command(subcommand)]
+        command: FuzzCommand,
+    },
+    /// Make a finding of `fuzz run` small: what is not needed for it is left out.
+    Shrink(ShrinkArguments),
+    /// Turn a finding into a scenario, an input of the fuzz targets and a snapshot, in a checkout of the repository.
+    Promote(PromoteArguments),
     /// Show benches, lock them, find their ports.
     Rig {
         /// What to do.
@@ -395,6 +408,9 @@ fn rate(text: &str) -> Result<Rate, String> {
     bits.and_then(Rate::from_bits_per_second)
         .ok_or_else(|| "38400, 19200 or 9600 is expected (ND21 8.3)".to_owned())
 }
+/// What `--wire-time` of the commands of `fuzz` says of itself.
+pub(super) const WIRE_TIME_HELP: &str = "How long the line is used at most, such as 60s; on a rig with ports one minute \
+                                         where nothing is said";
 
 /// A time such as `30s`; at most a day.
 pub(super) fn duration(text: &str) -> Result<Duration, String> {

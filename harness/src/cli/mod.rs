@@ -7,17 +7,20 @@ mod check;
 mod deviations;
 mod drive;
 mod exit;
+mod fuzz;
 mod import;
 mod list;
 mod man;
 mod manual;
 mod output;
+mod promote;
 mod qualify;
 mod rig;
 mod rig_check;
 mod rig_failure;
 mod run;
 mod run_rig;
+mod shrink;
 mod trace;
 mod verify;
 
@@ -71,6 +74,9 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Cells(arguments) => cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify { folder } => verify::verify(&folder, output),
+        Command::Fuzz { command } => fuzz::fuzz(&command, output),
+        Command::Shrink(arguments) => shrink::shrink(&arguments, output),
+        Command::Promote(arguments) => promote::promote(&arguments, output),
         Command::Rig { command } => rig::rig(&command, output),
         Command::Campaign(arguments) => campaign::campaign(&arguments, output),
         Command::Deviations(arguments) => deviations::deviations(&arguments, output),

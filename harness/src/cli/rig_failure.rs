@@ -3,9 +3,10 @@
 use super::exit::Exit;
 use super::output::Output;
 use crate::guard::SafeState;
+use crate::link::{Line, Trouble};
 use crate::rig::find::folder;
 use crate::rig::lock::LockError;
-use crate::rig::{Alarm, End, FindError, Rig, SessionError, find};
+use crate::rig::{Alarm, End, FindError, Rig, Session, SessionError, find};
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -64,6 +65,24 @@ pub(super) fn exit_of(error: &SessionError) -> Exit {
         | SessionError::Watchdog(_)
         | SessionError::Ill { .. } => Exit::RigError,
     }
+}
+
+/// Gives a rig back in its safe state and tells how; what ended the work early is graver than what came of it.
+pub(super) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -> (End, Exit) {
+    let exit = match session.link().trouble() {
+        Some(Trouble::Interrupted) => Exit::Interrupted,
+        Some(Trouble::Interlock(why)) => {
+            output.complain(why);
+            Exit::Interlock
+        }
+        _ => exit,
+    };
+    let end = match exit {
+        Exit::RigError | Exit::Interlock => session.close_with_error(),
+        _ => session.close(),
+    };
+    let exit = tell_end(&end, exit, output);
+    (end, exit)
 }
 
 /// Tells how a rig was given back; a safe state that is not confirmed is graver than all else.

@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::output::Output;
 use super::qualify::{Findings, settle};
-use super::rig_failure::{alarm, exit_of, interrupt_flag, tell_end};
+use super::rig_failure::{alarm, exit_of, give_back, interrupt_flag};
 use super::run::{details, line, progress_bar, summary};
 use crate::evidence::{About, EvidenceError, Folder};
 use crate::library::Entry;
@@ -91,19 +91,7 @@ pub(super) fn work(
             return Err(error);
         }
     };
-    let exit = match session.link().trouble() {
-        Some(Trouble::Interrupted) => Exit::Interrupted,
-        Some(Trouble::Interlock(why)) => {
-            output.complain(why);
-            Exit::Interlock
-        }
-        _ => exit,
-    };
-    let end = match exit {
-        Exit::RigError | Exit::Interlock => session.close_with_error(),
-        _ => session.close(),
-    };
-    let exit = tell_end(&end, exit, output);
+    let (end, exit) = give_back(session, exit, output);
     if let Some(folder) = folder {
         let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
         match folder.finish(safe) {

@@ -4,6 +4,7 @@ pub mod csv;
 pub mod json;
 pub mod meaning;
 pub mod mismatch;
+pub mod page;
 pub mod pcapng;
 pub mod plot;
 pub mod svg;

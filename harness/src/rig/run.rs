@@ -63,6 +63,8 @@ pub struct Run<'s> {
     byte_time: Span,
     /// The sign of life of whoever only computes; see the session's watchdog.
     beats: Option<Arc<AtomicU64>>,
+    /// Drives are not reset before a scenario, whatever is allowed.
+    as_they_are: bool,
 }
 
 impl<'s> Run<'s> {
@@ -87,6 +89,7 @@ impl<'s> Run<'s> {
             session,
             twin,
             byte_time,
+            as_they_are: false,
         })
     }
 
@@ -229,8 +232,13 @@ impl<'s> Run<'s> {
         Way {
             rings: self.session.rings().to_vec(),
             attempts: file.health.between.then_some(file.health.attempts),
-            anew: limits.reset && limits.motion,
+            anew: limits.reset && limits.motion && !self.as_they_are,
         }
+    }
+
+    /// Resets no drive any more before a scenario: for a ring with a drive that does not answer `ResetH8` as it should.
+    pub fn leave_as_they_are(&mut self) {
+        self.as_they_are = true;
     }
 
     fn follow(&mut self, conversations: &[Conversation]) -> Vec<Comparison> {

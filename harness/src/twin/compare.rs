@@ -4,12 +4,15 @@ use super::follow::Conversation;
 use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at};
+use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::ops::RangeInclusive;
 
 /// The longest run of one byte in which each counts: more than the 25 zeros of 9.7.
 const LONGEST_RUN: usize = 32;
@@ -43,6 +46,20 @@ pub enum What {
     Time,
 }
 
+impl What {
+    /// It in a few words.
+    #[must_use]
+    pub const fn words(&self) -> &'static str {
+        match self {
+            Self::Value => "another value",
+            Self::LineStatus => "another line status",
+            Self::Missing => "a byte is missing",
+            Self::Surplus => "a byte too many",
+            Self::Time => "another time",
+        }
+    }
+}
+
 /// The first byte that is otherwise than the model says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Divergence {
@@ -74,13 +91,7 @@ impl fmt::Display for Divergence {
             },
         };
         let (section, rule) = self.role.rule();
-        let what = match self.what {
-            What::Value => "another value",
-            What::LineStatus => "another line status",
-            What::Missing => "a byte is missing",
-            What::Surplus => "a byte too many",
-            What::Time => "another time",
-        };
+        let what = self.what.words();
         let ring = if self.ring == 0 { "" } else { " of ring 2" };
         write!(f, "byte {}{ring}", self.byte)?;
         if let Some(drive) = self.drive {
@@ -132,6 +143,8 @@ pub(super) struct Comparer<'a> {
     pub(super) written: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells taken over.
     pub(super) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
+    /// Drives whose outgoing process data (14.10.3) change by themselves.
+    pub(super) moving: BTreeSet<(usize, u8)>,
     pub(super) comparison: Comparison,
 }
 
@@ -146,9 +159,13 @@ impl Comparer<'_> {
     ) {
         let sent = conversation.sent_in(ring);
         let received = &conversation.received_in(ring);
-        let roles = roles(size, &sent);
+        let (places, roles) = answered(size, &sent);
         // A ring that gives back a byte for a byte (9.1) has each role at its place.
-        let aligned = received.len() == sent.len() && expected.len() == sent.len();
+        let aligned = received.len() == roles.len() && expected.len() == roles.len();
+        let known = match aligned {
+            true => roles.len(),
+            false => known_places(&sent, (&places, &roles), expected, received),
+        };
         let real_time = self.exactness.tolerance > Span::ZERO;
         let (shorter, short);
         let (expected, received) = if aligned || !real_time {
@@ -160,6 +177,10 @@ impl Comparer<'_> {
         // What was still coming when the conversation ended came a moment sooner or later.
         let tail = conversation.end - self.exactness.tolerance - TAIL;
         let role_at = |index: usize| roles.get(index).copied().unwrap_or(Role::Foreign);
+        let step_at = |index: usize| {
+            let place = places.get(index).copied().unwrap_or(index);
+            conversation.step_at(ring, place)
+        };
         for index in 0..received.len().max(expected.len()) {
             let role = role_at(index);
             let pair = (expected.get(index).copied(), received.get(index).copied());
@@ -168,11 +189,11 @@ impl Comparer<'_> {
                     let found_good = found.error.is_none() || !self.exactness.line_errors;
                     let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
                     let same = wanted.byte == found.byte
-                        || aligned && self.may_differ(ring, role, received, index);
+                        || index < known && self.may_differ(ring, &roles, received, index);
                     self.note_write(ring, role);
                     match (same, wanted_good == found_good) {
                         (true, true) => {
-                            let step = || conversation.step_at(ring, index);
+                            let step = || step_at(index);
                             let pair = ((due, wanted), (at, found));
                             self.time((ring, index), role, step, pair);
                             None
@@ -194,11 +215,7 @@ impl Comparer<'_> {
                 return;
             }
             if let Some(what) = what {
-                let heard: Vec<_> = expected[..index.min(expected.len())]
-                    .iter()
-                    .map(|(_, byte)| *byte)
-                    .collect();
-                let spelled = locate(&heard, size.drives()).map(|location| location.drive);
+                let heard = &expected[..index.min(expected.len())];
                 let found = Divergence {
                     ring,
                     byte: index + 1,
@@ -206,8 +223,8 @@ impl Comparer<'_> {
                     expected: pair.0,
                     received: pair.1,
                     role,
-                    step: conversation.step_at(ring, index),
-                    drive: role.drive().or(spelled),
+                    step: step_at(index),
+                    drive: role.drive().or_else(|| spelled(heard, size)),
                 };
                 self.comparison.divergence.get_or_insert(found);
                 return;
@@ -220,12 +237,12 @@ impl Comparer<'_> {
     fn may_differ(
         &mut self,
         ring: usize,
-        role: Role,
+        roles: &[Role],
         received: &[(Instant, Received)],
         index: usize,
     ) -> bool {
         let value = received[index].1.byte;
-        match role {
+        match roles[index] {
             Role::Data {
                 drive: Some(drive),
                 address,
@@ -250,12 +267,21 @@ impl Comparer<'_> {
                 });
                 true
             }
-            Role::Check { length, .. } => {
-                let from = (index + 1).saturating_sub(usize::from(length));
-                let bytes = &received[from..index];
-                let sum = bytes
-                    .iter()
-                    .fold(Checksum::EMPTY, |sum, (_, byte)| sum.with(byte.byte));
+            Role::ProcessData { drive: Some(drive) } => {
+                let moves = !self.exactness.knows_cells && self.moving.contains(&(ring, drive));
+                self.comparison.measured += u64::from(moves);
+                moves
+            }
+            Role::Check { drive, length, .. } => {
+                // A command may be cut over several telegrams (9.5): its bytes need not stand together.
+                let own = |role: &Role| {
+                    matches!(role, Role::Command { .. } | Role::Data { .. })
+                        && role.drive() == drive
+                };
+                let before = roles[..index].iter().zip(received).rev();
+                let before = before.filter(|(role, _)| own(role));
+                let bytes = before.take(usize::from(length).saturating_sub(1));
+                let sum = bytes.fold(Checksum::EMPTY, |sum, (_, (_, byte))| sum.with(byte.byte));
                 sum.minus() == value
             }
             _ => false,
@@ -305,6 +331,53 @@ impl Comparer<'_> {
     }
 }
 
+/// The drive that a ring spells out with these bytes (9.7).
+fn spelled(heard: &[(Instant, Received)], size: RingSize) -> Option<u8> {
+    let heard: Vec<_> = heard.iter().map(|(_, byte)| *byte).collect();
+    locate(&heard, size.drives()).map(|location| location.drive)
+}
+
+/// The bytes that are answered, by their places among those sent, and their roles: a PAUSE where a sync byte is due is swallowed (9.2).
+fn answered(size: RingSize, sent: &[(u8, bool)]) -> (Vec<usize>, Vec<Role>) {
+    let all = roles(size, sent).into_iter().zip(sent).enumerate();
+    let answered = all.filter(|(_, (role, (byte, _)))| (*role, *byte) != (Role::Idle, PAUSE));
+    answered.map(|(place, (role, _))| (place, role)).unzip()
+}
+
+/// Up to where each byte received is known to stand for a byte sent, in a ring that does not give back a byte for a byte: up to the
+/// first one that meets a fault, or that is left out of a long run.
+fn known_places(
+    sent: &[(u8, bool)],
+    (places, roles): (&[usize], &[Role]),
+    expected: &[(Instant, Received)],
+    received: &[(Instant, Received)],
+) -> usize {
+    let damaged = places.iter().position(|place| !sent[*place].1);
+    let known = match damaged {
+        Some(damaged) => damaged,
+        // Without a fault it is the drives that lose bytes, or swallow or send some where they report an error.
+        None if expected.len() == places.len() => places.len(),
+        // Up to the error: a sync byte, or a byte of a command that is echoed, does not come back as it was.
+        None => {
+            let lost = |(index, role): (usize, &Role)| match role {
+                Role::Foreign => true,
+                Role::Sync | Role::Command { .. } => expected
+                    .get(index)
+                    .is_none_or(|(_, byte)| !byte.is(sent[places[index]].0)),
+                _ => false,
+            };
+            let error = roles.iter().enumerate().position(lost);
+            error.unwrap_or(roles.len())
+        }
+    };
+    let short = |bytes: &[(Instant, Received)]| {
+        let same = |run: &[(Instant, Received)]| run.iter().all(|byte| byte.1 == run[0].1);
+        let long = bytes.windows(LONGEST_RUN + 1).position(same);
+        long.map_or(usize::MAX, |from| from + LONGEST_RUN)
+    };
+    known.min(short(expected)).min(short(received))
+}
+
 /// Drives that report an error send for ever (9.9), and a real clock does not cut that off at a byte: of a long run of
 /// one byte only the beginning is compared.
 fn collapsed(bytes: &[(Instant, Received)]) -> Vec<(Instant, Received)> {
@@ -320,39 +393,112 @@ fn collapsed(bytes: &[(Instant, Received)]) -> Vec<(Instant, Received)> {
     kept
 }
 
+/// Whether no model knows what a cell of a real drive holds from one moment to the next.
+pub(crate) fn unknowable(address: u16) -> bool {
+    measured(address) || moves(address)
+}
+
 /// Whether the drive itself writes a cell (14.2: read only), so that no model knows what it holds.
 fn measured(address: u16) -> bool {
     cell_at(address).is_some_and(|cell| cell.access != Access::Write)
 }
 
 /// Whether a cell changes by itself as time goes on, so that a bench that is late by a moment reads something else: states
-/// (14.4), the positioning controller (13.3), the EEPROM controller (14.10.5) and the oscilloscope (14.10.6).
+/// (14.4), the positioning controller (13.3), the EEPROM controller (14.10.5), the oscilloscope (14.10.6), positions (14.5.5), and the
+/// counters and buffers of the drive's program (14.2.1).
 fn moves(address: u16) -> bool {
-    const SECTIONS: [&str; 4] = ["14.4", "13.3", "14.10.5", "14.10.6"];
-    cell_at(address).is_some_and(|cell| {
-        SECTIONS
-            .iter()
-            .any(|section| cell.section.starts_with(section))
-    })
+    const SECTIONS: [&str; 5] = ["14.4", "13.3", "14.10.5", "14.10.6", "14.5.5"];
+    const OWN: [RangeInclusive<u16>; 5] = [
+        ram::I2..=ram::I2 + 3,
+        ram::STACK..=ram::STACK + 95,
+        ram::N_INTEGRATOR..=ram::LAGE0 + 1,
+        ram::ICRA..=ram::ICRA0 + 1,
+        ram::CNT2..=ram::CNT_REVERS,
+    ];
+    OWN.iter().any(|own| own.contains(&address))
+        || cell_at(address).is_some_and(|cell| {
+            let own = |section: &&str| cell.section.starts_with(*section);
+            SECTIONS.iter().any(own)
+        })
 }
 
 /// Whether a byte is another one, or one too many or too few.
-fn what_of(
+pub(crate) fn what_of(
     expected: &[(Instant, Received)],
     received: &[(Instant, Received)],
     index: usize,
 ) -> What {
     const ALIKE: usize = 4;
+    fn rest(bytes: &[(Instant, Received)], from: usize) -> &[(Instant, Received)] {
+        bytes.get(from..).unwrap_or_default()
+    }
+    match (expected.get(index), received.get(index)) {
+        (_, None) => return What::Missing,
+        (None, _) => return What::Surplus,
+        (Some((_, wanted)), Some((_, found))) if wanted.byte == found.byte => {
+            return What::LineStatus;
+        }
+        _ => {}
+    }
     let run = |a: &[(Instant, Received)], b: &[(Instant, Received)]| {
         a.len() >= ALIKE
             && b.len() >= ALIKE
             && a[..ALIKE].iter().zip(b).all(|(a, b)| a.1.byte == b.1.byte)
     };
-    if run(&expected[index + 1..], &received[index..]) {
+    if run(rest(expected, index + 1), rest(received, index)) {
         What::Missing
-    } else if run(&expected[index..], &received[index + 1..]) {
+    } else if run(rest(expected, index), rest(received, index + 1)) {
         What::Surplus
     } else {
         What::Value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::{Line, Link};
+    use crate::scenario::simulate::bench;
+    use crate::scenario::source::Source;
+
+    /// ND21 14.2.1: what a drive changes by itself, while it stands and while it turns, is compared with nobody's.
+    #[test]
+    fn what_changes_by_itself_is_not_compared() {
+        let text = "title x\nring 1\ndrive 0 model nd21\ndrive 0 input GPIN3 GPIN5 high\nwrite-word 0 nsoll = 0400\n";
+        let source = Source {
+            name: "test".to_owned(),
+            text: text.to_owned().into(),
+        };
+        let plan = crate::library::Entry::new(source, None)
+            .expect("no mistakes")
+            .plan;
+        let mut link = bench(&plan.expect("novobus"));
+        // 9.3, 10.2: nsoll of drive 0 becomes 0400.
+        let turn = [0x8C, 0xFF, 0x63, 0x00, 0x04, 0x08, 0xFF, 0x6E];
+        let cells = |link: &crate::link::SimulatedLink| -> Vec<(u16, Option<u8>)> {
+            (0xFD80..=0xFF7F)
+                .map(|cell| (cell, link.peek(0, 0, cell)))
+                .collect()
+        };
+        let mut changed = BTreeSet::new();
+        for sent in [&[][..], &turn] {
+            link.send(0, sent);
+            link.run_until(link.now() + Span::from_millis(10));
+            let before = cells(&link);
+            for _ in 0..300 {
+                link.run_until(link.now() + Span::from_millis(1));
+                let pairs = cells(&link).into_iter().zip(&before);
+                changed.extend(pairs.filter(|(now, was)| now != *was).map(|(now, _)| now.0));
+            }
+        }
+        assert!(
+            changed.contains(&ram::CNT2) && changed.contains(&ram::LAGEIST),
+            "{changed:04X?}"
+        );
+        let compared: Vec<_> = changed
+            .iter()
+            .filter(|cell| !measured(**cell) && !moves(**cell))
+            .collect();
+        assert!(compared.is_empty(), "{compared:04X?}");
     }
 }

@@ -1,9 +1,11 @@
 //! The twin itself, and what it is given.
 
-use super::compare::{Comparer, Comparison, Exactness};
+use super::compare::{Comparer, Comparison, Exactness, unknowable};
 use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
+use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::command::PAGE;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
@@ -160,17 +162,31 @@ impl Twin {
     pub fn follow(&mut self, conversation: &Conversation, exactness: Exactness) -> Comparison {
         let real_time = exactness.tolerance > Span::ZERO;
         let slack = if real_time { SLACK } else { Span::ZERO };
+        let mut moving = self.moving();
         let received = self.answer(conversation, slack);
+        moving.extend(self.moving());
         let mut comparer = Comparer {
             exactness,
             written: &mut self.written,
             held: &mut self.held,
+            moving,
             comparison: Comparison::default(),
         };
         for (ring, (size, expected)) in self.sizes.iter().zip(&received).enumerate() {
             comparer.ring(ring, *size, conversation, expected);
         }
         comparer.comparison
+    }
+
+    /// Drives whose outgoing process data (ND21 14.10.3) come from a cell that changes by itself, as the actual speed does.
+    fn moving(&self) -> BTreeSet<(usize, u8)> {
+        let rings = self.sizes.iter().enumerate();
+        let drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
+        let moves = |(ring, drive): &(usize, u8)| {
+            let low = self.link.peek(*ring, *drive, ram::DATA_OUT).unwrap_or(0);
+            unknowable(PAGE | u16::from(low))
+        };
+        drives.filter(moves).collect()
     }
 
     /// Lives through conversations one after another. In real time nobody knows how a ring comes out of one in which drives

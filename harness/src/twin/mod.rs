@@ -9,4 +9,5 @@ mod compare;
 mod follow;
 
 pub use compare::{Adopted, Comparison, Divergence, Exactness, What};
+pub(crate) use compare::{unknowable, what_of};
 pub use follow::{Conversation, Done, Twin};

@@ -1,0 +1,33 @@
+//! `drivebench fuzz`: conversations that nobody has written.
+
+mod power;
+mod replay;
+mod rig;
+mod run;
+mod watch;
+
+use super::exit::Exit;
+use super::output::Output;
+use clap::Subcommand;
+
+pub(super) use rig::{Use, on_ports, scope, tell};
+
+/// The commands of `fuzz`.
+#[derive(Debug, Subcommand)]
+pub enum FuzzCommand {
+    /// Make conversations from a seed and look for a byte that is otherwise than the manual says; every finding is a scenario.
+    Run(run::FuzzRunArguments),
+    /// Try the conversations that a run has kept, or those of a corpus, the ones that show most first.
+    Replay(replay::ReplayArguments),
+    /// Show how many cases it takes to find each planned deviation of a drive.
+    Power(power::PowerArguments),
+}
+
+/// Does it.
+pub(super) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Result<Exit> {
+    match command {
+        FuzzCommand::Run(arguments) => run::run(arguments, output),
+        FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
+        FuzzCommand::Power(arguments) => power::power(arguments, output),
+    }
+}

@@ -1,0 +1,165 @@
+//! `drivebench fuzz power`: how many cases it takes to find each planned deviation.
+
+use super::rig::{simulated, tell};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::explore::{
+    About, Bounds, Campaign, ExploreError, Finding, OnSim, Planted, Pool, Progress, Setup, Swarm,
+    Watcher,
+};
+use crate::rig::find::find;
+use clap::Args;
+use harness_proto::novobus::guard::Limits;
+use harness_sim::deviation::{Deviation, deviations};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+const FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/deviations.toml");
+
+/// How many drives the ring has; one of them deviates, another one with each seed.
+const DRIVES: u8 = 3;
+
+/// For `fuzz power`.
+#[derive(Clone, Debug, Args)]
+pub struct PowerArguments {
+    /// Only deviations with this text in their name.
+    pub filter: Option<String>,
+    /// How many seeds each is looked for with.
+    #[arg(long, value_name = "NUMBER", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// After how many cases it counts as not found.
+    #[arg(long, value_name = "NUMBER", default_value_t = 10_000)]
+    pub cases: u64,
+}
+
+/// By which scenario a deviation is found, and by what means; see the head of the file.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ByScenario {
+    wire: Option<String>,
+    faults: Option<String>,
+    look: Option<String>,
+}
+
+impl ByScenario {
+    fn words(&self) -> String {
+        let means = [
+            ("wire", &self.wire),
+            ("faults", &self.faults),
+            ("look", &self.look),
+        ];
+        let first = means
+            .iter()
+            .find_map(|(name, scenario)| Some((name, scenario.as_ref()?)));
+        first.map_or_else(
+            || "-".to_owned(),
+            |(name, scenario)| format!("{name} {scenario}"),
+        )
+    }
+}
+
+/// Shows the table.
+pub(super) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let filter = arguments.filter.as_deref().unwrap_or_default();
+    let wanted: Vec<_> = deviations()
+        .filter(|own| own.name.contains(filter))
+        .collect();
+    if wanted.is_empty() {
+        output
+            .complain("no deviation has this text in its name; `drivebench deviations` shows them");
+        return Ok(Exit::NothingSelected);
+    }
+    // A test of the file keeps it whole.
+    let by: BTreeMap<String, ByScenario> = toml::from_str(FOUND_BY_SCENARIOS).unwrap_or_default();
+    let head = "cases until found: median of the seeds (least, most), and by which means a scenario finds it";
+    output.result(&format!("{head}\n"))?;
+    let (mut found, mut within) = (0, Vec::new());
+    for deviation in &wanted {
+        let counts = match counts(deviation, arguments) {
+            Ok(counts) => counts,
+            Err(error) => return Ok(tell(&error, output)),
+        };
+        let median = counts.get(counts.len() / 2).copied().flatten();
+        if let Some(median) = median {
+            found += 1;
+            within.push(median);
+        }
+        let show = |count: Option<&Option<u64>>| match count {
+            Some(Some(count)) => count.to_string(),
+            _ => "-".to_owned(),
+        };
+        let mut line = String::new();
+        let _infallible = write!(
+            line,
+            "{:38} {:>7} ({:>6}, {:>6})  {}",
+            deviation.name,
+            show(Some(&median)),
+            show(counts.first()),
+            show(counts.last()),
+            by.get(deviation.name)
+                .map_or_else(|| "-".to_owned(), ByScenario::words)
+        );
+        output.result(&format!("{}\n", line.trim_end()))?;
+    }
+    within.sort_unstable();
+    let middle = within.get(within.len() / 2).copied().unwrap_or(0);
+    output.result(&format!(
+        "{found} of {} found within {} cases (median of {} seeds); the median of these is {middle}\n",
+        wanted.len(),
+        arguments.cases,
+        arguments.seeds
+    ))?;
+    Ok(Exit::Passed)
+}
+
+/// How many cases each seed takes, the least first; those that do not find it last.
+fn counts(
+    deviation: &Deviation,
+    arguments: &PowerArguments,
+) -> Result<Vec<Option<u64>>, ExploreError> {
+    let rig = find(&format!("sim:{DRIVES}"), std::path::Path::new(""))
+        .map_err(|error| ExploreError::Usage(error.to_string()))?;
+    let mut counts = Vec::new();
+    for seed in 1..=arguments.seeds {
+        let planted = Planted {
+            drive: u8::try_from(seed % u64::from(DRIVES)).unwrap_or(0),
+            name: deviation.name.to_owned(),
+        };
+        let setup = Setup::of_rig(&rig, &[planted], false);
+        let mut target = OnSim::new(setup.clone());
+        let scope = simulated(DRIVES, Limits::unlimited(), &setup);
+        let about = About {
+            schema: About::SCHEMA,
+            rig: format!("sim:{DRIVES}"),
+            drives: DRIVES,
+            ports: false,
+            seed,
+            confirm: 1,
+            of: 1,
+            setup: setup.clone(),
+            spices: Vec::new(),
+        };
+        let mut campaign = Campaign::new(about, scope);
+        let bounds = Bounds {
+            cases: arguments.cases,
+            wire: None,
+            findings: 1,
+            every: u64::MAX,
+        };
+        campaign.run(&mut target, None, &bounds, &mut Silent)?;
+        let cases = campaign.progress().cases;
+        counts.push((campaign.findings().0 > 0).then_some(cases));
+    }
+    counts.sort_unstable_by_key(|count| count.unwrap_or(u64::MAX));
+    Ok(counts)
+}
+
+/// Tells nothing.
+struct Silent;
+
+impl Watcher for Silent {
+    fn round(&mut self, _: u64, _: &Swarm) {}
+    fn found(&mut self, _: &Finding, _: &str) {}
+    fn progress(&mut self, _: &Progress, _: &Pool) {}
+}

@@ -1,0 +1,214 @@
+//! `drivebench fuzz replay`: a minute on hardware.
+
+use super::rig::{Use, on_ports, scope, simulated, tell};
+use super::watch::{Telling, summary};
+use crate::cli::args::{WIRE_TIME_HELP, duration};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::cli::rig_failure::find_rig;
+use crate::explore::{
+    About, Act, Bounds, Campaign, Case, ExploreError, Line, OnRig, OnSim, Setup, Target, What,
+    by_novelty, read,
+};
+use crate::rig::Rig;
+use clap::Args;
+use harness_proto::novobus::guard::Limits;
+use harness_proto::time::Span;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The most cases that are taken of a folder.
+const MOST_CASES: usize = 5_000;
+
+/// The largest file of a corpus.
+const LARGEST: u64 = 64 * 1024;
+
+/// For `fuzz replay`.
+#[derive(Clone, Debug, Args)]
+pub struct ReplayArguments {
+    /// A folder that `fuzz run` has written, or a corpus of `.hex` files such as corpora/fuzz/ring.
+    pub folder: PathBuf,
+    /// On which rig: sim:N, a file, or a name that `rig list` shows.
+    #[arg(long, value_name = "NAME")]
+    pub rig: String,
+    #[arg(long, value_name = "TIME", value_parser = duration, default_value = "60s", help = WIRE_TIME_HELP)]
+    pub wire_time: Duration,
+    /// Let motors turn, where the rig's file allows it too.
+    #[arg(long)]
+    pub allow_motion: bool,
+    /// How long to wait for a rig that somebody else has, such as 30s.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub wait: Option<Duration>,
+}
+
+/// Replays.
+pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let Some(rig) = find_rig(&arguments.rig, output) else {
+        return Ok(Exit::Usage);
+    };
+    let drives = rig.file.ring.first.drives;
+    let cases = match cases(&arguments.folder, drives) {
+        Ok(cases) => cases,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    if cases.is_empty() {
+        output.complain(&format!(
+            "{} holds no case for a ring of {drives}",
+            arguments.folder.display()
+        ));
+        return Ok(Exit::NothingSelected);
+    }
+    if rig.is_simulated() {
+        let setup = Setup::of_rig(&rig, &[], false);
+        let mut target = OnSim::new(setup.clone());
+        let scope = simulated(drives, Limits::unlimited(), &setup);
+        let campaign = campaign(arguments, &rig, setup, scope);
+        return play(arguments, campaign, cases, &mut target, output);
+    }
+    let how = Use {
+        purpose: "fuzz replay",
+        allow_motion: arguments.allow_motion,
+        wait: arguments.wait.unwrap_or_default(),
+    };
+    on_ports(&rig, &how, output, |run, output| {
+        let scope = scope(run);
+        let limits = scope.limits;
+        let campaign = campaign(arguments, &rig, Setup::of_ports(), scope);
+        match OnRig::new(run, limits) {
+            Ok(mut target) => play(arguments, campaign, cases, &mut target, output),
+            Err(error) => Ok(tell(&error, output)),
+        }
+    })
+}
+
+fn campaign(
+    arguments: &ReplayArguments,
+    rig: &Rig,
+    setup: Setup,
+    scope: crate::explore::Scope,
+) -> Campaign {
+    let about = About {
+        schema: About::SCHEMA,
+        rig: arguments.rig.clone(),
+        drives: scope.drives,
+        ports: !rig.is_simulated(),
+        seed: 0,
+        confirm: 2,
+        of: 3,
+        setup,
+        spices: Vec::new(),
+    };
+    Campaign::new(about, scope)
+}
+
+fn play(
+    arguments: &ReplayArguments,
+    mut campaign: Campaign,
+    cases: Vec<Case>,
+    target: &mut dyn Target,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let count = cases.len();
+    let mut allowed = Vec::new();
+    let mut denied = 0;
+    for case in cases {
+        match target.rehearse(&case) {
+            Ok(rehearsal) if rehearsal.denied.is_none() => allowed.push((case, rehearsal.features)),
+            Ok(_) => denied += 1,
+            Err(error) => return Ok(tell(&error, output)),
+        }
+    }
+    let ordered = by_novelty(allowed);
+    output.say(&format!(
+        "{count} cases, {denied} not allowed or not possible here, {} show something that the others do not\n",
+        ordered.len()
+    ));
+    let bounds = Bounds {
+        cases: u64::MAX,
+        wire: Some(Span::from_nanos(
+            u64::try_from(arguments.wire_time.as_nanos()).unwrap_or(u64::MAX),
+        )),
+        findings: usize::MAX,
+        every: 1,
+    };
+    let mut telling = Telling {
+        output,
+        folder: None,
+        rounds: false,
+        told: None,
+        failed: None,
+    };
+    let end = campaign.replay(&ordered, target, None, &bounds, &mut telling);
+    if let Some(error) = telling.failed.take() {
+        return Err(error);
+    }
+    let end = match end {
+        Ok(end) => end,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    output.result(&summary(&campaign, &end))?;
+    Ok(match campaign.findings() {
+        (0, 0) => Exit::Passed,
+        (0, _) => Exit::Incomplete,
+        _ => Exit::Failed,
+    })
+}
+
+/// The cases of a folder that fit a ring.
+fn cases(folder: &Path, drives: u8) -> Result<Vec<Case>, ExploreError> {
+    if folder.join(crate::explore::RECORD).exists() {
+        let (kept, _) = read(folder)?;
+        let own = kept.lines.into_iter().filter_map(|line| match line {
+            Line::Kept { case, .. } if case.drives == drives => Some(case),
+            _ => None,
+        });
+        return Ok(own.take(MOST_CASES).collect());
+    }
+    let unreadable = |error: std::io::Error| {
+        ExploreError::File(format!("failed to read {}: {error}", folder.display()))
+    };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder)
+        .map_err(unreadable)?
+        .take(MOST_CASES)
+    {
+        let path = entry.map_err(unreadable)?.path();
+        if path.extension().is_some_and(|ending| ending == "hex") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    let cases = files.iter().map(|path| of_hex(path, drives));
+    cases.collect()
+}
+
+/// A file of corpora/fuzz/ring: two bytes that say what is damaged, and the bytes of the wire. The bytes alone are a case: what they
+/// damage lies on links that a rig does not reach.
+fn of_hex(path: &Path, drives: u8) -> Result<Case, ExploreError> {
+    let wrong = |why: &str| ExploreError::File(format!("{}: {why}", path.display()));
+    let size = std::fs::metadata(path)
+        .map_err(|error| wrong(&error.to_string()))?
+        .len();
+    if size > LARGEST {
+        return Err(wrong("larger than an input of a ring"));
+    }
+    let text = std::fs::read_to_string(path).map_err(|error| wrong(&error.to_string()))?;
+    let lines = text
+        .lines()
+        .map(|line| line.split('#').next().unwrap_or_default());
+    let words: Vec<_> = lines.flat_map(str::split_whitespace).collect();
+    let bytes = words
+        .iter()
+        .map(|word| u8::from_str_radix(word, 16))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|_| wrong("bytes are two hexadecimal digits each"))?;
+    let wire = bytes.get(2..).unwrap_or_default().to_vec();
+    let case = Case {
+        drives,
+        acts: vec![Act::sound(What::Bytes(wire))],
+    };
+    match case.is_bounded() {
+        true => Ok(case),
+        false => Err(wrong("more bytes than a case has")),
+    }
+}

@@ -1,0 +1,153 @@
+//! Work on a rig with ports: opened as `run --rig` opens it, given back in its safe state.
+
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::cli::rig_failure::{alarm, exit_of, give_back, interrupt_flag};
+use crate::explore::{ExploreError, Scope, Setup, Spice};
+use crate::link::Line as _;
+use crate::link::{Capability, Link, Trouble};
+use crate::rig::{Options, Rig, Run, Session};
+use crate::scenario::run::start_anew;
+use harness_proto::novobus::guard::Limits;
+use std::time::Duration;
+
+/// How a rig is used.
+pub(crate) struct Use {
+    pub(crate) purpose: &'static str,
+    pub(crate) allow_motion: bool,
+    pub(crate) wait: Duration,
+}
+
+/// Tells why exploring ended early, and gives the exit code for it.
+pub(crate) fn tell(error: &ExploreError, output: &mut Output) -> Exit {
+    match error {
+        ExploreError::Mistakes(problems) => output.mistakes(problems),
+        other => output.complain(&other.to_string()),
+    }
+    match error {
+        ExploreError::Session(error) => exit_of(error),
+        ExploreError::Mistakes(_) | ExploreError::File(_) | ExploreError::Usage(_) => Exit::Usage,
+        ExploreError::Lost(_) => Exit::RigError,
+    }
+}
+
+/// Opens a rig with ports, works on it, and gives it back in its safe state.
+pub(crate) fn on_ports(
+    rig: &Rig,
+    how: &Use,
+    output: &mut Output,
+    work: impl FnOnce(&mut Run<'_>, &mut Output) -> std::io::Result<Exit>,
+) -> std::io::Result<Exit> {
+    if rig.rings().count() > 1 {
+        output.complain(
+            "a case is a conversation with one ring, and this rig has two: name a rig with the one that is meant",
+        );
+        return Ok(Exit::Usage);
+    }
+    let options = Options {
+        purpose: how.purpose.to_owned(),
+        wait: how.wait,
+        allow_motion: how.allow_motion,
+        ill_as_well: false,
+        interrupt: interrupt_flag(),
+        alarm: alarm(),
+    };
+    let mut session = match Session::open(rig, &options) {
+        Ok(session) => session,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(exit_of(&error));
+        }
+    };
+    let worked = match Run::new(&mut session) {
+        Ok(mut run) => work(&mut run, output),
+        Err(problems) => {
+            output.mistakes(&problems);
+            Ok(Exit::Usage)
+        }
+    };
+    leave_clean(&mut session, output);
+    match worked {
+        Ok(exit) => Ok(give_back(session, exit, output).1),
+        Err(error) => {
+            let _exit = give_back(session, Exit::RigError, output);
+            Err(error)
+        }
+    }
+}
+
+/// What cases have left in the drives' RAM goes with a reset, where that is allowed.
+fn leave_clean(session: &mut Session, output: &mut Output) {
+    let limits = session.limits();
+    let lost = |trouble: &Trouble| !matches!(trouble, Trouble::Denied(_));
+    if !(limits.reset && limits.motion) || session.link().trouble().is_some_and(lost) {
+        return;
+    }
+    let rings = session.rings().to_vec();
+    let done = match session.health() {
+        Ok(_) => start_anew(session.link(), &rings),
+        Err(error) => Err(error.to_string()),
+    };
+    if let Err(why) = done {
+        output.complain(&format!("the drives were not reset behind the run: {why}"));
+    }
+}
+
+/// What cases may have on simulated rings; plain drives have nothing behind their bus.
+pub(crate) fn simulated(drives: u8, limits: Limits, setup: &Setup) -> Scope {
+    let behind = [Spice::Motion, Spice::Eeprom];
+    let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
+    Scope {
+        drives,
+        spices: all
+            .filter(|spice| !setup.is_plain() || !behind.contains(spice))
+            .collect(),
+        // What is damaged behind the last drive no drive hears.
+        links: (0..drives).collect(),
+        limits,
+        spare_eeprom: false,
+    }
+}
+
+/// What cases may have on a rig with ports. What a case leaves in a drive's RAM the next reset takes away (ND21 10.5): without leave for
+/// it cases only read, stop and block. The EEPROM is never written.
+pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
+    let capabilities = run.capabilities();
+    let session = run.session();
+    let own = session.limits();
+    let limits = match own.reset && own.motion {
+        true => own,
+        false => Limits {
+            bytes_per_second: own.bytes_per_second,
+            most_bytes: own.most_bytes,
+            ..Limits::default()
+        },
+    };
+    let drives = session.rig().file.ring.first.drives;
+    let has = |capability| capabilities.contains(&capability);
+    let link = session.link();
+    let links: Vec<u8> = (0..drives)
+        .filter(|place| link.reaches(0, usize::from(*place)))
+        .collect();
+    let possible = |spice: &Spice| match spice {
+        Spice::Power => false,
+        Spice::Flip | Spice::Framing => has(Capability::LineErrors) && !links.is_empty(),
+        // What drives take lost bytes for nobody can judge.
+        Spice::Slip => limits.allow_everything() && !links.is_empty(),
+        Spice::Late => limits.allow_everything() && !links.is_empty(),
+        Spice::Reset => limits.reset && limits.motion,
+        Spice::ProcessData => limits.motion,
+        Spice::WriteIo => limits.outputs,
+        Spice::Motion => limits.motion,
+        Spice::Eeprom => false,
+        _ => true,
+    };
+    let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
+    Scope {
+        drives,
+        spices: all.filter(possible).collect(),
+        links,
+        limits,
+        spare_eeprom: true,
+    }
+}

@@ -1,0 +1,285 @@
+//! `drivebench fuzz run`.
+
+use super::rig::{Use, on_ports, scope, simulated, tell};
+use super::watch::{Telling, summary};
+use crate::cli::args::{WIRE_TIME_HELP, duration};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::cli::rig_failure::find_rig;
+use crate::explore::{
+    About, Bounds, Campaign, ExploreError, Kept, OnRig, OnSim, Planted, Record, Scope, Setup,
+    Target, read,
+};
+use crate::rig::{Rig, state};
+use clap::Args;
+use harness_proto::novobus::guard::Limits;
+use harness_proto::time::Span;
+use harness_sim::deviation;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+
+/// How many cases are tried where nothing is said, on simulated rings.
+const CASES: u64 = 10_000;
+
+/// How long the line is used where nothing is said, on a rig with ports.
+const WIRE: Duration = Duration::from_secs(60);
+
+/// After how many cases the progress is written, on simulated rings.
+const EVERY: u64 = 50;
+
+/// For `fuzz run`.
+#[derive(Clone, Debug, Args)]
+pub struct FuzzRunArguments {
+    /// On which rig: sim:N, a file, or a name that `rig list` shows.
+    #[arg(long, value_name = "NAME", default_value = "sim:3")]
+    pub rig: String,
+    /// The seed: the same seed gives the same run.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// How many cases; 10000 on simulated rings where nothing is said.
+    #[arg(long, value_name = "NUMBER")]
+    pub cases: Option<u64>,
+    #[arg(long, value_name = "TIME", value_parser = duration, help = WIRE_TIME_HELP)]
+    pub wire_time: Option<Duration>,
+    /// Plant a deviation in a drive of a simulated ring, as DRIVE=NAME; `drivebench deviations` shows the names. May repeat.
+    #[arg(long, value_name = "DRIVE=NAME", value_parser = planted)]
+    pub deviates: Vec<Planted>,
+    /// Let the drives of sim:N be whole ND21s; without it they are plain, as the reference model is.
+    #[arg(long)]
+    pub whole: bool,
+    /// A finding counts when it is seen again K of N times, as K/N.
+    #[arg(long, value_name = "K/N", default_value = "2/3", value_parser = k_of_n)]
+    pub confirm: (u8, u8),
+    /// End with so many findings.
+    #[arg(long, value_name = "NUMBER", default_value_t = 5)]
+    pub findings: usize,
+    /// Where the run is kept: a folder that is not there or is empty; fuzz-RIG-DATE where nothing is said.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Go on with the run of this folder; rig, seed, deviations and confirmation are those that it began with.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "rig", "seed", "deviates", "whole", "confirm"])]
+    pub resume: Option<PathBuf>,
+    /// Let motors turn, where the rig's file allows it too.
+    #[arg(long)]
+    pub allow_motion: bool,
+    /// How long to wait for a rig that somebody else has, such as 30s.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub wait: Option<Duration>,
+}
+
+/// `1=sends-16-zeros`.
+fn planted(text: &str) -> Result<Planted, String> {
+    let form = "a deviation is planted as DRIVE=NAME, such as 1=sends-16-zeros";
+    let (drive, name) = text.split_once('=').ok_or(form)?;
+    let drive = drive.trim().parse().map_err(|_| form)?;
+    let known = deviation::deviation(name.trim());
+    let known = known.ok_or_else(|| {
+        format!("there is no deviation `{name}`; `drivebench deviations` shows what there is")
+    })?;
+    Ok(Planted {
+        drive,
+        name: known.name.to_owned(),
+    })
+}
+
+/// `2/3`.
+fn k_of_n(text: &str) -> Result<(u8, u8), String> {
+    let wrong = || "so often of so many times, such as 2/3; at most 100".to_owned();
+    let (k, n) = text.split_once('/').ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<u8>().map_err(|_| wrong());
+    let (k, n) = (number(k)?, number(n)?);
+    match (1..=n).contains(&k) && n <= 100 {
+        true => Ok((k, n)),
+        false => Err(wrong()),
+    }
+}
+
+/// Explores.
+pub(super) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io::Result<Exit> {
+    // What a run that goes on is, its record says.
+    let before = match arguments.resume.as_deref().map(read).transpose() {
+        Ok(before) => before.map(|(kept, _)| kept),
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    let name = before
+        .as_ref()
+        .map_or(&arguments.rig, |kept| &kept.about.rig);
+    let Some(rig) = find_rig(name, output) else {
+        return Ok(Exit::Usage);
+    };
+    if rig.is_simulated() {
+        return on_simulated(arguments, before.as_ref(), &rig, output);
+    }
+    if !arguments.deviates.is_empty() || arguments.whole {
+        output.complain("--deviates and --whole are for simulated rings: the drives of this rig are what they are");
+        return Ok(Exit::Usage);
+    }
+    let how = Use {
+        purpose: "fuzz",
+        allow_motion: arguments.allow_motion,
+        wait: arguments.wait.unwrap_or_default(),
+    };
+    on_ports(&rig, &how, output, |run, output| {
+        let scope = scope(run);
+        let mut target = match OnRig::new(run, scope.limits) {
+            Ok(target) => target,
+            Err(error) => return Ok(tell(&error, output)),
+        };
+        let about = about(arguments, &rig, Setup::of_ports(), &scope);
+        let bounds = Bounds {
+            cases: arguments.cases.unwrap_or(u64::MAX),
+            wire: Some(span(arguments.wire_time.unwrap_or(WIRE))),
+            findings: arguments.findings.max(1),
+            every: 1,
+        };
+        explore(arguments, (about, scope), &mut target, &bounds, output)
+    })
+}
+
+fn on_simulated(
+    arguments: &FuzzRunArguments,
+    before: Option<&Kept>,
+    rig: &Rig,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let drives = rig.file.ring.first.drives;
+    if rig.rings().count() > 1 {
+        output.complain("a case is a conversation with one ring, and this rig has two: name sim:N");
+        return Ok(Exit::Usage);
+    }
+    if let Some(planted) = arguments.deviates.iter().find(|own| own.drive >= drives) {
+        output.complain(&format!(
+            "the ring has the drives 0 to {}, and no drive {}",
+            drives - 1,
+            planted.drive
+        ));
+        return Ok(Exit::Usage);
+    }
+    let setup = match before {
+        Some(kept) => kept.about.setup.clone(),
+        None => Setup::of_rig(rig, &arguments.deviates, arguments.whole),
+    };
+    if !setup.is_plain() && setup.deviates.is_empty() {
+        output.complain(
+            "there is nothing to hold whole ND21s against: the reference model knows plain drives only. Plant a deviation \
+             (--deviates DRIVE=NAME), or use sim:N without --whole",
+        );
+        return Ok(Exit::Usage);
+    }
+    let own = &rig.file.limits;
+    let limits = Limits {
+        motion: own.allow_motion,
+        eeprom: own.allow_eeprom,
+        reset: own.allow_reset,
+        outputs: own.allow_outputs,
+        ..Limits::default()
+    };
+    let scope = simulated(drives, limits, &setup);
+    let mut target = OnSim::new(setup.clone());
+    let bounds = Bounds {
+        cases: arguments.cases.unwrap_or(match arguments.wire_time {
+            Some(_) => u64::MAX,
+            None => CASES,
+        }),
+        wire: arguments.wire_time.map(span),
+        findings: arguments.findings.max(1),
+        every: EVERY,
+    };
+    let about = about(arguments, rig, setup, &scope);
+    explore(arguments, (about, scope), &mut target, &bounds, output)
+}
+
+fn about(arguments: &FuzzRunArguments, rig: &Rig, setup: Setup, scope: &Scope) -> About {
+    let names = scope.spices.iter().map(|spice| spice.name().to_owned());
+    About {
+        schema: About::SCHEMA,
+        rig: arguments.rig.clone(),
+        drives: scope.drives,
+        ports: !rig.is_simulated(),
+        seed: arguments.seed,
+        confirm: arguments.confirm.0,
+        of: arguments.confirm.1,
+        setup,
+        spices: names.collect(),
+    }
+}
+
+/// Begins a run or goes on with one, and tells what came of it.
+fn explore(
+    arguments: &FuzzRunArguments,
+    (about, scope): (About, Scope),
+    target: &mut dyn Target,
+    bounds: &Bounds,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let begun = match &arguments.resume {
+        Some(folder) => resume(folder, &about, &scope, target),
+        None => {
+            let stamp = state::utc(SystemTime::now()).replace([':', ' '], "-");
+            let name = about.rig.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+            let name = name.trim_matches('-');
+            let folder = arguments.out.clone();
+            let folder = folder.unwrap_or_else(|| PathBuf::from(format!("fuzz-{name}-{stamp}")));
+            Record::create(&folder, &about).map(|record| (record, Campaign::new(about, scope)))
+        }
+    };
+    let (mut record, mut campaign) = match begun {
+        Ok(begun) => begun,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    let folder = record.folder().to_owned();
+    let mut telling = Telling {
+        output,
+        folder: Some(folder.clone()),
+        rounds: true,
+        told: None,
+        failed: None,
+    };
+    let end = campaign.run(target, Some(&mut record), bounds, &mut telling);
+    let failed = telling.failed.take();
+    let end = match end {
+        Ok(end) => end,
+        Err(error) => {
+            let exit = tell(&error, output);
+            output.say(&format!(
+                "what was done so far is in {}; go on: drivebench fuzz run --resume {}\n",
+                folder.display(),
+                folder.display()
+            ));
+            return Ok(exit);
+        }
+    };
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    output.result(&summary(&campaign, &end))?;
+    output.say(&format!("the run is in {}\n", folder.display()));
+    Ok(match campaign.findings() {
+        (0, 0) => Exit::Passed,
+        (0, _) => Exit::Incomplete,
+        _ => Exit::Failed,
+    })
+}
+
+fn resume(
+    folder: &std::path::Path,
+    about: &About,
+    scope: &Scope,
+    target: &mut dyn Target,
+) -> Result<(Record, Campaign), ExploreError> {
+    let (record, kept) = Record::resume(folder)?;
+    if (kept.about.drives, &kept.about.spices) != (about.drives, &about.spices) {
+        return Err(ExploreError::Usage(format!(
+            "the rig {} is another one than when the run in {} began: other drives, or other leave; begin another run",
+            kept.about.rig,
+            folder.display()
+        )));
+    }
+    let campaign = Campaign::resumed(&kept, scope.clone(), target)?;
+    Ok((record, campaign))
+}
+
+/// A time on the line.
+fn span(time: Duration) -> Span {
+    Span::from_nanos(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX))
+}

@@ -1,0 +1,84 @@
+//! What a run tells while it goes on.
+
+use crate::cli::output::Output;
+use crate::explore::{Campaign, End, Finding, Pool, Progress, Swarm, Watcher};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// How long the progress is not told again.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Tells it: findings on standard output, all else on standard error.
+pub(super) struct Telling<'o> {
+    pub(super) output: &'o mut Output,
+    /// Where the files of findings stand.
+    pub(super) folder: Option<PathBuf>,
+    /// Whether rounds are told.
+    pub(super) rounds: bool,
+    /// When the progress was told last.
+    pub(super) told: Option<Instant>,
+    /// Why standard output could not be written.
+    pub(super) failed: Option<std::io::Error>,
+}
+
+impl Watcher for Telling<'_> {
+    fn round(&mut self, round: u64, swarm: &Swarm) {
+        if self.rounds {
+            let names = swarm.names().join(" ");
+            self.output.say(&format!("round {round}: {names}\n"));
+        }
+    }
+
+    fn found(&mut self, finding: &Finding, file: &str) {
+        let word = if finding.confirmed { "found" } else { "flaky" };
+        let mut text = format!(
+            "{word}: case {}, seen again {} of {} times: {}\n",
+            finding.number,
+            finding.seen_again,
+            finding.of,
+            finding.difference.signature()
+        );
+        text.push_str(&format!("  {}\n", finding.difference.about));
+        if let Some(folder) = &self.folder {
+            let path = folder.join(file).with_extension("json");
+            text.push_str(&format!("  drivebench shrink {}\n", path.display()));
+        }
+        if let Err(error) = self.output.result(&text) {
+            self.failed.get_or_insert(error);
+        }
+    }
+
+    fn progress(&mut self, progress: &Progress, pool: &Pool) {
+        if self.output.progress && self.told.is_none_or(|told| told.elapsed() >= PAUSE) {
+            self.told = Some(Instant::now());
+            self.output.say(&format!(
+                "{} cases, {} kept with {} features\n",
+                progress.cases,
+                pool.cases().len(),
+                pool.shown()
+            ));
+        }
+    }
+}
+
+/// The last line of a run.
+pub(super) fn summary(campaign: &Campaign, end: &End) -> String {
+    let progress = campaign.progress();
+    let (confirmed, flaky) = campaign.findings();
+    let why = match end {
+        End::Cases => "all cases were tried".to_owned(),
+        End::Wire => "the next case would need more of the wire's time".to_owned(),
+        End::Findings => "enough was found".to_owned(),
+        End::Over(why) => why.clone(),
+    };
+    format!(
+        "{} cases ({} not allowed or not possible here, {} repeats of findings), {:.3} s on the line, {} kept with {} \
+         features; {confirmed} found, {flaky} flaky: {why}\n",
+        progress.cases,
+        progress.not_sent,
+        progress.repeats,
+        progress.wire_ns as f64 / 1e9,
+        campaign.pool().cases().len(),
+        campaign.pool().shown(),
+    )
+}

@@ -1,0 +1,67 @@
+//! `drivebench promote`: a finding that is kept.
+
+use super::exit::Exit;
+use super::fuzz::tell;
+use super::output::Output;
+use crate::explore::promote::{Naming, checkout, promote as keep};
+use crate::explore::{ExploreError, Finding};
+use clap::Args;
+use std::path::PathBuf;
+
+/// For `promote`.
+#[derive(Clone, Debug, Args)]
+pub struct PromoteArguments {
+    /// A finding of `fuzz run` or `shrink`: its `.json`, or the scenario beside it.
+    pub finding: PathBuf,
+    /// The name of the scenario: the section that it is about and what it shows, such as 9.6-checksum-of-a-read.
+    #[arg(long, value_name = "NAME")]
+    pub name: String,
+    /// Its title.
+    #[arg(long, value_name = "TEXT")]
+    pub title: Option<String>,
+    /// The table of the manual that it pins, as `drivebench manual` names it.
+    #[arg(long, value_name = "TABLE")]
+    pub source: Option<String>,
+    /// A checkout of the repository, or a folder in one; the present folder where nothing is said.
+    #[arg(long, value_name = "FOLDER")]
+    pub checkout: Option<PathBuf>,
+}
+
+/// Writes the files.
+pub(super) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let promoted = promoted(arguments);
+    let promoted = match promoted {
+        Ok(promoted) => promoted,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    let names = promoted
+        .files
+        .iter()
+        .map(|file| format!("{}\n", file.display()));
+    output.result(&names.collect::<String>())?;
+    output.say("the model passes it");
+    output.say(match promoted.fails_on_deviating {
+        Some(true) => ", the ring that it was found on fails it\n",
+        Some(false) => ", and so does the ring that it was found on: what is otherwise does not show at the master\n",
+        None => "\n",
+    });
+    output.say("compare the table with the print, cell by cell, before you keep it\n");
+    Ok(Exit::Passed)
+}
+
+fn promoted(
+    arguments: &PromoteArguments,
+) -> Result<crate::explore::promote::Promoted, ExploreError> {
+    let (finding, _) = Finding::read(&arguments.finding)?;
+    let here = PathBuf::from(".");
+    let from = arguments.checkout.as_ref().unwrap_or(&here);
+    let from = from
+        .canonicalize()
+        .map_err(|error| ExploreError::Usage(format!("{}: {error}", from.display())))?;
+    let naming = Naming {
+        name: arguments.name.clone(),
+        title: arguments.title.clone(),
+        source: arguments.source.clone(),
+    };
+    keep(&finding, &naming, &checkout(&from)?)
+}

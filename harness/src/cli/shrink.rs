@@ -1,0 +1,239 @@
+//! `drivebench shrink`: a finding made small.
+
+use super::args::duration;
+use super::exit::Exit;
+use super::fuzz::{Use, on_ports, scope, tell};
+use super::output::Output;
+use super::rig_failure::find_rig;
+use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
+use crate::explore::{Difference, ExploreError, Finding, OnRig, OnSim, Planted, Setup, Target};
+use crate::rig::Run;
+use clap::Args;
+use harness_sim::deviation::deviations;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How often a simulated ring is asked at most where nothing is said.
+const RUNS: u32 = 300;
+
+/// How often a rig is asked at most where nothing is said.
+const RUNS_ON_RIG: u32 = 40;
+
+/// For `shrink`.
+#[derive(Clone, Debug, Args)]
+pub struct ShrinkArguments {
+    /// A finding of `fuzz run`: its `.json`, or the scenario beside it.
+    pub finding: PathBuf,
+    /// The rig with ports that it was found on; findings of simulated rings need none.
+    #[arg(long, value_name = "NAME")]
+    pub rig: Option<String>,
+    /// How often a ring is asked at most: 300 on simulated rings, 40 on a rig with ports where nothing is said.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub runs: Option<u32>,
+    /// Let motors turn, where the rig's file allows it too.
+    #[arg(long)]
+    pub allow_motion: bool,
+    /// How long to wait for a rig that somebody else has, such as 30s.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub wait: Option<Duration>,
+}
+
+/// Makes a finding small, and writes what came of it beside it.
+pub(super) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let (finding, path) = match Finding::read(&arguments.finding) {
+        Ok(read) => read,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    if !finding.ports {
+        if arguments.rig.is_some() {
+            output.complain(
+                "this finding was made on a simulated ring: it is made small there, without --rig",
+            );
+            return Ok(Exit::Usage);
+        }
+        let most = arguments.runs.unwrap_or(RUNS);
+        let subject = subject(&finding);
+        let small = make_small(subject, finding.difference.clone(), most, &mut on_simulated);
+        return settle(&finding, &path, small, output);
+    }
+    let Some(name) = &arguments.rig else {
+        output.complain(&format!(
+            "this finding was made on the rig {}, which has ports: name it with --rig",
+            finding.rig
+        ));
+        return Ok(Exit::Usage);
+    };
+    let Some(rig) = find_rig(name, output) else {
+        return Ok(Exit::Usage);
+    };
+    if rig.is_simulated() || rig.file.ring.first.drives != finding.case.drives {
+        output.complain(&format!(
+            "the finding is of a ring of {} drives with ports, and {name} is another",
+            finding.case.drives
+        ));
+        return Ok(Exit::Usage);
+    }
+    let how = Use {
+        purpose: "shrink",
+        allow_motion: arguments.allow_motion,
+        wait: arguments.wait.unwrap_or_default(),
+    };
+    let most = arguments.runs.unwrap_or(RUNS_ON_RIG);
+    let start = explained(&finding, output);
+    on_ports(&rig, &how, output, |run, output| {
+        let small = on_rig(&finding, start, most, run);
+        settle(&finding, &path, small, output)
+    })
+}
+
+fn subject(finding: &Finding) -> Subject {
+    Subject {
+        case: finding.case.clone(),
+        setup: finding.setup.clone(),
+    }
+}
+
+/// Asks a simulated ring.
+fn on_simulated(subject: &Subject) -> Result<Option<Difference>, ExploreError> {
+    let mut target = OnSim::new(subject.setup.clone());
+    // A smaller ring may not have what the header speaks of.
+    let Ok(rehearsal) = target.rehearse(&subject.case) else {
+        return Ok(None);
+    };
+    match target.attempt(&subject.case, &rehearsal) {
+        Ok(tried) => Ok(tried.difference),
+        Err(_) => Ok(None),
+    }
+}
+
+/// What a finding of a rig is made into on the simulator first, where a known deviation of a drive shows the same there: runs that
+/// cost nothing. What comes of it is only a proposal; the rig decides.
+fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
+    let kind = finding.difference.kind();
+    let drives = 0..finding.case.drives;
+    let own = finding.difference.drive;
+    let suspects: Vec<u8> = own.map_or_else(|| drives.collect(), |drive| vec![drive]);
+    for deviation in deviations() {
+        for drive in &suspects {
+            let name = deviation.name.to_owned();
+            let planted = Planted {
+                drive: *drive,
+                name,
+            };
+            let subject = Subject {
+                case: finding.case.clone(),
+                setup: Setup {
+                    deviates: vec![planted],
+                    ..finding.setup.clone()
+                },
+            };
+            let found = on_simulated(&subject).ok().flatten();
+            let Some(difference) = found.filter(|found| found.kind() == kind) else {
+                continue;
+            };
+            // The rig's ring has the size that it has.
+            let size = finding.case.drives;
+            let mut ask = |subject: &Subject| match subject.case.drives == size {
+                true => on_simulated(subject),
+                false => Ok(None),
+            };
+            let small = make_small(subject, difference, RUNS, &mut ask).ok()?;
+            output.say(&format!(
+                "drive {drive} deviates {} shows the same on the simulator: made small there first, in {} runs\n",
+                deviation.name, small.runs
+            ));
+            return Some(Subject {
+                setup: finding.setup.clone(),
+                ..small.subject
+            });
+        }
+    }
+    None
+}
+
+/// Makes a finding small on the rig that it was made on.
+fn on_rig(
+    finding: &Finding,
+    start: Option<Subject>,
+    most: u32,
+    run: &mut Run<'_>,
+) -> Result<Shrunk, ExploreError> {
+    let limits = scope(run).limits;
+    let mut target = OnRig::new(run, limits)?;
+    let mut ask = |subject: &Subject| {
+        if subject.case.drives != finding.case.drives {
+            return Ok(None);
+        }
+        let rehearsal = target.rehearse(&subject.case)?;
+        if rehearsal.denied.is_some() {
+            return Ok(None);
+        }
+        let tried = target.attempt(&subject.case, &rehearsal)?;
+        Ok(tried.difference)
+    };
+    let mut spent = 0;
+    if let Some(start) = start {
+        spent += 1;
+        let found = ask(&start)?;
+        let kind = finding.difference.kind();
+        if let Some(difference) = found.filter(|found| found.kind() == kind) {
+            let mut small = make_small(start, difference, most.saturating_sub(spent), &mut ask)?;
+            small.runs += spent;
+            return Ok(small);
+        }
+    }
+    let left = most.saturating_sub(spent);
+    let mut small = make_small(subject(finding), finding.difference.clone(), left, &mut ask)?;
+    small.runs += spent;
+    Ok(small)
+}
+
+/// Writes the smaller finding beside the old one, and shows it.
+fn settle(
+    finding: &Finding,
+    path: &Path,
+    small: Result<Shrunk, ExploreError>,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let small = match small {
+        Ok(small) => small,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    let before = finding.case.bytes().len();
+    let after = small.subject.case.bytes().len();
+    let new = Finding {
+        shrunk_in: Some(small.runs),
+        difference: small.difference,
+        setup: small.subject.setup,
+        case: small.subject.case,
+        ..finding.clone()
+    };
+    let stem = path
+        .file_stem()
+        .and_then(|stem| stem.to_str())
+        .unwrap_or("finding");
+    let stem = stem.trim_end_matches("-small");
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let written = new.write(folder, &format!("{stem}-small"));
+    let text = written.and_then(|files| {
+        let text = std::fs::read_to_string(&files[1])
+            .map_err(|error| ExploreError::File(format!("{}: {error}", files[1].display())))?;
+        Ok((files, text))
+    });
+    let (files, text) = match text {
+        Ok(done) => done,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    output.result(&text)?;
+    let end = match small.complete {
+        true => "nothing more can be taken away",
+        false => "the runs are used up; --runs allows more",
+    };
+    output.say(&format!(
+        "{before} bytes became {after} in {} runs; {end}\n{}\ndrivebench promote {} --name NAME\n",
+        small.runs,
+        files[1].display(),
+        files[0].display()
+    ));
+    Ok(Exit::Passed)
+}

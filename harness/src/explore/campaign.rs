@@ -1,0 +1,356 @@
+//! A run: case after case, what is new is kept, what is otherwise is confirmed and written down.
+
+use super::case::Case;
+use super::dice::Dice;
+use super::error::ExploreError;
+use super::finding::Finding;
+use super::generate::{Generator, Scope};
+use super::mutate::mutate;
+use super::novelty::Pool;
+use super::oracle::Difference;
+use super::record::{About, Kept, Line, Progress, Record};
+use super::swarm::Swarm;
+use super::target::{Rehearsal, Target};
+use harness_proto::time::Span;
+use std::collections::BTreeMap;
+
+/// So often the same thing may be flaky before it is no longer looked at.
+const SETTLED: u8 = 3;
+
+/// How far a run goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// The number of cases.
+    pub cases: u64,
+    /// How long the line is used at most.
+    pub wire: Option<Span>,
+    /// It ends with so many findings.
+    pub findings: usize,
+    /// After how many cases the progress is written.
+    pub every: u64,
+}
+
+/// Why a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// All cases were tried.
+    Cases,
+    /// The next case would use the line for too long.
+    Wire,
+    /// Enough was found.
+    Findings,
+    /// The rig, or somebody, wants it to end.
+    Over(String),
+}
+
+/// What a run tells of while it goes on.
+pub trait Watcher {
+    /// A round begins, with what its cases may have.
+    fn round(&mut self, round: u64, swarm: &Swarm);
+
+    /// Something was found; the name of its files stands behind it.
+    fn found(&mut self, finding: &Finding, file: &str);
+
+    /// So far.
+    fn progress(&mut self, progress: &Progress, pool: &Pool);
+}
+
+/// A run.
+#[derive(Debug)]
+pub struct Campaign {
+    about: About,
+    scope: Scope,
+    pool: Pool,
+    progress: Progress,
+    /// What was found, and how often in vain: what counts is settled.
+    known: BTreeMap<String, u8>,
+    /// How many findings count.
+    confirmed: usize,
+    flaky: usize,
+}
+
+impl Campaign {
+    /// A run that begins.
+    #[must_use]
+    pub fn new(about: About, scope: Scope) -> Self {
+        Self {
+            about,
+            scope,
+            pool: Pool::default(),
+            progress: Progress::default(),
+            known: BTreeMap::new(),
+            confirmed: 0,
+            flaky: 0,
+        }
+    }
+
+    /// A run that goes on: what was kept is kept again, what was found is known.
+    ///
+    /// # Errors
+    /// The model cannot be made.
+    pub fn resumed(
+        kept: &Kept,
+        scope: Scope,
+        target: &mut dyn Target,
+    ) -> Result<Self, ExploreError> {
+        let mut campaign = Self::new(kept.about.clone(), scope);
+        for line in &kept.lines {
+            match line {
+                Line::Kept { case, .. } => {
+                    let rehearsal = target.rehearse(case)?;
+                    campaign.pool.offer(case, &rehearsal.features);
+                }
+                Line::Finding {
+                    signature,
+                    confirmed,
+                    ..
+                } => campaign.note(signature, *confirmed),
+                _ => {}
+            }
+        }
+        campaign.progress = kept.progress;
+        Ok(campaign)
+    }
+
+    fn note(&mut self, signature: &str, confirmed: bool) {
+        let times = self.known.entry(signature.to_owned()).or_default();
+        if confirmed {
+            *times = SETTLED;
+            self.confirmed += 1;
+        } else {
+            *times += 1;
+            self.flaky += 1;
+        }
+    }
+
+    /// Whether such a thing was found already, or was flaky often enough.
+    fn is_settled(&self, difference: &Difference) -> bool {
+        let times = self.known.get(&difference.signature());
+        times.is_some_and(|times| *times >= SETTLED)
+    }
+
+    /// How far it has come.
+    #[must_use]
+    pub const fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
+    /// How many findings were seen again often enough, and how many were not.
+    #[must_use]
+    pub const fn findings(&self) -> (usize, usize) {
+        (self.confirmed, self.flaky)
+    }
+
+    /// What was kept.
+    #[must_use]
+    pub const fn pool(&self) -> &Pool {
+        &self.pool
+    }
+
+    /// The case of a number: it depends on the seed, the number and what was kept before.
+    fn case(&self, number: u64, swarm: &Swarm) -> Case {
+        let mut dice = Dice::of_part(self.about.seed, number);
+        let maker = Generator::new(&self.scope, swarm, &mut dice);
+        let old = dice
+            .percent(60)
+            .then(|| self.pool.pick(&mut dice))
+            .flatten();
+        let other = self.pool.pick(&mut dice);
+        match old {
+            Some(old) => mutate(old, other, &maker, &mut dice),
+            None => maker.case(&mut dice),
+        }
+    }
+
+    /// Goes on up to the bounds. The record, where there is one, holds everything when it ends, and when it fails on the way.
+    ///
+    /// # Errors
+    /// The rig or the record fails.
+    pub fn run(
+        &mut self,
+        target: &mut dyn Target,
+        mut record: Option<&mut Record>,
+        bounds: &Bounds,
+        watcher: &mut dyn Watcher,
+    ) -> Result<End, ExploreError> {
+        let mut swarm = None;
+        let end = loop {
+            if let Some(end) = self.end(bounds, target) {
+                break end;
+            }
+            let number = self.progress.cases;
+            let round = number / Swarm::ROUND;
+            let own = match swarm.take() {
+                Some((known, own)) if known == round => own,
+                _ => {
+                    let own = Swarm::of_round(self.about.seed, round, &self.scope);
+                    watcher.round(round, &own);
+                    if number.is_multiple_of(Swarm::ROUND) {
+                        let spices = own.names().into_iter().map(str::to_owned).collect();
+                        write(&mut record, || Line::Swarm { round, spices })?;
+                    }
+                    own
+                }
+            };
+            let case = self.case(number, &own);
+            swarm = Some((round, own));
+            let rehearsal = target.rehearse(&case)?;
+            if self.too_long(bounds, rehearsal.took) {
+                break End::Wire;
+            }
+            self.one(&case, &rehearsal, target, &mut record, watcher)?;
+            self.progress.cases += 1;
+            if self.progress.cases.is_multiple_of(bounds.every) {
+                write(&mut record, || Line::Progress(self.progress))?;
+                watcher.progress(&self.progress, &self.pool);
+            }
+        };
+        write(&mut record, || Line::Progress(self.progress))?;
+        watcher.progress(&self.progress, &self.pool);
+        Ok(end)
+    }
+
+    /// Tries these cases in order, within the wire's time: what is otherwise is confirmed and written down as in a run.
+    ///
+    /// # Errors
+    /// The rig or the record fails.
+    pub fn replay(
+        &mut self,
+        cases: &[Case],
+        target: &mut dyn Target,
+        mut record: Option<&mut Record>,
+        bounds: &Bounds,
+        watcher: &mut dyn Watcher,
+    ) -> Result<End, ExploreError> {
+        let mut end = End::Cases;
+        for case in cases {
+            if let Some(own) = self.end(bounds, target) {
+                end = own;
+                break;
+            }
+            let rehearsal = target.rehearse(case)?;
+            if self.too_long(bounds, rehearsal.took) {
+                end = End::Wire;
+                break;
+            }
+            self.one(case, &rehearsal, target, &mut record, watcher)?;
+            self.progress.cases += 1;
+            write(&mut record, || Line::Progress(self.progress))?;
+        }
+        watcher.progress(&self.progress, &self.pool);
+        Ok(end)
+    }
+
+    fn end(&self, bounds: &Bounds, target: &mut dyn Target) -> Option<End> {
+        if let Some(why) = target.over() {
+            return Some(End::Over(why));
+        }
+        if self.confirmed >= bounds.findings {
+            return Some(End::Findings);
+        }
+        (self.progress.cases >= bounds.cases).then_some(End::Cases)
+    }
+
+    /// Whether the line would be used for longer than it may.
+    fn too_long(&self, bounds: &Bounds, more: Span) -> bool {
+        let used = self.progress.wire_ns.saturating_add(more.as_nanos());
+        bounds.wire.is_some_and(|most| used > most.as_nanos())
+    }
+
+    fn use_line(&mut self, took: Span) {
+        self.progress.wire_ns = self.progress.wire_ns.saturating_add(took.as_nanos());
+    }
+
+    fn one(
+        &mut self,
+        case: &Case,
+        rehearsal: &Rehearsal,
+        target: &mut dyn Target,
+        record: &mut Option<&mut Record>,
+        watcher: &mut dyn Watcher,
+    ) -> Result<(), ExploreError> {
+        if rehearsal.denied.is_some() {
+            self.progress.not_sent += 1;
+            return Ok(());
+        }
+        let tried = target.attempt(case, rehearsal)?;
+        self.use_line(tried.took);
+        let number = self.progress.cases;
+        match tried.difference {
+            None if tried.not_played.is_some() => self.progress.not_sent += 1,
+            None => {
+                let new = self.pool.offer(case, &rehearsal.features);
+                if new > 0 {
+                    let case = case.clone();
+                    write(record, || Line::Kept { number, new, case })?;
+                }
+            }
+            Some(difference) if self.is_settled(&difference) => {
+                self.progress.repeats += 1;
+            }
+            Some(difference) => {
+                let mut finding = Finding {
+                    schema: Finding::SCHEMA,
+                    rig: self.about.rig.clone(),
+                    ports: self.about.ports,
+                    seed: self.about.seed,
+                    number,
+                    seen_again: 0,
+                    of: 0,
+                    confirmed: false,
+                    shrunk_in: None,
+                    difference,
+                    setup: self.about.setup.clone(),
+                    case: case.clone(),
+                };
+                self.confirm(&mut finding, rehearsal, target)?;
+                let signature = finding.difference.signature();
+                self.note(&signature, finding.confirmed);
+                let file = format!("finding-{number:06}");
+                if let Some(record) = record {
+                    finding.write(record.folder(), &file)?;
+                    record.line(&Line::Finding {
+                        number,
+                        signature,
+                        confirmed: finding.confirmed,
+                        file: file.clone(),
+                    })?;
+                }
+                watcher.found(&finding, &file);
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries a case again, until it was otherwise in the same way often enough or cannot be any more.
+    fn confirm(
+        &mut self,
+        finding: &mut Finding,
+        rehearsal: &Rehearsal,
+        target: &mut dyn Target,
+    ) -> Result<(), ExploreError> {
+        while finding.of < self.about.of && target.over().is_none() {
+            let tried = target.attempt(&finding.case, rehearsal)?;
+            self.use_line(tried.took);
+            finding.of += 1;
+            let kind = finding.difference.kind();
+            let again = tried.difference.is_some_and(|other| other.kind() == kind);
+            finding.seen_again += u8::from(again);
+            if finding.seen_again >= self.about.confirm {
+                finding.confirmed = true;
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+}
+
+fn write(
+    record: &mut Option<&mut Record>,
+    line: impl FnOnce() -> Line,
+) -> Result<(), ExploreError> {
+    match record {
+        Some(record) => record.line(&line()),
+        None => Ok(()),
+    }
+}

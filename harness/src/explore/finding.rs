@@ -1,0 +1,169 @@
+//! A finding: a case, what was otherwise, and how to see it again. It is kept as JSON, with its scenario beside it.
+
+use super::case::Case;
+use super::error::ExploreError;
+use super::files::{read_text, write_whole};
+use super::oracle::{Difference, answered, sent};
+use super::play::Seen;
+use super::setup::Setup;
+use super::text::{Expected, Page, text};
+use crate::manual::tables;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::role::{Role, roles};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The version of the form.
+const SCHEMA: u32 = 1;
+
+/// Something that was found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Finding {
+    /// The version of the form: 1.
+    pub schema: u32,
+    /// The rig as it was named.
+    pub rig: String,
+    /// Whether that rig has ports: its drives are nobody's to plant something in.
+    pub ports: bool,
+    /// The seed of the run.
+    pub seed: u64,
+    /// Which case of the run it was, counted from 0.
+    pub number: u64,
+    /// How often it was seen again.
+    pub seen_again: u8,
+    /// Of so many attempts.
+    pub of: u8,
+    /// Whether it was seen again often enough.
+    pub confirmed: bool,
+    /// How many runs made it smaller; none where nobody tried.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shrunk_in: Option<u32>,
+    /// What was otherwise.
+    pub difference: Difference,
+    /// What its rings are made of.
+    pub setup: Setup,
+    /// The conversation.
+    pub case: Case,
+}
+
+impl Finding {
+    /// The version of the form.
+    pub const SCHEMA: u32 = SCHEMA;
+
+    /// The finding of a file: its JSON, or the scenario beside it.
+    ///
+    /// # Errors
+    /// There is none, or it is damaged.
+    pub fn read(path: &Path) -> Result<(Self, PathBuf), ExploreError> {
+        let file = match path.extension() {
+            Some(ending) if ending == "scn" => path.with_extension("json"),
+            _ => path.to_owned(),
+        };
+        if file.is_dir() || !file.exists() {
+            return Err(ExploreError::Usage(format!(
+                "there is no finding {}: name a file `finding-....json` of a folder that `drivebench fuzz run` has written",
+                file.display()
+            )));
+        }
+        let json = read_text(&file)?;
+        let finding: Self = serde_json::from_str(&json).map_err(|error| {
+            ExploreError::Usage(format!("{} is no finding: {error}", file.display()))
+        })?;
+        let sound = finding.schema == SCHEMA
+            && RingSize::new(u64::from(finding.case.drives)).is_ok()
+            && finding.case.is_bounded();
+        if !sound {
+            return Err(ExploreError::Usage(format!(
+                "{} is no finding of schema {SCHEMA} within the bounds of a case",
+                file.display()
+            )));
+        }
+        Ok((finding, file))
+    }
+
+    /// Writes the finding and its scenario into a folder; gives the two files.
+    ///
+    /// # Errors
+    /// They cannot be written, or the model cannot be made.
+    pub fn write(&self, folder: &Path, name: &str) -> Result<[PathBuf; 2], ExploreError> {
+        let json = folder.join(format!("{name}.json"));
+        let scenario = folder.join(format!("{name}.scn"));
+        let title = format!("Found by fuzzing: {}", self.difference.kind());
+        let text = self.scenario(&title, &self.sources())?;
+        let mut form = serde_json::to_string_pretty(self)
+            .map_err(|error| ExploreError::file("write", &json, &error))?;
+        form.push('\n');
+        write_whole(&scenario, &text)?;
+        write_whole(&json, &form)?;
+        Ok([json, scenario])
+    }
+
+    /// The scenario: it passes where every byte is as the model says, and fails where it is not.
+    ///
+    /// # Errors
+    /// The model cannot be made.
+    pub fn scenario(&self, title: &str, sources: &[String]) -> Result<String, ExploreError> {
+        let seen = self.setup.model_answers(&self.case)?;
+        let any = match self.ports {
+            true => unknowable(&self.case, &seen),
+            false => Vec::new(),
+        };
+        let timed = self.difference.byte.filter(|_| self.difference.time);
+        let mut remarks = vec![self.difference.about.clone()];
+        for planted in &self.setup.deviates {
+            remarks.push(format!(
+                "found on drive {} deviates {}",
+                planted.drive, planted.name
+            ));
+        }
+        let page = Page {
+            title,
+            sources,
+            header: &self.setup.header,
+            remarks: &remarks,
+            expected: Some(Expected {
+                seen: &seen,
+                any: &any,
+                timed: timed.and_then(|byte| byte.checked_sub(1)),
+            }),
+        };
+        Ok(text(&self.case, &page))
+    }
+
+    /// The tables of the manual that it is about, as the catalogue names them.
+    #[must_use]
+    pub fn sources(&self) -> Vec<String> {
+        let tables = tables().unwrap_or_default();
+        let own = tables
+            .iter()
+            .find(|table| table.section == self.difference.section);
+        let own = own.or(tables.iter().find(|table| table.section == "9.1"));
+        own.map(|table| table.id.clone()).into_iter().collect()
+    }
+}
+
+/// Bytes that the model cannot know on a real ring: data that a drive measures or changes itself, and the checking bytes over them.
+fn unknowable(case: &Case, seen: &Seen) -> Vec<usize> {
+    let Ok(size) = RingSize::new(u64::from(case.drives)) else {
+        return Vec::new();
+    };
+    let sent = sent(case);
+    let mut any = Vec::new();
+    let mut open = false;
+    for (index, role) in answered(&roles(size, &sent), &sent).enumerate() {
+        match role {
+            Role::Data { address, .. } => {
+                let own = crate::twin::unknowable(address);
+                open |= own;
+                if own {
+                    any.push(index);
+                }
+            }
+            Role::Check { .. } if std::mem::take(&mut open) => any.push(index),
+            _ => {}
+        }
+    }
+    any.retain(|index| *index < seen.received.len());
+    any
+}

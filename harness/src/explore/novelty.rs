@@ -1,0 +1,160 @@
+//! What a case has shown that none before it had: it is kept, and others are made of it.
+//!
+//! A feature is what a drive's end of the bus did, with what stood on the line then: which byte of which kind of telegram came behind
+//! which other, how the ring answered it, what the drives marked there (ND21 9.7) and for what reason.
+
+use super::case::Case;
+use super::dice::Dice;
+use super::play::Seen;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::role::{Role, roles};
+use harness_sim::trace::Trace;
+use std::collections::BTreeSet;
+
+/// The most cases that are kept.
+pub const MOST_KEPT: usize = 2_000;
+
+/// The features of a run of the model.
+#[must_use]
+pub fn features(case: &Case, seen: &Seen, trace: &Trace) -> BTreeSet<u32> {
+    let mut found = BTreeSet::new();
+    let Ok(size) = RingSize::new(u64::from(case.drives)) else {
+        return found;
+    };
+    let bytes = case.bytes();
+    let sent: Vec<_> = bytes.iter().map(|byte| (*byte, true)).collect();
+    let roles = roles(size, &sent);
+    let role_at = |index: usize| roles.get(index).map_or(0, |role| number(*role));
+    let mut before = 0;
+    for (index, byte) in bytes.iter().enumerate() {
+        let role = role_at(index);
+        found.insert(hash(&[1, before, role]));
+        let answer = match seen.received.get(index) {
+            None => 0,
+            Some((_, answer)) if answer.error.is_some() => 1,
+            Some((_, answer)) if answer.byte == *byte => 2,
+            Some((_, answer)) if answer.byte == 0 => 3,
+            Some((_, answer)) if answer.byte < case.drives => 4,
+            Some(_) => 5,
+        };
+        found.insert(hash(&[2, role, answer]));
+        before = role;
+    }
+    for mark in &trace.marks {
+        let index = usize::try_from(mark.byte).unwrap_or(usize::MAX);
+        let cause = mark.cause.map_or(0, |cause| u32::from(cause.code()));
+        let signs = (0..7).fold(0, |signs, bit| {
+            let own = sign(bit);
+            signs | u32::from(mark.marks.contains(own)) << bit
+        });
+        found.insert(hash(&[3, signs, cause, role_at(index.saturating_sub(1))]));
+    }
+    let surplus = seen.received.len().saturating_sub(bytes.len());
+    found.insert(hash(&[4, surplus.min(3) as u32]));
+    found
+}
+
+fn sign(bit: u32) -> harness_proto::novobus::error_mode::Marks {
+    use harness_proto::novobus::error_mode::Marks;
+    const ALL: [Marks; 7] = [
+        Marks::DETECTED,
+        Marks::UPSTREAM,
+        Marks::SEVENTEENTH,
+        Marks::SEQUENCE,
+        Marks::RECOVERED,
+        Marks::ANSWER,
+        Marks::CHECKSUM,
+    ];
+    ALL.get(bit as usize).copied().unwrap_or(Marks::NONE)
+}
+
+/// A number for what a byte is for, whichever drive is meant.
+fn number(role: Role) -> u32 {
+    let meant = |drive: Option<u8>| u32::from(drive.is_some());
+    match role {
+        Role::Idle => 1,
+        Role::Sync => 2,
+        Role::Address { drive } => 4 + meant(drive),
+        Role::ProcessData { drive } => 6 + meant(drive),
+        Role::CheckSequence => 8,
+        Role::Foreign => 9,
+        Role::Data { drive, address } => 10 + meant(drive) + 4 * u32::from(address >> 12 == 2),
+        Role::Command { drive, section } => {
+            let section = section.bytes().fold(0, |sum, b| sum * 31 + u32::from(b));
+            100 + meant(drive) + (section % 10_000) * 2
+        }
+        Role::Check { length, writes, .. } => {
+            let width = writes.map_or(0, |(_, width)| u32::from(width));
+            50 + u32::from(length) + 8 * width
+        }
+    }
+}
+
+/// FNV-1a.
+fn hash(words: &[u32]) -> u32 {
+    let bytes = words.iter().flat_map(|word| word.to_le_bytes());
+    bytes.fold(0x811C_9DC5, |hash: u32, byte| {
+        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+    })
+}
+
+/// The cases that are kept, and what all of them have shown.
+#[derive(Clone, Debug, Default)]
+pub struct Pool {
+    cases: Vec<Case>,
+    shown: BTreeSet<u32>,
+}
+
+impl Pool {
+    /// Keeps a case that shows something new; how much of it is new, 0 where it is not kept.
+    pub fn offer(&mut self, case: &Case, features: &BTreeSet<u32>) -> usize {
+        let new = features.difference(&self.shown).count();
+        if new == 0 || self.cases.len() >= MOST_KEPT {
+            return 0;
+        }
+        self.shown.extend(features);
+        self.cases.push(case.clone());
+        new
+    }
+
+    /// Those that are kept, the oldest first.
+    #[must_use]
+    pub fn cases(&self) -> &[Case] {
+        &self.cases
+    }
+
+    /// How many features there are.
+    #[must_use]
+    pub fn shown(&self) -> usize {
+        self.shown.len()
+    }
+
+    /// One of them; the younger ones more often.
+    pub fn pick(&self, dice: &mut Dice) -> Option<&Case> {
+        let count = self.cases.len();
+        let from = if dice.percent(50) { count * 3 / 4 } else { 0 };
+        self.cases.get(from + dice.below(count - from))
+    }
+}
+
+/// Cases in an order in which each shows as much new as any could, as long as one shows something.
+#[must_use]
+pub fn by_novelty(cases: Vec<(Case, BTreeSet<u32>)>) -> Vec<Case> {
+    let mut rest = cases;
+    let mut shown: BTreeSet<u32> = BTreeSet::new();
+    let mut ordered = Vec::new();
+    while !rest.is_empty() {
+        let new = |features: &BTreeSet<u32>| features.difference(&shown).count();
+        // The first of the best, so that the order is one.
+        let counts: Vec<_> = rest.iter().map(|(_, features)| new(features)).collect();
+        let best = counts.iter().copied().max().unwrap_or(0);
+        let at = counts.iter().position(|count| *count == best).unwrap_or(0);
+        let (case, features) = rest.remove(at);
+        if best == 0 {
+            break;
+        }
+        shown.extend(features);
+        ordered.push(case);
+    }
+    ordered
+}

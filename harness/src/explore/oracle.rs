@@ -1,0 +1,263 @@
+//! What a ring must answer: the model of the manual, byte for byte and to the nanosecond, and the reference model, on every link and
+//! in every cell.
+
+use super::case::{Case, Harm, What};
+use super::order::Order;
+use super::play::Seen;
+use crate::link::{Link, SimulatedLink};
+use crate::twin;
+use harness_proto::line::Received;
+use harness_proto::nd21::ram;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::PAUSE;
+use harness_proto::time::Instant;
+use harness_sim::reference;
+use harness_sim::trace::Trace;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
+
+/// How a ring was otherwise than it must be.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Difference {
+    /// What is otherwise, in a few words.
+    pub what: String,
+    /// The section of the ND21 manual with the rule, such as `9.6`.
+    pub section: String,
+    /// The rule in a few words.
+    pub rule: String,
+    /// The drive that is meant, where one is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive: Option<u8>,
+    /// Which byte received it is, counted from 1; none where it is no byte at the master.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub byte: Option<usize>,
+    /// Whether only the time of that byte is otherwise.
+    #[serde(default)]
+    pub time: bool,
+    /// All of it, in a sentence.
+    pub about: String,
+}
+
+impl Difference {
+    /// What makes two findings one: the same thing is otherwise by the same rule.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        format!("{} (ND21 {}, {})", self.what, self.section, self.rule)
+    }
+
+    /// The same of the same drive.
+    #[must_use]
+    pub fn signature(&self) -> String {
+        match self.drive {
+            Some(drive) => format!("drive {drive}: {}", self.kind()),
+            None => self.kind(),
+        }
+    }
+}
+
+impl From<&twin::Divergence> for Difference {
+    fn from(found: &twin::Divergence) -> Self {
+        let (section, rule) = found.role.rule();
+        Self {
+            what: found.what.words().to_owned(),
+            section: section.to_owned(),
+            rule: rule.to_owned(),
+            drive: found.drive,
+            byte: Some(found.byte),
+            time: found.what == twin::What::Time,
+            about: found.to_string(),
+        }
+    }
+}
+
+/// The first byte that the master received otherwise than the model says: by value, line status and number, or else by time.
+#[must_use]
+pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Difference> {
+    if model.received == seen.received {
+        return None;
+    }
+    let size = RingSize::new(u64::from(case.drives)).ok()?;
+    let same = |a: &(Instant, Received), b: &(Instant, Received)| {
+        (a.1.byte, a.1.error.is_some()) == (b.1.byte, b.1.error.is_some())
+    };
+    let (expected, received) = (&model.received, &seen.received);
+    let pairs = || expected.iter().zip(received);
+    let shorter = expected.len().min(received.len());
+    let index = pairs()
+        .position(|(a, b)| !same(a, b))
+        .or((expected.len() != received.len()).then_some(shorter));
+    let (index, what) = match index {
+        Some(index) => (index, twin::what_of(expected, received, index)),
+        None => (pairs().position(|(a, b)| a.0 != b.0)?, twin::What::Time),
+    };
+    let sent = sent(case);
+    let role = answered(&roles(size, &sent), &sent).nth(index);
+    let role = role.unwrap_or(Role::Foreign);
+    let divergence = twin::Divergence {
+        ring: 0,
+        byte: index + 1,
+        what,
+        expected: expected.get(index).copied(),
+        received: received.get(index).copied(),
+        role,
+        step: None,
+        drive: role.drive(),
+    };
+    Some(Difference::from(&divergence))
+}
+
+/// The bytes that a case sends, and whether each goes round whole; what comes late is whole.
+pub(super) fn sent(case: &Case) -> Vec<(u8, bool)> {
+    let faults = case.faults().into_iter();
+    let spoiling = faults.filter(|(.., harm)| !matches!(harm, Harm::Delay(_)));
+    let damaged: BTreeSet<u64> = spoiling.map(|(_, byte, _)| byte).collect();
+    let numbered = (1..).zip(case.bytes());
+    let whole = numbered.map(|(number, byte)| (byte, !damaged.contains(&number)));
+    whole.collect()
+}
+
+/// The roles of bytes that are answered: a PAUSE where a sync byte is due is not (ND21 9.2).
+pub(super) fn answered<'a>(
+    roles: &'a [Role],
+    sent: &'a [(u8, bool)],
+) -> impl Iterator<Item = Role> + 'a {
+    let pairs = roles.iter().zip(sent);
+    pairs
+        .filter(|(role, (byte, _))| (**role, *byte) != (Role::Idle, PAUSE))
+        .map(|(role, _)| *role)
+}
+
+/// The first place where a simulated ring of plain drives is otherwise than the reference model; `None` also where the case is
+/// beyond that model: it knows no time and no power.
+#[must_use]
+pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Option<Difference> {
+    let beyond = |act: &super::case::Act| matches!(act.what, What::Wait(_) | What::Power { .. });
+    if case.acts.iter().any(beyond) || asks_for_code(case) {
+        return None;
+    }
+    let faults = reference_faults(case)?;
+    let monitors = |drive| link.peek(0, drive, ram::FLAGS2).unwrap_or(0) & 0x04 != 0;
+    if (0..case.drives).any(monitors) {
+        return None;
+    }
+    let mut drives: Vec<_> = (0..case.drives).map(|_| reference::Drive::new()).collect();
+    let links = reference::run(&mut drives, &case.bytes(), &faults);
+    for (place, (link, expected)) in trace.links.iter().zip(&links).enumerate() {
+        let received: Vec<_> = link
+            .bytes
+            .iter()
+            .filter_map(|byte| byte.arrival())
+            .map(|byte| (byte.byte, byte.error.is_some()))
+            .collect();
+        let expected: Vec<_> = expected
+            .iter()
+            .map(|cell| (cell.byte, cell.error))
+            .collect();
+        if received != expected {
+            let shorter = received.len().min(expected.len());
+            let pairs = received.iter().zip(&expected);
+            let at = pairs.clone().position(|(a, b)| a != b).unwrap_or(shorter);
+            return Some(on_link(case, place, at, received.get(at), expected.get(at)));
+        }
+    }
+    drives.iter().rev().zip(0..).find_map(|(other, drive)| {
+        let in_error = link.error_of(0, drive).flatten().is_some();
+        if in_error != other.in_error() {
+            return Some(beside_bus(drive, "error mode", "9.7", String::new()));
+        }
+        // The reference model knows one code for every bad byte.
+        let cells = (0xFD80..=0xFFFF).filter(|cell| ![0xFD82, 0xFD83].contains(cell));
+        let mut differing =
+            cells.filter(|cell| link.peek(0, drive, *cell) != Some(other.peek(*cell)));
+        differing
+            .next()
+            .map(|cell| beside_bus(drive, "contents of a cell", "10.2", format!(" {cell:04X}")))
+    })
+}
+
+/// Whether a case asks a drive which error of the line it was: the reference model knows one code for every bad byte.
+fn asks_for_code(case: &Case) -> bool {
+    // A long read begins up to three cells in front of it.
+    const CODE: RangeInclusive<u16> = ram::ERRORCODE - 3..=ram::ERRORCODE + 1;
+    let no_parity = |(_, _, harm): &(u8, u64, Harm)| match harm {
+        Harm::Flip { stop, .. } => *stop,
+        Harm::Break(_) | Harm::Overrun => true,
+        _ => false,
+    };
+    let asks = |order: &Order| {
+        order
+            .command
+            .cell()
+            .is_some_and(|cell| CODE.contains(&cell))
+    };
+    case.faults().iter().any(no_parity) && case.orders().any(asks)
+}
+
+fn on_link(
+    case: &Case,
+    place: usize,
+    at: usize,
+    received: Option<&(u8, bool)>,
+    expected: Option<&(u8, bool)>,
+) -> Difference {
+    let show = |byte: Option<&(u8, bool)>| match byte {
+        None => "nothing".to_owned(),
+        Some((byte, false)) => format!("{byte:02X}"),
+        Some((byte, true)) => format!("{byte:02X} (bad)"),
+    };
+    let name = crate::link::link_name(0, case.drives, place);
+    Difference {
+        what: "another byte on a link than in the reference model".to_owned(),
+        section: "9.1".to_owned(),
+        rule: "ring".to_owned(),
+        drive: None,
+        byte: (place == usize::from(case.drives)).then_some(at + 1),
+        time: false,
+        about: format!(
+            "byte {} on {name} is {}, the reference model says {}",
+            at + 1,
+            show(received),
+            show(expected)
+        ),
+    }
+}
+
+fn beside_bus(drive: u8, rule: &str, section: &str, detail: String) -> Difference {
+    Difference {
+        what: "another state than in the reference model".to_owned(),
+        section: section.to_owned(),
+        rule: rule.to_owned(),
+        drive: Some(drive),
+        byte: None,
+        time: false,
+        about: format!("drive {drive}: {rule}{detail} is otherwise than in the reference model"),
+    }
+}
+
+/// The faults in the words of the reference model; `None` where it has none for one of them, or two meet.
+fn reference_faults(case: &Case) -> Option<Vec<(usize, usize, reference::Fault)>> {
+    let mut places = BTreeSet::new();
+    let mut faults = Vec::new();
+    for (link, byte, harm) in case.faults() {
+        if !places.insert((link, byte)) {
+            return None;
+        }
+        let fault = match harm {
+            Harm::Flip { data, parity, stop } => reference::Fault::Flip(data, parity, stop),
+            Harm::Replace(byte) => reference::Fault::Replace(byte),
+            Harm::Drop => reference::Fault::Drop,
+            Harm::Duplicate => reference::Fault::Duplicate,
+            Harm::Insert(byte) => reference::Fault::Insert(byte),
+            // Shorter than a byte: nothing but the byte itself is lost.
+            Harm::Break(..=280) => reference::Fault::Break,
+            // The byte is read as it is, and marked bad.
+            Harm::Overrun => reference::Fault::Flip(0, true, false),
+            Harm::Delay(_) | Harm::Break(_) => return None,
+        };
+        faults.push((usize::from(link), usize::try_from(byte).ok()?, fault));
+    }
+    Some(faults)
+}

@@ -1,0 +1,211 @@
+//! Commands with any parameters, proper or not, and perhaps with a wrong byte (ND21 chapter 10).
+
+use harness_proto::novobus::checksum::Checksum;
+use harness_proto::novobus::guard::Act as GuardedAct;
+use serde::{Deserialize, Serialize};
+
+/// A command, perhaps spoiled.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Order {
+    /// Which.
+    #[serde(flatten)]
+    pub command: Command,
+    /// A byte of it that is put wrong after its checking byte was worked out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spoil: Option<Spoil>,
+}
+
+/// A byte put wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spoil {
+    /// Which byte of the command, counted from 0; the last one where there are fewer.
+    pub at: u8,
+    /// What stands there.
+    pub byte: u8,
+}
+
+/// A command of chapter 10 with any parameters, proper or not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "command", rename_all = "kebab-case")]
+pub enum Command {
+    /// 10.1.
+    ReadByte {
+        /// The address.
+        cell: u16,
+    },
+    /// 10.1.
+    ReadWord {
+        /// The address.
+        cell: u16,
+    },
+    /// 10.1.
+    ReadLong {
+        /// The address.
+        cell: u16,
+    },
+    /// 10.2.
+    WriteByte {
+        /// The address.
+        cell: u16,
+        /// What.
+        data: u8,
+    },
+    /// 10.2.
+    WriteWord {
+        /// The address.
+        cell: u16,
+        /// What.
+        data: u16,
+    },
+    /// 10.3.
+    And {
+        /// The low byte of the address.
+        low: u8,
+        /// The mask.
+        data: u8,
+    },
+    /// 10.3.
+    Or {
+        /// The low byte of the address.
+        low: u8,
+        /// The mask.
+        data: u8,
+    },
+    /// 10.4.
+    WriteIo {
+        /// The code.
+        code: u8,
+    },
+    /// 10.5.
+    Reset,
+}
+
+impl Command {
+    /// Its bytes without the checking byte.
+    #[must_use]
+    pub fn head(self) -> Vec<u8> {
+        let parts = |cell: u16| {
+            let [high, low] = cell.to_be_bytes();
+            (low, high)
+        };
+        match self {
+            Self::ReadByte { cell } => vec![0xC0, parts(cell).0, parts(cell).1],
+            Self::ReadWord { cell } => vec![0xC1, parts(cell).0, parts(cell).1, b'?'],
+            Self::ReadLong { cell } => vec![0xC7, parts(cell).0, parts(cell).1, b'1', b'2'],
+            Self::WriteByte { cell, data } => vec![0x82, data, parts(cell).0, parts(cell).1],
+            Self::WriteWord { cell, data } => {
+                let [upper, lower] = data.to_be_bytes();
+                vec![0x63, lower, upper, parts(cell).0, parts(cell).1]
+            }
+            Self::And { low, data } => vec![0xA4, data, low],
+            Self::Or { low, data } => vec![0xA5, data, low],
+            Self::WriteIo { code } => vec![0xC8, code],
+            Self::Reset => vec![0xDD, b'!'],
+        }
+    }
+
+    /// The address that is written in it whole; none of the bit commands.
+    #[must_use]
+    pub const fn cell(self) -> Option<u16> {
+        match self {
+            Self::ReadByte { cell }
+            | Self::ReadWord { cell }
+            | Self::ReadLong { cell }
+            | Self::WriteByte { cell, .. }
+            | Self::WriteWord { cell, .. } => Some(cell),
+            _ => None,
+        }
+    }
+
+    /// The same command with this in its data, or in the low byte of them.
+    #[must_use]
+    pub const fn with_data(mut self, new: u8) -> Self {
+        match &mut self {
+            Self::WriteByte { data, .. } | Self::And { data, .. } | Self::Or { data, .. } => {
+                *data = new;
+            }
+            Self::WriteWord { data, .. } => *data = *data & 0xFF00 | new as u16,
+            _ => {}
+        }
+        self
+    }
+
+    /// The same command with the address `new` in place of `old`.
+    #[must_use]
+    pub fn at(mut self, old: u16, new: u16) -> Self {
+        match &mut self {
+            Self::ReadByte { cell }
+            | Self::ReadWord { cell }
+            | Self::ReadLong { cell }
+            | Self::WriteByte { cell, .. }
+            | Self::WriteWord { cell, .. }
+                if *cell == old =>
+            {
+                *cell = new;
+            }
+            _ => {}
+        }
+        self
+    }
+
+    /// What the guard calls it.
+    #[must_use]
+    pub const fn act(self) -> GuardedAct {
+        match self {
+            Self::ReadByte { .. } | Self::ReadWord { .. } | Self::ReadLong { .. } => {
+                GuardedAct::Read
+            }
+            Self::WriteByte { cell, data } => GuardedAct::WriteByte(cell, data),
+            Self::WriteWord { cell, data } => GuardedAct::WriteWord(cell, data),
+            Self::And { low, data } => GuardedAct::And(0xFF00 | low as u16, data),
+            Self::Or { low, data } => GuardedAct::Or(0xFF00 | low as u16, data),
+            Self::WriteIo { code } => GuardedAct::WriteIo(code),
+            Self::Reset => GuardedAct::Reset,
+        }
+    }
+
+    /// The manual's name for it, with its parameters.
+    #[must_use]
+    pub fn words(self) -> String {
+        match self {
+            Self::ReadByte { cell } => format!("ReadByte {cell:04X}"),
+            Self::ReadWord { cell } => format!("ReadWord {cell:04X}"),
+            Self::ReadLong { cell } => format!("ReadLong {cell:04X}"),
+            other => match other.act() {
+                // The guard names the cell as well; the address is enough here.
+                act @ (GuardedAct::WriteByte(..)
+                | GuardedAct::WriteWord(..)
+                | GuardedAct::And(..)
+                | GuardedAct::Or(..)) => {
+                    let words = act.to_string();
+                    words.split(" (").next().unwrap_or_default().to_owned()
+                }
+                act => act.to_string(),
+            },
+        }
+    }
+}
+
+impl Order {
+    /// A command as it should be.
+    #[must_use]
+    pub const fn sound(command: Command) -> Self {
+        Self {
+            command,
+            spoil: None,
+        }
+    }
+
+    /// Its bytes with the checking byte.
+    #[must_use]
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut bytes = self.command.head();
+        bytes.push(Checksum::over(&bytes).plus());
+        if let Some(spoil) = self.spoil {
+            let at = usize::from(spoil.at).min(bytes.len() - 1);
+            bytes[at] = spoil.byte;
+        }
+        bytes
+    }
+}

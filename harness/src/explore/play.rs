@@ -1,0 +1,55 @@
+//! A case on simulated rings without the way over its text: thousands a second. A test holds that both ways are one.
+
+use super::case::{Case, What};
+use crate::link::{DriveFault, Line, Link, Moment, PlacedFault, SimulatedLink};
+use harness_proto::line::Received;
+use harness_proto::time::{Instant, Span};
+
+/// How long bytes may be on their way round: far more than the longest case takes.
+const MOST_ROUND: Span = Span::from_millis(60_000);
+
+/// What the master saw.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// What it received, and when.
+    pub received: Vec<(Instant, Received)>,
+    /// How long it took on the line.
+    pub took: Span,
+}
+
+/// Plays a case on a ring that nobody has spoken to, in the steps in which a scenario is played.
+pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
+    for (place, byte, harm) in case.faults() {
+        let fault = PlacedFault::Link(usize::from(place), harm.fault());
+        link.inject(0, fault, Moment::Byte(byte));
+    }
+    // When the line before was done.
+    let mut line_before = link.now();
+    for act in &case.acts {
+        match act.what {
+            What::Wait(ms) => {
+                line_before = line_before.max(link.now()) + Span::from_millis(u64::from(ms));
+                link.run_until(line_before);
+            }
+            What::Power { drive, on } => {
+                let fault = if on { DriveFault::On } else { DriveFault::Off };
+                link.inject(0, PlacedFault::Drive(drive, fault), Moment::Now);
+            }
+            _ => {
+                for part in act
+                    .parts(case.drives)
+                    .iter()
+                    .filter(|part| !part.is_empty())
+                {
+                    line_before = link.send(0, part);
+                }
+            }
+        }
+    }
+    let end = link.now() + MOST_ROUND;
+    while link.busy() && link.now() < end && link.wait(end) {}
+    Seen {
+        received: std::iter::from_fn(|| link.receive(0)).collect(),
+        took: link.now().since_start(),
+    }
+}

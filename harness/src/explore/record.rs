@@ -1,0 +1,256 @@
+//! The folder of a run: what happens is written as it happens, line by line, so that a run that was killed goes on where it was.
+//!
+//! `run.jsonl` is the record. Behind a line of progress everything in front of it is settled; what stands behind the last one is
+//! done again when a run is resumed.
+
+use super::case::Case;
+use super::error::ExploreError;
+use super::files::read_text;
+use super::setup::Setup;
+use rustix::fs::FlockOperation;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The record's name in its folder.
+pub const RECORD: &str = "run.jsonl";
+
+/// What a run is: all that decides which cases are tried, and how they are judged.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct About {
+    /// The version of the form: 1.
+    pub schema: u32,
+    /// The rig as it was named.
+    pub rig: String,
+    /// How many drives its ring has.
+    pub drives: u8,
+    /// Whether it has ports.
+    pub ports: bool,
+    /// The seed.
+    pub seed: u64,
+    /// A finding counts when it is seen again so often ...
+    pub confirm: u8,
+    /// ... of so many attempts.
+    pub of: u8,
+    /// What the rings are made of.
+    pub setup: Setup,
+    /// What cases may have, by name.
+    pub spices: Vec<String>,
+}
+
+impl About {
+    /// The version of the form.
+    pub const SCHEMA: u32 = 1;
+}
+
+/// A line of the record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Line {
+    /// The first line.
+    Run(About),
+    /// A round begins.
+    Swarm {
+        /// Which, counted from 0.
+        round: u64,
+        /// What its cases may have.
+        spices: Vec<String>,
+    },
+    /// A case is kept.
+    Kept {
+        /// Its number.
+        number: u64,
+        /// How many features are new.
+        new: usize,
+        /// The case.
+        case: Case,
+    },
+    /// Something was found; its files stand in the folder.
+    Finding {
+        /// The number of its case.
+        number: u64,
+        /// What makes it one with others.
+        signature: String,
+        /// Whether it was seen again often enough.
+        confirmed: bool,
+        /// The name of its files.
+        file: String,
+    },
+    /// So far everything is settled.
+    Progress(Progress),
+}
+
+/// How far a run has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Progress {
+    /// How many cases were made.
+    pub cases: u64,
+    /// How many of them the rig does not allow or cannot do: they were not sent.
+    pub not_sent: u64,
+    /// How many showed again what had been found.
+    pub repeats: u64,
+    /// How long the line was used, in nanoseconds.
+    pub wire_ns: u64,
+}
+
+/// What a record holds.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    /// The first line.
+    pub about: About,
+    /// The lines behind it, up to the last one of progress.
+    pub lines: Vec<Line>,
+    /// The last line of progress.
+    pub progress: Progress,
+}
+
+/// The record of a run under way.
+#[derive(Debug)]
+pub struct Record {
+    folder: PathBuf,
+    file: File,
+}
+
+impl Record {
+    /// A record in a folder that is not there or is empty.
+    ///
+    /// # Errors
+    /// It is there with something in it, or cannot be written.
+    pub fn create(folder: &Path, about: &About) -> Result<Self, ExploreError> {
+        let unusable =
+            |error: std::io::Error| ExploreError::file("make the folder", folder, &error);
+        std::fs::create_dir_all(folder).map_err(unusable)?;
+        if std::fs::read_dir(folder)
+            .map_err(unusable)?
+            .next()
+            .is_some()
+        {
+            return Err(ExploreError::File(format!(
+                "{} is not empty; name another folder, or go on with the run in it: --resume {}",
+                folder.display(),
+                folder.display()
+            )));
+        }
+        let path = folder.join(RECORD);
+        let file = File::create_new(&path).map_err(|e| ExploreError::file("make", &path, &e))?;
+        hold(&file, folder)?;
+        let mut record = Self {
+            folder: folder.to_owned(),
+            file,
+        };
+        record.line(&Line::Run(about.clone()))?;
+        record.line(&Line::Progress(Progress::default()))?;
+        Ok(record)
+    }
+
+    /// The record of a run that goes on, and what it holds. What stands behind the last line of progress is cut off.
+    ///
+    /// # Errors
+    /// There is none, or a line of it is damaged; half a line at its end is not.
+    pub fn resume(folder: &Path) -> Result<(Self, Kept), ExploreError> {
+        let path = folder.join(RECORD);
+        let (kept, length) = read(folder)?;
+        let file = File::options()
+            .append(true)
+            .open(&path)
+            .map_err(|error| ExploreError::file("write", &path, &error))?;
+        hold(&file, folder)?;
+        // A record only grows: cut off at its last settled line it is as if the rest had never been written.
+        file.set_len(length as u64)
+            .map_err(|error| ExploreError::file("write", &path, &error))?;
+        let record = Self {
+            folder: folder.to_owned(),
+            file,
+        };
+        Ok((record, kept))
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Writes a line.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn line(&mut self, line: &Line) -> Result<(), ExploreError> {
+        let path = self.folder.join(RECORD);
+        let failed = |error: &dyn std::fmt::Display| ExploreError::file("write", &path, error);
+        let mut text = serde_json::to_string(line).map_err(|error| failed(&error))?;
+        text.push('\n');
+        // One write a line: a process that is killed leaves whole lines, or half of the last one.
+        self.file
+            .write_all(text.as_bytes())
+            .and_then(|()| self.file.flush())
+            .map_err(|error| failed(&error))
+    }
+}
+
+/// Keeps other processes out of a run's folder for as long as its record is open.
+fn hold(file: &File, folder: &Path) -> Result<(), ExploreError> {
+    rustix::fs::flock(file, FlockOperation::NonBlockingLockExclusive).map_err(|_| {
+        ExploreError::Usage(format!(
+            "another process works on the run in {}; wait for its end",
+            folder.display()
+        ))
+    })
+}
+
+/// What a folder holds, and how long its record is up to the last line of progress.
+///
+/// # Errors
+/// There is no record, or it is damaged.
+pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
+    let path = folder.join(RECORD);
+    if !path.exists() {
+        return Err(ExploreError::Usage(format!(
+            "{} holds no run: there is no {RECORD} in it",
+            folder.display()
+        )));
+    }
+    let text = read_text(&path)?;
+    let damaged = |number: usize, why: &str| {
+        ExploreError::File(format!(
+            "{}, line {}: {why}; the run cannot go on from a damaged record, begin another one",
+            path.display(),
+            number + 1
+        ))
+    };
+    let mut about = None;
+    let mut lines = Vec::new();
+    let mut settled = None;
+    let mut at = 0;
+    for (number, line) in text.split_inclusive('\n').enumerate() {
+        at += line.len();
+        if !line.ends_with('\n') {
+            // Its writer was killed.
+            break;
+        }
+        let line: Line =
+            serde_json::from_str(line).map_err(|error| damaged(number, &error.to_string()))?;
+        match line {
+            Line::Run(own) if number == 0 && own.schema == About::SCHEMA => about = Some(own),
+            Line::Run(_) => return Err(damaged(number, "another kind of record")),
+            Line::Progress(progress) => settled = Some((progress, at, lines.len())),
+            other => lines.push(other),
+        }
+        if about.is_none() {
+            return Err(damaged(number, "a record begins with what the run is"));
+        }
+    }
+    let (Some(about), Some((progress, length, count))) = (about, settled) else {
+        return Err(damaged(0, "the record is cut off before its first case"));
+    };
+    lines.truncate(count);
+    let kept = Kept {
+        about,
+        lines,
+        progress,
+    };
+    Ok((kept, length))
+}

@@ -1,0 +1,498 @@
+//! Makes a finding small: what is not needed for it is left out, what is needed is made simple.
+//!
+//! Every step removes or lowers something: [`Case::measure`] falls strictly with each one that holds, so it ends. The order of
+//! steps is fixed, so it is the same each time. On hardware a run is what it costs, so the steps that take most away come first:
+//! behind the byte that is otherwise nothing is needed, then acts, parts of acts, faults, drives, silence and values.
+
+use super::case::{Act, Case, Harm, MOST_NET, Talk, To, What};
+use super::error::ExploreError;
+use super::oracle::Difference;
+use super::order::{Command, Order};
+use super::setup::Setup;
+use harness_proto::novobus::memory::RAM;
+use std::collections::BTreeSet;
+
+/// What is made small: a conversation with a ring.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Subject {
+    /// The conversation.
+    pub case: Case,
+    /// What its rings are made of.
+    pub setup: Setup,
+}
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Shrunk {
+    /// The smallest one that was found.
+    pub subject: Subject,
+    /// How its ring is otherwise.
+    pub difference: Difference,
+    /// How often a ring was asked.
+    pub runs: u32,
+    /// Whether nothing more could be taken away; otherwise the runs were used up.
+    pub complete: bool,
+}
+
+/// Asks a ring how it is otherwise; `None` where it is not.
+pub type Asking<'a> = dyn FnMut(&Subject) -> Result<Option<Difference>, ExploreError> + 'a;
+
+/// Makes a subject small within so many runs. It stays a finding of the same kind as `difference`.
+///
+/// # Errors
+/// The ring cannot be asked.
+pub fn shrink(
+    subject: Subject,
+    difference: Difference,
+    most_runs: u32,
+    ask: &mut Asking<'_>,
+) -> Result<Shrunk, ExploreError> {
+    let mut shrinker = Shrinker {
+        best: subject,
+        kind: difference.kind(),
+        difference,
+        tried: BTreeSet::new(),
+        runs: 0,
+        most_runs,
+        ask,
+    };
+    let mut complete = false;
+    while !shrinker.is_spent() {
+        let before = shrinker.best.case.measure();
+        shrinker.pass()?;
+        if shrinker.best.case.measure() == before {
+            complete = !shrinker.is_spent();
+            break;
+        }
+    }
+    Ok(Shrunk {
+        subject: shrinker.best,
+        difference: shrinker.difference,
+        runs: shrinker.runs,
+        complete,
+    })
+}
+
+/// The first cell of the RAM.
+const FIRST_CELL: u16 = *RAM.start();
+
+struct Shrinker<'a, 'b> {
+    best: Subject,
+    kind: String,
+    difference: Difference,
+    /// What was asked already.
+    tried: BTreeSet<String>,
+    runs: u32,
+    most_runs: u32,
+    ask: &'a mut Asking<'b>,
+}
+
+impl Shrinker<'_, '_> {
+    fn is_spent(&self) -> bool {
+        self.runs >= self.most_runs
+    }
+
+    /// Asks about a candidate that is smaller, and takes it where it is a finding of the same kind.
+    fn offer(&mut self, candidate: Subject) -> Result<bool, ExploreError> {
+        let smaller = candidate.case.measure() < self.best.case.measure();
+        if !smaller || candidate.case.acts.is_empty() || self.is_spent() {
+            return Ok(false);
+        }
+        if !self.tried.insert(format!("{candidate:?}")) {
+            return Ok(false);
+        }
+        self.runs += 1;
+        match (self.ask)(&candidate)? {
+            Some(difference) if difference.kind() == self.kind => {
+                self.difference = difference;
+                self.best = candidate;
+                Ok(true)
+            }
+            _ => Ok(false),
+        }
+    }
+
+    /// Offers the best one with a change of its case.
+    fn change(&mut self, change: impl FnOnce(&mut Case)) -> Result<bool, ExploreError> {
+        let mut candidate = self.best.clone();
+        change(&mut candidate.case);
+        self.offer(candidate)
+    }
+
+    /// Offers it with a change of an act.
+    fn change_act(
+        &mut self,
+        at: usize,
+        change: impl FnOnce(&mut Act),
+    ) -> Result<bool, ExploreError> {
+        self.change(|case| {
+            if let Some(act) = case.acts.get_mut(at) {
+                change(act);
+            }
+        })
+    }
+
+    /// Offers it with a change of a talk.
+    fn change_talk(
+        &mut self,
+        at: usize,
+        change: impl FnOnce(&mut Talk),
+    ) -> Result<bool, ExploreError> {
+        self.change_act(at, |act| {
+            if let What::Talk(talk) = &mut act.what {
+                change(talk);
+            }
+        })
+    }
+
+    fn pass(&mut self) -> Result<(), ExploreError> {
+        self.cut_behind()?;
+        self.drop_acts()?;
+        self.smaller_ring()?;
+        self.lower_cells()?;
+        let mut at = 0;
+        while at < self.best.case.acts.len() {
+            self.damages(at)?;
+            self.parts(at)?;
+            self.values(at)?;
+            at += 1;
+        }
+        Ok(())
+    }
+
+    /// Behind the byte that is otherwise nothing is needed to see it; in doubt, up to the end of its act.
+    fn cut_behind(&mut self) -> Result<(), ExploreError> {
+        let Some(byte) = self.difference.byte else {
+            return Ok(());
+        };
+        let drives = self.best.case.drives;
+        let mut before = 0;
+        let mut found = None;
+        for (at, act) in self.best.case.acts.iter().enumerate() {
+            let length = act.length(drives);
+            if before + length >= byte {
+                found = Some((at, byte - before));
+                break;
+            }
+            before += length;
+        }
+        let Some((at, inside)) = found else {
+            return Ok(());
+        };
+        // The command that is answered need not be the last one of its act.
+        let shortened = self.change(|case| {
+            case.acts.truncate(at + 1);
+            if let Some(act) = case.acts.last_mut() {
+                shorten(&mut act.what, inside);
+            }
+        })?;
+        if !shortened {
+            self.change(|case| case.acts.truncate(at + 1))?;
+        }
+        Ok(())
+    }
+
+    /// Leaves out acts: long runs of them first.
+    fn drop_acts(&mut self) -> Result<(), ExploreError> {
+        let mut length = self.best.case.acts.len().saturating_sub(1);
+        while length > 0 {
+            let mut from = 0;
+            while from < self.best.case.acts.len() {
+                let to = (from + length).min(self.best.case.acts.len());
+                let dropped = self.change(|case| {
+                    case.acts.drain(from..to);
+                })?;
+                if !dropped {
+                    from += length;
+                }
+            }
+            length = (length / 2).min(self.best.case.acts.len());
+        }
+        Ok(())
+    }
+
+    /// The smallest ring that shows it.
+    fn smaller_ring(&mut self) -> Result<(), ExploreError> {
+        for drives in 1..self.best.case.drives {
+            if self.offer(on_ring(&self.best, drives))? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the first cell of the RAM (ND21 10.1) in place of another, in all commands: what is written is read again.
+    fn lower_cells(&mut self) -> Result<(), ExploreError> {
+        let cells: BTreeSet<u16> = self
+            .best
+            .case
+            .orders()
+            .filter_map(|o| o.command.cell())
+            .collect();
+        for cell in cells.into_iter().filter(|cell| *cell > FIRST_CELL) {
+            self.change(|case| {
+                for act in &mut case.acts {
+                    if let What::Talk(talk) = &mut act.what {
+                        let own = talk.orders.iter_mut();
+                        own.for_each(|order| order.command = order.command.at(cell, FIRST_CELL));
+                    }
+                }
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Leaves out faults, and makes them single bits.
+    fn damages(&mut self, at: usize) -> Result<(), ExploreError> {
+        let mut index = 0;
+        while let Some(damage) = self
+            .best
+            .case
+            .acts
+            .get(at)
+            .and_then(|a| a.damages.get(index))
+        {
+            let damage = *damage;
+            let dropped = self.change_act(at, |act| {
+                act.damages.remove(index);
+            })?;
+            if dropped {
+                continue;
+            }
+            let flip = |data, parity, stop| Harm::Flip { data, parity, stop };
+            let mut simpler = vec![flip(0, true, false), flip(1, false, false)];
+            match damage.harm {
+                Harm::Flip { stop: true, .. } => simpler.push(flip(0, false, true)),
+                Harm::Delay(us) => simpler.extend([Harm::Drop, Harm::Delay(us / 2)]),
+                Harm::Break(_) => simpler.push(Harm::Break(200)),
+                Harm::Replace(_) => simpler.extend([Harm::Drop, Harm::Replace(0)]),
+                Harm::Insert(_) => simpler.extend([Harm::Duplicate, Harm::Insert(0)]),
+                _ => {}
+            }
+            for harm in simpler {
+                let weight = self.best.case.acts[at].damages[index].harm.weight();
+                if harm.weight() < weight
+                    && self.change_act(at, |act| act.damages[index].harm = harm)?
+                {
+                    break;
+                }
+            }
+            index += 1;
+        }
+        Ok(())
+    }
+
+    /// Leaves out parts of an act.
+    fn parts(&mut self, at: usize) -> Result<(), ExploreError> {
+        let Some(act) = self.best.case.acts.get(at).cloned() else {
+            return Ok(());
+        };
+        match act.what {
+            What::Synco(count) | What::Pause(count) | What::Zeros(count) => {
+                self.lowest(at, usize::from(count))
+            }
+            What::Wait(ms) => {
+                // Just beyond the times of ND21 9.9.
+                for ms in [1, 11, 21, ms / 2].into_iter().filter(|own| *own < ms) {
+                    if self.change_act(at, |act| act.what = What::Wait(ms))? {
+                        break;
+                    }
+                }
+                Ok(())
+            }
+            What::Bytes(bytes) => self.bytes(at, bytes.len()),
+            What::Recover => {
+                self.change_act(at, |act| act.what = What::Sequence)?;
+                Ok(())
+            }
+            What::Talk(talk) => self.talk(at, &talk),
+            What::Sequence | What::Power { .. } => Ok(()),
+        }
+    }
+
+    /// The lowest number of like bytes that shows it.
+    fn lowest(&mut self, at: usize, count: usize) -> Result<(), ExploreError> {
+        let (mut too_few, mut enough) = (0, count);
+        // One less first: behind a cut that is most often the end of it.
+        let mut next = count.saturating_sub(1);
+        while enough - too_few > 1 {
+            if self.change_act(at, |act| shorten(&mut act.what, next))? {
+                enough = next;
+            } else {
+                too_few = next;
+            }
+            next = (too_few + enough) / 2;
+        }
+        Ok(())
+    }
+
+    fn bytes(&mut self, at: usize, count: usize) -> Result<(), ExploreError> {
+        let mut length = count / 2;
+        while length > 0 {
+            let mut from = 0;
+            loop {
+                let now = self
+                    .best
+                    .case
+                    .acts
+                    .get(at)
+                    .map_or(0, |act| act.length(self.best.case.drives));
+                if from + length > now || now <= length {
+                    break;
+                }
+                let dropped = self.change_act(at, |act| {
+                    if let What::Bytes(bytes) = &mut act.what {
+                        bytes.drain(from..from + length);
+                    }
+                })?;
+                if !dropped {
+                    from += length;
+                }
+            }
+            length /= 2;
+        }
+        Ok(())
+    }
+
+    fn talk(&mut self, at: usize, talk: &Talk) -> Result<(), ExploreError> {
+        if talk.process_data.is_some() {
+            self.change_talk(at, |talk| talk.process_data = None)?;
+        }
+        if talk.room < MOST_NET {
+            self.change_talk(at, |talk| talk.room = MOST_NET)?;
+        }
+        let mut index = 0;
+        while let Some(order) = self.order(at, index) {
+            let dropped = self.change_talk(at, |talk| {
+                talk.orders.remove(index);
+            })?;
+            if dropped {
+                continue;
+            }
+            if order.spoil.is_some() {
+                self.change_talk(at, |talk| talk.orders[index].spoil = None)?;
+            }
+            for command in shorter(order.command) {
+                if self.change_talk(at, |talk| talk.orders[index].command = command)? {
+                    break;
+                }
+            }
+            index += 1;
+        }
+        Ok(())
+    }
+
+    fn order(&self, at: usize, index: usize) -> Option<Order> {
+        match &self.best.case.acts.get(at)?.what {
+            What::Talk(talk) => talk.orders.get(index).cloned(),
+            _ => None,
+        }
+    }
+
+    /// Brings values toward zero.
+    fn values(&mut self, at: usize) -> Result<(), ExploreError> {
+        let Some(What::Talk(talk)) = self.best.case.acts.get(at).map(|act| act.what.clone()) else {
+            return Ok(());
+        };
+        if talk.process_data.is_some_and(|data| data > 1) {
+            for data in [0, 1] {
+                if self.change_talk(at, |talk| talk.process_data = Some(data))? {
+                    break;
+                }
+            }
+        }
+        for index in 0..talk.orders.len() {
+            let Some(order) = self.order(at, index) else {
+                break;
+            };
+            for command in lower(order.command) {
+                if self.change_talk(at, |talk| talk.orders[index].command = command)? {
+                    break;
+                }
+            }
+            if order.spoil.is_some_and(|spoil| spoil.byte > 0) {
+                self.change_talk(at, |talk| {
+                    if let Some(spoil) = &mut talk.orders[index].spoil {
+                        spoil.byte = 0;
+                    }
+                })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Leaves so many bytes of an act, where it can be cut at any byte.
+fn shorten(what: &mut What, length: usize) {
+    let count = u8::try_from(length).unwrap_or(u8::MAX);
+    match what {
+        What::Synco(own) | What::Pause(own) | What::Zeros(own) => *own = count.min(*own),
+        What::Bytes(bytes) => bytes.truncate(length),
+        _ => {}
+    }
+}
+
+/// Commands with fewer bytes to the same cell.
+fn shorter(command: Command) -> Vec<Command> {
+    match command {
+        Command::ReadWord { cell } => vec![Command::ReadByte { cell }],
+        Command::ReadLong { cell } => vec![Command::ReadByte { cell }, Command::ReadWord { cell }],
+        Command::WriteByte { cell, .. } => vec![Command::ReadByte { cell }],
+        Command::WriteWord { cell, data } => vec![
+            Command::ReadByte { cell },
+            Command::WriteByte {
+                cell,
+                data: data as u8,
+            },
+        ],
+        _ => Vec::new(),
+    }
+}
+
+/// The same command with lower values: the data 0 or 1.
+fn lower(command: Command) -> Vec<Command> {
+    match command {
+        Command::WriteByte { cell, data } => {
+            let data = [0, 1].into_iter().filter(|new| *new < data);
+            data.map(|data| Command::WriteByte { cell, data }).collect()
+        }
+        Command::WriteWord { cell, data } => {
+            let data = [0, 1, 0x0100].into_iter().filter(|new| *new < data);
+            data.map(|data| Command::WriteWord { cell, data }).collect()
+        }
+        Command::And { low, data } if data > 0 => vec![Command::And { low, data: 0 }],
+        Command::Or { low, data } if data > 1 => vec![Command::Or { low, data: 1 }],
+        Command::WriteIo { code } if code > 0 => vec![Command::WriteIo { code: 0 }],
+        _ => Vec::new(),
+    }
+}
+
+/// The same conversation on a smaller ring: the drives that it has not are its highest one.
+fn on_ring(subject: &Subject, drives: u8) -> Subject {
+    let old = subject.case.drives;
+    let map = |drive: u8| drive.min(drives - 1);
+    let mut new = subject.clone();
+    new.case.drives = drives;
+    for act in &mut new.case.acts {
+        match &mut act.what {
+            What::Power { drive, .. } => *drive = map(*drive),
+            What::Talk(talk) => {
+                if let To::Drive(drive) = &mut talk.to {
+                    *drive = map(*drive);
+                }
+            }
+            _ => {}
+        }
+        for damage in &mut act.damages {
+            // The link in front of the same drive.
+            damage.link = match old.checked_sub(1 + damage.link) {
+                Some(drive) => drives - 1 - map(drive),
+                None => drives,
+            };
+        }
+    }
+    for planted in &mut new.setup.deviates {
+        planted.drive = map(planted.drive);
+    }
+    new
+}

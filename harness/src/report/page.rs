@@ -1,0 +1,41 @@
+//! The page that a scenario leaves: verdict, table and plots. Snapshots of scenarios are such pages.
+
+use super::plot::plots;
+use super::table::{LEGEND, Part, table, wires};
+use crate::library::Entry;
+use crate::scenario::run::Outcome;
+use harness_sim::trace::Trace;
+use std::fmt::Write as _;
+
+/// Rows of a table that a page holds at most.
+const ROWS: usize = 120;
+
+/// Columns of a table that a page holds at most.
+const COLUMNS: usize = 20;
+
+/// Lines of bytes where a link had another one than its neighbours, at most.
+const WIRES: usize = 20;
+
+/// The page of a scenario that was played, with what each ring's links carried.
+#[must_use]
+pub fn page(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
+    let mut page = format!("{}\n", entry.scenario.title);
+    // Writing to a String cannot fail.
+    for source in &entry.scenario.sources {
+        let _infallible = writeln!(page, "pins {}", source.text);
+    }
+    let _infallible = writeln!(page, "{} after {}", outcome.verdict, outcome.took);
+    for remark in &outcome.remarks {
+        let _infallible = writeln!(page, "note: {remark}");
+    }
+    for trace in traces {
+        let part = Part {
+            at_most: Some(ROWS),
+            columns_at_most: Some(COLUMNS),
+            ..Part::default()
+        };
+        let _infallible = write!(page, "\n{}{}", table(trace, &part), wires(trace, WIRES));
+    }
+    let _infallible = write!(page, "\n{LEGEND}{}", plots(&outcome.records));
+    page
+}

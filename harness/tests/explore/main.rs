@@ -1,0 +1,97 @@
+//! Exploring: cases and their texts, runs that repeat and go on, findings that become small and are kept.
+
+mod command;
+mod findings;
+mod rig;
+mod runs;
+mod texts;
+
+use harness::explore::{
+    About, Bounds, Campaign, Difference, End, ExploreError, Finding, OnSim, Planted, Pool,
+    Progress, Rehearsal, Scope, Setup, Spice, Swarm, Target, Tried, Watcher,
+};
+use harness_proto::novobus::guard::Limits;
+
+/// The seed of every random test: `DRIVEBENCH_SEED`, or always the same.
+fn seed() -> u64 {
+    let seed = std::env::var("DRIVEBENCH_SEED").ok();
+    seed.and_then(|seed| seed.parse().ok()).unwrap_or(38_400)
+}
+
+fn repeat(test: &str) -> String {
+    format!(
+        "repeat with: DRIVEBENCH_SEED={} cargo test --test explore {test}",
+        seed()
+    )
+}
+
+/// Everything on a simulated ring of plain drives.
+fn scope(drives: u8) -> Scope {
+    let behind = [Spice::Motion, Spice::Eeprom];
+    let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
+    Scope {
+        drives,
+        spices: all.filter(|spice| !behind.contains(spice)).collect(),
+        links: (0..drives).collect(),
+        limits: Limits::unlimited(),
+        spare_eeprom: false,
+    }
+}
+
+fn planted(drive: u8, name: &str) -> Setup {
+    Setup {
+        header: Vec::new(),
+        deviates: vec![Planted {
+            drive,
+            name: name.to_owned(),
+        }],
+    }
+}
+
+fn about(setup: &Setup, seed: u64) -> About {
+    About {
+        schema: About::SCHEMA,
+        rig: "sim:3".to_owned(),
+        drives: 3,
+        ports: false,
+        seed,
+        confirm: 2,
+        of: 3,
+        setup: setup.clone(),
+        spices: Vec::new(),
+    }
+}
+
+/// Keeps what a run tells of.
+#[derive(Default)]
+struct Heard {
+    findings: Vec<Finding>,
+}
+
+impl Watcher for Heard {
+    fn round(&mut self, _: u64, _: &Swarm) {}
+
+    fn found(&mut self, finding: &Finding, _: &str) {
+        self.findings.push(finding.clone());
+    }
+
+    fn progress(&mut self, _: &Progress, _: &Pool) {}
+}
+
+fn bounds(cases: u64, findings: usize) -> Bounds {
+    Bounds {
+        cases,
+        wire: None,
+        findings,
+        every: 50,
+    }
+}
+
+/// A run on a ring of three; what was found, and after how many cases it ended.
+fn explore(setup: &Setup, seed: u64, bounds: &Bounds) -> (Vec<Finding>, Campaign, End) {
+    let mut campaign = Campaign::new(about(setup, seed), scope(3));
+    let mut heard = Heard::default();
+    let mut target = OnSim::new(setup.clone());
+    let end = campaign.run(&mut target, None, bounds, &mut heard);
+    (heard.findings, campaign, end.expect("a simulated ring"))
+}
