@@ -24,3 +24,4 @@ pub mod plain;
 pub mod reference;
 pub mod ring;
 pub mod trace;
+pub mod transitions;
