@@ -8,6 +8,7 @@
 pub mod bus;
 pub mod cli;
 pub mod evidence;
+pub mod fuzz;
 pub mod guard;
 pub mod library;
 pub mod link;

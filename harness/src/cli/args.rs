@@ -2,6 +2,7 @@
 
 use super::drive::DriveCommand;
 use super::exit::Exit;
+use super::fuzz::FuzzCommand;
 use super::rig::RigCommand;
 use crate::rig::values::{Time, ValueError};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -73,6 +74,12 @@ pub enum Command {
         /// What to do.
         #[command(subcommand)]
         command: RigCommand,
+    },
+    /// Show what the kept inputs of the fuzz targets reach.
+    Fuzz {
+        /// What to do.
+        #[command(subcommand)]
+        command: FuzzCommand,
     },
     /// Show the ways in which a simulated drive can deviate from the manual.
     Deviations(DeviationsArguments),

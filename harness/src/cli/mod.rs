@@ -6,6 +6,7 @@ mod check;
 mod deviations;
 mod drive;
 mod exit;
+mod fuzz;
 mod list;
 mod man;
 mod manual;
@@ -66,6 +67,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify { folder } => verify::verify(&folder, output),
         Command::Rig { command } => rig::rig(&command, output),
+        Command::Fuzz { command } => fuzz::fuzz(&command, output),
         Command::Deviations(arguments) => deviations::deviations(&arguments, output),
         Command::Drive(command) => drive::drive(&command, output),
         Command::Completions { shell } => man::completions(shell, output),
