@@ -16,7 +16,7 @@ pub struct Rule {
 }
 
 /// Every reason. What no rule speaks of can happen everywhere: a zero, a line error, silence.
-pub const RULES: [Rule; 10] = [
+pub static RULES: [Rule; 10] = [
     Rule {
         events: &[
             Event::Synco,
