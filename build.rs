@@ -2,6 +2,7 @@
 
 fn main() {
     println!("cargo:rerun-if-changed=corpora/scenarios");
+    println!("cargo:rerun-if-changed=corpora/fuzz");
     println!("cargo:rerun-if-changed=corpora/probes");
     println!("cargo:rerun-if-changed=corpora/qualify");
     println!("cargo:rerun-if-changed=corpora/campaigns");

@@ -11,6 +11,7 @@ pub mod capture;
 pub mod cli;
 pub mod evidence;
 pub mod explore;
+pub mod fuzz;
 pub mod guard;
 pub mod library;
 pub mod link;

@@ -462,3 +462,34 @@ fn a_closed_pipe_is_no_failure() {
     drop(child.stdout.take());
     assert_eq!(child.wait().expect("it ends").code(), Some(1));
 }
+
+/// The whole corpus reaches everything; a part of it does not, and says what is missing.
+#[test]
+fn fuzz_coverage() {
+    let output = drivebench(&["fuzz", "coverage"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("(100.0 %)"));
+    let path = file("fuzz_coverage", "empty", "");
+    let folder = path.parent().expect("a folder");
+    let _none_before = std::fs::remove_dir_all(folder.join("detector"));
+    let empty = drivebench(&["fuzz", "coverage", "--corpus", text(folder)]);
+    assert_eq!(code(&empty), 4, "{}", stderr(&empty));
+    file("fuzz_coverage/detector", "one.hex", "00 80");
+    let part = drivebench(&["fuzz", "coverage", "--corpus", text(folder)]);
+    assert_eq!(code(&part), 1, "{}", stderr(&part));
+    assert!(stdout(&part).contains("missing              sync byte due"));
+    let json = [
+        "fuzz",
+        "coverage",
+        "--corpus",
+        text(folder),
+        "--format",
+        "json",
+    ];
+    let json: serde_json::Value = serde_json::from_str(&stdout(&drivebench(&json))).expect("JSON");
+    assert_eq!(json["reached_by_corpus"], 1);
+    file("fuzz_coverage/detector", "two.hex", "0");
+    let half = drivebench(&["fuzz", "coverage", "--corpus", text(folder)]);
+    assert_eq!(code(&half), 2);
+    assert!(stderr(&half).contains("two.hex: line 1 ends within a byte"));
+}

@@ -1,34 +1,26 @@
 //! The kept inputs of the fuzz targets, played with plain `cargo test`: none may break a rule.
 
-use harness_sim::fuzz::TARGETS;
-use std::path::Path;
+use harness::fuzz::coverage::Coverage;
+use harness::fuzz::input::input;
+use harness::fuzz::targets;
+use harness_sim::transitions::{State, tour};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
-/// Bytes as a file holds them: hexadecimal digits, `#` begins a comment.
-fn bytes(text: &str) -> Vec<u8> {
-    let digits: String = text
-        .lines()
-        .map(|line| line.split('#').next().unwrap_or_default())
-        .flat_map(|line| line.chars().filter(char::is_ascii_hexdigit))
-        .collect();
-    (0..digits.len() / 2)
-        .map(|i| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).expect("digits"))
-        .collect()
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("corpora/fuzz")
 }
 
 #[test]
 fn every_kept_input_keeps_the_rules() {
-    for (name, target) in TARGETS {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("corpora/fuzz")
-            .join(name);
+    for (name, target) in targets() {
+        let folder = folder().join(name);
         let mut played = 0;
         for entry in std::fs::read_dir(&folder).expect("a folder for each target") {
             let path = entry.expect("readable").path();
-            let input = std::fs::read(&path).expect("readable");
-            let input = match path.extension().and_then(|extension| extension.to_str()) {
-                Some("hex") => bytes(&String::from_utf8(input).expect("text")),
-                _ => input,
-            };
+            let content = std::fs::read(&path).expect("readable");
+            let input = input(&path.display().to_string(), &content)
+                .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             // A panic names the rule; the file is named here.
             let result = std::panic::catch_unwind(|| target(&input));
             assert!(result.is_ok(), "{}", path.display());
@@ -45,7 +37,7 @@ fn random_inputs_keep_the_rules() {
         .ok()
         .and_then(|seed| seed.parse().ok())
         .unwrap_or(38_400_u64);
-    for (name, target) in TARGETS {
+    for (name, target) in targets() {
         let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
         let mut random = |most: u64| {
             state ^= state << 13;
@@ -73,5 +65,46 @@ fn random_inputs_keep_the_rules() {
                 "{name}, case {case}: {input:02X?}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test --test corpora random_inputs"
             );
         }
+    }
+}
+
+/// Compares with a file that is kept; `UPDATE_SNAPSHOTS=1` writes it.
+fn kept(path: &Path, text: &str) {
+    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+        std::fs::write(path, text).expect("written");
+    }
+    let before = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(
+        before == text,
+        "{} differs; UPDATE_SNAPSHOTS=1 writes it",
+        path.display()
+    );
+}
+
+#[test]
+fn every_folder_belongs_to_a_target() {
+    let known: BTreeSet<_> = targets().map(|(name, _)| name.to_owned()).collect();
+    for entry in std::fs::read_dir(folder()).expect("a folder") {
+        let entry = entry.expect("readable");
+        let name = entry.file_name().to_string_lossy().into_owned();
+        assert!(!entry.path().is_dir() || known.contains(&name), "{name}");
+    }
+}
+
+/// The gate: every transition that can be reached is reached by the committed inputs.
+#[test]
+fn the_corpus_reaches_every_reachable_transition() {
+    let coverage = Coverage::of_folder(&folder()).expect("a corpus");
+    assert!(coverage.missing().is_empty(), "{}", coverage.sums());
+    let snapshot = Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots/fuzz/transitions.txt");
+    kept(&snapshot, &coverage.page());
+}
+
+/// The inputs of `bus_end` that are named after a state are the tour.
+#[test]
+fn the_tour_is_kept() {
+    for state in State::ALL {
+        let (name, text) = tour::file(*state);
+        kept(&folder().join("bus_end").join(name + ".hex"), &text);
     }
 }

@@ -24,4 +24,5 @@ pub mod plain;
 pub mod reference;
 pub mod ring;
 pub mod trace;
+pub mod transitions;
 mod uart;

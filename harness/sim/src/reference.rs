@@ -86,6 +86,11 @@ impl Drive {
         Self::default()
     }
 
+    /// The cells that were set, in order of their addresses.
+    pub fn cells(&self) -> impl Iterator<Item = (u16, u8)> + '_ {
+        self.memory.iter().map(|(address, byte)| (*address, *byte))
+    }
+
     /// Sets any memory cell, past the bus and its ranges (ND21 10).
     pub fn poke(&mut self, address: u16, byte: u8) {
         self.memory.insert(address, byte);

@@ -5,6 +5,8 @@
 //! [`BusEnd::deadline`], and call [`BusEnd::handle_deadline`] when it has come. What goes out goes out
 //! on a line that carries one byte at a time; keeping the order is the caller's part.
 
+mod view;
+
 use super::address::{ADDRESSED, passed_on};
 use super::command::PAGE;
 use super::error::BusError;
@@ -18,6 +20,7 @@ use crate::nd21;
 use crate::time::Instant;
 
 pub use super::parameter_channel::Parameter;
+pub use view::{Remaining, Silent};
 
 /// What a drive does about a byte or a deadline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -38,6 +38,12 @@ pub enum Progress {
 }
 
 impl Watch {
+    /// How many bytes of a sequence have come, 0 to 4.
+    #[must_use]
+    pub const fn matched(self) -> u8 {
+        self.matched
+    }
+
     /// Takes the next byte; `good` is false where the line status said that it was damaged.
     pub fn see(&mut self, byte: u8, good: bool) -> Progress {
         if !good {

@@ -92,6 +92,21 @@ pub struct ErrorMode {
     in_sequence: bool,
 }
 
+/// How far a drive in the error mode is, for those who look at a bus end from outside (ND21 9.7, 9.8).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stage {
+    /// Good zeros received in a row, the last of them just now.
+    pub zeros_received: u8,
+    /// Zeros sent; it stays at the largest number that fits.
+    pub zeros_sent: u8,
+    /// Whether "*" has been.
+    pub upstream: bool,
+    /// Whether the next byte is answered with received + 1 (rule 3).
+    pub increments: bool,
+    /// The bytes of the check sequence received, 0 to 4.
+    pub sequence: u8,
+}
+
 /// What the error mode makes of a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Response {
@@ -186,6 +201,18 @@ impl ErrorMode {
         }
     }
 
+    /// How far it is.
+    #[must_use]
+    pub const fn stage(&self) -> Stage {
+        Stage {
+            zeros_received: self.zeros_received,
+            zeros_sent: self.zeros_sent,
+            upstream: self.upstream,
+            increments: self.increments(),
+            sequence: self.watch.matched(),
+        }
+    }
+
     /// Notes that a 00 goes out, asked for or not.
     pub fn send_zero(&mut self) -> Marks {
         self.zeros_sent = self.zeros_sent.saturating_add(1);
@@ -211,7 +238,7 @@ impl ErrorMode {
     }
 
     /// Rule 3.
-    fn increments(&self) -> bool {
+    const fn increments(&self) -> bool {
         self.upstream && (self.after_time_out || self.zeros_sent >= self.rules.sent_zeros)
     }
 }

@@ -4,34 +4,52 @@
 //! a case needs stands in front of them and is described at each target. `corpora/fuzz/<target>/` holds inputs
 //! that are kept; plain `cargo test` plays all of them.
 
+mod bus_end;
 mod drive;
 mod guard;
 mod hostile;
+mod links;
+mod repair;
 
+pub use bus_end::{bus_end, bus_end_watched};
 pub use drive::drive;
 pub use guard::guard;
 pub use hostile::master;
+pub use links::links;
+pub use repair::repair;
 
+use crate::device::Device as _;
 use crate::fault::{Flips, LinkFault};
 use crate::plain::PlainDrive;
 use crate::reference;
 use crate::ring::Ring;
+use crate::transitions::{Reached, Watched};
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::bus_end::BusEnd;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::decode::Decoded;
-use harness_proto::novobus::properties::Properties;
 use harness_proto::novobus::telegram::Telegram;
 use harness_proto::time::{Instant, Span};
 
 /// A target: its name, which is that of its folder in `corpora/fuzz`, and its body.
 pub type Target = (&'static str, fn(&[u8]));
 
-/// Every target.
-pub const TARGETS: [Target; 6] = [
+/// A target that feeds drives raw bytes, and tells which transitions they went through.
+pub type Watching = (&'static str, fn(&[u8]) -> Reached);
+
+/// The targets that feed drives raw bytes.
+pub const WATCHING: [Watching; 3] = [
+    ("bus_end", bus_end_watched),
+    ("detector", detector_watched),
+    ("ring", ring_watched),
+];
+
+/// Every target whose body is here.
+pub const TARGETS: [Target; 8] = [
+    ("bus_end", bus_end),
     ("codec", codec),
     ("detector", detector),
+    ("links", links),
     ("ring", ring),
     ("drive", drive),
     ("master", master),
@@ -70,12 +88,20 @@ pub fn codec(data: &[u8]) {
 /// # Panics
 /// The two models answer otherwise, or disagree on the error mode or the memory.
 pub fn detector(data: &[u8]) {
+    let _transitions = detector_watched(data);
+}
+
+/// The same, with the transitions that the drive went through.
+///
+/// # Panics
+/// As [`detector`], or a transition is called unreachable.
+#[must_use]
+pub fn detector_watched(data: &[u8]) -> Reached {
+    let mut ours = Watched::default();
     let Some((&damaged, wire)) = data.split_first() else {
-        return;
+        return Reached::default();
     };
-    let mut ours = PlainDrive::default();
     let mut theirs = reference::Drive::new();
-    let mut bus_end = BusEnd::new(Properties::default());
     let mut now = Instant::START;
     for (index, &byte) in wire.iter().take(LONGEST).enumerate() {
         now += Span::from_micros(287);
@@ -85,16 +111,19 @@ pub fn detector(data: &[u8]) {
         } else {
             Received::good(byte)
         };
-        let step = bus_end.receive(now, received, ours.memory_mut());
+        let step = ours.receive(now, received);
         let expected = theirs.receive(reference::Cell { byte, error: bad });
         assert_eq!(step.byte, expected, "byte {} of {wire:02X?}", index + 1);
-        assert_eq!(bus_end.in_error(), theirs.in_error(), "byte {}", index + 1);
+        assert_eq!(ours.in_error(), theirs.in_error(), "byte {}", index + 1);
         // Time-outs are no part of the reference model: a case that switches them on ends here.
-        if ours.memory().peek(0xFF57) & 4 != 0 {
-            return;
+        if ours.drive().memory().peek(0xFF57) & 4 != 0 {
+            ours.reached().assert_possible();
+            return ours.reached().clone();
         }
     }
-    same_memory(&ours, &theirs);
+    same_memory(ours.drive(), &theirs);
+    ours.reached().assert_possible();
+    ours.reached().clone()
 }
 
 /// A ring of three against the reference model. The first byte of the input is the link that is damaged (0
@@ -103,33 +132,29 @@ pub fn detector(data: &[u8]) {
 /// # Panics
 /// A byte on any link is otherwise than in the reference model, or a drive's memory or error mode.
 pub fn ring(data: &[u8]) {
+    let _transitions = ring_watched(data);
+}
+
+/// The same, with the transitions that the three drives went through.
+///
+/// # Panics
+/// As [`ring`], or a transition is called unreachable.
+#[must_use]
+pub fn ring_watched(data: &[u8]) -> Reached {
+    let mut reached = Reached::default();
     let [what, place, wire @ ..] = data else {
-        return;
+        return reached;
+    };
+    let Ok(size) = RingSize::new(3) else {
+        return reached;
     };
     if wire.is_empty() {
-        return;
+        return reached;
     }
     let wire = &wire[..wire.len().min(256)];
-    let Ok(size) = RingSize::new(3) else { return };
-    let mut ours = Ring::new(size, Rate::Baud38400, |_| PlainDrive::default());
+    let mut ours = Ring::new(size, Rate::Baud38400, |_| Watched::default());
     let mut theirs: Vec<_> = (0..3).map(|_| reference::Drive::new()).collect();
-    let link = usize::from(what & 3);
-    let (fault, other) = match what >> 4 {
-        kind @ 0..8 => {
-            let data = 1 << kind;
-            let flips = Flips {
-                data,
-                ..Flips::default()
-            };
-            (
-                LinkFault::Flip(flips),
-                reference::Fault::Flip(data, false, false),
-            )
-        }
-        8 => (LinkFault::Drop, reference::Fault::Drop),
-        9 => (LinkFault::Duplicate, reference::Fault::Duplicate),
-        kind => (LinkFault::Insert(kind), reference::Fault::Insert(kind)),
-    };
+    let (link, fault, other) = ring_fault(*what);
     let mut faults = Vec::new();
     if *place > 0 && usize::from(*place) <= wire.len() {
         ours.arm_link(link, u64::from(*place), fault);
@@ -140,12 +165,11 @@ pub fn ring(data: &[u8]) {
         let Some(next) = ours.next_event() else { break };
         ours.run_until(next);
     }
-    let monitors = |k: u8| {
-        let drive = ours.drive(k);
-        drive.is_some_and(|drive| drive.memory().peek(0xFF57) & 4 != 0)
-    };
-    if (0..3).any(monitors) {
-        return;
+    let drives = || (0..3).rev().filter_map(|k| ours.drive(k));
+    drives().for_each(|drive| reached.join(drive.reached()));
+    reached.assert_possible();
+    if drives().any(|drive| drive.drive().memory().peek(0xFF57) & 4 != 0) {
+        return reached;
     }
     let expected = reference::run(&mut theirs, wire, &faults);
     for (index, (link, expected)) in ours.trace().links.iter().zip(&expected).enumerate() {
@@ -161,18 +185,46 @@ pub fn ring(data: &[u8]) {
             .collect();
         assert_eq!(received, expected, "link {index}, sent {wire:02X?}");
     }
-    for (k, theirs) in (0..3).rev().zip(&theirs) {
-        if let Some(ours) = ours.drive(k) {
-            assert_eq!(ours.bus_end().in_error(), theirs.in_error(), "drive {k}");
-            same_memory(ours, theirs);
+    for (ours, theirs) in drives().zip(&theirs) {
+        assert_eq!(ours.in_error(), theirs.in_error(), "sent {wire:02X?}");
+        same_memory(ours.drive(), theirs);
+    }
+    reached
+}
+
+/// The memories are the same but for the error code, of which the reference model knows one only. Cells that are 00 in both
+/// are most of them, and are not looked up.
+fn same_memory(ours: &PlainDrive, theirs: &reference::Drive) {
+    let compared = |address: u16| address >= 0xFD80 && ![0xFD82, 0xFD83].contains(&address);
+    for (address, theirs) in theirs.cells().filter(|(address, _)| compared(*address)) {
+        assert_eq!(ours.memory().peek(address), theirs, "cell {address:04X}");
+    }
+    for address in 0xFD80..=0xFFFF {
+        let ours = ours.memory().peek(address);
+        if ours != 0 && compared(address) {
+            assert_eq!(ours, theirs.peek(address), "cell {address:04X}");
         }
     }
 }
 
-/// The memories are the same but for the error code, of which the reference model knows one only.
-fn same_memory(ours: &PlainDrive, theirs: &reference::Drive) {
-    for address in (0xFD80..=0xFFFF).filter(|address| ![0xFD82, 0xFD83].contains(address)) {
-        let (ours, theirs) = (ours.memory().peek(address), theirs.peek(address));
-        assert_eq!(ours, theirs, "cell {address:04X}");
+/// The damaged link of [`ring`], and what happens on it, in the words of both models.
+fn ring_fault(what: u8) -> (usize, LinkFault, reference::Fault) {
+    let link = usize::from(what & 3);
+    match what >> 4 {
+        kind @ 0..8 => {
+            let data = 1 << kind;
+            let flips = Flips {
+                data,
+                ..Flips::default()
+            };
+            let other = reference::Fault::Flip(data, false, false);
+            (link, LinkFault::Flip(flips), other)
+        }
+        8 => (link, LinkFault::Drop, reference::Fault::Drop),
+        9 => (link, LinkFault::Duplicate, reference::Fault::Duplicate),
+        kind => {
+            let other = reference::Fault::Insert(kind);
+            (link, LinkFault::Insert(kind), other)
+        }
     }
 }

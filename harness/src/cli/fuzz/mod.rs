@@ -1,5 +1,6 @@
-//! `drivebench fuzz`: conversations that nobody has written.
+//! `drivebench fuzz`: conversations that nobody has written, and what the kept inputs of the fuzz targets reach.
 
+mod coverage;
 mod power;
 mod replay;
 mod rig;
@@ -21,6 +22,8 @@ pub enum FuzzCommand {
     Replay(replay::ReplayArguments),
     /// Show how many cases it takes to find each planned deviation of a drive.
     Power(power::PowerArguments),
+    /// Show which protocol transitions the kept inputs reach; exit code 1 where a reachable one is missing.
+    Coverage(coverage::CoverageArguments),
 }
 
 /// Does it.
@@ -29,5 +32,6 @@ pub(super) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
         FuzzCommand::Power(arguments) => power::power(arguments, output),
+        FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
     }
 }

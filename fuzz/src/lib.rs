@@ -1,0 +1,34 @@
+//! What the targets share: libFuzzer's extra counters, fed with the protocol transitions of a case, and the mutator that
+//! repairs commands.
+
+use harness_sim::fuzz::repair;
+use harness_sim::transitions::{CELLS, Reached};
+use std::sync::atomic::{AtomicU8, Ordering};
+
+// libFuzzer takes the counters in steps of eight bytes.
+const COUNTERS: usize = CELLS.next_multiple_of(8);
+
+/// One counter a cell of the matrix of protocol transitions. libFuzzer finds them by the name of the section, sets them to 0 before each
+/// case and keeps an input that makes one of them rise for the first time. `used` keeps the linker from leaving them out.
+// Unsafe, since a section of a wrong form would harm the program; this one is an array of bytes, as libFuzzer documents it.
+#[used]
+#[unsafe(link_section = "__libfuzzer_extra_counters")]
+static TRANSITIONS: [AtomicU8; COUNTERS] = [const { AtomicU8::new(0) }; COUNTERS];
+
+/// Tells libFuzzer which transitions a case went through.
+pub fn count(reached: &Reached) {
+    for index in reached.indices() {
+        TRANSITIONS[index].store(1, Ordering::Relaxed);
+    }
+}
+
+/// libFuzzer's mutation, and behind it, for three seeds of four, repaired commands; `head` bytes in front are no wire bytes.
+pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32, head: usize) -> usize {
+    let size = libfuzzer_sys::fuzzer_mutate(data, size, max_size);
+    if !seed.is_multiple_of(4)
+        && let Some(wire) = data[..size].get_mut(head..)
+    {
+        repair(wire);
+    }
+    size
+}

@@ -1,0 +1,73 @@
+//! In-band marks: what a stream with marks says does not depend on where it is cut.
+
+use super::LONGEST;
+use harness_proto::line::{LineError, Received};
+use harness_proto::marks::{BadMark, Unmark, mark};
+
+type Read = Vec<Result<Received, BadMark>>;
+
+/// The first byte chooses how the stream is cut, the rest is the stream as it is read from a socket or a pseudo terminal
+/// (PARMRK, termios).
+///
+/// # Panics
+/// Another cut gives other bytes; a byte is read out of nothing or gets lost; what is read is not read again when it is
+/// written with marks; a good end is called the middle of a mark, or the reverse.
+pub fn links(data: &[u8]) {
+    let Some((&cut, stream)) = data.split_first() else {
+        return;
+    };
+    let stream = &stream[..stream.len().min(LONGEST)];
+    let (whole, boundary) = read([stream]);
+    let pieces = stream.chunks(usize::from(cut) + 1);
+    assert_eq!(read(pieces), (whole.clone(), boundary), "cut at {cut}");
+    let (front, back) = stream.split_at(usize::from(cut).min(stream.len()));
+    assert_eq!(
+        read([front, &[], back]),
+        (whole.clone(), boundary),
+        "at {cut}"
+    );
+    assert!(whole.len() <= stream.len(), "a byte out of nothing");
+    assert!(
+        3 * whole.len() + 2 >= stream.len(),
+        "a mark has at most three bytes"
+    );
+    again(&whole);
+    as_line(stream);
+}
+
+fn read<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> (Read, bool) {
+    let mut unmark = Unmark::default();
+    let mut read = Vec::new();
+    for piece in pieces {
+        read.extend(piece.iter().filter_map(|byte| unmark.push(*byte)));
+    }
+    (read, unmark.at_boundary())
+}
+
+/// What was read is written with marks and read again.
+fn again(read_first: &Read) {
+    let good: Vec<_> = read_first.iter().copied().filter_map(Result::ok).collect();
+    let mut stream = Vec::new();
+    for received in &good {
+        stream.extend_from_slice(mark(*received).as_bytes());
+    }
+    let expected: Read = good.into_iter().map(Ok).collect();
+    assert_eq!(read([&stream[..]]), (expected, true));
+}
+
+/// The input as bytes of a line, every third of them damaged: each comes back with its error, as far as the coding tells.
+fn as_line(bytes: &[u8]) {
+    let errors = [None, Some(LineError::Parity), Some(LineError::Framing)];
+    let sent = bytes.iter().zip(errors.into_iter().cycle());
+    let mut stream = Vec::new();
+    let mut expected = Read::new();
+    for (&byte, error) in sent {
+        stream.extend_from_slice(mark(Received { byte, error }).as_bytes());
+        let seen = error.map(|_| match byte {
+            0 => LineError::Break,
+            _ => LineError::Parity,
+        });
+        expected.push(Ok(Received { byte, error: seen }));
+    }
+    assert_eq!(read([&stream[..]]), (expected, true));
+}

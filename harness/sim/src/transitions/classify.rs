@@ -1,0 +1,206 @@
+//! From a bus end and what happens to it to a cell of the matrix. Nothing is changed.
+
+use super::{Event, State, Transition};
+use crate::cells::Cells;
+use harness_proto::line::{LineError, Received};
+use harness_proto::nd21;
+use harness_proto::novobus::address::{ADDRESSED, passed_on};
+use harness_proto::novobus::bus_end::{BusEnd, Parameter, Place, Silent};
+use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
+use harness_proto::novobus::command::{Field, Kind, PAGE, layout};
+use harness_proto::novobus::error_mode::{Stage, UPSTREAM_ZEROS};
+use harness_proto::novobus::memory::Memory as _;
+use harness_proto::novobus::output::OutputChange;
+use harness_proto::novobus::properties::ReadLongAnswer;
+use harness_proto::novobus::sync::{Addressing, SyncByte};
+
+/// The cell that a byte is for a bus end on this memory, before it is received.
+#[must_use]
+pub fn classify(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transition {
+    let place = bus_end.place();
+    let event = match received.error {
+        Some(LineError::Parity) => Event::Parity,
+        Some(LineError::Framing) => Event::Framing,
+        Some(LineError::Break) => Event::Break,
+        Some(LineError::Overrun) => Event::Overrun,
+        None if received.byte == 0 => Event::Zero,
+        None => good(place, bus_end, memory, received.byte),
+    };
+    Transition {
+        state: state_at(place, bus_end, memory),
+        event,
+    }
+}
+
+/// The state of a bus end on this memory.
+#[must_use]
+pub fn state(bus_end: &BusEnd, memory: &Cells) -> State {
+    state_at(bus_end.place(), bus_end, memory)
+}
+
+fn state_at(place: Place, bus_end: &BusEnd, memory: &Cells) -> State {
+    let remaining = bus_end.remaining();
+    match place {
+        Place::Sync => between_telegrams(bus_end, memory),
+        Place::Address if remaining.is_some_and(|left| left.process_data) => State::AddressProcess,
+        Place::Address => State::Address,
+        Place::Passing if remaining.is_some_and(|left| left.net_bytes == 1) => State::PassingLast,
+        Place::Passing => State::Passing,
+        Place::ProcessHigh => State::ProcessHigh,
+        Place::ProcessLow => State::ProcessLow,
+        Place::Command => State::Command,
+        Place::Parameter(parameter) => match parameter.field {
+            Field::AddrL => State::AddrL,
+            Field::AddrH => State::AddrH,
+            Field::AddrInPage => State::AddrInPage,
+            Field::Data(_) => State::Data,
+            Field::Code => State::Code,
+            Field::Fixed(_) => State::Fixed,
+            Field::Check if parameter.kind == Kind::ResetH8 => State::CheckReset,
+            Field::Check => State::Check,
+        },
+        Place::ErrorMode => bus_end
+            .error_stage()
+            .map_or(State::ErrorZeros, |(stage, silent)| {
+                error_mode(stage, silent)
+            }),
+    }
+}
+
+fn between_telegrams(bus_end: &BusEnd, memory: &Cells) -> State {
+    if !bus_end.short_address_valid() {
+        return State::SyncNoAddress;
+    }
+    let own = memory.peek(nd21::ram::BUS_ADDR) == ADDRESSED;
+    match (own, bus_end.command_begun()) {
+        (false, false) => State::SyncOther,
+        (false, true) => State::SyncOtherBegun,
+        (true, false) => State::SyncOwn,
+        (true, true) => State::SyncOwnBegun,
+    }
+}
+
+fn error_mode(stage: Stage, silent: Silent) -> State {
+    const SEQUENCES: [[State; 4]; 4] = [
+        [
+            State::Sequence1,
+            State::Sequence2,
+            State::Sequence3,
+            State::Sequence4,
+        ],
+        [
+            State::IncrementsSequence1,
+            State::IncrementsSequence2,
+            State::IncrementsSequence3,
+            State::IncrementsSequence4,
+        ],
+        [
+            State::WaitingSequence1,
+            State::WaitingSequence2,
+            State::WaitingSequence3,
+            State::WaitingSequence4,
+        ],
+        [
+            State::SendingSequence1,
+            State::SendingSequence2,
+            State::SendingSequence3,
+            State::SendingSequence4,
+        ],
+    ];
+    let form = match silent {
+        Silent::No => usize::from(stage.increments),
+        Silent::Waiting => 2,
+        Silent::Sending => 3,
+    };
+    if let Some(place) = stage.sequence.checked_sub(1) {
+        return SEQUENCES[form][usize::from(place)];
+    }
+    let seven = stage.zeros_received == UPSTREAM_ZEROS - 1;
+    let long = stage.zeros_sent >= ZEROS;
+    match (silent, stage.upstream) {
+        (Silent::No, false) => match (long, seven) {
+            (false, false) => State::ErrorZeros,
+            (false, true) => State::ErrorSeven,
+            (true, false) => State::ErrorLong,
+            (true, true) => State::ErrorLongSeven,
+        },
+        (Silent::No, true) if long => State::Increments,
+        (Silent::No, true) if stage.zeros_sent == ZEROS - 1 => State::UpstreamSixteen,
+        (Silent::No, true) => State::Upstream,
+        (Silent::Waiting, true) => State::WaitingIncrements,
+        (Silent::Waiting, false) if seven => State::WaitingSeven,
+        (Silent::Waiting, false) => State::Waiting,
+        (Silent::Sending, true) => State::SendingIncrements,
+        (Silent::Sending, false) if seven => State::SendingSeven,
+        (Silent::Sending, false) => State::Sending,
+    }
+}
+
+/// What a good byte is that is no 00.
+fn good(place: Place, bus_end: &BusEnd, memory: &Cells, byte: u8) -> Event {
+    match place {
+        Place::Sync => match SyncByte::decode(byte) {
+            Err(_) => Event::NoSyncByte,
+            Ok(SyncByte::Synco) => Event::Synco,
+            Ok(SyncByte::Pause) => Event::Pause,
+            Ok(SyncByte::Telegram(header)) => match header.addressing() {
+                Addressing::AddressFollows => Event::AddressFollows,
+                _ if header.net_length() == 0 => Event::EmptyShort,
+                Addressing::SameDrive => Event::SameDrive,
+                Addressing::NextDrive => Event::NextDrive,
+            },
+        },
+        Place::Address if passed_on(byte) == ADDRESSED => Event::OwnAddress,
+        Place::Address => Event::OtherAddress,
+        Place::Passing => Event::NetByte,
+        Place::ProcessHigh | Place::ProcessLow => Event::ProcessData,
+        Place::Command => command(byte),
+        Place::Parameter(parameter) => parameter_byte(&parameter, memory, byte),
+        Place::ErrorMode => {
+            let stage = bus_end.error_stage();
+            let due = stage.map_or(0, |(stage, _)| usize::from(stage.sequence));
+            if byte == SEQUENCE[0] {
+                Event::SequenceStart
+            } else if due > 0 && byte == SEQUENCE[due] {
+                Event::SequenceNext
+            } else {
+                Event::OtherByte
+            }
+        }
+    }
+}
+
+fn command(byte: u8) -> Event {
+    match layout(byte, ReadLongAnswer::default()).map(|layout| layout.kind) {
+        None => Event::UnknownCommand,
+        Some(Kind::ReadByte) => Event::ReadByte,
+        Some(Kind::ReadWord) => Event::ReadWord,
+        Some(Kind::ReadLong) => Event::ReadLong,
+        Some(Kind::WriteByte) => Event::WriteByte,
+        Some(Kind::WriteWord) => Event::WriteWord,
+        Some(Kind::And) => Event::And,
+        Some(Kind::Or) => Event::Or,
+        Some(Kind::WriteIo) => Event::WriteIo,
+        Some(Kind::ResetH8) => Event::ResetH8,
+    }
+}
+
+fn parameter_byte(parameter: &Parameter, memory: &Cells, byte: u8) -> Event {
+    let accepted = match parameter.field {
+        Field::Check if byte == parameter.command_sum.plus() => return Event::RightCheck,
+        Field::Check => return Event::WrongCheck,
+        Field::AddrL | Field::Data(_) => true,
+        Field::AddrH => {
+            let address = parameter.address & 0x00FF | u16::from(byte) << 8;
+            memory.permits(parameter.kind, address)
+        }
+        Field::AddrInPage => memory.permits(parameter.kind, PAGE | u16::from(byte)),
+        Field::Code => OutputChange::from_code(byte).is_some(),
+        Field::Fixed(expected) => byte == expected,
+    };
+    if accepted {
+        Event::Accepted
+    } else {
+        Event::Refused
+    }
+}

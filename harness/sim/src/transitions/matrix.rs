@@ -1,0 +1,143 @@
+//! Which cells of the matrix nothing can reach, each with its reason.
+
+use super::{Event, State, Transition};
+
+/// Why some events cannot happen in most states.
+#[derive(Clone, Copy, Debug)]
+pub struct Rule {
+    /// The events.
+    pub events: &'static [Event],
+    /// The states in which they can happen all the same.
+    pub only_in: &'static [State],
+    /// Why not elsewhere.
+    pub reason: &'static str,
+    /// The section of the ND21 manual that says so.
+    pub section: &'static str,
+}
+
+/// Every reason. What no rule speaks of can happen everywhere: a zero, a line error, silence.
+pub static RULES: [Rule; 10] = [
+    Rule {
+        events: &[
+            Event::Synco,
+            Event::Pause,
+            Event::AddressFollows,
+            Event::SameDrive,
+            Event::NextDrive,
+            Event::EmptyShort,
+            Event::NoSyncByte,
+        ],
+        only_in: &[
+            State::SyncNoAddress,
+            State::SyncOther,
+            State::SyncOtherBegun,
+            State::SyncOwn,
+            State::SyncOwnBegun,
+        ],
+        reason: "a byte is read as a sync byte between telegrams only",
+        section: "9.1",
+    },
+    Rule {
+        events: &[Event::OwnAddress, Event::OtherAddress],
+        only_in: &[State::Address, State::AddressProcess],
+        reason: "a byte is an address byte only behind a sync byte that announces one",
+        section: "9.2",
+    },
+    Rule {
+        events: &[Event::NetByte],
+        only_in: &[State::Passing, State::PassingLast],
+        reason: "a net byte is passed on unread only while another drive is addressed",
+        section: "9.3",
+    },
+    Rule {
+        events: &[Event::ProcessData],
+        only_in: &[State::ProcessHigh, State::ProcessLow],
+        reason: "process data are the first two net bytes of a telegram with D = 1",
+        section: "9.4",
+    },
+    Rule {
+        events: &[
+            Event::ReadByte,
+            Event::ReadWord,
+            Event::ReadLong,
+            Event::WriteByte,
+            Event::WriteWord,
+            Event::And,
+            Event::Or,
+            Event::WriteIo,
+            Event::ResetH8,
+            Event::UnknownCommand,
+        ],
+        only_in: &[State::Command],
+        reason: "a byte is a command byte only where no command is begun, for the drive that is addressed",
+        section: "9.5",
+    },
+    Rule {
+        events: &[Event::Accepted],
+        only_in: &[
+            State::AddrL,
+            State::AddrH,
+            State::AddrInPage,
+            State::Data,
+            State::Code,
+            State::Fixed,
+        ],
+        reason: "no parameter of a command is due",
+        section: "9.5",
+    },
+    Rule {
+        events: &[Event::Refused],
+        only_in: &[State::AddrH, State::AddrInPage, State::Code, State::Fixed],
+        reason: "nothing is due that could be refused: any data byte and any low byte of an address will do",
+        section: "10.1",
+    },
+    Rule {
+        events: &[Event::RightCheck, Event::WrongCheck],
+        only_in: &[State::Check, State::CheckReset],
+        reason: "no checking byte is due",
+        section: "9.6",
+    },
+    Rule {
+        events: &[Event::SequenceStart, Event::OtherByte],
+        only_in: ERROR_MODE,
+        reason: "the check sequence is looked for in the error mode only",
+        section: "9.8",
+    },
+    Rule {
+        events: &[Event::SequenceNext],
+        only_in: IN_SEQUENCE,
+        reason: "no check sequence has begun",
+        section: "9.8",
+    },
+];
+
+/// The states of the error mode.
+const ERROR_MODE: &[State] = State::ALL.split_at(State::ErrorZeros.index()).1;
+
+/// Those with a check sequence half-way.
+const IN_SEQUENCE: &[State] = &[
+    State::Sequence1,
+    State::Sequence2,
+    State::Sequence3,
+    State::Sequence4,
+    State::IncrementsSequence1,
+    State::IncrementsSequence2,
+    State::IncrementsSequence3,
+    State::IncrementsSequence4,
+    State::WaitingSequence1,
+    State::WaitingSequence2,
+    State::WaitingSequence3,
+    State::WaitingSequence4,
+    State::SendingSequence1,
+    State::SendingSequence2,
+    State::SendingSequence3,
+    State::SendingSequence4,
+];
+
+/// The rule by which nothing can reach a cell; `None` for one that can be reached.
+#[must_use]
+pub fn why_unreachable(cell: Transition) -> Option<&'static Rule> {
+    RULES
+        .iter()
+        .find(|rule| rule.events.contains(&cell.event) && !rule.only_in.contains(&cell.state))
+}

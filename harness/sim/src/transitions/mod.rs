@@ -1,0 +1,73 @@
+//! The matrix of protocol transitions of a drive's end of the bus: [`State`]s times [`Event`]s (ND21 9.1-9.9).
+//!
+//! A cell is reachable, or unreachable with a reason ([`why_unreachable`]). [`classify`] names the cell that a byte or a
+//! silence is for a bus end; it looks on and changes nothing. [`Watched`] is a drive with that observer around it, and
+//! [`Reached`] the cells of a run. [`tour`] leads to every reachable cell.
+//!
+//! The place of a drive in its ring is no dimension of the matrix. A drive hears its inbound link and nothing else, and a
+//! damaged link can bring any byte: what can happen to the first drive can happen to the last. The tests hold that:
+//! each drive of a ring, fed with what its link carried, and nothing of the ring around it, goes through the same cells.
+//!
+//! The matrix is that of a drive with default properties.
+
+mod classify;
+mod event;
+mod matrix;
+mod named;
+mod reached;
+mod state;
+pub mod tour;
+mod watched;
+
+pub use classify::{classify, state};
+pub use event::Event;
+pub use matrix::{RULES, Rule, why_unreachable};
+pub use reached::Reached;
+pub use state::State;
+pub use watched::Watched;
+
+/// A cell of the matrix: what happened, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Transition {
+    /// The state of the bus end before.
+    pub state: State,
+    /// What happened to it.
+    pub event: Event,
+}
+
+/// How many cells the matrix has.
+pub const CELLS: usize = State::ALL.len() * Event::ALL.len();
+
+impl Transition {
+    /// All of them, state by state.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let row = |state: &State| {
+            let state = *state;
+            Event::ALL.iter().map(move |event| Self {
+                state,
+                event: *event,
+            })
+        };
+        State::ALL.iter().flat_map(row)
+    }
+
+    /// Those that can be reached.
+    pub fn reachable() -> impl Iterator<Item = Self> {
+        Self::all().filter(|cell| why_unreachable(*cell).is_none())
+    }
+
+    /// Its number, below [`CELLS`].
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.state.index() * Event::ALL.len() + self.event.index()
+    }
+}
+
+impl std::fmt::Display for Transition {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.state.name(), self.event.name())
+    }
+}
+
+#[cfg(test)]
+mod tests;

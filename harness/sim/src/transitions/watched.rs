@@ -1,0 +1,78 @@
+//! A plain drive with an observer around it that notes its transitions.
+
+use super::{Event, Reached, Transition, classify, state};
+use crate::device::Device;
+use crate::plain::PlainDrive;
+use harness_proto::line::Received;
+use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::Instant;
+
+/// A plain drive whose transitions are noted. It does what the drive does.
+#[derive(Clone, Debug, Default)]
+pub struct Watched {
+    drive: PlainDrive,
+    reached: Reached,
+}
+
+impl Watched {
+    /// A drive with nothing noted.
+    #[must_use]
+    pub fn new(drive: PlainDrive) -> Self {
+        Self {
+            drive,
+            reached: Reached::default(),
+        }
+    }
+
+    /// The drive.
+    #[must_use]
+    pub const fn drive(&self) -> &PlainDrive {
+        &self.drive
+    }
+
+    /// What it has gone through.
+    #[must_use]
+    pub const fn reached(&self) -> &Reached {
+        &self.reached
+    }
+
+    /// What a byte would be to it.
+    #[must_use]
+    pub fn transition(&self, received: Received) -> Transition {
+        classify(self.drive.bus_end(), self.drive.memory(), received)
+    }
+}
+
+impl Device for Watched {
+    #[inline]
+    fn receive(&mut self, now: Instant, received: Received) -> Step {
+        self.reached.add(self.transition(received));
+        self.drive.receive(now, received)
+    }
+
+    #[inline]
+    fn deadline(&self) -> Option<Deadline> {
+        self.drive.deadline()
+    }
+
+    fn handle_deadline(&mut self, now: Instant) -> Step {
+        self.reached.add(Transition {
+            state: state(self.drive.bus_end(), self.drive.memory()),
+            event: Event::Silence,
+        });
+        self.drive.handle_deadline(now)
+    }
+
+    fn power_on(&mut self, now: Instant) {
+        self.drive.power_on(now);
+    }
+
+    fn in_error(&self) -> bool {
+        self.drive.in_error()
+    }
+
+    fn cause(&self) -> Option<BusError> {
+        self.drive.cause()
+    }
+}

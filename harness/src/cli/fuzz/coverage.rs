@@ -1,0 +1,113 @@
+//! `drivebench fuzz coverage`: the matrix of protocol transitions, and what reaches it.
+
+use crate::cli::args::Format;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::fuzz::coverage::{Coverage, CoverageError};
+use clap::Args;
+use harness_sim::transitions::{CELLS, Transition, why_unreachable};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// For `fuzz coverage`.
+#[derive(Clone, Debug, Args)]
+pub struct CoverageArguments {
+    /// In which form.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    pub format: Format,
+    /// Play the inputs of this folder, which has a folder for each target, in place of the built-in ones.
+    #[arg(long, value_name = "FOLDER")]
+    pub corpus: Option<PathBuf>,
+}
+
+/// One cell, for tools.
+#[derive(Serialize)]
+struct Cell {
+    state: &'static str,
+    event: &'static str,
+    corpus: bool,
+    hardware: bool,
+    /// Why nothing can reach it; missing where something can.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unreachable: Option<&'static str>,
+}
+
+/// One input, for tools.
+#[derive(Serialize)]
+struct Input<'a> {
+    name: &'a str,
+    reached: usize,
+}
+
+/// Everything, for tools.
+#[derive(Serialize)]
+struct Table<'a> {
+    schema: u8,
+    cells: usize,
+    reachable: usize,
+    reached_by_corpus: usize,
+    reached_on_hardware: usize,
+    percent: f64,
+    inputs: Vec<Input<'a>>,
+    transitions: Vec<Cell>,
+}
+
+impl<'a> Table<'a> {
+    fn new(coverage: &'a Coverage) -> Self {
+        let cell = |cell: Transition| Cell {
+            state: cell.state.name(),
+            event: cell.event.name(),
+            corpus: coverage.corpus.contains(cell),
+            hardware: coverage.hardware.contains(cell),
+            unreachable: why_unreachable(cell).map(|rule| rule.reason),
+        };
+        let input = |file: &'a crate::fuzz::coverage::Played| Input {
+            name: &file.name,
+            reached: file.reached.count(),
+        };
+        Self {
+            schema: 1,
+            cells: CELLS,
+            reachable: Transition::reachable().count(),
+            reached_by_corpus: coverage.corpus.count(),
+            reached_on_hardware: coverage.hardware.count(),
+            percent: Coverage::percent(&coverage.corpus),
+            inputs: coverage.files.iter().map(input).collect(),
+            transitions: Transition::all().map(cell).collect(),
+        }
+    }
+}
+
+/// Plays the inputs and shows what they reach.
+pub(super) fn coverage(
+    arguments: &CoverageArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let played = match &arguments.corpus {
+        Some(folder) => Coverage::of_folder(folder),
+        None => Coverage::committed(),
+    };
+    let coverage = match played {
+        Ok(coverage) => coverage,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(match error {
+                CoverageError::Rule { .. } => Exit::Failed,
+                CoverageError::Empty => Exit::NothingSelected,
+                _ => Exit::Usage,
+            });
+        }
+    };
+    match arguments.format {
+        Format::Table => output.result(&coverage.page())?,
+        Format::Json => {
+            let text = serde_json::to_string(&Table::new(&coverage))?;
+            output.result(&(text + "\n"))?;
+        }
+    }
+    Ok(if coverage.missing().is_empty() {
+        Exit::Passed
+    } else {
+        Exit::Failed
+    })
+}

@@ -1,0 +1,327 @@
+//! Which transitions of a drive's end of the bus (ND21 9.1-9.9) the kept inputs reach, and which were reached on hardware.
+
+use super::input::{InputError, input};
+use harness_sim::fuzz::WATCHING;
+use harness_sim::transitions::{CELLS, Event, RULES, Reached, State, Transition, why_unreachable};
+use include_dir::{Dir, include_dir};
+use serde::Deserialize;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// The inputs that the binary carries.
+static CORPUS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/fuzz");
+
+/// What was reached on hardware.
+const HARDWARE: &str = include_str!("../../../corpora/fuzz/hardware.toml");
+
+/// The largest input file that is read, in bytes.
+const MAX_SIZE: u64 = 1 << 20;
+
+/// The most files that are taken from a folder.
+const MAX_FILES: usize = 100_000;
+
+/// Why there is no coverage.
+#[derive(Debug, thiserror::Error)]
+pub enum CoverageError {
+    /// A folder or file cannot be read.
+    #[error(
+        "failed to read {name}: {error}; a corpus is a folder with a folder for each of bus_end, detector and ring"
+    )]
+    Unreadable {
+        /// Which.
+        name: String,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// A file that no input can be, or more files than are taken.
+    #[error("{name} is too large: an input has at most 1 MiB, a folder 100000 files")]
+    TooLarge {
+        /// Which.
+        name: String,
+    },
+    /// A file is no input.
+    #[error("failed to read {name}: {error}")]
+    Input {
+        /// The file.
+        name: String,
+        /// What is wrong with it.
+        error: InputError,
+    },
+    /// An input breaks a rule of the manual; the panic before this says which.
+    #[error("{name} breaks a rule, see above; `cargo test --test corpora` plays it too")]
+    Rule {
+        /// The file.
+        name: String,
+    },
+    /// There is no input.
+    #[error("the corpus is empty: no file in bus_end, detector or ring")]
+    Empty,
+    /// The list of what was reached on hardware is damaged.
+    #[error("corpora/fuzz/hardware.toml: {0}")]
+    Hardware(String),
+}
+
+/// An input, and how much it reaches.
+#[derive(Clone, Debug)]
+pub struct Played {
+    /// Target and file name.
+    pub name: String,
+    /// What it reaches.
+    pub reached: Reached,
+}
+
+/// What is reached.
+#[derive(Clone, Debug)]
+pub struct Coverage {
+    /// Each input, in order of names.
+    pub files: Vec<Played>,
+    /// What the inputs reach together.
+    pub corpus: Reached,
+    /// What was reached on hardware.
+    pub hardware: Reached,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HardwareList {
+    #[serde(default)]
+    reached: Vec<HardwareEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HardwareEntry {
+    state: String,
+    event: String,
+    /// The evidence: the run in which it was seen.
+    run: String,
+}
+
+impl Coverage {
+    /// Plays the inputs that the binary carries.
+    ///
+    /// # Errors
+    /// One of them is none, or breaks a rule.
+    pub fn committed() -> Result<Self, CoverageError> {
+        let mut files = Vec::new();
+        for (target, _) in WATCHING {
+            let folder = CORPUS.get_dir(target);
+            for file in folder.iter().flat_map(|folder| folder.files()) {
+                files.push((file.path().display().to_string(), file.contents().to_vec()));
+            }
+        }
+        Self::of(files)
+    }
+
+    /// Plays the inputs of a folder that has a folder for each target; one that is missing holds nothing.
+    ///
+    /// # Errors
+    /// It cannot be read, holds no input, or one breaks a rule.
+    pub fn of_folder(folder: &Path) -> Result<Self, CoverageError> {
+        let name = |path: &Path| path.display().to_string();
+        let mut files = Vec::new();
+        let unreadable = |path: &Path| {
+            let name = name(path);
+            move |error| CoverageError::Unreadable { name, error }
+        };
+        std::fs::read_dir(folder).map_err(unreadable(folder))?;
+        for (target, _) in WATCHING {
+            let inner = folder.join(target);
+            if !inner.is_dir() {
+                continue;
+            }
+            for entry in std::fs::read_dir(&inner).map_err(unreadable(&inner))? {
+                let path = entry.map_err(unreadable(&inner))?.path();
+                let metadata = path.metadata().map_err(unreadable(&path))?;
+                if !metadata.is_file() {
+                    continue;
+                }
+                if metadata.len() > MAX_SIZE || files.len() >= MAX_FILES {
+                    return Err(CoverageError::TooLarge { name: name(&path) });
+                }
+                let content = std::fs::read(&path).map_err(unreadable(&path))?;
+                let file = path.file_name().unwrap_or_default().to_string_lossy();
+                files.push((format!("{target}/{file}"), content));
+            }
+        }
+        Self::of(files)
+    }
+
+    /// Plays inputs, each with `TARGET/FILE` as its name.
+    fn of(mut inputs: Vec<(String, Vec<u8>)>) -> Result<Self, CoverageError> {
+        inputs.sort();
+        let mut files = Vec::new();
+        let mut corpus = Reached::default();
+        for (name, content) in inputs {
+            let target = name.split('/').next().unwrap_or_default();
+            let Some((_, body)) = WATCHING.iter().find(|(known, _)| *known == target) else {
+                continue;
+            };
+            let data = input(&name, &content).map_err(|error| CoverageError::Input {
+                name: name.clone(),
+                error,
+            })?;
+            let played = std::panic::catch_unwind(|| body(&data));
+            let Ok(reached) = played else {
+                return Err(CoverageError::Rule { name });
+            };
+            corpus.join(&reached);
+            files.push(Played { name, reached });
+        }
+        if files.is_empty() {
+            return Err(CoverageError::Empty);
+        }
+        Ok(Self {
+            files,
+            corpus,
+            hardware: hardware(HARDWARE)?,
+        })
+    }
+
+    /// Those of the reachable cells that no input reaches.
+    #[must_use]
+    pub fn missing(&self) -> Vec<Transition> {
+        let missing = |cell: &Transition| !self.corpus.contains(*cell);
+        Transition::reachable().filter(missing).collect()
+    }
+
+    /// How many percent of the reachable cells a set holds, rounded down to a tenth: 100.0 means all.
+    #[must_use]
+    pub fn percent(reached: &Reached) -> f64 {
+        let all = Transition::reachable().count();
+        let tenths = reached.count() * 1_000 / all.max(1);
+        f64::from(u32::try_from(tenths).unwrap_or(0)) / 10.0
+    }
+
+    /// The matrix as a page: a row a state, a column an event, then what the signs mean, and the sums.
+    #[must_use]
+    pub fn page(&self) -> String {
+        let mut text = String::from(
+            "Transitions of a drive's end of the bus (ND21 9.1-9.9): a row a state, a column an event\n\n",
+        );
+        self.rows(&mut text);
+        text.push_str(
+            "\n#  reached by the corpus       @  and on hardware       h  on hardware only       -  missing\n\
+             a letter: nothing can reach it, because\n",
+        );
+        // Writing to a String cannot fail.
+        for (letter, rule) in ('a'..).zip(&RULES) {
+            let (section, reason) = (rule.section, rule.reason);
+            let _infallible = writeln!(text, "{letter}  {section:5} {reason}");
+        }
+        text.push_str("\nEvents\n");
+        for event in Event::ALL {
+            let (number, section, name) = (event.index() + 1, event.section(), event.name());
+            let _infallible = writeln!(text, "{number:2} {section:5} {name}");
+        }
+        text.push('\n');
+        text.push_str(&self.sums());
+        text
+    }
+
+    fn rows(&self, text: &mut String) {
+        let heading: String = (1..=Event::ALL.len()).map(|n| format!("{n:3}")).collect();
+        let _infallible = writeln!(text, "{:68}{heading}", "");
+        for state in State::ALL.iter().copied() {
+            let sign = |event: &Event| format!("  {}", self.sign(state, *event));
+            let signs: String = Event::ALL.iter().map(sign).collect();
+            let _infallible = writeln!(text, "{:5} {:62}{signs}", state.section(), state.name());
+        }
+    }
+
+    fn sign(&self, state: State, event: Event) -> char {
+        let cell = Transition { state, event };
+        if let Some(rule) = why_unreachable(cell) {
+            let place = RULES.iter().position(|one| std::ptr::eq(one, rule));
+            return place.and_then(|n| ('a'..='z').nth(n)).unwrap_or('?');
+        }
+        match (self.corpus.contains(cell), self.hardware.contains(cell)) {
+            (true, false) => '#',
+            (true, true) => '@',
+            (false, true) => 'h',
+            (false, false) => '-',
+        }
+    }
+
+    /// The sums, and every cell that is missing.
+    #[must_use]
+    pub fn sums(&self) -> String {
+        let all = Transition::reachable().count();
+        let line = |reached: &Reached| {
+            let percent = Self::percent(reached);
+            format!("{} of {all} reachable ({percent:.1} %)", reached.count())
+        };
+        let nothing = if self.hardware.count() == 0 {
+            "; nothing has been played on hardware yet"
+        } else {
+            ""
+        };
+        let mut text = format!(
+            "cells                {CELLS}: {} states, {} events\nunreachable          {}, each with its reason\n\
+             reached by corpus    {}, {} inputs\nreached on hardware  {}{nothing}\n",
+            State::ALL.len(),
+            Event::ALL.len(),
+            CELLS - all,
+            line(&self.corpus),
+            self.files.len(),
+            line(&self.hardware),
+        );
+        for cell in self.missing() {
+            let _infallible = writeln!(text, "missing              {cell}");
+        }
+        text
+    }
+}
+
+/// Reads the list of what was reached on hardware.
+fn hardware(text: &str) -> Result<Reached, CoverageError> {
+    let list: HardwareList =
+        toml::from_str(text).map_err(|error| CoverageError::Hardware(error.to_string()))?;
+    let mut reached = Reached::default();
+    for HardwareEntry { state, event, run } in list.reached {
+        let wrong = |what: &str| {
+            CoverageError::Hardware(format!(
+                "`{state}`, `{event}`: {what}; `drivebench fuzz coverage` shows the names"
+            ))
+        };
+        let cell = Transition {
+            state: State::from_name(&state).ok_or_else(|| wrong("no such state"))?,
+            event: Event::from_name(&event).ok_or_else(|| wrong("no such event"))?,
+        };
+        if why_unreachable(cell).is_some() {
+            return Err(wrong("the matrix says that nothing can reach it"));
+        }
+        if run.is_empty() {
+            return Err(wrong("names no run that shows it"));
+        }
+        reached.add(cell);
+    }
+    Ok(reached)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn list(state: &str, event: &str, run: &str) -> Result<Reached, CoverageError> {
+        hardware(&format!(
+            "[[reached]]\nstate = \"{state}\"\nevent = \"{event}\"\nrun = \"{run}\"\n"
+        ))
+    }
+
+    #[test]
+    fn hardware_is_a_checked_list() {
+        assert_eq!(hardware("").expect("empty").count(), 0);
+        let one = list("command byte due", "zero", "lab-1").expect("a cell");
+        assert_eq!(one.count(), 1);
+        for (state, event, run, says) in [
+            ("command due", "zero", "lab-1", "no such state"),
+            ("command byte due", "nought", "lab-1", "no such event"),
+            ("command byte due", "SYNCO", "lab-1", "nothing can reach"),
+            ("command byte due", "zero", "", "no run"),
+        ] {
+            let error = list(state, event, run).expect_err(says).to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+}
