@@ -188,8 +188,12 @@ impl<'l> Pump<'l> {
                 };
                 idle |= lead == Span::ZERO;
             }
-            // Where bytes are handed over ahead, the next are before the line has run dry.
-            let ahead = if idle { Span::ZERO } else { lead };
+            // Where bytes are handed over ahead, the next are before the line has run dry, many at a time.
+            let ahead = if idle {
+                Span::ZERO
+            } else {
+                Span::from_nanos(lead.as_nanos() / 2)
+            };
             let next = Instant::START + ring.free.since_start().saturating_sub(ahead);
             until = until.min(next.max(now + byte_time.min(lead)));
         }

@@ -1,14 +1,15 @@
 //! The safe state of a bench: every drive stopped, standing and blocked, and read back.
 
-use crate::bus::{Axis, Bus, Error, Options, recover};
+use crate::bus::{Axis, Bus, Error, Options, Order, recover};
 use crate::link::{Line, Trouble};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::speed_from_raw;
+use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::Job;
 use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
 use harness_proto::time::{Instant, Span};
 use std::fmt;
@@ -136,31 +137,137 @@ fn ring_to_safe_state(
         Err(error) => return all(error.to_string()),
     };
     // The bus has one ring, whichever it is of the bench.
-    let axes = || (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
-    let axes: Vec<_> = axes().collect();
-    let mut why: Vec<Option<String>> = vec![None; axes.len()];
+    let axes = (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
+    let mut drives: Vec<_> = axes.map(Told::new).collect();
     let mut told = 0;
     for step in &standing.order {
-        let ordered: Vec<_> = axes.iter().map(|axis| order(&bus, *axis, *step)).collect();
-        told |= step.flag();
-        // Standing is waited for once: a drive that does not stop is not waited for again.
-        for ((axis, ordered), why) in axes.iter().zip(ordered).zip(&mut why) {
-            let within = match why {
-                None => standing.within,
-                Some(_) => FLAGS,
-            };
-            let seen = ordered.and_then(|()| see(&bus, *axis, told, standing.rpm, within));
-            *why = why.take().or(seen.err().map(|error| error.to_string()));
+        for command in step.commands() {
+            let answers = together(&bus, &drives, command);
+            for (drive, answer) in drives.iter_mut().zip(answers) {
+                drive.note(answer.err());
+            }
         }
+        told |= step.flag();
+        wait_until_seen(&bus, &mut drives, told, standing);
     }
     bus.close();
-    let not_safe = axes.iter().zip(why).filter_map(|(axis, why)| {
+    let not_safe = drives.into_iter().filter_map(|drive| {
         Some(NotSafe {
-            axis: Axis::new(ring, axis.drive())?,
-            why: why?,
+            axis: Axis::new(ring, drive.axis.drive())?,
+            why: drive.why?,
         })
     });
     not_safe.collect()
+}
+
+/// A drive on its way to the safe state.
+struct Told {
+    axis: Axis,
+    /// Why it is not there.
+    why: Option<String>,
+    /// Since when it has been standing.
+    stood: Option<Instant>,
+    seen: bool,
+}
+
+impl Told {
+    const fn new(axis: Axis) -> Self {
+        Self {
+            axis,
+            why: None,
+            stood: None,
+            seen: false,
+        }
+    }
+
+    fn note(&mut self, why: Option<String>) {
+        self.why = self.why.take().or(why);
+    }
+}
+
+/// One command for every drive, all on their way at once: the last drive of a long ring must not wait for the answers of the
+/// others. Where one answer does not come, nobody waits for those behind it.
+fn together(bus: &Bus<'_>, drives: &[Told], command: Command) -> Vec<Result<Option<u32>, String>> {
+    let start = |drive: &Told| bus.start(drive.axis, |k| Job::new(k, command));
+    let orders: Vec<_> = drives.iter().map(start).collect();
+    let mut lost: Option<String> = None;
+    let result = |order: Result<Order, Error>| match (&lost, order) {
+        (Some(lost), _) => Err(lost.clone()),
+        (None, order) => order.and_then(|order| bus.result(order)).map_err(|error| {
+            let text = error.to_string();
+            lost = Some(text.clone());
+            text
+        }),
+    };
+    orders.into_iter().map(result).collect()
+}
+
+/// Waits until every drive shows what it was told, and stands. One that did not stop before is not waited for again.
+fn wait_until_seen(bus: &Bus<'_>, drives: &mut [Told], told: u8, standing: &Standing) {
+    let read = |drives: &[Told], address, whole| {
+        let command = match whole {
+            true => Command::ReadWord { address },
+            false => Command::ReadByte { address },
+        };
+        together(bus, drives, command)
+    };
+    let ranges = read(drives, ram::SW_VERSION2, false);
+    let begin = bus.now();
+    for drive in drives.iter_mut() {
+        (drive.seen, drive.stood) = (false, None);
+    }
+    loop {
+        let found = read(drives, ram::FLAGS, false);
+        let speeds = read(drives, ram::NIST, true);
+        let now = bus.now();
+        let answers = ranges.iter().zip(found).zip(speeds);
+        for (drive, ((range, found), speed)) in drives.iter_mut().zip(answers) {
+            if drive.seen {
+                continue;
+            }
+            let (range, found, raw) = match (range.clone(), found, speed) {
+                (Ok(Some(range)), Ok(Some(found)), Ok(Some(speed))) => {
+                    let [.., range] = range.to_be_bytes();
+                    let [.., found] = found.to_be_bytes();
+                    let [_, _, high, low] = speed.to_be_bytes();
+                    (range, found, i16::from_be_bytes([high, low]))
+                }
+                (Err(why), ..) | (_, Err(why), _) | (.., Err(why)) => {
+                    drive.note(Some(why));
+                    drive.seen = true;
+                    continue;
+                }
+                _ => continue,
+            };
+            let range = SpeedRange::from_sw_version2(range);
+            let speed = speed_from_raw(raw, range).to_f64();
+            let stands = speed.abs() <= standing.rpm;
+            drive.stood = stands.then(|| drive.stood.unwrap_or(now));
+            if stands && found & told == told {
+                drive.seen = true;
+                continue;
+            }
+            let within = match drive.why {
+                None => standing.within,
+                Some(_) => FLAGS,
+            };
+            let late = match drive.stood {
+                None => now >= begin + within,
+                Some(stood) => now >= stood + FLAGS,
+            };
+            if late {
+                drive.seen = true;
+                drive.note(Some(format!(
+                    "waited {} for drive {} to do as told and to stand (Flags are {found:02X}, {told:02X} of them told; nist is {speed:.1} rpm)",
+                    now.since(begin),
+                    drive.axis
+                )));
+            }
+        }
+        if drives.iter().all(|drive| drive.seen) {
+            return;
+        }
+    }
 }
 
 /// Ends what was half-sent and brings the ring back (ND21 9.8).
@@ -224,50 +331,27 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
 const FLAGS: Span = Span::from_millis(500);
 
 impl SafeStep {
+    /// What a drive is told (11.8, 14.10).
+    fn commands(self) -> Vec<Command> {
+        let status = |data| Command::Or {
+            address_low: ram::STATUS.to_be_bytes()[1],
+            data,
+        };
+        let stand = Command::WriteWord {
+            address: ram::NSOLL,
+            data: 0,
+        };
+        match self {
+            Self::Stop => vec![status(status::STOP)],
+            Self::Block => vec![stand, status(status::BLOCK)],
+        }
+    }
+
     /// What `Flags` show of it (14.4.2).
     const fn flag(self) -> u8 {
         match self {
             Self::Stop => flags::STOP,
             Self::Block => flags::BLOCK,
-        }
-    }
-}
-
-fn order(bus: &Bus<'_>, axis: Axis, step: SafeStep) -> Result<(), Error> {
-    match step {
-        SafeStep::Stop => bus.stop(axis),
-        SafeStep::Block => {
-            bus.write_word(axis, ram::NSOLL, 0)?;
-            bus.block(axis)
-        }
-    }
-}
-
-/// Waits until a drive shows what it was told, and stands.
-fn see(bus: &Bus<'_>, axis: Axis, told: u8, rpm: f64, within: Span) -> Result<(), Error> {
-    let range = bus.speed_range(axis)?;
-    let begin = bus.now();
-    let mut stood = None;
-    loop {
-        let found = bus.read_byte(axis, ram::FLAGS)?;
-        let raw = bus.read_word(axis, ram::NIST)?.cast_signed();
-        let speed = speed_from_raw(raw, range).to_f64();
-        let now = bus.now();
-        stood = (speed.abs() <= rpm).then(|| stood.unwrap_or(now));
-        if stood.is_some() && found & told == told {
-            return Ok(());
-        }
-        let late = match stood {
-            None => now >= begin + within,
-            Some(stood) => now >= stood + FLAGS,
-        };
-        if late {
-            return Err(Error::TimeOut {
-                waited: now.since(begin),
-                what: format!(
-                    "drive {axis} to do as told and to stand (Flags are {found:02X}, {told:02X} of them told; nist is {speed:.1} rpm)"
-                ),
-            });
         }
     }
 }

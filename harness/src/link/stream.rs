@@ -23,6 +23,9 @@ use std::time;
 /// How far ahead of the line bytes are given to the operating system.
 const AHEAD: Span = Span::from_millis(100);
 
+/// How far ahead they are at least, while there are any.
+const AT_LEAST_AHEAD: Span = Span::from_millis(50);
+
 /// How far ahead of the line a driver may hand over its bytes: more than a busy computer is late, less than a person
 /// notices.
 const LEAD: Span = Span::from_millis(16);
@@ -37,7 +40,7 @@ pub const TOLERANCE: Span = Span::from_millis(5);
 const NAP: Span = Span::from_millis(50);
 
 /// For how much longer the line must be taken by what has been sent, so that nobody waits for an answer.
-const CALM: Span = Span::from_millis(6);
+const CALM: Span = Span::from_millis(4);
 
 /// The sleep then: some bytes.
 const DOZE: Span = Span::from_millis(2);
@@ -253,7 +256,8 @@ impl StreamLink {
     fn due(&self) -> Option<Instant> {
         let queues = self.rings.iter().filter_map(|ring| {
             let (start, exact, _) = ring.queue.front()?;
-            let lead = if *exact { Span::ZERO } else { AHEAD };
+            // All that is due goes out at once, and then nothing for a while.
+            let lead = if *exact { Span::ZERO } else { AT_LEAST_AHEAD };
             Some(Instant::START + start.since_start().saturating_sub(lead))
         });
         let faults = self.scheduled.front().map(|(at, ..)| *at);

@@ -219,11 +219,25 @@ impl Twin {
         slack: Span,
     ) -> Vec<Vec<(Instant, Received)>> {
         self.link.begin();
-        for (ring, done) in &conversation.done {
-            match done {
+        let byte_time = self.link.byte_time();
+        let mut done = conversation.done.iter().peekable();
+        while let Some((ring, done_here)) = done.next() {
+            match done_here {
                 Done::Sent(at, byte) => {
+                    // Bytes without a gap go out together.
+                    let mut bytes = vec![*byte];
+                    let mut next = *at + byte_time;
+                    while let Some((_, Done::Sent(_, byte))) =
+                        done.next_if(|(own, done)| match done {
+                            Done::Sent(at, _) => own == ring && *at == next,
+                            _ => false,
+                        })
+                    {
+                        bytes.push(*byte);
+                        next += byte_time;
+                    }
                     self.pass_until(*at);
-                    self.link.send(*ring, &[*byte]);
+                    self.link.send(*ring, &bytes);
                 }
                 Done::Fault(at, fault, moment) => {
                     if *moment == Moment::Now {
