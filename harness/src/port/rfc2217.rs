@@ -1,7 +1,7 @@
 //! A serial port behind a socket: Telnet (RFC 854, 856) with the COM port options of RFC 2217.
 //!
-//! Rate, 8O1 and the notification of line errors are asked for and checked. The protocol tells that there was a line
-//! error, not at which byte: what such a link cannot show makes a verdict inconclusive.
+//! Rate and 8O1 are asked for and checked. So is the notification of line errors, to which some servers (ser2net among them) say nothing. The
+//! protocol tells that there was a line error, not at which byte: what such a link cannot show makes a verdict inconclusive.
 
 use harness_proto::line::Rate;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -35,6 +35,9 @@ const MOST_ANSWER: usize = 64;
 /// How long the server may take to answer everything.
 const PATIENCE: Duration = Duration::from_secs(3);
 
+/// And how long to say whether it tells of line errors.
+const FOR_LINE_STATE: Duration = Duration::from_millis(500);
+
 /// Why a server cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum NegotiationError {
@@ -60,14 +63,13 @@ pub enum NegotiationError {
 }
 
 /// The settings, in the order in which they are asked for: name, command, value, bytes of it.
-fn settings(rate: Rate) -> [(&'static str, u8, u32, usize); 6] {
+fn settings(rate: Rate) -> [(&'static str, u8, u32, usize); 5] {
     [
         ("the rate", 1, rate.bits_per_second(), 4),
         ("8 data bits", 2, 8, 1),
         ("odd parity", 3, 2, 1),
         ("1 stop bit", 4, 1, 1),
         ("no flow control", 5, 1, 1),
-        ("notification of line errors", 10, LINE_ERRORS as u32, 1),
     ]
 }
 
@@ -224,7 +226,24 @@ pub(super) fn negotiate(stream: &TcpStream, rate: Rate) -> Result<Telnet, Negoti
             return Err(NegotiationError::Otherwise { what, asked, got });
         }
     }
+    notify(&mut telnet, stream)?;
     Ok(telnet)
+}
+
+/// Asks to be told of line errors. A server that says nothing may do it all the same; one that says something else does not.
+fn notify(telnet: &mut Telnet, mut stream: &TcpStream) -> Result<(), NegotiationError> {
+    const COMMAND: u8 = 10;
+    let (what, asked) = ("notification of line errors", u32::from(LINE_ERRORS));
+    stream.write_all(&ask(COMMAND, asked, 1))?;
+    let end = Instant::now() + FOR_LINE_STATE;
+    let got = converse(telnet, stream, end, what, |telnet| {
+        telnet.answer_to(COMMAND)
+    });
+    match got {
+        Ok(got) if got != asked => Err(NegotiationError::Otherwise { what, asked, got }),
+        Ok(_) | Err(NegotiationError::Silent(_)) => Ok(()),
+        Err(error) => Err(error),
+    }
 }
 
 /// Reads until something has come.
