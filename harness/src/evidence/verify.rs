@@ -274,7 +274,10 @@ impl Recorded {
             None => None,
             Some((verdict, ..)) if verdict != judged => Some(format!(
                 "the record says {verdict}, its bytes say {judged}{}",
-                found.map_or(String::new(), |found| format!(": {found}"))
+                match found.or_else(|| outcome.remarks.first().cloned()) {
+                    Some(found) => format!(": {found}"),
+                    None => String::new(),
+                }
             )),
             Some((_, finding, _)) if *finding != found => Some(format!(
                 "the record says \"{}\", its bytes say \"{}\"",

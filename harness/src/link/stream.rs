@@ -15,6 +15,7 @@ use harness_sim::link::LineByte;
 use harness_sim::trace::{LinkTrace, Trace};
 use rustix::event::{Timespec, poll};
 use rustix::io::Errno;
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -56,6 +57,8 @@ pub struct StreamLink {
     rate: Rate,
     /// The time that is the conversation's start.
     start: time::Instant,
+    /// The last time that somebody was told: what had not come then has come later, whatever is computed of it.
+    told: Cell<Instant>,
     capabilities: Vec<Capability>,
     /// Faults that wait for their time, in order of it.
     scheduled: VecDeque<(Instant, usize, usize, LinkFault)>,
@@ -123,6 +126,7 @@ impl StreamLink {
             inner,
             rate,
             start: time::Instant::now(),
+            told: Cell::new(Instant::START),
             capabilities,
             scheduled: VecDeque::new(),
             interrupt,
@@ -199,7 +203,8 @@ impl StreamLink {
     /// Lets due faults happen, gives the operating system what is due, and takes what has come.
     fn pump(&mut self) {
         self.beats.fetch_add(1, Ordering::Relaxed);
-        let now = self.now();
+        let told = self.told.get();
+        let now = self.at(time::Instant::now());
         while let Some(&(at, ring, link, fault)) = self.scheduled.front()
             && at <= now
         {
@@ -213,9 +218,9 @@ impl StreamLink {
         }
         for ring in &mut self.rings {
             let done = match self.trouble {
-                None => ring
-                    .transmit(now)
-                    .and_then(|()| ring.collect(now, self.rate.byte_time(), self.recording)),
+                None => ring.transmit(now).and_then(|()| {
+                    ring.collect((told, now), self.rate.byte_time(), self.recording)
+                }),
                 Some(_) => {
                     ring.queue.clear();
                     Ok(())
@@ -367,9 +372,17 @@ impl Ring {
     }
 
     /// Takes what has come.
-    fn collect(&mut self, now: Instant, byte_time: Span, recording: bool) -> Result<(), Trouble> {
+    fn collect(
+        &mut self,
+        (told, now): (Instant, Instant),
+        byte_time: Span,
+        recording: bool,
+    ) -> Result<(), Trouble> {
         let mut bytes = Vec::new();
         let result = self.wire.receive(&mut bytes);
+        if !bytes.is_empty() {
+            self.last_arrival = self.last_arrival.max(told);
+        }
         self.unplaced += self.wire.take_unplaced();
         for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
             self.came += 1;
@@ -394,7 +407,9 @@ impl Line for StreamLink {
     }
 
     fn now(&self) -> Instant {
-        self.at(time::Instant::now())
+        let now = self.at(time::Instant::now());
+        self.told.set(now);
+        now
     }
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
@@ -491,6 +506,7 @@ impl Link for StreamLink {
     fn begin(&mut self) {
         self.pump();
         self.start = time::Instant::now();
+        self.told.set(Instant::START);
         self.scheduled.clear();
         self.rings.iter_mut().for_each(Ring::begin);
         self.inner.iter_mut().for_each(InnerLink::begin);

@@ -2,6 +2,7 @@
 
 use super::hypothesis::Hypothesis;
 use crate::library::Entry;
+use crate::link::link_name;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use harness_proto::novobus::properties::PROPERTIES;
@@ -60,11 +61,35 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
     Ok(probes)
 }
 
-/// The conversations of a qualification that the model alone judges, for a ring of `drives`, by their names.
+/// What stands for a link in a conversation that is played for every link that faults can be put on, and for the drive behind it.
+const LINK: &str = "{link}";
+const RECEIVER: &str = "{receiver}";
+
+/// More links than this are not all asked: the first ones, the middle one and the last one to a drive.
+const MOST_LINKS: usize = 8;
+
+/// The links of a conversation: their places, counted from the master's outgoing one.
+fn links(drives: u8, reaches: &dyn Fn(usize) -> bool) -> Vec<u8> {
+    let all: Vec<u8> = (0..drives)
+        .filter(|place| reaches(usize::from(*place)))
+        .collect();
+    if all.len() <= MOST_LINKS {
+        return all;
+    }
+    let some = [0, 1, all.len() / 2, all.len() - 1];
+    some.into_iter()
+        .filter_map(|at| all.get(at).copied())
+        .collect()
+}
+
+/// The conversations of a qualification, for a ring of `drives`, by their names; `reaches` says on which links faults can be put.
 ///
 /// # Errors
 /// One of them has mistakes.
-pub fn conversations(drives: u8) -> Result<Vec<Entry>, Box<Problems>> {
+pub fn conversations(
+    drives: u8,
+    reaches: &dyn Fn(usize) -> bool,
+) -> Result<Vec<Entry>, Box<Problems>> {
     let mut files: Vec<_> = CONVERSATIONS.files().collect();
     files.sort_by_key(|file| file.path().to_owned());
     let named = files.into_iter().filter_map(|file| {
@@ -73,6 +98,21 @@ pub fn conversations(drives: u8) -> Result<Vec<Entry>, Box<Problems>> {
     });
     let mut entries = Vec::new();
     for (name, text) in named {
+        if text.contains(LINK) {
+            for place in links(drives, reaches) {
+                let link = link_name(0, drives, usize::from(place));
+                let receiver = (drives - 1 - place).to_string();
+                let source = Source {
+                    name: format!("qualify-{name}-{}", link.replace("->", "-to-")),
+                    text: text
+                        .replace(LINK, &link)
+                        .replace(RECEIVER, &receiver)
+                        .into(),
+                };
+                entries.push(Entry::new(source, Some(drives))?);
+            }
+            continue;
+        }
         let each: Vec<u8> = match text.contains(EACH) {
             false => vec![0],
             true => [0, 1, drives / 2, drives.saturating_sub(1)]
@@ -133,6 +173,24 @@ pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// ND21 9.7: the drive that a damaged byte comes to spells out its address.
+    #[test]
+    fn every_reachable_link_is_located() {
+        let names = |drives, reaches: &dyn Fn(usize) -> bool| -> Vec<String> {
+            let entries = conversations(drives, reaches).expect("no mistakes");
+            let names = entries.iter().map(|entry| entry.short_name().to_owned());
+            names.filter(|name| name.contains("location")).collect()
+        };
+        let own = names(3, &|place| place == 0);
+        assert_eq!(own, ["qualify-location-master-to-2"]);
+        let inner = names(3, &|place| place < 2);
+        assert_eq!(
+            inner,
+            ["qualify-location-master-to-2", "qualify-location-2-to-1"]
+        );
+        assert_eq!(names(250, &|_| true).len(), 4);
+    }
 
     #[test]
     fn every_property_of_the_bus_has_a_probe_or_none_can_show_it() {
