@@ -5,7 +5,7 @@
 //! so it delays the ring by one byte time and by what the computer needs; [`Delay`] measures the latter.
 
 use super::Trouble;
-use super::stream::stamped;
+use super::stamp::stamped;
 use super::tamper::Tamper;
 use crate::port::{Outgoing, Wire};
 use harness_proto::line::{LineError, Received};

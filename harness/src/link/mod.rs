@@ -7,6 +7,7 @@ mod inner;
 mod record;
 mod replay;
 mod sim;
+mod stamp;
 mod stream;
 mod tamper;
 

@@ -5,6 +5,7 @@
 //! a little ahead of the line, so that a busy computer leaves no gaps in a telegram.
 
 use super::inner::InnerLink;
+use super::stamp::stamped;
 use super::tamper::Tamper;
 use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name};
 use crate::port::{LastWords, Outgoing, Wire};
@@ -624,23 +625,6 @@ impl Link for StreamLink {
             marks: Vec::new(),
         }
     }
-}
-
-/// Bytes that were read together, each with the time at which it came: the last one now, each before it a byte time
-/// sooner, and none before the one that was read last.
-pub(super) fn stamped(
-    bytes: Vec<Received>,
-    now: Instant,
-    byte_time: Span,
-    last: &mut Instant,
-) -> Vec<(Instant, Received)> {
-    let behind = (0..bytes.len() as u64).rev();
-    let stamp = |(byte, behind)| {
-        let at = Instant::START + now.since_start().saturating_sub(byte_time * behind);
-        *last = at.max(*last);
-        (*last, byte)
-    };
-    bytes.into_iter().zip(behind).map(stamp).collect()
 }
 
 /// The drive in front of the `place`-th link of a ring of `drives`; `None` for the master.
