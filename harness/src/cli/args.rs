@@ -8,7 +8,7 @@ use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shrink::ShrinkArguments;
 use crate::rig::values::{Time, ValueError};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use harness_proto::line::Rate;
 use std::path::PathBuf;
@@ -81,6 +81,8 @@ pub enum Command {
         /// The folder.
         folder: PathBuf,
     },
+    /// Make the reports of a folder of evidence again, from its record and captures; the same bytes as the run wrote.
+    Report(ReportArguments),
     /// Look for what nobody has thought of: conversations from a seed, on simulated rings or on a rig.
     Fuzz {
         /// What to do.
@@ -152,6 +154,9 @@ pub struct RunArguments {
     /// Show what scenarios recorded, also where several are played.
     #[arg(long)]
     pub records: bool,
+    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Count a skipped scenario as missing (exit code 5).
     #[arg(long)]
     pub require_all: bool,
@@ -175,9 +180,26 @@ pub struct QualifyArguments {
     /// Where the evidence goes: a folder that is not there or is empty; evidence-RIG-DATE where nothing is said.
     #[arg(long, value_name = "FOLDER")]
     pub evidence: Option<PathBuf>,
+    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Count a skipped scenario as missing (exit code 5).
     #[arg(long)]
     pub require_all: bool,
+}
+
+/// For `report`.
+#[derive(Clone, Debug, Args)]
+#[command(group = ArgGroup::new("form").required(true).multiple(true))]
+pub struct ReportArguments {
+    /// The folder that `run --evidence` or `qualify` has written.
+    pub folder: PathBuf,
+    /// Write one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE", group = "form")]
+    pub html: Option<PathBuf>,
+    /// Write the verdicts as JUnit's XML into this file.
+    #[arg(long, value_name = "FILE", group = "form")]
+    pub junit: Option<PathBuf>,
 }
 
 /// For `check`.
@@ -303,6 +325,9 @@ pub struct CampaignArguments {
     /// Play nothing but this case, and print the scenario that replays it: LINK:BYTE:WHAT, such as 98->97:10:0.
     #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
     pub case: Option<String>,
+    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// On how many threads; on all cores where nothing is said. The outcome is the same.
     #[arg(long, value_name = "NUMBER", value_parser = threads)]
     pub threads: Option<usize>,

@@ -4,6 +4,7 @@
 use super::args::QualifyArguments;
 use super::exit::Exit;
 use super::output::Output;
+use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run::{details, line, select};
 use super::run_rig::{Job, Stop, over, play, work};
@@ -72,6 +73,9 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
             return Ok(Exit::Usage);
         }
     };
+    let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
+        return Ok(Exit::Usage);
+    };
     let stamp = state::utc(SystemTime::now()).replace([':', ' '], "-");
     let evidence = arguments
         .evidence
@@ -86,7 +90,7 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         require_all: arguments.require_all,
         qualify: true,
     };
-    work(&rig, &entries, &job, output)
+    work(&rig, &entries, &job, page, output)
 }
 
 /// Plays what is judged by the model alone, settles what the manual leaves open, and names what drives do otherwise.
