@@ -142,22 +142,29 @@ fn beside(html: &mut Html, difference: &Difference) {
                 html.line("th", &[("scope", &"col")], at + 1);
             }
         });
-        let rows: [(&str, &dyn Fn(usize) -> Option<String>); 2] =
-            [("Expected", &expected), ("Received", &received)];
-        for (name, byte) in rows {
-            html.element("tr", &[], |html| {
-                html.line("th", &[("scope", &"row")], name);
-                for at in from..to {
-                    let text = byte(at).unwrap_or_else(|| "none".to_owned());
-                    if at == difference.index {
-                        html.element("td", &[("class", &"bad")], |html| {
-                            html.line("strong", &[], text);
-                        });
-                    } else {
-                        html.line("td", &[], text);
-                    }
-                }
-            });
+        row(html, "Expected", from..to, difference.index, &expected);
+        row(html, "Received", from..to, difference.index, &received);
+    });
+}
+
+fn row(
+    html: &mut Html,
+    name: &str,
+    shown: std::ops::Range<usize>,
+    differs: usize,
+    byte: &dyn Fn(usize) -> Option<String>,
+) {
+    html.element("tr", &[], |html| {
+        html.line("th", &[("scope", &"row")], name);
+        for at in shown {
+            let text = byte(at).unwrap_or_else(|| "none".to_owned());
+            if at == differs {
+                html.element("td", &[("class", &"bad")], |html| {
+                    html.line("strong", &[], text);
+                });
+            } else {
+                html.line("td", &[], text);
+            }
         }
     });
 }

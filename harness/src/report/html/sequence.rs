@@ -26,6 +26,9 @@ const DETECTED: usize = 4;
 /// Bytes of an event that are written at most.
 const BYTES: usize = 16;
 
+/// What the master sends to bring a ring back (9.8).
+const CHECK: &str = "check sequence";
+
 const COLUMN: usize = 110;
 const ROW: usize = 26;
 const TOP: usize = 30;
@@ -193,7 +196,7 @@ fn told(at: Instant, master: bool, whom: Who, process_data: bool) -> Event {
 fn open_run(role: Role, master: bool, at: Instant, events: &mut Vec<Event>) -> Option<usize> {
     let (kind, what) = match role {
         Role::ErrorZero if master => (Kind::Sequence, "zeros"),
-        Role::CheckSequence if master => (Kind::Sequence, "check sequence"),
+        Role::CheckSequence if master => (Kind::Sequence, CHECK),
         Role::CheckSequence => (Kind::Sequence, "check sequence is back"),
         Role::ErrorZero => (Kind::Trouble, "zeros: a drive is in the error mode"),
         Role::ErrorAddress => (Kind::Trouble, "number spelled out"),
@@ -225,36 +228,39 @@ fn open_run(role: Role, master: bool, at: Instant, events: &mut Vec<Event>) -> O
     Some(events.len() - 1)
 }
 
-/// Which jobs were answered: the n-th of a drive by its n-th answer.
+/// Which jobs were answered: the n-th of a drive by its n-th answer. A check sequence makes every drive forget what it has
+/// begun (ND21 9.8), so jobs in front of one are answered in front of it or not at all.
 fn asked(events: &mut [Event]) {
-    let mut answers: BTreeMap<Who, Vec<usize>> = BTreeMap::new();
+    let sequence = |event: &&Event| event.from == Who::Master && event.what == CHECK;
+    let sequences: Vec<_> = events
+        .iter()
+        .filter(sequence)
+        .map(|event| event.at)
+        .collect();
+    let period = |at: Instant| sequences.iter().filter(|own| **own < at).count();
+    let mut answers: BTreeMap<(Who, usize), Vec<usize>> = BTreeMap::new();
     for (index, event) in events.iter().enumerate() {
         if event.kind == Kind::Answer {
-            answers.entry(event.from).or_default().push(index);
+            let key = (event.from, period(event.at));
+            answers.entry(key).or_default().push(index);
         }
     }
-    let mut next: BTreeMap<Who, usize> = BTreeMap::new();
+    let mut next: BTreeMap<(Who, usize), usize> = BTreeMap::new();
     for index in 0..events.len() {
-        if events[index].kind != Kind::Job {
+        let job = &events[index];
+        if job.kind != Kind::Job {
             continue;
         }
-        let own = next.entry(events[index].to).or_default();
-        let answer = answers.get(&events[index].to).and_then(|all| all.get(*own));
-        let whole = |answer: &&usize| events[**answer].bytes.len() == events[index].bytes.len();
-        let result = match answer.filter(whole) {
-            Some(answer) if events[*answer].result.is_empty() => "answered".to_owned(),
-            Some(answer) => format!(
-                "answered:{}{}",
-                if events[*answer].result.starts_with(' ') {
-                    ""
-                } else {
-                    " "
-                },
-                events[*answer].result
-            ),
+        let key = (job.to, period(job.at));
+        let own = next.entry(key).or_default();
+        let answer = answers.get(&key).and_then(|all| all.get(*own));
+        *own += 1;
+        let answer = answer.map(|answer| &events[*answer]);
+        let result = match answer.filter(|answer| answer.bytes.len() == job.bytes.len()) {
+            Some(answer) if answer.result.is_empty() => "answered".to_owned(),
+            Some(answer) => format!("answered: {}", answer.result.trim_start()),
             None => "no whole answer".to_owned(),
         };
-        *own += 1;
         events[index].result = result;
     }
     for event in events {
@@ -328,7 +334,7 @@ fn remarks(trace: &Trace, events: &mut Vec<Event>) {
         events.push(note(mark.at, mark.drive, what, Kind::Trouble));
     }
     let back = of(Marks::RECOVERED);
-    if let Some(last) = back.clone().last() {
+    if let Some(last) = back.clone().next_back() {
         let what = format!("back in normal mode, the last of {}", back.count());
         events.push(note(last.at, last.drive, what, Kind::Sequence));
     }
