@@ -81,7 +81,7 @@ pub enum Command {
         /// The folder.
         folder: PathBuf,
     },
-    /// Make the reports of a folder of evidence again, from its record and captures; the same bytes as the run wrote.
+    /// Make the reports of a run's folder again, from its record and captures: the same bytes as the run wrote.
     Report(ReportArguments),
     /// Look for what nobody has thought of: conversations from a seed, on simulated rings or on a rig.
     Fuzz {
@@ -192,7 +192,7 @@ pub struct QualifyArguments {
 #[derive(Clone, Debug, Args)]
 #[command(group = ArgGroup::new("form").required(true).multiple(true))]
 pub struct ReportArguments {
-    /// The folder that `run --evidence` or `qualify` has written.
+    /// The folder that `run --evidence`, `qualify` or `fuzz run` has written.
     pub folder: PathBuf,
     /// Write one page of HTML into this file, which is there whole or not at all.
     #[arg(long, value_name = "FILE", group = "form")]

@@ -4,7 +4,8 @@ use super::args::ReportArguments;
 use super::exit::Exit;
 use super::output::Output;
 use super::page::{writable, write};
-use crate::evidence::derive;
+use crate::evidence::{RIG, derive};
+use crate::explore::{RECORD, page};
 
 /// Makes the reports of a folder again.
 pub(super) fn report(arguments: &ReportArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -12,6 +13,9 @@ pub(super) fn report(arguments: &ReportArguments, output: &mut Output) -> std::i
         if writable(path, output).is_err() {
             return Ok(Exit::Usage);
         }
+    }
+    if arguments.folder.join(RECORD).exists() && !arguments.folder.join(RIG).exists() {
+        return Ok(explored(arguments, output));
     }
     let derived = match derive(&arguments.folder) {
         Ok(derived) => derived,
@@ -28,4 +32,27 @@ pub(super) fn report(arguments: &ReportArguments, output: &mut Output) -> std::i
         }
     }
     Ok(Exit::Passed)
+}
+
+/// The page of a run of fuzzing.
+fn explored(arguments: &ReportArguments, output: &mut Output) -> Exit {
+    if arguments.junit.is_some() {
+        output.complain(
+            "a run of fuzzing has no verdicts of scenarios: JUnit is made of folders of evidence",
+        );
+        return Exit::Usage;
+    }
+    let text = match page(&arguments.folder) {
+        Ok(text) => text,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Exit::Usage;
+        }
+    };
+    let written = arguments.html.iter().all(|path| write(path, &text, output));
+    if written {
+        Exit::Passed
+    } else {
+        Exit::RigError
+    }
 }

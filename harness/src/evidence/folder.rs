@@ -21,7 +21,7 @@ pub(super) const SUMS: &str = "SHA256SUMS";
 /// The file of the record.
 pub(super) const RECORD: &str = "run.jsonl";
 /// The file of the rig.
-pub(super) const RIG: &str = "rig.toml";
+pub const RIG: &str = "rig.toml";
 /// The profile that the rig's file names.
 const KNOWN_PROFILE: &str = "known-profile.toml";
 /// The file of verdicts for programs.

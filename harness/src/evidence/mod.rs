@@ -18,7 +18,7 @@ mod record;
 mod verify;
 
 pub use derive::{Derived, derive};
-pub use folder::{About, EvidenceError, Folder, Kept, PAGE};
+pub use folder::{About, EvidenceError, Folder, Kept, PAGE, RIG};
 pub use junit::{Case, junit};
 pub use record::{Line, RecordError, Writer, read};
 pub use verify::{Finding, Verified, verify};

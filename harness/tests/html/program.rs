@@ -170,3 +170,94 @@ fn a_folder_that_is_cut_off_gives_what_there_is() {
         assert!(!html.exists() && !output.stderr.is_empty());
     }
 }
+
+/// The page of a run of fuzzing: what was found with its picture, made again from the folder.
+#[test]
+fn fuzzing_writes_a_page() {
+    let own = folder("fuzz");
+    let (out, html, again) = (
+        own.join("run"),
+        own.join("page.html"),
+        own.join("again.html"),
+    );
+    let output = drivebench(&[
+        "fuzz",
+        "run",
+        "--seed",
+        "7",
+        "--cases",
+        "2000",
+        "--deviates",
+        "1=writes-ignored",
+        "--findings",
+        "1",
+        "--out",
+        path(&out),
+        "--html",
+        path(&html),
+    ]);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let text = read(&html);
+    let parsed = parse(&text);
+    sound(&parsed);
+    for words in [
+        "1 findings",
+        "drive 1 deviates writes-ignored",
+        "Transitions reached",
+        "Expected and received around byte",
+    ] {
+        assert!(text.contains(words), "{words}");
+    }
+    assert!(
+        text.contains("drivebench shrink finding-"),
+        "the command that plays it again"
+    );
+    let output = drivebench(&["report", path(&out), "--html", path(&again)]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert_eq!(read(&again), text);
+    let output = drivebench(&["report", path(&out), "--junit", path(&again)]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+}
+
+/// The page of a campaign: the same figures as its table, and a cell for each byte of each link.
+#[test]
+fn a_campaign_writes_a_page() {
+    let own = folder("campaign");
+    let html = own.join("page.html");
+    let output = drivebench(&["campaign", "9.9-silence", "--html", path(&html)]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let text = read(&html);
+    let parsed = parse(&text);
+    sound(&parsed);
+    let all = parsed.all();
+    let map = all
+        .iter()
+        .find(|own| own.attribute("class") == Some("heat"))
+        .expect("a map");
+    let rows: Vec<_> = map
+        .all()
+        .into_iter()
+        .filter(|own| own.name == "tr")
+        .collect();
+    // Three drives have four links.
+    assert!(rows.iter().all(|row| {
+        row.all()
+            .iter()
+            .filter(|own| own.name == "td" || own.name == "th")
+            .count()
+            == 5
+    }));
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let located = printed
+        .lines()
+        .find(|line| line.contains("located"))
+        .expect("a row");
+    let count = located.split_whitespace().nth(1).expect("a count");
+    let row = all
+        .iter()
+        .filter(|own| own.name == "tr")
+        .find(|row| row.text().replace('\n', " ").trim().starts_with("located"))
+        .expect("a row");
+    assert!(row.text().contains(count), "{count}");
+    assert!(text.contains("drivebench campaign 9.9-silence --case"));
+}

@@ -45,14 +45,19 @@ pub(super) fn lines(html: &mut Html, id: &str, records: &[Record]) {
                 .collect();
             match ends {
                 Some(ends) if !known.is_empty() => {
-                    curve(
-                        html,
-                        &format!("{id}-r{number}"),
-                        &title,
-                        record,
-                        &known,
-                        ends,
-                    );
+                    let value = |value: f64| {
+                        format!("{} {unit}", figures(value, unit))
+                            .trim_end()
+                            .to_owned()
+                    };
+                    Curve {
+                        id: &format!("{id}-r{number}"),
+                        title: &format!("{title} against time"),
+                        along: &|at| format!("{at:.3} ms"),
+                        upwards: &value,
+                        steps: record.every.is_none(),
+                    }
+                    .draw(html, &known, ends);
                 }
                 _ => html.line("p", &[], "Nothing was seen."),
             }
@@ -72,70 +77,104 @@ fn ms(sample: &Sample) -> f64 {
     sample.at.since_start().as_millis_f64()
 }
 
-fn curve(
-    html: &mut Html,
-    id: &str,
-    title: &str,
-    record: &Record,
-    known: &[(f64, f64)],
-    (from, to): (f64, f64),
-) {
-    let (least, most) = known.iter().fold(
-        (f64::INFINITY, f64::NEG_INFINITY),
-        |(least, most), (_, value)| (least.min(*value), most.max(*value)),
-    );
-    let unit = record.unit();
-    let label = |value: f64| {
-        format!("{} {unit}", figures(value, unit))
-            .trim_end()
-            .to_owned()
-    };
-    let span = if to > from { to - from } else { 1.0 };
-    let height = if most > least { most - least } else { 1.0 };
-    let x = |at: f64| LEFT + (at - from) / span * (WIDTH - LEFT - RIGHT);
-    let y = |value: f64| TOP + (most - value) / height * (HEIGHT - TOP - BOTTOM);
-    let view = format!("0 0 {WIDTH} {HEIGHT}");
-    let named = format!("{id}-t {id}-d");
-    let attributes: [(&str, &dyn std::fmt::Display); 4] = [
-        ("class", &"nb curve"),
-        ("role", &"img"),
-        ("aria-labelledby", &named),
-        ("viewBox", &view),
-    ];
-    html.element("svg", &attributes, |html| {
-        html.line("title", &[("id", &format!("{id}-t"))], format_args!("{title} against time"));
-        html.line(
-            "desc",
-            &[("id", &format!("{id}-d"))],
-            format_args!(
-                "From {from:.3} ms to {to:.3} ms, {} samples, between {} and {}; first {}, last {}.",
-                known.len(),
-                label(least),
-                label(most),
-                known.first().map_or_else(String::new, |(_, value)| label(*value)),
-                known.last().map_or_else(String::new, |(_, value)| label(*value)),
-            ),
+/// A curve, and how its axes are labelled.
+pub(super) struct Curve<'c> {
+    /// In front of the names of its parts.
+    pub(super) id: &'c str,
+    pub(super) title: &'c str,
+    /// A point along and one upwards, in words.
+    pub(super) along: &'c dyn Fn(f64) -> String,
+    pub(super) upwards: &'c dyn Fn(f64) -> String,
+    /// A value holds up to the next one.
+    pub(super) steps: bool,
+}
+
+impl Curve<'_> {
+    /// Draws it through these points, which are there, between these ends.
+    pub(super) fn draw(&self, html: &mut Html, known: &[(f64, f64)], (from, to): (f64, f64)) {
+        let values = known.iter().map(|(_, value)| *value);
+        let (least, most) = values.fold(
+            (f64::INFINITY, f64::NEG_INFINITY),
+            |(least, most), value| (least.min(value), most.max(value)),
         );
+        let view = format!("0 0 {WIDTH} {HEIGHT}");
+        let (title, described) = (format!("{}-t", self.id), format!("{}-d", self.id));
+        let named = format!("{title} {described}");
+        let attributes: [(&str, &dyn std::fmt::Display); 4] = [
+            ("class", &"nb curve"),
+            ("role", &"img"),
+            ("aria-labelledby", &named),
+            ("viewBox", &view),
+        ];
+        let upwards = self.upwards;
+        let (first, last) = (known.first(), known.last());
+        let end = |point: Option<&(f64, f64)>| {
+            point.map_or_else(String::new, |(_, value)| upwards(*value))
+        };
+        html.element("svg", &attributes, |html| {
+            html.line("title", &[("id", &title)], self.title);
+            html.line(
+                "desc",
+                &[("id", &described)],
+                format_args!(
+                    "From {} to {}, {} points, between {} and {}; first {}, last {}.",
+                    (self.along)(from),
+                    (self.along)(to),
+                    known.len(),
+                    upwards(least),
+                    upwards(most),
+                    end(first),
+                    end(last),
+                ),
+            );
+            self.shapes(html, known, (from, to), (least, most));
+        });
+    }
+
+    fn shapes(
+        &self,
+        html: &mut Html,
+        known: &[(f64, f64)],
+        (from, to): (f64, f64),
+        (least, most): (f64, f64),
+    ) {
+        let span = if to > from { to - from } else { 1.0 };
+        let height = if most > least { most - least } else { 1.0 };
+        let x = |at: f64| LEFT + (at - from) / span * (WIDTH - LEFT - RIGHT);
+        let y = |value: f64| TOP + (most - value) / height * (HEIGHT - TOP - BOTTOM);
         let bottom = HEIGHT - BOTTOM;
-        let axes = format!("M{LEFT} {TOP}V{bottom}H{}", WIDTH - RIGHT);
-        html.shape("path", &[("class", &"axis"), ("d", &axes)]);
+        let right = WIDTH - RIGHT;
+        html.shape(
+            "path",
+            &[
+                ("class", &"axis"),
+                ("d", &format!("M{LEFT} {TOP}V{bottom}H{right}")),
+            ],
+        );
         if least < 0.0 && most > 0.0 {
-            let zero = format!("M{LEFT} {:.1}H{}", y(0.0), WIDTH - RIGHT);
-            html.shape("path", &[("class", &"zero"), ("d", &zero)]);
+            html.shape(
+                "path",
+                &[
+                    ("class", &"zero"),
+                    ("d", &format!("M{LEFT} {:.1}H{right}", y(0.0))),
+                ],
+            );
         }
-        let steps = record.every.is_none();
-        html.shape("path", &[("class", &"line"), ("d", &path(known, steps, &x, &y))]);
-        let mut text = |class: &str, x: f64, y: f64, text: &str| {
+        html.shape(
+            "path",
+            &[("class", &"line"), ("d", &path(known, self.steps, &x, &y))],
+        );
+        let mut text = |class: &str, x: f64, y: f64, text: String| {
             let (x, y) = (format!("{x:.0}"), format!("{y:.0}"));
             html.line("text", &[("class", &class), ("x", &x), ("y", &y)], text);
         };
-        text("e", LEFT - 6.0, TOP + 6.0, &label(most));
+        text("e", LEFT - 6.0, TOP + 6.0, (self.upwards)(most));
         if most > least {
-            text("e", LEFT - 6.0, bottom, &label(least));
+            text("e", LEFT - 6.0, bottom, (self.upwards)(least));
         }
-        text("s", LEFT, HEIGHT - 10.0, &format!("{from:.3} ms"));
-        text("e", WIDTH - RIGHT, HEIGHT - 10.0, &format!("{to:.3} ms"));
-    });
+        text("s", LEFT, HEIGHT - 10.0, (self.along)(from));
+        text("e", right, HEIGHT - 10.0, (self.along)(to));
+    }
 }
 
 /// The curve; where changes were noted a cell holds its value up to the next one.

@@ -18,10 +18,10 @@ pub struct Head<'h> {
 /// A row of the table.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
-    name: String,
-    title: String,
+    pub(super) name: String,
+    pub(super) title: String,
     drives: String,
-    verdict: Verdict,
+    pub(super) verdict: Verdict,
     took: Span,
     sources: String,
 }
