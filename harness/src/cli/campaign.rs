@@ -41,9 +41,7 @@ pub(super) fn campaign(
     {
         return Ok(Exit::Usage);
     }
-    let threads = arguments
-        .threads
-        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+    let threads = arguments.threads.unwrap_or_else(cores);
     let mut all = Vec::new();
     for campaign in &campaigns {
         let bar = progress_bar(campaign.cases.len(), output.progress);
@@ -76,6 +74,11 @@ pub(super) fn campaign(
     }
     let differs = all.iter().any(|finished| !finished.differs().is_empty());
     Ok(if differs { Exit::Failed } else { Exit::Passed })
+}
+
+/// How many threads there is room for.
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
 fn shown(finished: &Finished, only: Option<ClassName>) -> String {

@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         output.complain("no scenario was selected; `drivebench list` shows what there is");
         return Ok(Exit::NothingSelected);
     }
-    let Ok(mut page) = Page::new(arguments.html.as_deref(), output) else {
+    let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
         return Ok(Exit::Usage);
     };
     let recorded = arguments.evidence.is_some();
@@ -91,12 +91,23 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         };
         return work(rig, &entries, &job, page, output);
     }
+    on_simulated(arguments, &entries, rig.as_ref(), page, output)
+}
+
+/// Plays scenarios on simulated rings, each of its own.
+fn on_simulated(
+    arguments: &RunArguments,
+    entries: &[Entry],
+    rig: Option<&Rig>,
+    mut page: Option<Page>,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let bar = progress_bar(entries.len(), output.progress);
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
-    for entry in &entries {
+    for entry in entries {
         bar.set_message(entry.short_name().to_owned());
-        let played = match rig.as_ref().and_then(|rig| too_large(entry, rig)) {
+        let played = match rig.and_then(|rig| too_large(entry, rig)) {
             Some(why) => Played {
                 outcome: Outcome::skipped(why),
                 traces: Vec::new(),

@@ -19,12 +19,10 @@ fn middle(browser: &mut Browser, link: usize, row: usize) -> (f64, f64) {
 const TIP: &str = "document.querySelector('.tip:not([hidden])')?.textContent ?? ''";
 const SAID: &str = "document.querySelector('.said').textContent";
 
-#[test]
-fn a_byte_is_told_to_pointers_and_keys() {
-    let own = folder("bytes");
-    let Some(mut browser) = Browser::start(&own.join("profile")) else {
-        return;
-    };
+/// The browser with the page of the parity error of ND21 9.7, its diagram ready.
+fn opened(name: &str) -> Option<Browser> {
+    let own = folder(name);
+    let mut browser = Browser::start(&own.join("profile"))?;
     let file = own.join("page.html");
     std::fs::write(
         &file,
@@ -34,6 +32,14 @@ fn a_byte_is_told_to_pointers_and_keys() {
     browser.open(&file);
     browser.value("document.querySelector('.ring').scrollIntoView()");
     browser.until("!!document.querySelector('.tools button')");
+    Some(browser)
+}
+
+#[test]
+fn a_byte_is_told_to_the_pointer() {
+    let Some(mut browser) = opened("pointer") else {
+        return;
+    };
     let size = browser.value("(() => { const box = document.querySelector('.ring svg').getBoundingClientRect(); return [box.width, box.height]; })()");
     assert!(
         size[0].as_f64() > Some(800.0) && size[1].as_f64() > Some(200.0),
@@ -53,6 +59,14 @@ fn a_byte_is_told_to_pointers_and_keys() {
     browser.point(2.0, 2.0);
     browser.until(&format!("({TIP}) === ''"));
 
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_byte_is_told_to_keys() {
+    let Some(mut browser) = opened("keys") else {
+        return;
+    };
     // By keys: the picture is reached by the tabulator, and says what the cursor is at.
     browser.value("document.querySelector('.ring .tools button:last-of-type').focus()");
     browser.press("Tab");
@@ -73,6 +87,23 @@ fn a_byte_is_told_to_pointers_and_keys() {
     assert!(browser.text(SAID).contains("98->97, byte "));
     assert!(browser.value("!!document.querySelector('.said[role=status]')") == json!(true));
 
+    // Larger, and back.
+    let width = "document.querySelector('.ring svg').getBoundingClientRect().width";
+    let before = browser.value(width).as_f64();
+    browser.press("+");
+    assert!(browser.value(width).as_f64() > before);
+    browser.press("-");
+    assert_eq!(browser.value(width).as_f64(), before);
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn bytes_stand_at_their_times() {
+    let Some(mut browser) = opened("times") else {
+        return;
+    };
+    browser.value("document.querySelector('.scroll').focus()");
+    browser.press("ArrowRight");
     // The same byte where its time is.
     browser.press("Home");
     browser.press("f");
@@ -100,13 +131,6 @@ fn a_byte_is_told_to_pointers_and_keys() {
     let tip = browser.text(TIP);
     assert!(tip.starts_with("Fault. 98->97, byte 10, "), "{tip}");
 
-    // Larger, and back.
-    let width = "document.querySelector('.ring svg').getBoundingClientRect().width";
-    let before = browser.value(width).as_f64();
-    browser.press("+");
-    assert!(browser.value(width).as_f64() > before);
-    browser.press("-");
-    assert_eq!(browser.value(width).as_f64(), before);
     browser.press("t");
     assert_eq!(
         browser.value("document.querySelector('.by-time') === null"),

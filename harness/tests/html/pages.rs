@@ -91,26 +91,10 @@ fn the_data_holds_every_byte() {
             .expect("data")
             .text();
         let data: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-        let numbers = |value: &serde_json::Value| -> Vec<i64> {
-            value
-                .as_array()
-                .expect("a list")
-                .iter()
-                .map(|n| n.as_i64().expect("a number"))
-                .collect()
-        };
         let areas = numbers(&data["areas"]);
         let byte = data["byte"].as_u64().expect("a time");
         for (place, link) in traces[0].links.iter().enumerate() {
-            let mut times = Vec::new();
-            let mut at = 0;
-            for run in numbers(&data["times"][place]).chunks(2) {
-                at += run[0].unsigned_abs();
-                for index in 0..run[1].unsigned_abs() {
-                    at += if index > 0 { byte } else { 0 };
-                    times.push(at);
-                }
-            }
+            let times = times(&numbers(&data["times"][place]), byte);
             assert_eq!(times.len(), link.bytes.len(), "{name}, link {place}");
             for (row, (carried, at)) in link.bytes.iter().zip(times).enumerate() {
                 assert!(
@@ -138,4 +122,24 @@ fn the_data_holds_every_byte() {
             }
         }
     }
+}
+
+fn numbers(value: &serde_json::Value) -> Vec<i64> {
+    let list = value.as_array().expect("a list").iter();
+    list.map(|number| number.as_i64().expect("a number"))
+        .collect()
+}
+
+/// When each byte of a link had passed: runs of bytes, each behind the one before.
+fn times(runs: &[i64], byte: u64) -> Vec<u64> {
+    let mut times = Vec::new();
+    let mut at = 0;
+    for run in runs.chunks(2) {
+        at += run[0].unsigned_abs();
+        for index in 0..run[1].unsigned_abs() {
+            at += if index > 0 { byte } else { 0 };
+            times.push(at);
+        }
+    }
+    times
 }

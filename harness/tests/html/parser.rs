@@ -197,15 +197,7 @@ impl Reader<'_> {
         match element.name.as_str() {
             "meta" | "br" | "hr" | "col" => return Node::Element(element),
             "script" | "style" => {
-                let end = format!("</{}", element.name);
-                let (raw, rest) = self.rest.split_once(&end).expect("an end");
-                assert!(
-                    !raw.contains("<!--") && !raw.contains("<script"),
-                    "markup in {}",
-                    element.name
-                );
-                element.inside.push(Node::Text(raw.to_owned()));
-                self.rest = rest.strip_prefix('>').expect("an end of a tag");
+                self.raw(&mut element);
                 return Node::Element(element);
             }
             _ => {}
@@ -220,6 +212,18 @@ impl Reader<'_> {
             .strip_prefix(&end)
             .unwrap_or_else(|| panic!("{end} expected at {:.80}", self.rest));
         Node::Element(element)
+    }
+}
+
+impl Reader<'_> {
+    /// What stands in a script or a style, up to its end.
+    fn raw(&mut self, element: &mut Element) {
+        let end = format!("</{}", element.name);
+        let (raw, rest) = self.rest.split_once(&end).expect("an end");
+        let markup = raw.contains("<!--") || raw.contains("<script");
+        assert!(!markup, "markup in {}", element.name);
+        element.inside.push(Node::Text(raw.to_owned()));
+        self.rest = rest.strip_prefix('>').expect("an end of a tag");
     }
 }
 
@@ -268,8 +272,30 @@ pub(crate) fn sound(page: &Element) {
             assert!(ids.insert(id), "{id} stands twice");
         }
     }
-    let mut level = 0;
-    for element in &all {
+    addresses(&all, &ids);
+    order(&all);
+    for name in ["main", "h1", "header", "footer"] {
+        assert_eq!(
+            all.iter().filter(|element| element.name == name).count(),
+            1,
+            "{name}"
+        );
+    }
+    let policy = all
+        .iter()
+        .find(|own| own.attribute("http-equiv") == Some("Content-Security-Policy"));
+    let policy = policy
+        .and_then(|own| own.attribute("content"))
+        .expect("a policy");
+    assert!(
+        policy.starts_with("default-src 'none';") && policy.contains("script-src 'sha256-"),
+        "{policy}"
+    );
+}
+
+/// Names lead somewhere, and nowhere outside.
+fn addresses(all: &[&Element], ids: &BTreeSet<&str>) {
+    for element in all {
         for name in element
             .attribute("aria-labelledby")
             .into_iter()
@@ -283,6 +309,13 @@ pub(crate) fn sound(page: &Element) {
                 .unwrap_or_else(|| panic!("an address outside: {place}"));
             assert!(ids.contains(name), "{place} leads nowhere");
         }
+    }
+}
+
+/// Headings are in order, tables have captions, pictures have words.
+fn order(all: &[&Element]) {
+    let mut level = 0;
+    for element in all {
         if let Some(own) = element
             .name
             .strip_prefix('h')
@@ -313,23 +346,6 @@ pub(crate) fn sound(page: &Element) {
             assert_eq!(names, ["title", "desc"]);
         }
     }
-    for name in ["main", "h1", "header", "footer"] {
-        assert_eq!(
-            all.iter().filter(|element| element.name == name).count(),
-            1,
-            "{name}"
-        );
-    }
-    let policy = all
-        .iter()
-        .find(|own| own.attribute("http-equiv") == Some("Content-Security-Policy"));
-    let policy = policy
-        .and_then(|own| own.attribute("content"))
-        .expect("a policy");
-    assert!(
-        policy.starts_with("default-src 'none';") && policy.contains("script-src 'sha256-"),
-        "{policy}"
-    );
 }
 
 /// The page as a reader without pictures has it: a line a heading, a paragraph, a row; of long tables the first rows.

@@ -56,20 +56,12 @@ pub fn campaigns(all: &[Finished]) -> String {
     page("drivebench: campaigns of faults", &front, &sections)
 }
 
-fn head(html: &mut Html, names: &[&str]) {
-    html.element("tr", &[], |html| {
-        for name in names {
-            html.line("th", &[("scope", &"col")], name);
-        }
-    });
-}
-
 fn summary(html: &mut Html, all: &[Finished]) {
     html.element("table", &[], |html| {
         html.line("caption", &[], "Campaigns");
         let mut names = vec!["Campaign", "Drives", "Bytes", "Cases", "Pinned figures"];
         names.extend(Class::ALL.map(Class::name));
-        head(html, &names);
+        html.heads(&names);
         for (number, one) in all.iter().enumerate() {
             html.element("tr", &[], |html| {
                 html.element("th", &[("scope", &"row")], |html| {
@@ -95,7 +87,7 @@ fn summary(html: &mut Html, all: &[Finished]) {
 fn letters(html: &mut Html) {
     html.element("table", &[], |html| {
         html.line("caption", &[], "Classes, in order of gravity");
-        head(html, &["Letter", "Class", "What it means"]);
+        html.heads(&["Letter", "Class", "What it means"]);
         for class in Class::ALL {
             html.element("tr", &[], |html| {
                 html.line("td", &[("class", &colour(class))], letter(class));
@@ -155,7 +147,7 @@ fn classes(html: &mut Html, finished: &Finished) {
     let all = finished.outcomes.len() as u64;
     html.element("table", &[], |html| {
         html.line("caption", &[], "Cases by class");
-        head(html, &["Class", "Cases", "Share", "What it means"]);
+        html.heads(&["Class", "Cases", "Share", "What it means"]);
         for class in Class::ALL {
             let count = finished.count(class);
             html.element("tr", &[], |html| {
@@ -187,37 +179,28 @@ fn map(
     rows: &[(String, BTreeMap<usize, Counts>)],
 ) {
     let links = usize::from(finished.drives) + 1;
-    html.element(
-        "div",
-        &[
-            ("class", &"scroll"),
-            ("tabindex", &"0"),
-            ("role", &"group"),
-            ("aria-label", &caption),
-        ],
-        |html| {
-            html.element("table", &[("class", &"heat")], |html| {
-                html.line("caption", &[], caption);
-                html.element("tr", &[], |html| {
-                    html.line("th", &[("scope", &"col")], "");
-                    for link in 0..links {
-                        let full = finished.link(link);
-                        let sender = full.split("->").next().unwrap_or_default();
-                        let short = if link == 0 { "m" } else { sender };
-                        html.line("th", &[("scope", &"col"), ("title", &full)], short);
-                    }
-                });
-                for (name, cells) in rows {
-                    html.element("tr", &[], |html| {
-                        html.line("th", &[("scope", &"row")], name);
-                        for link in 0..links {
-                            cell(html, cells.get(&link));
-                        }
-                    });
+    html.scroll(caption, |html| {
+        html.element("table", &[("class", &"heat")], |html| {
+            html.line("caption", &[], caption);
+            html.element("tr", &[], |html| {
+                html.line("th", &[("scope", &"col")], "");
+                for link in 0..links {
+                    let full = finished.link(link);
+                    let sender = full.split("->").next().unwrap_or_default();
+                    let short = if link == 0 { "m" } else { sender };
+                    html.line("th", &[("scope", &"col"), ("title", &full)], short);
                 }
             });
-        },
-    );
+            for (name, cells) in rows {
+                html.element("tr", &[], |html| {
+                    html.line("th", &[("scope", &"row")], name);
+                    for link in 0..links {
+                        cell(html, cells.get(&link));
+                    }
+                });
+            }
+        });
+    });
 }
 
 fn cell(html: &mut Html, counts: Option<&Counts>) {
@@ -328,7 +311,7 @@ fn by_link(finished: &Finished) -> Html {
             );
             let mut names = vec!["Link"];
             names.extend(Class::ALL.map(Class::name));
-            head(html, &names);
+            html.heads(&names);
             for (link, counts) in links.iter().take(LINKS) {
                 html.element("tr", &[], |html| {
                     html.line("th", &[("scope", &"row")], finished.link(*link));
@@ -363,7 +346,7 @@ fn worst(finished: &Finished) -> Option<Html> {
             &[],
             "The gravest cases, each with what plays it again",
         );
-        head(html, &["Class", "Case", "What happened", "Again"]);
+        html.heads(&["Class", "Case", "What happened", "Again"]);
         for outcome in worst.into_iter().take(WORST) {
             let case = outcome.case.name(finished.drives);
             html.element("tr", &[], |html| {

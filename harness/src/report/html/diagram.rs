@@ -71,18 +71,9 @@ pub(super) fn diagram(
     let frame = Frame { column, rows };
     let description = description(ring, trace, drawn, cut);
     html.element("div", &[("class", &"ring")], |html| {
-        html.element(
-            "div",
-            &[
-                ("class", &"scroll"),
-                ("tabindex", &"0"),
-                ("role", &"group"),
-                ("aria-label", &title),
-            ],
-            |html| {
-                picture(html, id, title, &description, trace, drawn, &frame);
-            },
-        );
+        html.scroll(title, |html| {
+            picture(html, id, title, &description, trace, drawn, &frame);
+        });
         legend(html, drawn);
         if cut {
             html.line(

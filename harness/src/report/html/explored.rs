@@ -100,21 +100,13 @@ fn facts(html: &mut Html, run: &Explored<'_>) {
     });
 }
 
-fn head(html: &mut Html, names: &[&str]) {
-    html.element("tr", &[], |html| {
-        for name in names {
-            html.line("th", &[("scope", &"col")], name);
-        }
-    });
-}
-
 fn findings(html: &mut Html, all: &[Shown]) {
     if all.is_empty() {
         return;
     }
     html.element("table", &[], |html| {
         html.line("caption", &[], "Findings");
-        head(html, &["Verdict", "Finding", "What was otherwise"]);
+        html.heads(&["Verdict", "Finding", "What was otherwise"]);
         for Shown { row, section } in all {
             html.element("tr", &[], |html| {
                 html.line(
@@ -172,16 +164,16 @@ fn course(html: &mut Html, run: &Explored<'_>) {
             curve.draw(html, &features, (0.0, last.cases as f64));
         });
     }
+    progress(html, run.history);
+}
+
+fn progress(html: &mut Html, history: &[Progress]) {
     html.element("details", &[], |html| {
         html.line("summary", &[], "As a table");
         html.element("table", &[], |html| {
             html.line("caption", &[], "Progress");
-            head(html, &["Cases", "Not sent", "Repeats", "On the line"]);
-            for progress in run
-                .history
-                .iter()
-                .step_by(run.history.len().div_ceil(ROWS).max(1))
-            {
+            html.heads(&["Cases", "Not sent", "Repeats", "On the line"]);
+            for progress in history.iter().step_by(history.len().div_ceil(ROWS).max(1)) {
                 html.element("tr", &[], |html| {
                     html.line("td", &[("class", &"n")], progress.cases);
                     html.line("td", &[("class", &"n")], progress.not_sent);
@@ -210,53 +202,48 @@ fn transitions(html: &mut Html, reached: &Reached) {
         &[],
         format_args!(
             "The kept cases reach {} of {all} reachable transitions of a drive's end of the bus on the model (ND21 9.1-9.9). \
-             R is reached, - is not; where nothing stands, nothing can reach it.",
+             R is reached, - is not; where nothing stands, nothing can reach it. Silence is not played again: time-outs (9.9) are not counted.",
             reached.count()
         ),
     );
-    html.element(
-        "div",
-        &[
-            ("class", &"scroll"),
-            ("tabindex", &"0"),
-            ("role", &"group"),
-            ("aria-label", &"Transitions"),
-        ],
-        |html| {
-            html.element("table", &[("class", &"heat")], |html| {
-                html.line(
-                    "caption",
-                    &[],
-                    "Transitions: states down, events across by their numbers",
-                );
-                html.element("tr", &[], |html| {
-                    html.line("th", &[("scope", &"col")], "State");
-                    for event in Event::ALL {
-                        html.line(
-                            "th",
-                            &[("scope", &"col"), ("title", &event.name())],
-                            event.index() + 1,
-                        );
-                    }
-                });
-                for state in State::ALL.iter().copied() {
-                    html.element("tr", &[], |html| {
-                        html.line("th", &[("scope", &"row")], state.name());
-                        for event in Event::ALL.iter().copied() {
-                            let cell = Transition { state, event };
-                            if why_unreachable(cell).is_some() {
-                                html.line("td", &[], "");
-                            } else if reached.contains(cell) {
-                                html.line("td", &[("class", &"k1")], "R");
-                            } else {
-                                html.line("td", &[("class", &"k0")], "-");
-                            }
-                        }
-                    });
+    html.scroll("Transitions", |html| {
+        html.element("table", &[("class", &"heat")], |html| {
+            html.line(
+                "caption",
+                &[],
+                "Transitions: states down, events across by their numbers",
+            );
+            html.element("tr", &[], |html| {
+                html.line("th", &[("scope", &"col")], "State");
+                for event in Event::ALL {
+                    html.line(
+                        "th",
+                        &[("scope", &"col"), ("title", &event.name())],
+                        event.index() + 1,
+                    );
                 }
             });
-        },
-    );
+            for state in State::ALL.iter().copied() {
+                html.element("tr", &[], |html| {
+                    html.line("th", &[("scope", &"row")], state.name());
+                    for event in Event::ALL.iter().copied() {
+                        let cell = Transition { state, event };
+                        if why_unreachable(cell).is_some() {
+                            html.line("td", &[], "");
+                        } else if reached.contains(cell) {
+                            html.line("td", &[("class", &"k1")], "R");
+                        } else {
+                            html.line("td", &[("class", &"k0")], "-");
+                        }
+                    }
+                });
+            }
+        });
+    });
+    events(html);
+}
+
+fn events(html: &mut Html) {
     html.element("details", &[], |html| {
         html.line("summary", &[], "The events by their numbers");
         html.element("ol", &[], |html| {

@@ -236,11 +236,7 @@ fn table(html: &mut Html, record: &Record) {
                 (_, every) => format!("{} samples, one of {every} shown", samples.len()),
             };
             html.line("caption", &[], caption);
-            html.element("tr", &[], |html| {
-                for head in ["Time", "Bytes", "Value", "Bits"] {
-                    html.line("th", &[("scope", &"col")], head);
-                }
-            });
+            html.heads(&["Time", "Bytes", "Value", "Bits"]);
             for sample in samples.iter().step_by(every) {
                 html.element("tr", &[], |html| {
                     html.line("td", &[("class", &"n")], sample.at);

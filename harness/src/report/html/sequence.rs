@@ -29,6 +29,9 @@ const BYTES: usize = 16;
 /// What the master sends to bring a ring back (9.8).
 const CHECK: &str = "check sequence";
 
+/// Said of an answer whose checking byte is wrong (9.6).
+const MISFIT: &str = " (checking byte does not fit)";
+
 const COLUMN: usize = 110;
 const ROW: usize = 26;
 const TOP: usize = 30;
@@ -164,7 +167,7 @@ fn said(link: &LinkTrace, mut reader: Reader<'_>, events: &mut Vec<Event>) {
             let _infallible = write!(event.result, "{gap}{value:02X}");
         }
         if meaning.fits == Some(false) {
-            event.result.push_str(" (checking byte does not fit)");
+            event.result.push_str(MISFIT);
         }
     }
 }
@@ -258,6 +261,7 @@ fn asked(events: &mut [Event]) {
         let answer = answer.map(|answer| &events[*answer]);
         let result = match answer.filter(|answer| answer.bytes.len() == job.bytes.len()) {
             Some(answer) if answer.result.is_empty() => "answered".to_owned(),
+            Some(answer) if answer.result.ends_with(MISFIT) => "no good answer".to_owned(),
             Some(answer) => format!("answered: {}", answer.result.trim_start()),
             None => "no whole answer".to_owned(),
         };
@@ -355,9 +359,8 @@ fn hex(event: &Event) -> String {
     text
 }
 
-/// A line for each that speaks, and an arrow for each event.
-fn picture(html: &mut Html, id: &str, events: &[Event]) {
-    let drawn = &events[..events.len().min(DRAWN)];
+/// Who has a line: the master, the drives in the order of the ring, and what stands for all others.
+fn lifelines(drawn: &[Event]) -> Vec<Who> {
     let mut who: Vec<Who> = drawn
         .iter()
         .flat_map(|event| [event.from, event.to])
@@ -375,6 +378,13 @@ fn picture(html: &mut Html, id: &str, events: &[Event]) {
         who.retain(|one| *one != Who::Ring);
         who.push(Who::Ring);
     }
+    who
+}
+
+/// A line for each that speaks, and an arrow for each event.
+fn picture(html: &mut Html, id: &str, events: &[Event]) {
+    let drawn = &events[..events.len().min(DRAWN)];
+    let who = lifelines(drawn);
     let x = |one: Who| {
         let place = who
             .iter()
@@ -394,7 +404,7 @@ fn picture(html: &mut Html, id: &str, events: &[Event]) {
         ("width", &width),
         ("height", &height),
     ];
-    html.element("div", &[("class", &"scroll"), ("tabindex", &"0"), ("role", &"group"), ("aria-label", &"What was said, as a picture")], |html| {
+    html.scroll("What was said, as a picture", |html| {
         html.element("svg", &attributes, |html| {
             html.line("title", &[("id", &format!("{id}-qt"))], "Sequence of jobs and answers");
             let words = "A line downwards for the master, for each drive that had a part, and for the ring; an arrow for each event. \
@@ -448,11 +458,7 @@ fn table(html: &mut Html, events: &[Event]) {
         html.line("summary", &[], "As a table");
         html.element("table", &[], |html| {
             html.line("caption", &[], "What was said, in order");
-            html.element("tr", &[], |html| {
-                for head in ["Time", "From", "To", "What", "Bytes", "Result"] {
-                    html.line("th", &[("scope", &"col")], head);
-                }
-            });
+            html.heads(&["Time", "From", "To", "What", "Bytes", "Result"]);
             for event in events.iter().take(MOST) {
                 html.element("tr", &[], |html| {
                     html.line("td", &[("class", &"n")], event.at);

@@ -116,18 +116,14 @@ fn table(html: &mut Html, shown: &[Shown]) {
     html.element("table", &[], |html| {
         html.line("caption", &[], "Scenarios");
         html.element("thead", &[], |html| {
-            html.element("tr", &[], |html| {
-                for head in [
-                    "Verdict",
-                    "Scenario",
-                    "Drives",
-                    "On the line",
-                    "Shows",
-                    "Pins",
-                ] {
-                    html.line("th", &[("scope", &"col")], head);
-                }
-            });
+            html.heads(&[
+                "Verdict",
+                "Scenario",
+                "Drives",
+                "On the line",
+                "Shows",
+                "Pins",
+            ]);
         });
         html.element("tbody", &[], |html| {
             for Shown { row, section } in shown {

@@ -62,6 +62,26 @@ impl Html {
         self.out.push_str(end);
     }
 
+    /// Something that may be larger than the window: it scrolls by itself, also by keys.
+    pub fn scroll(&mut self, label: &str, inside: impl FnOnce(&mut Self)) {
+        let attributes: [Attribute<'_>; 4] = [
+            ("class", &"scroll"),
+            ("tabindex", &"0"),
+            ("role", &"group"),
+            ("aria-label", &label),
+        ];
+        self.element("div", &attributes, inside);
+    }
+
+    /// A row of heads of columns.
+    pub fn heads(&mut self, names: &[&str]) {
+        self.element("tr", &[], |html| {
+            for name in names {
+                html.line("th", &[("scope", &"col")], name);
+            }
+        });
+    }
+
     /// Text as text, whatever it holds.
     pub fn text(&mut self, text: impl Display) {
         // Writing to a String cannot fail.
