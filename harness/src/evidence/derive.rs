@@ -7,7 +7,7 @@
 use super::folder::{CAPTURES, EvidenceError};
 use super::junit::{Case, junit};
 use super::record::Line;
-use super::verify::{Opened, Verified};
+use super::verify::{Opened, Verified, is_name};
 use crate::capture::{CaptureError, read_file};
 use crate::library::Entry;
 use crate::report::html::{Head, Played, Shown, run, section};
@@ -48,7 +48,20 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
         };
         attempts.insert(recorded.name, attempt);
     })?;
-    let mut settled: Vec<_> = opened.lines.iter().filter_map(Settled::of).collect();
+    let mut settled = Vec::new();
+    for (number, line) in opened.lines.iter().enumerate() {
+        match (line, Settled::of(line)) {
+            (_, Some(case)) => settled.push(case),
+            (Line::Case { verdict, .. }, None) => {
+                let why = format!(
+                    "line {} of its record: there is no verdict `{verdict}`",
+                    number + 1
+                );
+                return Err(EvidenceError::Foreign(path.display().to_string(), why));
+            }
+            _ => {}
+        }
+    }
     for (name, attempt) in &attempts {
         // A run that was killed has not settled its last scenario.
         if settled.iter().all(|case| case.name != *name) {
@@ -59,8 +72,10 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
     for case in &settled {
         let attempt = attempts.get(&case.name);
         let traces = match attempt {
-            Some(attempt) => traces(path, &case.name, attempt.number, opened.rate())?,
-            None => Vec::new(),
+            Some(attempt) if is_name(&case.name) => {
+                traces(path, &case.name, attempt.number, opened.rate())?
+            }
+            _ => Vec::new(),
         };
         shown.push(show(shown.len() + 1, case, attempt, &traces, opened.rate()));
     }

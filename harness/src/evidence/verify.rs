@@ -235,7 +235,7 @@ fn group(lines: &[Line]) -> Vec<Recorded> {
 }
 
 /// Whether a name leads to a file of the folder and nowhere else.
-fn is_name(name: &str) -> bool {
+pub(super) fn is_name(name: &str) -> bool {
     let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
     !name.is_empty() && !name.starts_with('.') && name.chars().all(safe)
 }

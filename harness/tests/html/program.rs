@@ -162,6 +162,18 @@ fn a_folder_that_is_cut_off_gives_what_there_is() {
         sound(&parse(&text));
         assert!(text.contains("the record ends before the run did"), "{cut}");
     }
+    // A verdict that there is not, and a name that leads elsewhere.
+    let text = String::from_utf8(whole.clone()).expect("text");
+    let named = text.replace("\"name\":\"9.2-synco\"", "\"name\":\"../../9.2-synco\"");
+    std::fs::write(&record, named).expect("a file");
+    let output = drivebench(&["report", path(&evidence), "--html", path(&html)]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    sound(&parse(&read(&html)));
+    let judged = text.replace("\"verdict\":\"passed\"", "\"verdict\":\"splendid\"");
+    std::fs::write(&record, judged).expect("a file");
+    let output = drivebench(&["report", path(&evidence), "--html", path(&html)]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("no verdict `splendid`"));
     std::fs::write(&record, "{\"kind\":\"other\"}\n").expect("a file");
     std::fs::remove_file(&html).expect("a file");
     for folder in [path(&evidence), path(&own), "/dev/null"] {
