@@ -7,11 +7,15 @@ use super::sequence::sequence;
 use super::summary::{Row, Shown, colour};
 use super::write::Html;
 use crate::scenario::run::{Difference, Finding, Outcome, Shown as Byte, show};
+use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_sim::trace::Trace;
 
 /// Bytes of a line shown before and behind the one that differs.
 const AROUND: usize = 12;
+
+/// Expectations shown at most.
+const EXPECTED: usize = 100;
 
 /// Remarks shown at most.
 const REMARKS: usize = 40;
@@ -169,8 +173,77 @@ fn row(
     });
 }
 
+/// What the scenario expects, line by line, and whether it came; false where it expects nothing.
+fn expectations(html: &mut Html, played: &Played<'_>) -> bool {
+    let mut start = 0;
+    let mut rows = Vec::new();
+    for (index, line) in played.text.split_inclusive('\n').enumerate() {
+        let text = line.trim();
+        if text.starts_with(['<', '?']) {
+            rows.push((
+                index + 1,
+                text,
+                came(played.outcome, start, start + line.len()),
+            ));
+        }
+        start += line.len();
+    }
+    if rows.is_empty() {
+        return false;
+    }
+    html.element("details", &[], |html| {
+        html.line("summary", &[], format_args!("Expectations: {}", rows.len()));
+        html.element("table", &[], |html| {
+            html.line(
+                "caption",
+                &[],
+                "Lines of the scenario that expect something, and what came",
+            );
+            html.heads(&["Line", "Expected", "Received"]);
+            for (number, text, (class, came)) in rows.iter().take(EXPECTED) {
+                html.element("tr", &[], |html| {
+                    html.line("td", &[("class", &"n")], number);
+                    html.line("td", &[("class", &"n")], text);
+                    html.line("td", &[("class", class)], came);
+                });
+            }
+        });
+        if rows.len() > EXPECTED {
+            let more = rows.len() - EXPECTED;
+            html.line(
+                "p",
+                &[("class", &"note")],
+                format_args!("{more} more are not shown."),
+            );
+        }
+    });
+    true
+}
+
+/// Whether what a line expects came: playing stops at the first thing that is otherwise.
+fn came(outcome: &Outcome, start: usize, end: usize) -> (&'static str, &'static str) {
+    let known = outcome.finding.as_ref().map(|found| &found.span);
+    match (outcome.verdict, known) {
+        (_, Some(span)) if span.end > 0 && (start..end).contains(&span.start) => {
+            ("bad", "otherwise, see above")
+        }
+        (_, Some(span)) if span.end > 0 && end <= span.start => ("good", "as expected"),
+        (Verdict::Passed | Verdict::Marginal | Verdict::Flaky, None) => ("good", "as expected"),
+        (Verdict::Skipped, _) => ("open", "not played"),
+        _ => ("open", "not known"),
+    }
+}
+
 fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
     let mut parts = Vec::new();
+    let mut html = Html::new();
+    if expectations(&mut html, played) {
+        parts.push(Part {
+            heading: "Expected and received".to_owned(),
+            html,
+            instead: String::new(),
+        });
+    }
     let two = played.traces.len() > 1;
     let instead = format!("It is shown by: {}", played.again);
     for (ring, trace) in played.traces.iter().enumerate() {
@@ -214,17 +287,23 @@ fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
             instead,
         });
     }
-    if !played.text.is_empty() {
-        let mut html = Html::new();
-        html.element("details", &[], |html| {
-            html.line("summary", &[], "Its text");
-            html.element("pre", &[], |html| html.line("code", &[], played.text));
-        });
-        parts.push(Part {
-            heading: "Scenario".to_owned(),
-            html,
-            instead: String::new(),
-        });
-    }
+    parts.extend(text(played.text));
     parts
+}
+
+/// The scenario's own text.
+fn text(text: &str) -> Option<Part> {
+    if text.is_empty() {
+        return None;
+    }
+    let mut html = Html::new();
+    html.element("details", &[], |html| {
+        html.line("summary", &[], "Its text");
+        html.element("pre", &[], |html| html.line("code", &[], text));
+    });
+    Some(Part {
+        heading: "Scenario".to_owned(),
+        html,
+        instead: String::new(),
+    })
 }
