@@ -156,7 +156,29 @@ fn pipelines(path: &Path) -> datatest_stable::Result<()> {
     Ok(())
 }
 
+/// A page with a mistake is refused, by the check that its file is named after and by no other.
+fn refused(path: &Path) -> datatest_stable::Result<()> {
+    type Check = fn(&Path) -> datatest_stable::Result<()>;
+    let checks: [(&str, Check); 5] = [
+        ("commands", commands),
+        ("options", options),
+        ("links", links),
+        ("citations", citations),
+        ("pipelines", pipelines),
+    ];
+    let name = path
+        .file_name()
+        .and_then(|name| name.to_str())
+        .expect("text");
+    for (check, judge) in checks {
+        let fails = std::panic::catch_unwind(|| judge(path).is_err()).unwrap_or(true);
+        assert_eq!(fails, name.starts_with(check), "{name}: {check}");
+    }
+    Ok(())
+}
+
 datatest_stable::harness! {
+    { test = refused, root = "harness/tests/guide/wrong", pattern = r"\.md$" },
     { test = commands, root = "harness/docs", pattern = r"\.md$" },
     { test = options, root = "harness/docs", pattern = r"\.md$" },
     { test = links, root = "harness/docs", pattern = r"\.md$" },
