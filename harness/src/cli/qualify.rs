@@ -142,8 +142,19 @@ pub(super) fn settle(
 /// The deviations that explain every byte of every attempt that diverged.
 fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<String, Stop> {
     if findings.diverged.is_empty() {
-        output.result("deviations: none; every byte is as the model of the manual says\n")?;
-        return Ok("none\n".to_owned());
+        let known = &run.session().rig().file.deviation;
+        let text = match known.is_empty() {
+            true => "deviations: none; every byte is as the model of the manual says\n".to_owned(),
+            false => {
+                let names: Vec<_> = known.iter().map(|entry| entry.name.as_str()).collect();
+                format!(
+                    "deviations: none beside the known ones: {}\n",
+                    names.join(", ")
+                )
+            }
+        };
+        output.result(&text)?;
+        return Ok(text);
     }
     let drives = run.session().rig().file.ring.first.drives;
     let exactness = run.exactness();
