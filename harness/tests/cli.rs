@@ -516,7 +516,8 @@ fn fuzz_distil() {
         format!("{name}\n1 inputs: 1 transitions more, 1 before\n")
     );
     let written = std::fs::read_to_string(kept.join(name)).expect("written");
-    assert!(written.ends_with("PAUSE\n00 81\n"), "{written}");
+    // What stands in front of the PAUSE is the number of the damaged byte: any will do that is none of this wire.
+    assert!(written.ends_with("PAUSE\n80 81\n"), "{written}");
     let again = distil("detector");
     assert_eq!(
         stdout(&again),
