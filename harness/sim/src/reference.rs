@@ -15,8 +15,9 @@ const READ_WORD_RANGES: [(u16, u16); 2] = [(0x2F00, 0x2FDF), RAM];
 /// Where RAM and the registers behind it begin, and how many cells they have (ND21 10.1).
 const RAM_AND_REGISTERS: (u16, usize) = (RAM.0, 0x280);
 
-// Kept address (ND21 9.2, the RAM map), and the port of GPO1 (bit 7) and GPO2 (bit 5) (ND21 10.4).
+// Kept address (ND21 9.2, the RAM map), the flag of the time-out monitoring (14.10.2), and the port of GPO1 (bit 7) and GPO2 (bit 5) (ND21 10.4).
 const BUS_ADDR: u16 = 0xFF36;
+const FLAGS2: u16 = 0xFF57;
 const PORT: u16 = 0xFFB7;
 /// The check sequence, without its 17 zeros (ND21 9.8).
 const CHECK_SEQUENCE: [u8; 5] = [0xFF, 0x44, 0x72, 0x4C, 0x41];
@@ -130,6 +131,8 @@ pub struct Drive {
     matched: usize,
     /// What was executed, oldest first: a command without its checking byte, or 00 and two process data bytes.
     executed: Vec<Bytes>,
+    /// Time-outs have been monitored at some time (ND21 14.10.2).
+    monitored: bool,
 }
 
 impl Drive {
@@ -147,6 +150,7 @@ impl Drive {
 
     /// Sets any memory cell, past the bus and its ranges (ND21 10).
     pub fn poke(&mut self, address: u16, byte: u8) {
+        self.monitored |= address == FLAGS2 && byte & 0x04 != 0;
         match address.checked_sub(RAM_AND_REGISTERS.0) {
             Some(place) => self.memory.ram[usize::from(place)] = byte,
             None => {
@@ -162,6 +166,13 @@ impl Drive {
             Some(place) => self.memory.ram[usize::from(place)],
             None => self.memory.elsewhere.get(&address).map_or(0, |byte| *byte),
         }
+    }
+
+    /// Whether time-outs were monitored at any time (bit 2 of `Flags2`, ND21 14.10.2), be they not any more: from there on silence may have
+    /// done what this model does not know (9.9).
+    #[must_use]
+    pub fn has_monitored(&self) -> bool {
+        self.monitored
     }
 
     /// Fetches what was executed since the last call, oldest first: commands without their checking byte; 00 and two bytes

@@ -148,6 +148,7 @@ fn header(lines: &[Line], rig: &Rig, rig_text: &str, verified: &mut Verified) ->
             tolerance: Span::from_units(*tolerance),
             line_errors: capabilities.contains(&crate::link::Capability::LineErrors),
             knows_cells: *simulated,
+            looks: None,
         },
         capabilities,
         simulated: *simulated,

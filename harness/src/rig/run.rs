@@ -84,6 +84,7 @@ impl<'s> Run<'s> {
                 tolerance,
                 line_errors,
                 knows_cells: simulated,
+                looks: None,
             },
             beats: session.ports().map(|ports| ports.beats()),
             session,
@@ -454,8 +455,7 @@ pub(crate) fn twin(rig: &Rig, lines: &[String]) -> Result<Twin, Problems> {
     }
     let plan = model.plan_with(lines)?;
     let mut twin = Twin::new(simulate::bench(&plan), &plan.rings);
-    // The self-tests are over (11.8).
-    twin.rest(Span::from_millis(200));
+    twin.rest_through_self_tests();
     Ok(twin)
 }
 
