@@ -147,6 +147,33 @@ pub struct Comparison {
     pub apart: Span,
 }
 
+/// What a ring sent back, beside what its twin received.
+struct Rows<'a> {
+    ring: usize,
+    /// What each byte is for, as far as that is known.
+    roles: &'a [Role],
+    /// Up to which byte the roles stand at their places.
+    known: usize,
+    expected: &'a [(Instant, Received)],
+    received: &'a [(Instant, Received)],
+}
+
+impl Rows<'_> {
+    fn role(&self, index: usize) -> Role {
+        self.roles.get(index).copied().unwrap_or(Role::Foreign)
+    }
+
+    /// Whether a byte is missing or too many because a conversation in real time ended with it under way.
+    fn cut_short(&self, index: usize, what: &What, tail: Instant) -> bool {
+        match (what, self.expected.get(index), self.received.get(index)) {
+            (What::Missing, Some((at, _)), None) | (What::Surplus, None, Some((at, _))) => {
+                *at >= tail
+            }
+            _ => false,
+        }
+    }
+}
+
 /// What is compared, ring by ring.
 pub(super) struct Comparer<'a> {
     pub(super) exactness: Exactness,
@@ -187,60 +214,73 @@ impl Comparer<'_> {
         };
         // What was still coming when the conversation ended came a moment sooner or later.
         let tail = conversation.end - self.exactness.tolerance - TAIL;
-        let role_at = |index: usize| roles.get(index).copied().unwrap_or(Role::Foreign);
-        let step_at = |index: usize| {
-            let place = places.get(index).copied().unwrap_or(index);
-            conversation.step_at(ring, place)
+        let rows = Rows {
+            ring,
+            roles: &roles,
+            known,
+            expected,
+            received,
         };
         for index in 0..received.len().max(expected.len()) {
-            let role = role_at(index);
-            let pair = (expected.get(index).copied(), received.get(index).copied());
-            let what = match pair {
-                (Some((due, wanted)), Some((at, found))) => {
-                    let found_good = found.error.is_none() || !self.exactness.line_errors;
-                    let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
-                    let same = wanted.byte == found.byte
-                        || index < known
-                            && self.may_differ(ring, &roles, (wanted.byte, received), index);
-                    self.note_write(ring, role);
-                    match (same, wanted_good == found_good) {
-                        (true, true) => {
-                            let step = || step_at(index);
-                            let pair = ((due, wanted), (at, found));
-                            self.time((ring, index), role, step, pair);
-                            None
-                        }
-                        (true, false) => Some(What::LineStatus),
-                        (false, _) => Some(what_of(expected, received, index)),
-                    }
-                }
-                (Some(_), None) => Some(What::Missing),
-                (None, _) => Some(What::Surplus),
+            let step = || {
+                let place = places.get(index).copied().unwrap_or(index);
+                conversation.step_at(ring, place)
             };
+            let what = self.row(&rows, index, step);
             self.comparison.compared += 1;
-            let cut_short = match (&what, pair) {
-                (Some(What::Missing), (Some((at, _)), None))
-                | (Some(What::Surplus), (None, Some((at, _)))) => real_time && at >= tail,
-                _ => false,
+            let Some(what) = what else { continue };
+            if real_time && rows.cut_short(index, &what, tail) {
+                return;
+            }
+            let heard = &expected[..index.min(expected.len())];
+            let role = rows.role(index);
+            let found = Divergence {
+                ring,
+                byte: index + 1,
+                what,
+                expected: expected.get(index).copied(),
+                received: received.get(index).copied(),
+                role,
+                step: step(),
+                drive: role.drive().or_else(|| spelled(heard, size)),
             };
-            if cut_short {
-                return;
+            self.comparison.divergence.get_or_insert(found);
+            return;
+        }
+    }
+
+    /// What is otherwise at one place, apart from the time.
+    fn row(
+        &mut self,
+        rows: &Rows<'_>,
+        index: usize,
+        step: impl FnOnce() -> Option<usize>,
+    ) -> Option<What> {
+        let Rows {
+            ring,
+            expected,
+            received,
+            ..
+        } = *rows;
+        let role = rows.role(index);
+        let (due, wanted, at, found) = match (expected.get(index), received.get(index)) {
+            (Some((due, wanted)), Some((at, found))) => (*due, *wanted, *at, *found),
+            (Some(_), None) => return Some(What::Missing),
+            (None, _) => return Some(What::Surplus),
+        };
+        let found_good = found.error.is_none() || !self.exactness.line_errors;
+        let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
+        let same = wanted.byte == found.byte
+            || index < rows.known
+                && self.may_differ(ring, rows.roles, (wanted.byte, received), index);
+        self.note_write(ring, role);
+        match (same, wanted_good == found_good) {
+            (true, true) => {
+                self.time((ring, index), role, step, ((due, wanted), (at, found)));
+                None
             }
-            if let Some(what) = what {
-                let heard = &expected[..index.min(expected.len())];
-                let found = Divergence {
-                    ring,
-                    byte: index + 1,
-                    what,
-                    expected: pair.0,
-                    received: pair.1,
-                    role,
-                    step: step_at(index),
-                    drive: role.drive().or_else(|| spelled(heard, size)),
-                };
-                self.comparison.divergence.get_or_insert(found);
-                return;
-            }
+            (true, false) => Some(What::LineStatus),
+            (false, _) => Some(what_of(expected, received, index)),
         }
     }
 
