@@ -18,6 +18,7 @@ mod pump;
 mod s_ramp;
 mod scope;
 
+pub use access::Width;
 pub use axis::Axis;
 pub(crate) use discovery::count_behind;
 pub use discovery::{Identity, Recovery, State, count_drives, recover};
