@@ -141,6 +141,12 @@ impl<'l> Bus<'l> {
             .count()
     }
 
+    /// Why nothing goes on any more, if so: a ring has been stopped (11.5), or the link carries nothing. Time may stand still then.
+    #[must_use]
+    pub fn halted(&self) -> Option<Error> {
+        self.lock().halt()
+    }
+
     /// How many errors were corrected since the bus was opened (11.5).
     #[doc(alias = "NB_BusError")]
     #[must_use]

@@ -104,9 +104,10 @@ impl Drop for Screen {
     }
 }
 
-/// Gives the terminal back, if it is taken: on the way out of a program that ends without unwinding.
+/// Gives the terminal back, if it is taken: on the way out of a program that ends without unwinding. Waits for nobody who draws
+/// for long.
 pub fn leave() {
-    give_back(&mut taken());
+    give_back_whoever_draws();
 }
 
 fn key_of(code: KeyCode, control: bool) -> Option<Key> {
@@ -155,6 +156,6 @@ fn give_back_whoever_draws() {
             Err(TryLockError::WouldBlock) => std::thread::sleep(WAIT),
         }
     }
-    // It is this very thread that draws, and it will not go on.
+    // It is this very thread that draws, or one that the terminal holds: it will not go on.
     give_back(&mut true);
 }

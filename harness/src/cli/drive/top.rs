@@ -11,17 +11,20 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::interrupt_flag;
 use crate::link::Trouble;
-use crate::top::screen::Input;
+use crate::top::screen::{Input, leave};
 use crate::top::{DriveReading, Heading, Press, Reading, RingReading, Screen, Top, view};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{Drive, SpeedRange};
-use harness_proto::novobus::master::{Counters, Event, Fault};
+use harness_proto::novobus::master::{Counters, Event};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, SyncSender, TryRecvError, channel, sync_channel,
+};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant as Moment};
 
 /// Drives that are asked side by side: what is shown comes piece by piece, and the end does not wait for a long ring.
@@ -147,14 +150,14 @@ fn live(
     // A terminal that is closed.
     let _as_before = signal_hook::flag::register(signal_hook::consts::SIGHUP, Arc::clone(&flag));
     let screen = Screen::enter(output.colours())?;
-    let (news, readings) = channel();
-    let (leave, asked) = channel();
+    let (news, readings) = sync_channel(1);
+    let (why, asked) = channel();
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
     let desk = std::thread::spawn(move || {
-        let why = desk(screen, Top::new(heading), &readings, &stopped);
+        let end = desk(screen, Top::new(heading), &readings, &stopped);
         // Nobody listens where the bus has ended by itself.
-        let _ended = leave.send(why);
+        let _ended = why.send(end);
     });
     let end = pump(reader, every, &flag, &news, &asked);
     stop.store(true, Ordering::Relaxed);
@@ -163,17 +166,25 @@ fn live(
     end
 }
 
-/// Waits until the terminal has been given back; not for ever where it takes nothing more.
-fn wait_for(desk: std::thread::JoinHandle<()>) {
-    let end = Moment::now() + Duration::from_secs(1);
-    while !desk.is_finished() && Moment::now() < end {
+/// Waits until the terminal has been given back; not for ever where it takes nothing more, as the drives wait for their safe
+/// state.
+fn wait_for(desk: JoinHandle<()>) {
+    if ended(&desk) {
+        if let Err(panic) = desk.join() {
+            std::panic::resume_unwind(panic);
+        }
+    } else {
+        ended(&std::thread::spawn(leave));
+    }
+}
+
+/// Whether a thread ends in time.
+fn ended(thread: &JoinHandle<()>) -> bool {
+    let end = Moment::now() + Duration::from_secs(2);
+    while !thread.is_finished() && Moment::now() < end {
         std::thread::sleep(Duration::from_millis(2));
     }
-    if desk.is_finished()
-        && let Err(panic) = desk.join()
-    {
-        std::panic::resume_unwind(panic);
-    }
+    thread.is_finished()
 }
 
 /// Draws what comes and takes keys, until its end.
@@ -219,7 +230,7 @@ fn pump(
     reader: &mut Reader<'_>,
     every: Span,
     interrupted: &AtomicBool,
-    news: &Sender<Reading>,
+    news: &SyncSender<Reading>,
     asked: &Receiver<Leave>,
 ) -> Result<Exit, Failure> {
     let interrupt = || Failure::Bus(Error::Link(Trouble::Interrupted));
@@ -230,8 +241,11 @@ fn pump(
             // What is slower than the time given is read as often as it can be.
             next = (next + every).max(reader.bench.bus.now());
         }
-        // Whoever draws has gone; why is said by `asked`.
-        let _gone = news.send(reader.reading());
+        if let Some(halt) = reader.bench.bus.halted() {
+            return Err(halt.into());
+        }
+        // Who has not drawn the last page yet gets a later one; who has gone says why by `asked`.
+        let _not_now = news.try_send(reader.reading());
         if interrupted.load(Ordering::Relaxed) {
             return Err(interrupt());
         }
@@ -304,7 +318,7 @@ impl<'b> Reader<'b> {
         self.reading.at = now.since(self.start);
         for (ring, event) in bus.take_events() {
             if let Event::Disturbed { fault, .. } = event {
-                self.reading.disturbed(ring, in_words(&fault));
+                self.reading.disturbed(ring, fault.to_string());
             }
         }
         let counters = bus.counters();
@@ -349,11 +363,6 @@ impl<'b> Reader<'b> {
         }
         Duration::ZERO
     }
-}
-
-/// The link where it was located, as in `98->97`, or what else was wrong.
-fn in_words(fault: &Fault) -> String {
-    fault.to_string()
 }
 
 fn reading(bench: &Bench, axis: Axis, words: &[u16]) -> Option<DriveReading> {
