@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 (cd fuzz && cargo fuzz build --release --debug-assertions)
 built=fuzz/target/x86_64-unknown-linux-gnu/release
-for target in bus_end codec detector links ring drive master guard scenario rig; do
+for target in bus_end codec detector links ring drive master guard scenario rig capture record; do
     cp "$built/$target" "$OUT/"
     seeds=$(mktemp -d)
     for file in corpora/fuzz/"$target"/*; do

@@ -2,6 +2,7 @@
 
 use super::args::{RunArguments, Selection};
 use super::exit::Exit;
+use super::junit::Cases;
 use super::output::Output;
 use super::rig_failure::find_rig;
 use super::run_rig::{Job, work};
@@ -82,6 +83,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             evidence: arguments.evidence.clone(),
             records: arguments.records,
             require_all: arguments.require_all,
+            junit: arguments.junit.clone(),
             qualify: false,
         };
         return work(rig, &entries, &job, output);
@@ -89,6 +91,8 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     let bar = progress_bar(entries.len(), output.progress);
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
+    let name = rig.as_ref().map_or("sim", |rig| rig.id());
+    let mut cases = Cases::new(name, arguments.junit.as_deref());
     for entry in &entries {
         bar.set_message(entry.short_name().to_owned());
         let played = match rig.as_ref().and_then(|rig| too_large(entry, rig)) {
@@ -101,6 +105,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         let outcome = &played.outcome;
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
+        cases.note(entry, outcome);
         let mut line = line(entry, outcome, output);
         if arguments.records || entries.len() == 1 {
             line.push_str(&records(outcome));
@@ -112,7 +117,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     }
     bar.finish_and_clear();
     output.result(&summary(&verdicts, took))?;
-    Ok(Exit::of(&verdicts, arguments.require_all))
+    Ok(cases.write(Exit::of(&verdicts, arguments.require_all), output))
 }
 
 /// A scenario that was played, with what it left.
@@ -155,14 +160,20 @@ fn records(outcome: &Outcome) -> String {
     lines.lines().map(|line| format!("  {line}\n")).collect()
 }
 
-pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
+/// How many drives the rings of a scenario have: `3+1`.
+pub(super) fn drives(entry: &Entry) -> String {
     let rings = entry.plan.iter().flat_map(|plan| &plan.rings);
     let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
+    drives.join("+")
+}
+
+pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
+    let drives = drives(entry);
     format!(
         "{} {:44} {:>5} drives {:>12}  {}\n",
         output.verdict(outcome.verdict).trim_end_matches(' '),
         entry.short_name(),
-        drives.join("+"),
+        drives,
         outcome.took.to_string(),
         entry.scenario.title
     )

@@ -24,7 +24,7 @@ pub(super) const RECORD: &str = "run.jsonl";
 /// The file of the rig.
 pub(super) const RIG: &str = "rig.toml";
 /// The profile that the rig's file names.
-const KNOWN_PROFILE: &str = "known-profile.toml";
+pub(super) const KNOWN_PROFILE: &str = "known-profile.toml";
 /// The folder of scenarios.
 pub(super) const SCENARIOS: &str = "scenarios";
 /// The folder of captures.
@@ -44,12 +44,9 @@ pub enum EvidenceError {
         /// Why not.
         error: io::Error,
     },
-    /// The rig's file cannot be written as TOML.
-    #[error("failed to write the rig's file: {0}")]
-    Rig(#[from] toml::ser::Error),
     /// The record is damaged.
     #[error("{RECORD}: {0}")]
-    Record(#[from] super::record::RecordError),
+    Record(#[from] super::read::RecordError),
     /// It is no folder of a run.
     #[error("{0} is no folder of evidence: {1}")]
     Foreign(String, String),
@@ -79,6 +76,8 @@ pub struct Folder {
     cases: Vec<Case>,
     rig: String,
     report: String,
+    /// The files of the scenario that is played, for its case.
+    files: Vec<String>,
 }
 
 impl Folder {
@@ -98,10 +97,6 @@ impl Folder {
             fs::create_dir_all(path.join(folder)).map_err(failed)?;
         }
         let file = fs::File::create(path.join(RECORD)).map_err(failed)?;
-        let mut rig = about.rig.file.clone();
-        // The profile goes into the folder too, so that it stands for itself.
-        rig.rig.profile = about.rig.profile.as_ref().map(|_| KNOWN_PROFILE.to_owned());
-        let rig = toml::to_string(&rig)?;
         let started = state::utc(SystemTime::now());
         let mut folder = Self {
             path: path.to_owned(),
@@ -110,8 +105,10 @@ impl Folder {
             cases: Vec::new(),
             rig: about.rig.id().to_owned(),
             report: String::new(),
+            files: Vec::new(),
         };
-        folder.write(RIG, &rig)?;
+        folder.write(RIG, &about.rig.text)?;
+        // The profile that it names goes into the folder too, so that it stands for itself.
         if let Some(profile) = &about.rig.profile {
             folder.write(KNOWN_PROFILE, &profile.text)?;
         }
@@ -122,7 +119,7 @@ impl Folder {
             schema: SCHEMA,
             drivebench: env!("CARGO_PKG_VERSION").to_owned(),
             rig: about.rig.id().to_owned(),
-            rig_sha256: sum(rig.as_bytes()),
+            rig_sha256: sum(about.rig.text.as_bytes()),
             started,
             rate: about.rate.bits_per_second(),
             rings,
@@ -143,6 +140,7 @@ impl Folder {
 
     /// Keeps the attempts at a scenario of this name and text.
     pub fn keep<'f>(&'f mut self, name: &str, text: &'f str) -> Kept<'f> {
+        self.files.clear();
         Kept {
             name: self.unique(name),
             text,
@@ -165,6 +163,7 @@ impl Folder {
             verdict: outcome.verdict,
             message: message.join("; "),
             took: Duration::from_nanos(outcome.took.as_nanos()),
+            attachments: std::mem::take(&mut self.files),
         });
     }
 
@@ -196,6 +195,11 @@ impl Folder {
         Ok(self.path)
     }
 
+    /// A file was written for the scenario that is played.
+    fn left(&mut self, file: &str) {
+        self.files.push(self.path.join(file).display().to_string());
+    }
+
     fn unique(&mut self, name: &str) -> String {
         let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
         let bare = name.strip_suffix(".scn").unwrap_or(name);
@@ -204,7 +208,10 @@ impl Folder {
             .map(|c| if safe(c) { c } else { '_' })
             .take(120)
             .collect();
-        let own = own.trim_matches(['_', '.']).to_owned();
+        let own = match own.trim_matches(['_', '.']) {
+            "" => "scenario".to_owned(),
+            own => own.to_owned(),
+        };
         let mut unique = own.clone();
         let mut number = 1;
         while !self.names.insert(unique.clone()) {
@@ -275,6 +282,7 @@ impl Keeper for Kept<'_> {
         if attempt == 1 {
             let file = format!("{SCENARIOS}/{}.scn", self.name);
             let written = self.folder.write(&file, self.text);
+            self.folder.left(&file);
             self.note(written);
         }
         self.folder.writer.line(&Line::Scenario {
@@ -301,6 +309,7 @@ impl Keeper for Kept<'_> {
                 error,
             })
             .and_then(|()| self.folder.write(&file, &String::from_utf8_lossy(&capture)));
+        self.folder.left(&file);
         self.note(written);
     }
 }

@@ -24,6 +24,18 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// All, in order of gravity.
+    pub const ALL: [Self; 8] = [
+        Self::Skipped,
+        Self::Passed,
+        Self::Marginal,
+        Self::Flaky,
+        Self::Inconclusive,
+        Self::Failed,
+        Self::Aborted,
+        Self::RigError,
+    ];
+
     /// All but passed and failed, in order of gravity.
     pub const REST: [Self; 6] = [
         Self::Skipped,
