@@ -5,6 +5,8 @@ use super::tty::{Seen, Tty};
 use harness::port::Endpoint;
 use harness::top::{Heading, Screen, Top};
 use rustix::process::{Pid, Signal, kill_process};
+use std::io::Write;
+use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -165,6 +167,29 @@ fn a_rig_with_a_port_is_only_looked_at() {
     let seen = tty.is_as_before();
     // Quit as asked, drives stay as they are: nobody speaks of a safe state.
     assert!(!seen.first.contains("blocked"), "{}", seen.first);
+}
+
+/// ND21 9.7: a byte is damaged while the view is on; it names the link, and the ring comes back.
+#[test]
+fn a_damaged_link_is_named() {
+    let free = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr());
+    let control = free.expect("a port").to_string();
+    let served = Served::start("nd21", &[3], "pty", true, &["--control", &control]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut tty = top_of(&served, folder.path());
+    tty.see("a sound ring", |seen| {
+        shows(seen, 3) && seen.has("disturbed 0") && !seen.has(" 0 telegrams/s")
+    });
+    let mut control = TcpStream::connect(&control).expect("its control");
+    control.write_all(b"! 2->1: flip 1\n").expect("sent");
+    tty.see("the link", |seen| {
+        seen.has("the link from drive 2 to drive 1 is damaged (ND21 9.7) at 00:")
+            && seen.has("disturbed 1, corrected 1")
+            && seen.has("0502 SCIparity")
+    });
+    tty.keys("q");
+    assert_eq!(tty.ended().code(), Some(0));
+    tty.is_as_before();
 }
 
 #[test]
