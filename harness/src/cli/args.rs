@@ -149,7 +149,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub allow_motion: bool,
     /// How long to wait for a rig that somebody else has, such as 30s.
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
     /// Keep the evidence of a run on a rig in this folder, which is not there or is empty; `verify` judges it again.
     #[arg(long, value_name = "FOLDER", requires = "rig")]
@@ -178,7 +178,7 @@ pub struct QualifyArguments {
     #[arg(long)]
     pub allow_motion: bool,
     /// How long to wait for a rig that somebody else has, such as 30s.
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
     /// Where the evidence goes: a folder that is not there or is empty; evidence-RIG-DATE where nothing is said.
     #[arg(long, value_name = "FOLDER")]

@@ -29,6 +29,17 @@ pub struct Exactness {
     pub line_errors: bool,
     /// Whether the twin knows what every cell holds: a rig whose drives are simulated too.
     pub knows_cells: bool,
+    /// Cells of a drive that are compared although it writes them itself.
+    pub looks: Option<(u8, &'static [Look])>,
+}
+
+/// Bits of a cell that a question is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// The address of the byte.
+    pub address: u16,
+    /// The bits.
+    pub mask: u8,
 }
 
 /// How two bytes differ.
@@ -132,8 +143,8 @@ pub struct Comparison {
     pub divergence: Option<Divergence>,
     /// The first byte at another time.
     pub untimely: Option<Divergence>,
-    /// The largest difference of times.
-    pub latest: Span,
+    /// All differences of times together.
+    pub apart: Span,
 }
 
 /// What is compared, ring by ring.
@@ -189,7 +200,8 @@ impl Comparer<'_> {
                     let found_good = found.error.is_none() || !self.exactness.line_errors;
                     let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
                     let same = wanted.byte == found.byte
-                        || index < known && self.may_differ(ring, &roles, received, index);
+                        || index < known
+                            && self.may_differ(ring, &roles, (wanted.byte, received), index);
                     self.note_write(ring, role);
                     match (same, wanted_good == found_good) {
                         (true, true) => {
@@ -238,15 +250,23 @@ impl Comparer<'_> {
         &mut self,
         ring: usize,
         roles: &[Role],
-        received: &[(Instant, Received)],
+        (wanted, received): (u8, &[(Instant, Received)]),
         index: usize,
     ) -> bool {
         let value = received[index].1.byte;
+        let looks_at = |drive, address| {
+            let (asked, looks) = self.exactness.looks?;
+            let mut own = looks.iter().filter(|_| asked == drive);
+            own.find(|look| look.address == address)
+        };
         match roles[index] {
             Role::Data {
                 drive: Some(drive),
                 address,
             } => {
+                if let Some(look) = looks_at(drive, address) {
+                    return (value ^ wanted) & look.mask == 0;
+                }
                 if measured(address) || !self.exactness.knows_cells && moves(address) {
                     self.comparison.measured += 1;
                     return true;
@@ -315,7 +335,7 @@ impl Comparer<'_> {
             .0
             .since(received.0)
             .max(received.0.since(expected.0));
-        self.comparison.latest = self.comparison.latest.max(apart);
+        self.comparison.apart = self.comparison.apart + apart;
         if apart > self.exactness.tolerance && self.comparison.untimely.is_none() {
             self.comparison.untimely = Some(Divergence {
                 ring,
