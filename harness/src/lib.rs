@@ -23,4 +23,5 @@ pub mod report;
 pub mod rig;
 pub mod scenario;
 pub mod serve;
+pub mod top;
 pub mod twin;

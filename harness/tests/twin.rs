@@ -88,7 +88,7 @@ fn a_record_is_played_again() {
         );
         let message = |outcome: &Outcome| outcome.finding.as_ref().map(|f| f.message.clone());
         assert_eq!(message(&again), message(&outcome), "{name}");
-        assert!(replay.is_at_end(), "{name}");
+        assert_eq!(replay.left(), None, "{name}");
         played += usize::from(outcome.verdict != Verdict::Skipped);
     }
     assert!(played >= 30, "{played}");

@@ -26,6 +26,15 @@ fn page(address: u16) -> Result<u8, Error> {
     )))
 }
 
+/// How much of a cell is read at one instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// A byte.
+    Byte,
+    /// A word: two bytes from an even address on.
+    Word,
+}
+
 impl Bus<'_> {
     /// Reads a byte of RAM, ROM or the register field (12.3).
     ///
@@ -61,6 +70,25 @@ impl Bus<'_> {
     pub fn read_bytes(&self, axis: Axis, address: u16, count: u16) -> Result<Vec<u8>, Error> {
         let addresses = (0..count).map_while(|offset| address.checked_add(offset));
         let reads = addresses.map(|address| (axis, Command::ReadByte { address }));
+        self.run_commands(reads)?.into_iter().map(narrow).collect()
+    }
+
+    /// Reads bytes and words of many drives without waiting for an answer before the next is asked for: an address, and 1 or 2
+    /// bytes from it on, the high byte first (12.3). What was read, in their order.
+    ///
+    /// # Errors
+    /// See [`Error`]; the first one where several reads fail.
+    pub fn read_many(
+        &self,
+        cells: impl IntoIterator<Item = (Axis, u16, Width)>,
+    ) -> Result<Vec<u16>, Error> {
+        let reads = cells.into_iter().map(|(axis, address, width)| {
+            let command = match width {
+                Width::Byte => Command::ReadByte { address },
+                Width::Word => Command::ReadWord { address },
+            };
+            (axis, command)
+        });
         self.run_commands(reads)?.into_iter().map(narrow).collect()
     }
 

@@ -18,6 +18,7 @@ mod pump;
 mod s_ramp;
 mod scope;
 
+pub use access::Width;
 pub use axis::Axis;
 pub(crate) use discovery::count_behind;
 pub use discovery::{Identity, Recovery, State, count_drives, recover};
@@ -138,6 +139,12 @@ impl<'l> Bus<'l> {
         pump.phases()
             .filter(|phase| *phase != Phase::Stopped)
             .count()
+    }
+
+    /// Why nothing goes on any more, if so: a ring has been stopped (11.5), or the link carries nothing. Time may stand still then.
+    #[must_use]
+    pub fn halted(&self) -> Option<Error> {
+        self.lock().halt()
     }
 
     /// How many errors were corrected since the bus was opened (11.5).

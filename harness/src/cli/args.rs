@@ -83,6 +83,11 @@ pub enum Command {
     },
     /// Make the reports of a run's folder again, from its record and captures: the same bytes as the run wrote.
     Report(ReportArguments),
+    /// Print a JSON schema (draft 2020-12).
+    Schema {
+        /// Of what.
+        of: SchemaName,
+    },
     /// Look for what nobody has thought of: conversations from a seed, on simulated rings or on a rig.
     Fuzz {
         /// What to do.
@@ -151,6 +156,9 @@ pub struct RunArguments {
     /// Keep the evidence of a run on a rig in this folder, which is not there or is empty; `verify` judges it again.
     #[arg(long, value_name = "FOLDER", requires = "rig")]
     pub evidence: Option<PathBuf>,
+    /// Write the verdicts into this file too, as JUnit's XML.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
     /// Show what scenarios recorded, also where several are played.
     #[arg(long)]
     pub records: bool,
@@ -341,6 +349,15 @@ pub struct DeviationsArguments {
     /// In which form.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     pub format: Format,
+}
+
+/// What has a schema.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SchemaName {
+    /// A line of the record of a run, `run.jsonl` in a folder of evidence.
+    Record,
+    /// A bench's file, as `rig schema`.
+    Rig,
 }
 
 /// The forms of a table.

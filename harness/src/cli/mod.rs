@@ -9,6 +9,7 @@ mod drive;
 mod exit;
 mod fuzz;
 mod import;
+mod junit;
 mod list;
 mod man;
 mod manual;
@@ -22,6 +23,7 @@ mod rig_check;
 mod rig_failure;
 mod run;
 mod run_rig;
+mod schema;
 mod shrink;
 mod trace;
 mod verify;
@@ -77,6 +79,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify { folder } => verify::verify(&folder, output),
         Command::Report(arguments) => report::report(&arguments, output),
+        Command::Schema { of } => schema::schema(of, output),
         Command::Fuzz { command } => fuzz::fuzz(&command, output),
         Command::Shrink(arguments) => shrink::shrink(&arguments, output),
         Command::Promote(arguments) => promote::promote(&arguments, output),

@@ -38,6 +38,11 @@ impl Output {
         }
     }
 
+    /// Whether what goes to standard output may have colours.
+    pub(super) const fn colours(&self) -> bool {
+        self.colour_out
+    }
+
     /// Writes a result.
     pub(super) fn result(&mut self, text: &str) -> std::io::Result<()> {
         let mut out = std::io::stdout().lock();

@@ -88,6 +88,7 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         evidence: Some(evidence),
         records: false,
         require_all: arguments.require_all,
+        junit: None,
         qualify: true,
     };
     work(&rig, &entries, &job, page, output)

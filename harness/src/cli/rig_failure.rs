@@ -7,6 +7,7 @@ use crate::link::{Line, Trouble};
 use crate::rig::find::folder;
 use crate::rig::lock::LockError;
 use crate::rig::{Alarm, End, FindError, Rig, Session, SessionError, find};
+use crate::top::screen;
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -43,6 +44,7 @@ pub(super) fn alarm() -> Alarm {
         let why = format!("error: {why}\n");
         // Standard error may be what hangs.
         let said = std::thread::spawn(move || {
+            screen::leave();
             let _nobody_reads = std::io::stderr().write_all(why.as_bytes());
         });
         let end = Instant::now() + Duration::from_secs(1);

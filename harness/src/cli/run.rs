@@ -2,6 +2,7 @@
 
 use super::args::{RunArguments, Selection};
 use super::exit::Exit;
+use super::junit::Cases;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_rig;
@@ -87,6 +88,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             evidence: arguments.evidence.clone(),
             records: arguments.records,
             require_all: arguments.require_all,
+            junit: arguments.junit.clone(),
             qualify: false,
         };
         return work(rig, &entries, &job, page, output);
@@ -105,6 +107,8 @@ fn on_simulated(
     let bar = progress_bar(entries.len(), output.progress);
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
+    let name = rig.map_or("sim", |rig| rig.id());
+    let mut cases = Cases::new(name, arguments.junit.as_deref());
     for entry in entries {
         bar.set_message(entry.short_name().to_owned());
         let played = match rig.and_then(|rig| too_large(entry, rig)) {
@@ -117,6 +121,7 @@ fn on_simulated(
         let outcome = &played.outcome;
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
+        cases.note(entry, outcome);
         let mut line = line(entry, outcome, output);
         if arguments.records || entries.len() == 1 {
             line.push_str(&records(outcome));
@@ -138,7 +143,7 @@ fn on_simulated(
     if page.is_some_and(|page| !page.write(&head, output)) {
         return Ok(Exit::RigError);
     }
-    Ok(Exit::of(&verdicts, arguments.require_all))
+    Ok(cases.write(Exit::of(&verdicts, arguments.require_all), output))
 }
 
 /// A scenario that was played, with what it left.
@@ -181,14 +186,20 @@ fn records(outcome: &Outcome) -> String {
     lines.lines().map(|line| format!("  {line}\n")).collect()
 }
 
-pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
+/// How many drives the rings of a scenario have: `3+1`.
+pub(super) fn drives(entry: &Entry) -> String {
     let rings = entry.plan.iter().flat_map(|plan| &plan.rings);
     let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
+    drives.join("+")
+}
+
+pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
+    let drives = drives(entry);
     format!(
         "{} {:44} {:>5} drives {:>12}  {}\n",
         output.verdict(outcome.verdict).trim_end_matches(' '),
         entry.short_name(),
-        drives.join("+"),
+        drives,
         outcome.took.to_string(),
         entry.scenario.title
     )

@@ -1,11 +1,12 @@
 //! Work on a rig in use: `run --rig` on a rig with ports, and `qualify`.
 
 use super::exit::Exit;
+use super::junit::Cases;
 use super::output::Output;
 use super::page::{Page, write};
 use super::qualify::{Findings, settle};
 use super::rig_failure::{alarm, exit_of, give_back, interrupt_flag};
-use super::run::{details, line, progress_bar, summary};
+use super::run::{details, drives, line, progress_bar, summary};
 use crate::evidence::{About, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
 use crate::link::{Line, Trouble};
@@ -27,6 +28,8 @@ pub(super) struct Job {
     pub(super) evidence: Option<PathBuf>,
     pub(super) records: bool,
     pub(super) require_all: bool,
+    /// Where the verdicts go as JUnit's XML, beside the evidence.
+    pub(super) junit: Option<PathBuf>,
     /// Also settle what the manual leaves open, and name the deviations.
     pub(super) qualify: bool,
 }
@@ -79,15 +82,23 @@ pub(super) fn work(
             return Ok(exit_of(&error));
         }
     };
-    let (exit, folder) = match all(&mut session, entries, job, page.as_mut(), output) {
-        Ok(done) => done,
+    let mut folder = None;
+    let exit = match all(
+        &mut session,
+        entries,
+        job,
+        (&mut folder, page.as_mut()),
+        output,
+    ) {
+        Ok(exit) => exit,
         Err(Stop::Session(error)) => {
             output.complain(&error.to_string());
-            (exit_of(&error), None)
+            exit_of(&error)
         }
         Err(Stop::Evidence(error)) => {
             output.complain(&error.to_string());
-            (Exit::Usage, None)
+            folder = None;
+            Exit::Usage
         }
         Err(Stop::Output(error)) => {
             let _end = session.close();
@@ -141,30 +152,39 @@ fn all(
     session: &mut Session,
     entries: &[Entry],
     job: &Job,
-    mut page: Option<&mut Page>,
+    (folder, mut page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
-) -> Result<(Exit, Option<Folder>), Stop> {
+) -> Result<Exit, Stop> {
     let mut run = match Run::new(session) {
         Ok(run) => run,
         Err(problems) => {
             output.mistakes(&problems);
-            return Ok((Exit::Usage, None));
+            return Ok(Exit::Usage);
         }
     };
-    let mut folder = match &job.evidence {
-        None => None,
-        Some(path) => Some(Folder::create(path, &about(&mut run))?),
-    };
+    if let Some(path) = &job.evidence {
+        *folder = Some(Folder::create(path, &about(&mut run))?);
+    }
     let bar = progress_bar(entries.len(), output.progress);
     let mut findings = Findings::default();
+    let name = run.session().rig().id().to_owned();
+    let mut cases = Cases::new(&name, job.junit.as_deref());
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
     for entry in entries {
         bar.set_message(entry.short_name().to_owned());
-        let played = play(&mut run, entry, folder.as_mut())?;
+        let played = match play(&mut run, entry, folder.as_mut()) {
+            Err(Stop::Session(error)) => {
+                cases.note(entry, &Outcome::rig_error(error.to_string()));
+                cases.write(Exit::RigError, output);
+                return Err(Stop::Session(error));
+            }
+            played => played?,
+        };
         let outcome = &played.outcome;
         took = took + outcome.took;
         verdicts.push(outcome.verdict);
+        cases.note(entry, outcome);
         let mut text = line(entry, outcome, output);
         if job.records || entries.len() == 1 {
             text.extend(outcome.records.iter().map(plot));
@@ -184,7 +204,7 @@ fn all(
     }
     bar.finish_and_clear();
     output.result(&summary(&verdicts, took))?;
-    let mut exit = Exit::of(&verdicts, job.require_all);
+    let mut exit = cases.write(Exit::of(&verdicts, job.require_all), output);
     if job.qualify && !over(&mut run, output) {
         let ill = exit == Exit::RigError;
         match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
@@ -196,7 +216,7 @@ fn all(
     for gap in measured(&mut run) {
         output.say(&gap);
     }
-    Ok((exit, folder))
+    Ok(exit)
 }
 
 /// Plays a scenario, into the folder where there is one.
@@ -215,20 +235,18 @@ pub(super) fn play(
         return Ok(run.play(plan, None)?);
     };
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
-    let played = run.play(plan, Some(&mut kept))?;
+    let played = run.play(plan, Some(&mut kept));
     let name = kept.finish()?;
-    let drives: Vec<_> = plan
-        .rings
-        .iter()
-        .map(|ring| ring.drives().to_string())
-        .collect();
-    folder.done(
-        &name,
-        &drives.join("+"),
-        &entry.scenario.title,
-        &played.outcome,
-    );
-    Ok(played)
+    let lost;
+    let outcome = match &played {
+        Ok(played) => &played.outcome,
+        Err(error) => {
+            lost = Outcome::rig_error(error.to_string());
+            &lost
+        }
+    };
+    folder.done(&name, &drives(entry), &entry.scenario.title, outcome);
+    Ok(played?)
 }
 
 /// Whether nothing more can or may be played.

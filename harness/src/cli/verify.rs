@@ -28,6 +28,11 @@ pub(super) fn verify(folder: &Path, output: &mut Output) -> std::io::Result<Exit
             }
         };
         output.result(&text)?;
+        for fault in &attempt.unused {
+            output.result(&format!(
+                "             this fault never happened: {fault}\n"
+            ))?;
+        }
     }
     let count = verified.attempts.len();
     output.result(&format!(

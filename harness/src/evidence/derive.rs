@@ -4,10 +4,10 @@
 //! record: as `verify` does, each attempt is played again from what was received, and where that says the same as the record
 //! the bytes that differ are shown.
 
-use super::folder::{CAPTURES, EvidenceError};
+use super::folder::{CAPTURES, EvidenceError, SCENARIOS};
 use super::junit::{Case, junit};
 use super::record::Line;
-use super::verify::{Opened, Verified, is_name};
+use super::verify::{Opened, is_name, scenarios};
 use crate::capture::{CaptureError, read_file};
 use crate::library::Entry;
 use crate::report::html::{Head, Played, Shown, run, section};
@@ -36,10 +36,10 @@ pub struct Derived {
 /// # Errors
 /// It is no folder of evidence, or its record or a capture is damaged; with the place.
 pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
-    let opened = Opened::open(path, &mut Verified::default())?;
+    let opened = Opened::folder(path)?;
     let mut attempts: BTreeMap<String, Attempt> = BTreeMap::new();
-    opened.judged(|recorded, judged| {
-        let (text, outcome) = judged.map_or((String::new(), None), |(t, o)| (t, Some(o)));
+    opened.judged(&scenarios(path), |recorded, judged| {
+        let (text, outcome) = judged.map_or((String::new(), None), |(t, a)| (t, Some(a.outcome)));
         // The last attempt is shown.
         let attempt = Attempt {
             number: recorded.attempt,
@@ -48,20 +48,8 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
         };
         attempts.insert(recorded.name, attempt);
     })?;
-    let mut settled = Vec::new();
-    for (number, line) in opened.lines.iter().enumerate() {
-        match (line, Settled::of(line)) {
-            (_, Some(case)) => settled.push(case),
-            (Line::Case { verdict, .. }, None) => {
-                let why = format!(
-                    "line {} of its record: there is no verdict `{verdict}`",
-                    number + 1
-                );
-                return Err(EvidenceError::Foreign(path.display().to_string(), why));
-            }
-            _ => {}
-        }
-    }
+    let settled = opened.lines.iter().filter_map(Settled::of);
+    let mut settled: Vec<_> = settled.collect();
     for (name, attempt) in &attempts {
         // A run that was killed has not settled its last scenario.
         if settled.iter().all(|case| case.name != *name) {
@@ -81,7 +69,7 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
     }
     Ok(Derived {
         html: run(&head(&opened), shown),
-        junit: xml(opened.rig.id(), &settled),
+        junit: xml(path, opened.rig.id(), &settled),
     })
 }
 
@@ -106,7 +94,7 @@ pub(super) struct Settled {
 }
 
 impl Settled {
-    /// Reads its line; `None` for all others, and where it names a verdict that there is not.
+    /// Reads its line; `None` for all others.
     pub(super) fn of(line: &Line) -> Option<Self> {
         let Line::Case {
             name,
@@ -154,8 +142,8 @@ impl Settled {
     }
 }
 
-/// The verdicts as JUnit.
-pub(super) fn xml(rig: &str, settled: &[Settled]) -> String {
+/// The verdicts as JUnit, each with the files that it left in a folder.
+pub(super) fn xml(path: &Path, rig: &str, settled: &[Settled]) -> String {
     let cases: Vec<_> = settled
         .iter()
         .map(|case| {
@@ -165,10 +153,26 @@ pub(super) fn xml(rig: &str, settled: &[Settled]) -> String {
                 verdict: case.verdict,
                 message: messages.join("; "),
                 took: Duration::from_nanos(case.took.as_nanos()),
+                attachments: attachments(path, &case.name),
             }
         })
         .collect();
     junit(&format!("rig {rig}"), &cases)
+}
+
+/// The text of a scenario and the captures of its attempts.
+fn attachments(path: &Path, name: &str) -> Vec<String> {
+    if !is_name(name) {
+        return Vec::new();
+    }
+    let captures = (1..).map(|attempt: usize| format!("{CAPTURES}/{name}.{attempt}.json"));
+    let captures = captures.take_while(|file| path.join(file).is_file());
+    let text = format!("{SCENARIOS}/{name}.scn");
+    std::iter::once(text)
+        .filter(|file| path.join(file).is_file())
+        .chain(captures)
+        .map(|file| path.join(file).display().to_string())
+        .collect()
 }
 
 fn entry(name: &str, attempt: &Attempt) -> Option<Entry> {
@@ -251,7 +255,7 @@ fn show(
     )
 }
 
-fn head(opened: &Opened<'_>) -> Head<'static> {
+fn head(opened: &Opened) -> Head<'static> {
     let mut facts = vec![("Rig", opened.rig.id().to_owned())];
     if let Some(Line::Run {
         drivebench,

@@ -23,7 +23,7 @@ pub(super) const RECORD: &str = "run.jsonl";
 /// The file of the rig.
 pub const RIG: &str = "rig.toml";
 /// The profile that the rig's file names.
-const KNOWN_PROFILE: &str = "known-profile.toml";
+pub(super) const KNOWN_PROFILE: &str = "known-profile.toml";
 /// The file of verdicts for programs.
 const JUNIT: &str = "junit.xml";
 /// The file of the page for people.
@@ -47,12 +47,9 @@ pub enum EvidenceError {
         /// Why not.
         error: io::Error,
     },
-    /// The rig's file cannot be written as TOML.
-    #[error("failed to write the rig's file: {0}")]
-    Rig(#[from] toml::ser::Error),
     /// The record is damaged.
     #[error("{RECORD}: {0}")]
-    Record(#[from] super::record::RecordError),
+    Record(#[from] super::read::RecordError),
     /// It is no folder of a run.
     #[error("{0} is no folder of evidence: {1}")]
     Foreign(String, String),
@@ -101,10 +98,6 @@ impl Folder {
             fs::create_dir_all(path.join(folder)).map_err(failed)?;
         }
         let file = fs::File::create(path.join(RECORD)).map_err(failed)?;
-        let mut rig = about.rig.file.clone();
-        // The profile goes into the folder too, so that it stands for itself.
-        rig.rig.profile = about.rig.profile.as_ref().map(|_| KNOWN_PROFILE.to_owned());
-        let rig = toml::to_string(&rig)?;
         let started = state::utc(SystemTime::now());
         let mut folder = Self {
             path: path.to_owned(),
@@ -114,7 +107,8 @@ impl Folder {
             rig: about.rig.id().to_owned(),
             report: String::new(),
         };
-        folder.write(RIG, &rig)?;
+        folder.write(RIG, &about.rig.text)?;
+        // The profile that it names goes into the folder too, so that it stands for itself.
         if let Some(profile) = &about.rig.profile {
             folder.write(KNOWN_PROFILE, &profile.text)?;
         }
@@ -125,7 +119,7 @@ impl Folder {
             schema: SCHEMA,
             drivebench: env!("CARGO_PKG_VERSION").to_owned(),
             rig: about.rig.id().to_owned(),
-            rig_sha256: sum(rig.as_bytes()),
+            rig_sha256: sum(about.rig.text.as_bytes()),
             started,
             rate: about.rate.bits_per_second(),
             rings,
@@ -192,7 +186,7 @@ impl Folder {
         let verdicts = verdicts.collect();
         self.writer.line(&Line::End { verdicts, safe });
         self.check()?;
-        self.write(JUNIT, &xml(&self.rig, &self.cases))?;
+        self.write(JUNIT, &xml(&self.path, &self.rig, &self.cases))?;
         let report = format!("rig {}\n\n{}", self.rig, self.report);
         self.write("report.txt", &report)?;
         // A page that cannot be made is no reason to leave a folder without its sums.
@@ -210,7 +204,10 @@ impl Folder {
             .map(|c| if safe(c) { c } else { '_' })
             .take(120)
             .collect();
-        let own = own.trim_matches(['_', '.']).to_owned();
+        let own = match own.trim_matches(['_', '.']) {
+            "" => "scenario".to_owned(),
+            own => own.to_owned(),
+        };
         let mut unique = own.clone();
         let mut number = 1;
         while !self.names.insert(unique.clone()) {

@@ -1,7 +1,11 @@
-//! Verdicts for continuous integration: JUnit's XML as Jenkins reads it (junit-10.xsd).
+//! Verdicts for continuous integration: JUnit's XML as Jenkins and GitLab read it.
+//!
+//! A flaky scenario passed, and what came of the attempts before is a `flakyFailure`. What a scenario left is named in its output, as
+//! `[[ATTACHMENT|path]]`.
 
 use crate::scenario::verdict::Verdict;
-use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestRerun, TestSuite};
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// A scenario as a test case.
@@ -15,46 +19,110 @@ pub struct Case {
     pub message: String,
     /// How long it took on the line.
     pub took: Duration,
+    /// The files that it left.
+    pub attachments: Vec<String>,
 }
 
 /// The test cases as XML.
 #[must_use]
 pub fn junit(suite: &str, cases: &[Case]) -> String {
     let mut report = Report::new("drivebench");
-    let mut own = TestSuite::new(suite);
+    let mut own = TestSuite::new(named(suite, "run"));
+    let mut took = Duration::ZERO;
+    let mut names = BTreeSet::new();
     for case in cases {
-        let status = match case.verdict {
-            Verdict::Passed | Verdict::Marginal | Verdict::Flaky => TestCaseStatus::success(),
-            Verdict::Skipped | Verdict::Inconclusive => TestCaseStatus::skipped(),
-            Verdict::Failed => TestCaseStatus::non_success(NonSuccessKind::Failure),
-            Verdict::Aborted | Verdict::RigError => {
-                TestCaseStatus::non_success(NonSuccessKind::Error)
-            }
-        };
-        let mut status = status;
-        if !matches!(case.verdict, Verdict::Passed) {
-            status.set_message(printable(&case.message));
+        let time = in_millis(case.took);
+        let mut test = TestCase::new(unique(&case.name, &mut names), status(case));
+        test.set_classname("drivebench").set_time(time);
+        let output = output(case);
+        if !output.is_empty() {
+            test.set_system_out(output);
         }
-        if !matches!(
-            case.verdict,
-            Verdict::Passed | Verdict::Marginal | Verdict::Flaky
-        ) {
-            status.set_type(case.verdict.name());
-        }
-        let mut test = TestCase::new(printable(&case.name), status);
-        test.set_classname("drivebench");
-        // Three decimals are the most that Jenkins takes.
-        let millis = u64::try_from(case.took.as_millis()).unwrap_or(u64::MAX);
-        test.set_time(Duration::from_millis(millis));
+        took += time;
         own.add_test_case(test);
     }
-    report.add_test_suite(own);
-    report.to_string().unwrap_or_default()
+    own.set_time(took);
+    report.set_time(took).add_test_suite(own);
+    let xml = report.to_string().unwrap_or_default();
+    without_skipped(xml)
 }
 
-/// What XML can hold.
+/// Jenkins knows no count of skipped cases for the whole report; each suite has its own.
+fn without_skipped(mut xml: String) -> String {
+    let end = xml
+        .find("<testsuites")
+        .and_then(|at| Some(at + xml[at..].find('>')?));
+    let head = end.map_or("", |end| &xml[..end]);
+    if let Some(at) = head.find(" skipped=\"") {
+        let value = at + " skipped=\"".len();
+        if let Some(length) = head[value..].find('"') {
+            xml.replace_range(at..=value + length, "");
+        }
+    }
+    xml
+}
+
+/// A name that no case has had yet: GitLab drops what has the same name.
+fn unique(name: &str, names: &mut BTreeSet<String>) -> String {
+    let own = named(name, "scenario");
+    let later = (2..).map(|number: usize| format!("{own}_{number}"));
+    let mut free = std::iter::once(own.clone()).chain(later);
+    let name = free.find(|name| !names.contains(name)).unwrap_or(own);
+    names.insert(name.clone());
+    name
+}
+
+/// Three decimals are the most that Jenkins takes.
+fn in_millis(took: Duration) -> Duration {
+    Duration::from_millis(u64::try_from(took.as_millis()).unwrap_or(u64::MAX))
+}
+
+fn status(case: &Case) -> TestCaseStatus {
+    let message = printable(&case.message);
+    let mut status = match case.verdict {
+        Verdict::Passed | Verdict::Marginal => return TestCaseStatus::success(),
+        Verdict::Flaky => {
+            let mut before = TestRerun::new(NonSuccessKind::Failure);
+            before.set_type(case.verdict.name()).set_message(message);
+            let mut status = TestCaseStatus::success();
+            status.add_rerun(before);
+            return status;
+        }
+        Verdict::Skipped | Verdict::Inconclusive => TestCaseStatus::skipped(),
+        Verdict::Failed => TestCaseStatus::non_success(NonSuccessKind::Failure),
+        Verdict::Aborted | Verdict::RigError => TestCaseStatus::non_success(NonSuccessKind::Error),
+    };
+    status.set_type(case.verdict.name()).set_message(message);
+    status
+}
+
+/// What there is to say about what passed only just, and the files.
+fn output(case: &Case) -> String {
+    let said = match case.verdict {
+        Verdict::Marginal => format!("marginal: {}\n", printable(&case.message)),
+        _ => String::new(),
+    };
+    // A path that would end the mark too early cannot be named by it.
+    let paths = case.attachments.iter().map(|path| printable(path));
+    let paths = paths.filter(|path| !path.trim().is_empty() && !path.contains([']', '\n']));
+    said + &paths
+        .map(|path| format!("[[ATTACHMENT|{path}]]\n"))
+        .collect::<String>()
+}
+
+/// A name, or another one where nothing is left of it.
+fn named(name: &str, otherwise: &str) -> String {
+    match printable(name) {
+        empty if empty.trim().is_empty() => otherwise.to_owned(),
+        own => own,
+    }
+}
+
+/// What XML 1.0 can hold, without control characters that are no white space.
 fn printable(text: &str) -> String {
     text.chars()
-        .filter(|c| matches!(c, '\t' | '\n') || !c.is_control())
+        .filter(|c| {
+            matches!(c, '\t' | '\n') || !c.is_control() && !matches!(c, '\u{FFFE}' | '\u{FFFF}')
+        })
         .collect()
 }

@@ -1,9 +1,11 @@
 //! The lines of a record, and events written as such.
 
 use crate::link::{Capability, Event, LinkFault, Moment, PlacedFault, Sink, Trouble};
+use crate::scenario::verdict::Verdict;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Write;
@@ -13,24 +15,28 @@ pub(super) const SCHEMA: u32 = 1;
 
 /// A line of a record. Times are in thirds of a nanosecond since the conversation began (a bit at 38400 bit/s is
 /// 78125 of them); bytes are hexadecimal; rings are counted from 1.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Line {
     /// The first line.
     Run {
         /// The version of the form: 1.
+        #[schemars(extend("const" = 1))]
         schema: u32,
         /// The program's version.
         drivebench: String,
         /// The rig's id.
         rig: String,
         /// The sum of the rig's file.
+        #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
         rig_sha256: String,
         /// When the run began, in UTC.
         started: String,
         /// Bits a second.
+        #[schemars(extend("enum" = [38_400, 19_200, 9_600]))]
         rate: u32,
         /// How many drives each ring has.
+        #[schemars(length(min = 1, max = 2), inner(range(min = 1, max = 250)))]
         rings: Vec<u8>,
         /// How exactly times were compared.
         tolerance: u64,
@@ -46,8 +52,10 @@ pub enum Line {
         /// Its name.
         name: String,
         /// The sum of its text.
+        #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
         sha256: String,
         /// Which attempt, counted from 1.
+        #[schemars(range(min = 1))]
         attempt: usize,
     },
     /// A conversation begins, at this time of the one before.
@@ -63,27 +71,33 @@ pub enum Line {
     /// Bytes were sent; the last one will have left at this time.
     Sent {
         /// Which ring.
+        #[schemars(range(min = 1, max = 2))]
         ring: usize,
         /// When.
         t: u64,
         /// Which.
+        #[schemars(regex(pattern = "^([0-9A-F]{2})*$"))]
         bytes: String,
     },
     /// A byte was received.
     Received {
         /// Which ring.
+        #[schemars(range(min = 1, max = 2))]
         ring: usize,
         /// When.
         t: u64,
         /// Which.
+        #[schemars(regex(pattern = "^[0-9A-F]{2}$"))]
         byte: String,
         /// What the line status said.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("enum" = ["parity", "framing", "break", "overrun", null]))]
         error: Option<String>,
     },
     /// A fault was asked for on a link.
     Fault {
         /// Which ring.
+        #[schemars(range(min = 1, max = 2))]
         ring: usize,
         /// When.
         t: u64,
@@ -96,22 +110,26 @@ pub enum Line {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         at: Option<u64>,
         /// What: the kind and its number, as `[kind, number]`.
+        #[schemars(with = "FaultWritten")]
         what: (String, u64),
     },
     /// SYNCO were sent so that a ring spells out its address.
     Probe {
         /// Which ring.
+        #[schemars(range(min = 1, max = 2))]
         ring: usize,
         /// When.
         t: u64,
         /// How many.
         count: usize,
         /// What came.
+        #[schemars(with = "Vec<ByteWritten>")]
         bytes: Vec<(String, Option<String>)>,
     },
     /// The link carries nothing more.
     Trouble {
-        /// `denied`, `lost`, `garbled` or `interrupted`.
+        /// `denied`, `lost`, `garbled`, `interlock` or `interrupted`.
+        #[schemars(extend("enum" = ["denied", "lost", "garbled", "interlock", "interrupted"]))]
         cause: String,
         /// In a sentence.
         text: String,
@@ -119,6 +137,7 @@ pub enum Line {
     /// What came of the attempt.
     Verdict {
         /// The verdict.
+        #[schemars(schema_with = "verdict_schema")]
         verdict: String,
         /// What was otherwise, in a sentence.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -140,6 +159,7 @@ pub enum Line {
         /// How many drives its rings have.
         drives: String,
         /// The verdict.
+        #[schemars(schema_with = "verdict_schema")]
         verdict: String,
         /// What was otherwise, in a sentence.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -149,14 +169,48 @@ pub enum Line {
         /// How long it took.
         took: u64,
     },
-    /// The last line: how many scenarios had each verdict.
+    /// The last line: what came of all scenarios.
     End {
         /// The verdicts of all scenarios in order.
+        #[schemars(schema_with = "verdicts_schema")]
         verdicts: Vec<String>,
         /// Whether the safe state was confirmed; none for simulated rings.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         safe: Option<bool>,
     },
+}
+
+/// A fault on a link, as the schema has it.
+#[derive(JsonSchema)]
+#[expect(dead_code, reason = "only its schema is used")]
+struct FaultWritten(
+    #[schemars(extend("enum" = ["flip", "replace", "drop", "duplicate", "insert", "delay", "break", "overrun", "cut", "join"]))]
+     String,
+    u64,
+);
+
+/// A byte with its line status, as the schema has it.
+#[derive(JsonSchema)]
+#[expect(dead_code, reason = "only its schema is used")]
+struct ByteWritten(
+    #[schemars(regex(pattern = "^[0-9A-F]{2}$"))] String,
+    #[schemars(extend("enum" = ["parity", "framing", "break", "overrun", null]))] Option<String>,
+);
+
+fn verdict_schema(_: &mut SchemaGenerator) -> Schema {
+    let names = Verdict::ALL.map(Verdict::name);
+    json_schema!({"type": "string", "enum": names})
+}
+
+fn verdicts_schema(generator: &mut SchemaGenerator) -> Schema {
+    let items = verdict_schema(generator);
+    json_schema!({"type": "array", "items": items})
+}
+
+/// The JSON schema of a line of a record, draft 2020-12.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(Line).to_value()
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -165,7 +219,7 @@ fn hex(bytes: &[u8]) -> String {
 
 fn unhex(text: &str) -> Option<Vec<u8>> {
     let digits = text.as_bytes();
-    if !digits.len().is_multiple_of(2) || !text.is_ascii() {
+    if !digits.len().is_multiple_of(2) || !digits.iter().all(u8::is_ascii_hexdigit) {
         return None;
     }
     let pairs = digits.chunks(2);
@@ -302,6 +356,26 @@ impl Line {
         })
     }
 
+    /// The latest time that it names, that which a fault is to happen at and how long one lasts among them.
+    #[must_use]
+    pub(super) fn time(&self) -> Span {
+        let units = match self {
+            Self::Begin { t }
+            | Self::Sent { t, .. }
+            | Self::Received { t, .. }
+            | Self::Probe { t, .. } => *t,
+            Self::Fault { t, at, what, .. } => (*t).max(at.unwrap_or(0)).max(what.1),
+            Self::Run { .. }
+            | Self::Scenario { .. }
+            | Self::Step { .. }
+            | Self::Trouble { .. }
+            | Self::Verdict { .. }
+            | Self::Case { .. }
+            | Self::End { .. } => 0,
+        };
+        Span::from_units(units)
+    }
+
     /// The event of a line; `None` where it is none, or holds what cannot be.
     #[must_use]
     pub fn event(&self) -> Option<Event> {
@@ -397,52 +471,6 @@ impl Sink for Writer {
         if let Some(line) = Line::of(event) {
             self.line(&line);
         }
-    }
-}
-
-/// Why a text is no record.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordError {
-    /// A line is no line of a record.
-    #[error("line {line}, column {column}: {message}")]
-    Line {
-        /// Which, counted from 1.
-        line: usize,
-        /// Where in it, counted from 1.
-        column: usize,
-        /// What is wrong.
-        message: String,
-    },
-    /// It does not begin as a record does.
-    #[error("line 1: the record of a run expected here, of schema {SCHEMA}")]
-    Start,
-}
-
-/// The lines of a record, and whether the last one is whole; a run that was killed leaves half a line.
-///
-/// # Errors
-/// The first line that is none.
-pub fn read(text: &str) -> Result<(Vec<Line>, bool), RecordError> {
-    let mut lines = Vec::new();
-    let whole = text.is_empty() || text.ends_with('\n');
-    let count = text.lines().count();
-    for (index, line) in text.lines().enumerate() {
-        let parsed = serde_json::from_str::<Line>(line);
-        match parsed {
-            Ok(line) => lines.push(line),
-            Err(_) if !whole && index + 1 == count => return Ok((lines, false)),
-            Err(error) => {
-                return Err(RecordError::Line {
-                    line: index + 1,
-                    column: error.column(),
-                    message: error.to_string(),
-                });
-            }
-        }
-    }
-    match lines.first() {
-        Some(Line::Run { schema: SCHEMA, .. }) => Ok((lines, whole)),
-        _ => Err(RecordError::Start),
     }
 }
 

@@ -1,19 +1,25 @@
 //! Every verdict of a folder, judged again from its record.
 
-use super::folder::{EvidenceError, RECORD, RIG, SCENARIOS, SUMS, sum, sums};
-use super::record::{Line, capabilities, read};
+use super::folder::{EvidenceError, KNOWN_PROFILE, RECORD, RIG, SCENARIOS, SUMS, sum, sums};
+use super::read::{MAX_SIZE, RecordError, read};
+use super::record::{Line, capabilities};
 use crate::library::Entry;
-use crate::link::{Event, Replay};
+use crate::link::{Event, LinkFault, PlacedFault, Replay};
 use crate::rig::run::{judge, known, twin};
-use crate::rig::{Rig, Way, parse, play_one};
+use crate::rig::{Rig, Way, parse_beside, play_one};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 use crate::twin::{Conversation, Exactness, Twin};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::Path;
+
+/// How much longer a busy computer may have waited in one attempt.
+const WAITED: Span = Span::from_millis(1_000);
 
 /// What was found out about one attempt.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,6 +32,8 @@ pub struct Finding {
     pub judged: String,
     /// What differs, if anything does.
     pub differs: Option<String>,
+    /// Faults that were asked for and never happened, as the run told of them: a link's own bytes show them, not the master's.
+    pub unused: Vec<String>,
 }
 
 /// What a folder is worth.
@@ -55,7 +63,34 @@ pub(super) struct Recorded {
     sha256: String,
     pub(super) attempt: usize,
     events: Vec<Event>,
-    verdict: Option<(String, Option<String>, u64)>,
+    verdict: Option<Recalled>,
+}
+
+/// The verdict of a record.
+struct Recalled {
+    verdict: String,
+    finding: Option<String>,
+    remarks: Vec<String>,
+    took: Span,
+    unplaced: u64,
+}
+
+/// What came of an attempt that was played again.
+pub(super) struct Again {
+    pub(super) outcome: Outcome,
+    /// The twin found something.
+    stale: bool,
+    /// What the record holds behind the end of the attempt.
+    left: Option<String>,
+    ended: Ended,
+}
+
+/// What a record is judged by.
+pub struct Beside<'b> {
+    /// The rig's file.
+    pub rig: &'b Rig,
+    /// The text of the scenario of a name, which is no path, or why there is none.
+    pub scenario: &'b dyn Fn(&str) -> Result<String, String>,
 }
 
 /// Judges a folder again.
@@ -63,57 +98,89 @@ pub(super) struct Recorded {
 /// # Errors
 /// It is no folder of evidence, or its record is damaged; with the place.
 pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
-    let mut verified = Verified {
-        files: compare_sums(path)?,
-        ..Verified::default()
-    };
-    let opened = Opened::open(path, &mut verified)?;
+    let files = compare_sums(path)?;
+    let opened = Opened::folder(path)?;
+    let mut verified = opened.verified(&scenarios(path))?;
+    verified.files.splice(0..0, files);
     // The sums are written last.
-    verified.complete = opened.whole
-        && path.join(SUMS).exists()
-        && matches!(opened.lines.last(), Some(Line::End { .. }));
-    opened.judged(|recorded, judged| {
-        verified.attempts.push(match judged {
-            Ok((_, outcome)) => recorded.compare(&outcome),
-            Err(why) => recorded.with("aborted", Some(why)),
-        });
-    })?;
+    verified.complete &= path.join(SUMS).exists();
     Ok(verified)
 }
 
-/// A folder that is read.
-pub(super) struct Opened<'p> {
-    path: &'p Path,
+/// The texts of a folder's scenarios.
+pub(super) fn scenarios(path: &Path) -> impl Fn(&str) -> Result<String, String> {
+    let path = path.to_owned();
+    move |name| {
+        let file = format!("{SCENARIOS}/{name}.scn");
+        let text = std::fs::read_to_string(path.join(&file));
+        text.map_err(|error| format!("{file}: {error}"))
+    }
+}
+
+/// The bytes of the record of a folder.
+fn record(path: &Path) -> std::io::Result<Vec<u8>> {
+    let file = std::fs::File::open(path.join(RECORD))?;
+    let mut bytes = Vec::new();
+    file.take(MAX_SIZE + 1).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > MAX_SIZE {
+        true => Err(std::io::Error::other(format!(
+            "it has more than {} MiB",
+            MAX_SIZE >> 20
+        ))),
+        false => Ok(bytes),
+    }
+}
+
+/// Judges a record again.
+///
+/// # Errors
+/// It is damaged; with the place. Or it is of another rig.
+pub fn judge_record(record: &[u8], beside: &Beside<'_>) -> Result<Verified, EvidenceError> {
+    let opened = Opened::of(record, beside.rig.clone())?;
+    opened.verified(beside.scenario)
+}
+
+/// A record that has been read, and what it is judged by.
+pub(super) struct Opened {
     pub(super) lines: Vec<Line>,
     /// Whether the last line is.
     whole: bool,
     pub(super) rig: Rig,
     header: Header,
+    /// What is wrong with the files that it names.
+    files: Vec<String>,
 }
 
-impl<'p> Opened<'p> {
-    /// Reads the record and the rig's file; what is wrong with the files goes into `verified`.
-    pub(super) fn open(path: &'p Path, verified: &mut Verified) -> Result<Self, EvidenceError> {
-        let foreign = |why: String| EvidenceError::Foreign(path.display().to_string(), why);
-        let text = |file: &str| {
-            std::fs::read_to_string(path.join(file))
-                .map_err(|error| foreign(format!("{file}: {error}")))
-        };
-        let (lines, whole) = read(&text(RECORD)?)?;
-        let rig_text = text(RIG)?;
-        let rig = parse(&Source {
-            name: path.join(RIG).display().to_string(),
-            text: rig_text.clone().into(),
-        })
-        .map_err(|problems| foreign(problems.to_string()))?;
-        let header = header(&lines, &rig, &rig_text, verified)
-            .ok_or_else(|| foreign("the record's first line holds what cannot be".to_owned()))?;
+impl Opened {
+    /// Reads the record and the rig's file of a folder.
+    pub(super) fn folder(path: &Path) -> Result<Self, EvidenceError> {
+        let foreign = |what: String| EvidenceError::Foreign(path.display().to_string(), what);
+        let record = record(path).map_err(|error| foreign(format!("{RECORD}: {error}")))?;
+        let source = Source::read(&path.join(RIG)).map_err(|error| foreign(error.to_string()))?;
+        let rig = parse_beside(&source, &|_| {
+            Source::read(&path.join(KNOWN_PROFILE)).map_err(|error| error.to_string())
+        });
+        Self::of(
+            &record,
+            rig.map_err(|problems| foreign(problems.to_string()))?,
+        )
+    }
+
+    fn of(record: &[u8], rig: Rig) -> Result<Self, EvidenceError> {
+        let (lines, whole) = read(record)?;
+        let mut files = Vec::new();
+        let header = header(&lines, &rig, &mut files).map_err(|message| RecordError {
+            line: 1,
+            column: 1,
+            offset: 0,
+            message,
+        })?;
         Ok(Self {
-            path,
             lines,
             whole,
             rig,
             header,
+            files,
         })
     }
 
@@ -125,38 +192,63 @@ impl<'p> Opened<'p> {
     /// Plays every attempt again from its record: its text and what came of it, or why it cannot be.
     pub(super) fn judged(
         &self,
-        mut each: impl FnMut(Recorded, Result<(String, Outcome), String>),
+        scenario: &dyn Fn(&str) -> Result<String, String>,
+        mut each: impl FnMut(Recorded, Result<(String, Again), String>),
     ) -> Result<(), EvidenceError> {
         let fresh = || {
-            twin(&self.rig, &known(&self.rig)).map_err(|problems| {
-                EvidenceError::Foreign(self.path.display().to_string(), problems.to_string())
-            })
+            twin(&self.rig, &known(&self.rig))
+                .map_err(|problems| EvidenceError::Foreign(RIG.to_owned(), problems.to_string()))
         };
         let mut own = fresh()?;
         for recorded in group(&self.lines[1..]) {
-            let file = format!("{SCENARIOS}/{}.scn", recorded.name);
-            let judged = match std::fs::read_to_string(self.path.join(&file)) {
-                _ if !is_name(&recorded.name) => Err("this is no name of a scenario".to_owned()),
-                Err(error) => Err(format!("{file}: {error}")),
-                Ok(text) if sum(text.as_bytes()) != recorded.sha256 => {
-                    Err(format!("{file} is not the text that was played"))
-                }
+            let text = match is_name(&recorded.name) {
+                true => scenario(&recorded.name),
+                false => Err("this is no name of a scenario".to_owned()),
+            };
+            let judged = match text {
+                Err(why) => Err(why),
+                Ok(text) if sum(text.as_bytes()) != recorded.sha256 => Err(format!(
+                    "{SCENARIOS}/{}.scn is not the text that was played",
+                    recorded.name
+                )),
                 Ok(text) => {
-                    let (outcome, stale) =
-                        again(&recorded, &text, &self.header, &self.rig, &mut own);
-                    if stale {
+                    let again = again(&recorded, &text, &self.header, &self.rig, &mut own);
+                    if again.stale {
                         own = fresh()?;
                     }
-                    Ok((text, outcome))
+                    Ok((text, again))
                 }
             };
             each(recorded, judged);
         }
         Ok(())
     }
+
+    /// What the record is worth.
+    fn verified(
+        &self,
+        scenario: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Verified, EvidenceError> {
+        let mut verified = Verified {
+            files: self.files.clone(),
+            attempts: Vec::new(),
+            complete: self.whole && matches!(self.lines.last(), Some(Line::End { .. })),
+        };
+        self.judged(scenario, |recorded, judged| {
+            let finding = match judged {
+                Err(why) => recorded.with("aborted", Some(why)),
+                Ok((_, again)) => recorded.compare(&again, &self.header),
+            };
+            // The ring was lost in the middle of it.
+            verified.complete &= finding.recorded.is_some();
+            verified.attempts.push(finding);
+        })?;
+        Ok(verified)
+    }
 }
 
-fn header(lines: &[Line], rig: &Rig, rig_text: &str, verified: &mut Verified) -> Option<Header> {
+/// What the first line says, and what of it cannot be.
+fn header(lines: &[Line], rig: &Rig, files: &mut Vec<String>) -> Result<Header, String> {
     let Some(Line::Run {
         rig_sha256,
         rate,
@@ -168,19 +260,26 @@ fn header(lines: &[Line], rig: &Rig, rig_text: &str, verified: &mut Verified) ->
         ..
     }) = lines.first()
     else {
-        return None;
+        return Err("the record of a run expected here".to_owned());
     };
-    if *rig_sha256 != sum(rig_text.as_bytes()) {
-        verified
-            .files
-            .push(format!("{RIG} is not the file that was used"));
+    if *rig_sha256 != sum(rig.text.as_bytes()) {
+        files.push(format!("{RIG} is not the file that was used"));
     }
     let sizes = drives.iter().map(|n| RingSize::new((*n).into()).ok());
-    let rings = sizes.collect::<Option<Vec<_>>>()?;
+    let rings = sizes.collect::<Option<Vec<_>>>();
+    let rings = rings.ok_or("a ring has 1 to 250 drives (ND21 8.4)")?;
+    let own: Vec<u8> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    if own != *drives {
+        return Err(format!(
+            "the record is of rings of {drives:?} drives, {RIG} has {own:?}"
+        ));
+    }
+    let rate = Rate::from_bits_per_second(*rate)
+        .ok_or_else(|| format!("{rate} bit/s is no rate of the line (ND21 8.3)"))?;
     let capabilities = capabilities(names);
     let health = &rig.file.health;
-    Some(Header {
-        rate: Rate::from_bits_per_second(*rate)?,
+    Ok(Header {
+        rate,
         drives: drives.clone(),
         exactness: Exactness {
             tolerance: Span::from_units(*tolerance),
@@ -218,11 +317,18 @@ fn group(lines: &[Line]) -> Vec<Recorded> {
             Line::Verdict {
                 verdict,
                 finding,
+                remarks,
+                took,
                 unplaced,
-                ..
             } => {
                 if let Some(last) = all.last_mut() {
-                    last.verdict = Some((verdict.clone(), finding.clone(), *unplaced));
+                    last.verdict = Some(Recalled {
+                        verdict: verdict.clone(),
+                        finding: finding.clone(),
+                        remarks: remarks.clone(),
+                        took: Span::from_units(*took),
+                        unplaced: *unplaced,
+                    });
                 }
             }
             line => {
@@ -241,30 +347,19 @@ pub(super) fn is_name(name: &str) -> bool {
     !name.is_empty() && !name.starts_with('.') && name.chars().all(safe)
 }
 
-/// Plays an attempt again from its record, and says whether the twin found something.
-fn again(
-    recorded: &Recorded,
-    text: &str,
-    header: &Header,
-    rig: &Rig,
-    twin: &mut Twin,
-) -> (Outcome, bool) {
+/// Plays an attempt again from its record.
+fn again(recorded: &Recorded, text: &str, header: &Header, rig: &Rig, twin: &mut Twin) -> Again {
     let source = Source {
         name: recorded.name.clone(),
         text: text.to_owned().into(),
     };
     let size = header.rings.first().map(|ring| ring.drives());
-    let plan = match Entry::new(source, size) {
-        Ok(Entry {
-            plan: Some(plan), ..
-        }) => plan,
-        Ok(_) => {
-            return (
-                Outcome::rig_error("no scenario of this bus".to_owned()),
-                false,
-            );
-        }
-        Err(problems) => return (Outcome::rig_error(problems.to_string()), false),
+    let entry = Entry::new(source, size).map_err(|problems| problems.to_string());
+    let plan = entry.and_then(|entry| entry.plan.ok_or("no scenario of this bus".to_owned()));
+    let plan = match plan {
+        Ok(plan) if plan.rings == header.rings => plan,
+        Ok(_) => return Again::impossible("it is for other rings than the rig has".to_owned()),
+        Err(why) => return Again::impossible(why),
     };
     let mut replay = Replay::new(
         recorded.events.clone(),
@@ -286,10 +381,30 @@ fn again(
     let unplaced = recorded
         .verdict
         .as_ref()
-        .map_or(0, |(.., unplaced)| *unplaced);
+        .map_or(0, |recalled| recalled.unplaced);
     judge(&mut outcome, &comparisons, unplaced, &rig.file.deviation);
-    (outcome, stale)
+    Again {
+        outcome,
+        stale,
+        left: replay.left(),
+        ended: Ended::of(&recorded.events),
+    }
 }
+
+impl Again {
+    /// Nothing could be played.
+    fn impossible(why: String) -> Self {
+        Self {
+            outcome: Outcome::rig_error(why),
+            stale: false,
+            left: None,
+            ended: Ended::of(&[]),
+        }
+    }
+}
+
+/// What a remark about a fault begins with that was asked for and never happened.
+const UNUSED: &str = "this fault never happened: ";
 
 impl Recorded {
     fn with(&self, judged: &str, differs: Option<String>) -> Finding {
@@ -298,34 +413,113 @@ impl Recorded {
         } else {
             String::new()
         };
+        let remarks = self.verdict.iter().flat_map(|recalled| &recalled.remarks);
         Finding {
             name: format!("{}{number}", self.name),
-            recorded: self.verdict.as_ref().map(|(verdict, ..)| verdict.clone()),
+            recorded: self.verdict.as_ref().map(|own| own.verdict.clone()),
             judged: judged.to_owned(),
             differs,
+            unused: remarks
+                .filter_map(|remark| remark.strip_prefix(UNUSED))
+                .map(str::to_owned)
+                .collect(),
         }
     }
 
-    fn compare(&self, outcome: &Outcome) -> Finding {
+    fn compare(&self, again: &Again, header: &Header) -> Finding {
+        let judged = again.outcome.verdict.name();
+        let differs = self.verdict.as_ref();
+        let differs = differs.and_then(|own| own.differs(again, header));
+        self.with(judged, differs)
+    }
+}
+
+impl Recalled {
+    /// What of it the bytes do not bear out.
+    fn differs(&self, again: &Again, header: &Header) -> Option<String> {
+        let outcome = &again.outcome;
         let judged = outcome.verdict.name();
         let found = outcome.finding.as_ref().map(|found| found.message.clone());
-        let differs = match &self.verdict {
-            None => None,
-            Some((verdict, ..)) if verdict != judged => Some(format!(
-                "the record says {verdict}, its bytes say {judged}{}",
-                match found.or_else(|| outcome.remarks.first().cloned()) {
-                    Some(found) => format!(": {found}"),
-                    None => String::new(),
-                }
-            )),
-            Some((_, finding, _)) if *finding != found => Some(format!(
+        if self.verdict != judged {
+            let why = found.or_else(|| outcome.remarks.first().cloned());
+            let why = why.map_or_else(String::new, |why| format!(": {why}"));
+            let verdict = &self.verdict;
+            return Some(format!(
+                "the record says {verdict}, its bytes say {judged}{why}"
+            ));
+        }
+        if self.finding != found {
+            return Some(format!(
                 "the record says \"{}\", its bytes say \"{}\"",
-                finding.as_deref().unwrap_or("nothing"),
+                self.finding.as_deref().unwrap_or("nothing"),
                 found.as_deref().unwrap_or("nothing")
-            )),
-            Some(_) => None,
+            ));
+        }
+        // An attempt that was given up may have been so at any byte, and shows nothing.
+        if matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError) {
+            return None;
+        }
+        if let Some(left) = &again.left {
+            return Some(format!(
+                "the record goes on where the scenario ends: {left} was not asked for"
+            ));
+        }
+        let (least, most) = header.could_take(outcome.took, &again.ended);
+        if (least..=most).contains(&self.took) {
+            return None;
+        }
+        Some(format!(
+            "the record says that it took {}, its bytes say {least} to {most}",
+            self.took
+        ))
+    }
+}
+
+impl Header {
+    /// What an attempt can have taken. What was sent comes round behind its end, and where nobody fetches it the record does not
+    /// say when; where time is real, a wait ends a little later than it was to.
+    fn could_take(&self, took: Span, ended: &Ended) -> (Span, Span) {
+        let real = match self.exactness.tolerance {
+            Span::ZERO => Span::ZERO,
+            tolerance => tolerance + WAITED,
         };
-        self.with(judged, differs)
+        let drives = self.drives.iter().max().copied().unwrap_or(0);
+        let round = self.rate.byte_time() * (u64::from(drives) + 2);
+        let most = took.max(ended.at) + round + ended.held + real;
+        (took.saturating_sub(real), most)
+    }
+}
+
+/// How the last conversation of an attempt ended, as far as its record says.
+struct Ended {
+    /// The time of its last event.
+    at: Span,
+    /// How long faults may have held bytes up.
+    held: Span,
+}
+
+impl Ended {
+    fn of(events: &[Event]) -> Self {
+        let begin = |event: &Event| matches!(event, Event::Begin(_));
+        let last = events.iter().rposition(begin).unwrap_or(0);
+        let mut ended = Self {
+            at: Span::ZERO,
+            held: Span::ZERO,
+        };
+        for event in events.iter().skip(last + 1) {
+            let at = match event {
+                Event::Sent(_, at, _) | Event::Received(_, at, _) | Event::Probe(_, at, ..) => *at,
+                Event::Fault(_, at, PlacedFault::Link(_, what), _) => {
+                    if let LinkFault::Delay(span) | LinkFault::Break(span) = what {
+                        ended.held = ended.held + *span;
+                    }
+                    *at
+                }
+                _ => continue,
+            };
+            ended.at = ended.at.max(at.since_start());
+        }
+        ended
     }
 }
 

@@ -52,11 +52,22 @@ impl Replay {
         }
     }
 
-    /// Whether everything was played back.
+    /// The first thing that was recorded and not played back; `None` where all was. Bytes that nobody fetched and trouble that nobody
+    /// ran into are no matter.
     #[must_use]
-    pub fn is_at_end(&self) -> bool {
-        let left = |event: &Event| !matches!(event, Event::Received(..));
-        !self.events.iter().any(left)
+    pub fn left(&self) -> Option<String> {
+        let words = |event: &Event| match event {
+            Event::Received(..) | Event::Trouble(_) | Event::Step(_) => None,
+            Event::Begin(_) => Some("another conversation".to_owned()),
+            Event::Sent(_, at, bytes) => Some(format!("sending {} bytes until {at}", bytes.len())),
+            Event::Fault(_, at, ..) => Some(format!("a fault at {at}")),
+            Event::Probe(_, at, count, _) => Some(format!("{count} SYNCO from {at} on")),
+        };
+        match &self.trouble {
+            // Behind trouble nothing is asked for.
+            Some(_) => None,
+            None => self.events.iter().find_map(words),
+        }
     }
 
     fn otherwise(&mut self, what: &str) {

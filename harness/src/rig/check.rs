@@ -10,6 +10,8 @@ use crate::scenario::source::Source;
 use harness_proto::nd21::cells::{Cell, RAM, cell};
 use harness_proto::nd21::io::Input;
 use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 use toml::Spanned;
 use toml::de::DeTable;
@@ -22,6 +24,8 @@ const MAX_ID: usize = 64;
 pub struct Rig {
     /// Where it comes from, for messages: a path, `sim:3`, or the name of a built-in rig.
     pub origin: String,
+    /// The text of its file.
+    pub text: Arc<str>,
     /// What its file says.
     pub file: RigFile,
     /// The profile that it names, read.
@@ -50,11 +54,26 @@ impl Rig {
     }
 }
 
+/// The profile of a name that stands in a rig's file, or why there is none.
+pub type FindProfile<'f> = dyn Fn(&str) -> Result<Source, String> + 'f;
+
 /// Reads a rig file.
 ///
 /// # Errors
 /// All its mistakes, each with its place.
 pub fn parse(source: &Source) -> Result<Rig, Problems> {
+    parse_beside(source, &|named| {
+        let folder = Path::new(&source.name).parent();
+        let path = folder.unwrap_or(Path::new("")).join(named);
+        Source::read(&path).map_err(|error| error.to_string())
+    })
+}
+
+/// The same, with the text of the profile that it may name found by `profile`.
+///
+/// # Errors
+/// All its mistakes, each with its place.
+pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, Problems> {
     let problems = |mut problems: Vec<Problem>| {
         problems.sort_by_key(|problem| (problem.span.start, problem.span.end));
         problems.dedup();
@@ -71,12 +90,13 @@ pub fn parse(source: &Source) -> Result<Rig, Problems> {
         file: &file,
         problems: Vec::new(),
     };
-    let profile = check.all(source);
+    let profile = check.all(source, profile);
     if !check.problems.is_empty() {
         return Err(problems(check.problems));
     }
     Ok(Rig {
         origin: source.name.clone(),
+        text: source.text.clone(),
         file,
         profile,
     })
@@ -129,7 +149,7 @@ impl Check<'_> {
         self.problems.push(problem);
     }
 
-    fn all(&mut self, source: &Source) -> Option<KnownProfile> {
+    fn all(&mut self, source: &Source, find_profile: &FindProfile<'_>) -> Option<KnownProfile> {
         let file = self.file;
         debug_assert_eq!(file.schema, SCHEMA);
         self.id();
@@ -166,7 +186,7 @@ impl Check<'_> {
         self.safe_state();
         self.programs();
         self.quarantine();
-        let profile = self.profile(source);
+        let profile = self.profile(find_profile);
         self.setup(source, profile.as_ref());
         profile
     }

@@ -1,22 +1,18 @@
 //! The part of the check that simulated drives are made of: the profile that a rig names, and the lines of `[sim]`.
 
-use super::check::Check;
+use super::check::{Check, FindProfile};
 use super::file::Sim;
 use super::profile::{KnownProfile, Profile};
 use super::schema::Step;
 use super::sim::{lines, settle};
 use crate::scenario::problem::Problem;
 use crate::scenario::source::Source;
-use std::path::Path;
 
 impl Check<'_> {
-    /// The profile beside the rig's file.
-    pub(super) fn profile(&mut self, source: &Source) -> Option<KnownProfile> {
+    /// The profile that the rig's file names.
+    pub(super) fn profile(&mut self, find: &FindProfile<'_>) -> Option<KnownProfile> {
         let named = self.file.rig.profile.as_ref()?;
-        let folder = Path::new(&source.name).parent();
-        let path = folder.unwrap_or(Path::new("")).join(named);
-        let read = Source::read(&path).map_err(|error| error.to_string());
-        let profile = read.and_then(|source| {
+        let profile = find(named).and_then(|source| {
             let profile = Profile::parse(&source.text);
             let profile = profile.map_err(|error| format!("{}: {error}", source.name))?;
             Ok(KnownProfile {

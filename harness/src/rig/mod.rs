@@ -27,7 +27,7 @@ pub mod state;
 pub mod values;
 mod watchdog;
 
-pub use check::{Rig, parse};
+pub use check::{FindProfile, Rig, parse, parse_beside};
 pub use ends::Ends;
 pub use find::{FindError, find};
 pub use health::{Health, Unhealthy, examine};

@@ -6,8 +6,9 @@ use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A rig in use. Its [line](Self::line) goes to a driver, and behind the driver the rig is given back.
-#[derive(Debug)]
+/// A rig in use. Its [line](Self::line) goes to a driver, and behind the driver the rig is given back. Clones are handles of the
+/// same rig.
+#[derive(Clone, Debug)]
 pub struct Shared {
     session: Arc<Mutex<Option<Session>>>,
 }

@@ -24,17 +24,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// All but passed and failed, in order of gravity.
-    pub const REST: [Self; 6] = [
-        Self::Skipped,
-        Self::Marginal,
-        Self::Flaky,
-        Self::Inconclusive,
-        Self::Aborted,
-        Self::RigError,
-    ];
-
-    /// All of them, in order of gravity.
+    /// All, in order of gravity.
     pub const ALL: [Self; 8] = [
         Self::Skipped,
         Self::Passed,
@@ -42,6 +32,16 @@ impl Verdict {
         Self::Flaky,
         Self::Inconclusive,
         Self::Failed,
+        Self::Aborted,
+        Self::RigError,
+    ];
+
+    /// All but passed and failed, in order of gravity.
+    pub const REST: [Self; 6] = [
+        Self::Skipped,
+        Self::Marginal,
+        Self::Flaky,
+        Self::Inconclusive,
         Self::Aborted,
         Self::RigError,
     ];

@@ -24,6 +24,11 @@ const WATCH_FORM: &str = "\
 With --format csv the first line names the columns: time_ms, then the cells with their units; a value that the
 manual gives no meaning to is empty.";
 
+const TOP_KEYS: &str = "\
+Keys: q or Esc quit, / filter by text, e only drives in error, s sort, p pause, arrows and PgUp/PgDn scroll, ? help.
+The drives are only read and stay as they are; Ctrl-C, a signal or a lost port end in the bench's safe state. The terminal is left
+as it was.";
+
 const SCOPE_JSON: &str = "\
 A cell of two bytes is recorded with its high byte (14.10.6.1), and its value is that of this byte with 00
 behind it. Of two signals each measurement is of one, in turn (14.10.6.6).
@@ -49,6 +54,9 @@ pub enum DriveCommand {
     /// Show the values of cells again and again.
     #[command(after_help = WATCH_FORM)]
     Watch(WatchArguments),
+    /// Show all drives live: states, errors, traffic, disturbances.
+    #[command(after_help = TOP_KEYS)]
+    Top(TopArguments),
     /// Save, load and compare the parameters of a drive.
     #[command(subcommand)]
     Params(ParamsCommand),
@@ -187,6 +195,20 @@ pub struct WatchArguments {
     /// In which form.
     #[arg(long, value_enum, default_value_t = WatchForm::Text)]
     pub format: WatchForm,
+    /// Which bench.
+    #[command(flatten)]
+    pub rig: RigArguments,
+}
+
+/// For `top`.
+#[derive(Debug, Args)]
+pub struct TopArguments {
+    /// How often every drive is read, if the ring is fast enough.
+    #[arg(long, value_name = "TIME", default_value = "500ms", value_parser = duration)]
+    pub every: Span,
+    /// Print one page as plain text and end; needs no terminal.
+    #[arg(long)]
+    pub once: bool,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,

@@ -16,6 +16,7 @@ mod rig;
 mod scope;
 mod signal;
 mod sim;
+mod top;
 mod watch;
 mod write;
 
@@ -32,6 +33,7 @@ pub(super) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
         DriveCommand::Write(arguments) => write::write(arguments, output),
         DriveCommand::Info(arguments) => info::info(arguments, output),
         DriveCommand::Watch(arguments) => watch::watch(arguments, output),
+        DriveCommand::Top(arguments) => top::top(arguments, output),
         DriveCommand::Params(command) => params::params(command, output),
         DriveCommand::Scope(arguments) => scope::scope(arguments, output),
         DriveCommand::Position(arguments) => position::position(arguments, output),

@@ -15,7 +15,7 @@ use crate::scenario::plan::{Plan, plan};
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::Drive;
+use harness_proto::nd21::units::{Drive, SpeedRange};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::Span;
 use std::path::Path;
@@ -77,6 +77,8 @@ impl Use {
 pub(super) struct Bench {
     pub(super) bus: Bus<'static>,
     plan: Plan,
+    /// The rig in use, if it is none that was set up for this command.
+    rig: Option<Shared>,
 }
 
 impl Bench {
@@ -87,6 +89,19 @@ impl Bench {
             range: self.bus.speed_range(axis)?,
             ..self.plan.units(axis.ring(), axis.drive())
         })
+    }
+
+    /// The same without asking the drive: `range` is what it said of its range of speeds.
+    pub(super) fn units_with(&self, axis: Axis, range: SpeedRange) -> Drive {
+        Drive {
+            range,
+            ..self.plan.units(axis.ring(), axis.drive())
+        }
+    }
+
+    /// Does something with the rig in use, if it is one; the bus carries nothing meanwhile.
+    pub(super) fn with_rig<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
+        self.rig.as_ref()?.with(act)
     }
 
     /// The zeros of the check sequence (9.8), with which a rig is opened, put every drive in error. Before a command that may
@@ -144,7 +159,8 @@ pub(super) fn on_after(
         let (plan, link) = link(arguments, output)?;
         let bus = Bus::open(Box::new(link), &plan.rings, Options::default())?;
         bus.run(WARM);
-        return act(&Bench { bus, plan }, output);
+        let rig = None;
+        return act(&Bench { bus, plan, rig }, output);
     };
     let rig = named(name, arguments, output)?;
     let plan = rig.plan()?;
@@ -154,7 +170,11 @@ pub(super) fn on_after(
     let shared = Shared::new(session);
     let result = done.and_then(|()| {
         let bus = Bus::open(Box::new(shared.line()), &sizes, Options::default())?;
-        let bench = Bench { bus, plan };
+        let bench = Bench {
+            bus,
+            plan,
+            rig: Some(shared.clone()),
+        };
         let ready = bench.confirm_bus_errors(as_what, output);
         let result = ready.and_then(|()| act(&bench, output));
         bench.bus.close();

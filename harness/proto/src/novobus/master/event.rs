@@ -48,8 +48,12 @@ pub struct Counters {
     pub sent: u64,
     /// SYNCO and PAUSE among them.
     pub idle: u64,
+    /// Telegrams begun, that which counts the drives among them (ND21 9.1).
+    pub telegrams: u64,
     /// Bytes received.
     pub received: u64,
+    /// Bytes received with a line error: parity, framing, break, overrun.
+    pub line_errors: u64,
     /// Jobs that ran.
     pub done: u64,
     /// Jobs that had to be sent again, once for each time.

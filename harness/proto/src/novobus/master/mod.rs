@@ -90,7 +90,7 @@ use compose::Outgoing;
 use cycle::Cycle;
 use diagnosis::Cause;
 use event::Events;
-use in_flight::{Composed, InFlight, Sent};
+use in_flight::{Composed, InFlight, Place, Sent};
 use recovery::{Episode, State};
 use store::Store;
 
@@ -325,7 +325,9 @@ impl Master {
             evidence.expect(composed.back);
         }
         self.counters.sent += 1;
-        self.counters.idle += u64::from(composed.byte == SYNCO && composed == Composed::SYNCO);
+        let idle = composed.byte == SYNCO && composed == Composed::SYNCO;
+        self.counters.idle += u64::from(idle);
+        self.counters.telegrams += u64::from(composed.place == Place::Sync && !idle);
         Some(composed.byte)
     }
 
@@ -355,6 +357,7 @@ impl Master {
             self.handle_timeout(now);
         }
         self.counters.received += 1;
+        self.counters.line_errors += u64::from(received.error.is_some());
         let silent = now.since(core::mem::replace(&mut self.last_heard, now)) >= TIME_OUT;
         self.episode.heard_after(silent);
         match &mut self.state {

@@ -1,0 +1,72 @@
+//! `--junit FILE`: verdicts for continuous integration.
+
+use super::exit::Exit;
+use super::output::Output;
+use super::run::drives;
+use crate::evidence::{Case, junit};
+use crate::library::Entry;
+use crate::scenario::run::Outcome;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The verdicts of a run on their way into a file, if one is wanted.
+pub(super) struct Cases {
+    rig: String,
+    file: Option<PathBuf>,
+    cases: Vec<Case>,
+}
+
+impl Cases {
+    /// Of a run on this rig.
+    pub(super) fn new(rig: &str, file: Option<&Path>) -> Self {
+        Self {
+            rig: rig.to_owned(),
+            file: file.map(Path::to_owned),
+            cases: Vec::new(),
+        }
+    }
+
+    /// Notes what came of a scenario.
+    pub(super) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
+        let found = outcome.finding.iter().map(|found| found.message.clone());
+        let message: Vec<_> = found.chain(outcome.remarks.clone()).collect();
+        self.cases.push(Case {
+            name: format!(
+                "{}[rig={},drives={}]",
+                entry.short_name(),
+                self.rig,
+                drives(entry)
+            ),
+            verdict: outcome.verdict,
+            message: message.join("; "),
+            took: Duration::from_nanos(outcome.took.as_nanos()),
+            attachments: Vec::new(),
+        });
+    }
+
+    /// Writes the file, whole or not at all; where that fails it is told, and the exit code is that of a bench that failed.
+    pub(super) fn write(&self, exit: Exit, output: &mut Output) -> Exit {
+        let Some(path) = &self.file else {
+            return exit;
+        };
+        let xml = junit(&format!("rig {}", self.rig), &self.cases);
+        match whole(path, &xml) {
+            Ok(()) => exit,
+            Err(error) => {
+                output.complain(&format!("failed to write {}: {error}", path.display()));
+                exit.max(Exit::RigError)
+            }
+        }
+    }
+}
+
+fn whole(path: &Path, text: &str) -> std::io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    let beside = path.with_file_name(name);
+    let written = std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, path));
+    written.inspect_err(|_| {
+        // Where nothing was begun there is nothing to take away.
+        let _gone = std::fs::remove_file(&beside);
+    })
+}

@@ -1,0 +1,16 @@
+//! `drivebench schema`: the JSON schemas of what the program reads and writes.
+
+use super::args::SchemaName;
+use super::exit::Exit;
+use super::output::Output;
+use crate::{evidence, rig};
+
+/// Prints a schema.
+pub(super) fn schema(name: SchemaName, output: &mut Output) -> std::io::Result<Exit> {
+    let schema = match name {
+        SchemaName::Record => evidence::schema(),
+        SchemaName::Rig => rig::schema(),
+    };
+    output.result(&format!("{schema:#}\n"))?;
+    Ok(Exit::Passed)
+}

@@ -1,0 +1,78 @@
+//! The body of the fuzz target for records: hostile ones give a reason with a place, and what is taken is judged without a panic or a
+//! hang.
+
+use super::read::{RecordError, read};
+use super::record::Line;
+use super::verify::{Beside, judge_record};
+use crate::rig::{Rig, parse};
+use crate::scenario::source::Source;
+use harness_proto::time::Span;
+use std::sync::OnceLock;
+
+/// The longest input, in bytes.
+const LONGEST: usize = 32 * 1024;
+
+/// A conversation is not judged beyond this time, so that a fuzzer goes on: the twin lives through all of it.
+const SHORT: Span = Span::from_millis(2_000);
+
+/// The bench of every record.
+pub const RIG: &str = "schema = 1\n[rig]\nid = \"fuzz\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n[limits]\nallow_motion = true\n\
+                       allow_eeprom = true\nallow_reset = false\nallow_outputs = true\n";
+
+/// The scenario of every attempt, whatever its name.
+pub const SCENARIO: &str = "title A read\nsource nd21 10.1\nring 2\n> 88 FE C0 13 FE D1\n";
+
+fn rig() -> &'static Rig {
+    static RIG_READ: OnceLock<Rig> = OnceLock::new();
+    RIG_READ.get_or_init(|| {
+        let source = Source {
+            name: "fuzz.toml".to_owned(),
+            text: RIG.into(),
+        };
+        parse(&source).unwrap_or_else(|problems| panic!("{problems}"))
+    })
+}
+
+/// Reads a record and judges it, as `drivebench verify` does.
+///
+/// # Panics
+/// A rule is broken: an error has a place outside the record, or an event is not written as it was read.
+pub fn record(input: &[u8]) {
+    if input.len() > LONGEST {
+        return;
+    }
+    let lines = match read(input) {
+        Ok((lines, _)) => lines,
+        Err(error) => return placed(&error, input),
+    };
+    let mut longest = Span::ZERO;
+    for line in &lines {
+        if let Some(event) = line.event() {
+            let again = Line::of(&event).and_then(|line| line.event());
+            assert_eq!(
+                again.as_ref(),
+                Some(&event),
+                "an event is another when it is written"
+            );
+        }
+        longest = longest.max(line.time());
+    }
+    if longest > SHORT {
+        return;
+    }
+    let scenario = |_: &str| Ok(SCENARIO.to_owned());
+    let beside = Beside {
+        rig: rig(),
+        scenario: &scenario,
+    };
+    if let Err(error) = judge_record(input, &beside) {
+        assert!(!error.to_string().is_empty());
+    }
+}
+
+/// An error has its place in the input, or directly behind it.
+fn placed(error: &RecordError, input: &[u8]) {
+    let lines = input.split(|byte| *byte == b'\n').count().max(1);
+    assert!((1..=lines).contains(&error.line), "{error}");
+    assert!(error.column >= 1 && error.offset <= input.len(), "{error}");
+}

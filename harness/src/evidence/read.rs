@@ -1,0 +1,212 @@
+//! A record read back: every line is one, holds what can be, and stands where it can. The first that does not is named with its
+//! place.
+
+use super::record::{Line, SCHEMA};
+use crate::link::{Event, LinkFault, Moment, PlacedFault};
+use crate::scenario::verdict::Verdict;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::Span;
+
+/// The largest record, in bytes.
+pub const MAX_SIZE: u64 = 1 << 31;
+
+/// The longest time of a conversation: what a damaged digit makes of one must not keep a computer busy for years.
+pub const MAX_TIME: Span = Span::from_millis(24 * 3_600_000);
+
+/// Why bytes are no record.
+#[derive(Debug, thiserror::Error)]
+#[error("line {line}, column {column} (byte {offset}): {message}")]
+pub struct RecordError {
+    /// Which line, counted from 1.
+    pub line: usize,
+    /// Where in it, in bytes, counted from 1.
+    pub column: usize,
+    /// Where in the record, in bytes, counted from 0.
+    pub offset: usize,
+    /// What is wrong.
+    pub message: String,
+}
+
+/// The lines of a record, and whether the last one is whole; a run that was killed leaves half a line.
+///
+/// # Errors
+/// The first line that is none, or that cannot stand where it does.
+pub fn read(bytes: &[u8]) -> Result<(Vec<Line>, bool), RecordError> {
+    let mut lines = Vec::new();
+    let mut order = Order::default();
+    let mut offset = 0;
+    for (number, text) in (1..).zip(bytes.split_inclusive(|byte| *byte == b'\n')) {
+        let whole = text.ends_with(b"\n");
+        let wrong = |column: usize, message: String| RecordError {
+            line: number,
+            column: column.max(1),
+            offset: offset + column.saturating_sub(1),
+            message,
+        };
+        match parse(text) {
+            Ok(line) => {
+                order.take(&line).map_err(|message| wrong(1, message))?;
+                lines.push(line);
+            }
+            // The first line tells what it is all about.
+            Err(_) if !whole && number > 1 => return Ok((lines, false)),
+            Err((column, message)) => return Err(wrong(column, message)),
+        }
+        offset += text.len();
+    }
+    if lines.is_empty() {
+        return Err(RecordError {
+            line: 1,
+            column: 1,
+            offset: 0,
+            message: "the record is empty".to_owned(),
+        });
+    }
+    Ok((lines, bytes.ends_with(b"\n")))
+}
+
+/// A line, or where in it (counted from 1) it is none, and why.
+fn parse(bytes: &[u8]) -> Result<Line, (usize, String)> {
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let at = error.valid_up_to();
+        let byte = bytes.get(at).copied().unwrap_or(0);
+        (at + 1, format!("this is no UTF-8: {byte:02X} stands here"))
+    })?;
+    serde_json::from_str::<Line>(text.trim_end_matches('\n')).map_err(|error| {
+        let message = error.to_string();
+        // The place is told apart.
+        let message = message.split(" at line ").next().unwrap_or_default();
+        (error.column(), message.to_owned())
+    })
+}
+
+/// What stood in front of a line.
+#[derive(Default)]
+struct Order {
+    drives: Vec<u8>,
+    begun: bool,
+    scenario: bool,
+    verdict: bool,
+    ended: bool,
+}
+
+impl Order {
+    /// Whether a line can stand behind those before, and hold what it holds; why not, in a sentence.
+    fn take(&mut self, line: &Line) -> Result<(), String> {
+        if self.ended {
+            return Err("nothing can stand behind the end of the record".to_owned());
+        }
+        if matches!(line, Line::Run { .. }) == self.begun {
+            return Err(match self.begun {
+                true => "the record has begun already".to_owned(),
+                false => format!("the record of a run expected here, of schema {SCHEMA}"),
+            });
+        }
+        match line {
+            Line::Run {
+                schema,
+                rings,
+                tolerance,
+                ..
+            } => {
+                self.run(*schema, rings)?;
+                in_time(Span::from_units(*tolerance))
+            }
+            Line::Scenario { attempt, .. } => {
+                (self.scenario, self.verdict) = (true, false);
+                match attempt {
+                    0 => Err("attempts are counted from 1".to_owned()),
+                    _ => Ok(()),
+                }
+            }
+            Line::End { verdicts, .. } => {
+                self.ended = true;
+                verdicts.iter().try_for_each(|name| verdict(name))
+            }
+            // A scenario that was skipped has one, and no attempt.
+            Line::Case {
+                verdict: name,
+                took,
+                ..
+            } => {
+                self.scenario = false;
+                verdict(name)?;
+                in_time(Span::from_units(*took))
+            }
+            _ if !self.scenario => Err("no scenario has begun".to_owned()),
+            Line::Verdict {
+                verdict: name,
+                took,
+                ..
+            } => {
+                if std::mem::replace(&mut self.verdict, true) {
+                    return Err("the attempt has a verdict already".to_owned());
+                }
+                verdict(name)?;
+                in_time(Span::from_units(*took))
+            }
+            event => match event.event() {
+                Some(event) => self.event(&event),
+                None => Err("this is an event that cannot be".to_owned()),
+            },
+        }
+    }
+
+    fn run(&mut self, schema: u32, rings: &[u8]) -> Result<(), String> {
+        if schema != SCHEMA {
+            return Err(format!(
+                "a record of schema {schema}; this program knows {SCHEMA}"
+            ));
+        }
+        if !(1..=2).contains(&rings.len()) {
+            return Err("a bench has one ring or two (ND21 8.4)".to_owned());
+        }
+        for drives in rings {
+            RingSize::new(u64::from(*drives)).map_err(|error| error.to_string())?;
+        }
+        self.begun = true;
+        self.drives = rings.to_vec();
+        Ok(())
+    }
+
+    fn event(&self, event: &Event) -> Result<(), String> {
+        let (ring, at) = match event {
+            Event::Begin(at) => (0, *at),
+            Event::Sent(ring, at, _)
+            | Event::Received(ring, at, _)
+            | Event::Fault(ring, at, ..)
+            | Event::Probe(ring, at, ..) => (*ring, *at),
+            Event::Step(_) | Event::Trouble(_) => return Ok(()),
+        };
+        let Some(drives) = self.drives.get(ring) else {
+            return Err(format!("the bench has no ring {}", ring + 1));
+        };
+        if let Event::Fault(_, _, PlacedFault::Link(link, what), moment) = event {
+            if *link > usize::from(*drives) {
+                return Err(format!("a ring of {drives} drives has no link {link}"));
+            }
+            if let LinkFault::Delay(span) | LinkFault::Break(span) = what {
+                in_time(*span)?;
+            }
+            if let Moment::At(at) = moment {
+                in_time(at.since_start())?;
+            }
+        }
+        in_time(at.since_start())
+    }
+}
+
+fn in_time(span: Span) -> Result<(), String> {
+    match span <= MAX_TIME {
+        true => Ok(()),
+        false => Err("this time is longer than a day".to_owned()),
+    }
+}
+
+fn verdict(name: &str) -> Result<(), String> {
+    let known = Verdict::ALL.iter().any(|verdict| verdict.name() == name);
+    match known {
+        true => Ok(()),
+        false => Err(format!("`{name}` is no verdict")),
+    }
+}

@@ -1,0 +1,130 @@
+//! Keys: what each does to the view.
+
+use super::state::{Entry, Top};
+
+/// The longest text to filter by, in characters.
+const MOST: usize = 60;
+
+/// A key, whatever terminal it comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Key {
+    /// A character.
+    Char(char),
+    /// Enter.
+    Enter,
+    /// Escape.
+    Escape,
+    /// The key that takes the last character away.
+    Backspace,
+    /// Ctrl-C.
+    Interrupt,
+    /// A row up.
+    Up,
+    /// A row down.
+    Down,
+    /// A page up.
+    PageUp,
+    /// A page down.
+    PageDown,
+    /// To the first row.
+    Home,
+    /// To the last row.
+    End,
+}
+
+/// What becomes of the view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Press {
+    /// It goes on.
+    Stay,
+    /// It was asked for its end.
+    Quit,
+    /// It was interrupted, as by a signal.
+    Interrupt,
+}
+
+/// The keys and what they do, as the help shows them.
+pub const HELP: [(&str, &str); 9] = [
+    ("q, Esc", "quit; the drives stay as they are"),
+    (
+        "Ctrl-C",
+        "quit as by a signal: a bench with ports goes to its safe state",
+    ),
+    (
+        "/",
+        "show only drives with this text in their row; Enter keeps it, Esc takes it away",
+    ),
+    ("e", "show only drives in error, or all again"),
+    ("s", "sort by drive, state, speed or error"),
+    ("p", "pause: the page stands still, reading goes on"),
+    ("Up, Down, PgUp, PgDn", "scroll; also k and j, Home and End"),
+    ("?", "this help; any key closes it"),
+    ("c", "forget the disturbances shown so far"),
+];
+
+impl Top {
+    /// Does what a key says.
+    pub fn press(&mut self, key: Key) -> Press {
+        if key == Key::Interrupt {
+            return Press::Interrupt;
+        }
+        match self.entry {
+            Entry::Filter => {
+                self.type_filter(key);
+                Press::Stay
+            }
+            Entry::Help => {
+                self.entry = Entry::None;
+                Press::Stay
+            }
+            Entry::None => self.command(key),
+        }
+    }
+
+    fn type_filter(&mut self, key: Key) {
+        match key {
+            Key::Char(c) if !c.is_control() && self.filter.chars().count() < MOST => {
+                self.filter.push(c);
+            }
+            Key::Backspace => {
+                self.filter.pop();
+            }
+            Key::Enter => self.entry = Entry::None,
+            Key::Escape => {
+                self.filter.clear();
+                self.entry = Entry::None;
+            }
+            _ => self.scroll(key),
+        }
+    }
+
+    fn command(&mut self, key: Key) -> Press {
+        match key {
+            Key::Char('q') | Key::Escape => return Press::Quit,
+            Key::Char('/') => self.entry = Entry::Filter,
+            Key::Char('?' | 'h') => self.entry = Entry::Help,
+            Key::Char('e') => self.only_errors = !self.only_errors,
+            Key::Char('s') => self.sort = self.sort.next(),
+            Key::Char('p') => self.pause(),
+            Key::Char('c') => self.forget_disturbances(),
+            Key::Char('k') => self.scroll(Key::Up),
+            Key::Char('j') => self.scroll(Key::Down),
+            key => self.scroll(key),
+        }
+        Press::Stay
+    }
+
+    fn scroll(&mut self, key: Key) {
+        let page = self.page.max(1);
+        self.first = match key {
+            Key::Up => self.first.saturating_sub(1),
+            Key::Down => self.first.saturating_add(1),
+            Key::PageUp => self.first.saturating_sub(page),
+            Key::PageDown => self.first.saturating_add(page),
+            Key::Home => 0,
+            Key::End => usize::MAX,
+            _ => return,
+        };
+        self.keep_in_sight();
+    }
+}
