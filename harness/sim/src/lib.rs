@@ -18,6 +18,7 @@ pub mod drive;
 pub mod fault;
 pub mod fuzz;
 pub mod link;
+pub mod master;
 pub mod nd21;
 pub mod node;
 pub mod plain;

@@ -29,6 +29,7 @@ use crate::link::Line;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{self, Counters, Event, Job, JobId, Outcome, Phase, Refused};
 use harness_proto::time::{Instant, Span};
+use harness_sim::deviation::MasterDeviation;
 use pump::Pump;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -46,6 +47,8 @@ pub struct Options {
     /// Whether the points of the S-ramp go over the wire `puffer`, an invention of this project for its
     /// simulated drives: the manual does not say how they come to the drive (13.5.3).
     pub s_ramp_puffer: bool,
+    /// How the masters break the manual on purpose, for tests of what must find a wrong one.
+    pub deviates: Option<&'static MasterDeviation>,
 }
 
 impl Default for Options {
@@ -56,6 +59,7 @@ impl Default for Options {
             drive_patience: Span::from_millis(5_000),
             motion_patience: Span::from_millis(60_000),
             s_ramp_puffer: false,
+            deviates: None,
         }
     }
 }
@@ -89,7 +93,7 @@ impl<'l> Bus<'l> {
         options: Options,
     ) -> Result<Self, Error> {
         let bus = Self {
-            pump: Arc::new(Mutex::new(Pump::new(link, rings, options.master))),
+            pump: Arc::new(Mutex::new(Pump::new(link, rings, &options))),
             options,
         };
         bus.wait_until_open()?;

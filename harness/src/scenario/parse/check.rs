@@ -1,6 +1,7 @@
 //! Checks: `? located 97`, `? drive 3 memory FF08 = 1234`, `? error 0502 at 97`.
 
 use super::drive;
+use super::step;
 use super::words::{drives, named, required};
 use crate::scenario::expression::{self, Located};
 use crate::scenario::problem::Problem;
@@ -18,6 +19,7 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         Drive,
         Error,
         Corrected,
+        Named,
         Sent,
         Received,
     }
@@ -28,6 +30,7 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         ("drives", Word::Drive),
         ("error", Word::Error),
         ("corrected", Word::Corrected),
+        ("named", Word::Named),
         ("sent", Word::Sent),
         ("received", Word::Received),
     ];
@@ -52,6 +55,17 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
             Ok(Check::Error { error, drive })
         }
         Word::Corrected => Ok(Check::Corrected(expression::sum(scanner)?)),
+        Word::Named => {
+            let kinds = [("damaged", false), ("broken", true)];
+            let broken = named(scanner, &kinds, "what is wrong with a link")?;
+            let (ring, link, ends) = step::link(scanner)?;
+            Ok(Check::Named {
+                ring,
+                broken,
+                link,
+                ends,
+            })
+        }
         Word::Sent => {
             let bytes = expression::sum(scanner)?;
             required(scanner, &["bytes", "byte"])?;

@@ -36,6 +36,7 @@ pub(super) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
         let mut known = super::job::names();
         known.extend(CALLS);
         known.retain(|name| !["master", "recover", "exchange"].contains(name));
+        known.push(super::header::DEVIATES);
         let problem = scanner.unexpected("what the driver is to do");
         return Err(problem.did_you_mean(name, &known));
     }

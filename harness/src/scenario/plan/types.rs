@@ -14,7 +14,7 @@ use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time;
-use harness_sim::deviation::Deviation;
+use harness_sim::deviation::{Deviation, MasterDeviation};
 use harness_sim::drive::Model;
 use harness_sim::nd21::Nd21Properties;
 use std::ops::RangeInclusive;
@@ -36,6 +36,8 @@ pub struct Plan {
     pub deadline: time::Span,
     /// What a rig must have.
     pub needs: Vec<Capability>,
+    /// How the bench's own master breaks the manual, on purpose.
+    pub master: Option<&'static MasterDeviation>,
     /// The steps, in order.
     pub steps: Vec<PlannedStep>,
     pub(super) setups: Vec<PlannedSetup>,
@@ -329,6 +331,8 @@ pub enum PlannedCheck {
     Error(usize, u8, BusError),
     /// So many check sequences came back whole.
     Corrected(u64),
+    /// The driver has named this link of this ring, as broken or as damaged.
+    Named(usize, usize, bool),
     /// So many bytes were sent since the last check, in this time (and its tolerance).
     Sent(u64, Option<(time::Span, time::Span)>),
     /// So many bytes were received since the start.

@@ -11,7 +11,7 @@ use crate::scenario::problem::Span;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::Job;
+use harness_proto::novobus::master::{Event, Job};
 use harness_proto::time::{self, Instant};
 
 /// The line as a master sees it that works in the middle of a scenario.
@@ -81,18 +81,29 @@ impl Runner<'_> {
         let Ok(size) = RingSize::new(u64::from(size)) else {
             return Err(Stop::failed(span, "the ring has no drives"));
         };
+        let options = Options {
+            deviates: self.plan.master,
+            ..Options::default()
+        };
         let line = Through {
             runner: self,
             ring,
             halted: None,
         };
-        let result = Bus::open(Box::new(line), &[size], Options::default())
+        let mut events = Vec::new();
+        let result = Bus::open(Box::new(line), &[size], options)
             .map_err(failed)
             .and_then(|bus| {
                 let result = do_all(&bus, calls).map_err(|message| Stop::failed(span, message));
+                events = bus.take_events();
                 bus.close();
                 result
             });
+        let faults = events.into_iter().filter_map(|(_, event)| match event {
+            Event::Disturbed { fault, .. } => Some(fault),
+            _ => None,
+        });
+        self.disturbed = faults.collect();
         self.settle();
         self.forget(ring);
         self.line_before = self.link.now();

@@ -12,6 +12,7 @@ use crate::scenario::problem::Span;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
+use harness_proto::novobus::master::Fault;
 use harness_proto::time::{self, Instant};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -141,6 +142,8 @@ pub(super) struct Runner<'a> {
     pub(super) line_before: Instant,
     deadline: time::Span,
     pub(super) corrected: u64,
+    /// What the driver said was wrong in its last job, the first first.
+    pub(super) disturbed: Vec<Fault>,
     pub(super) sent: u64,
     pub(super) sent_from: Instant,
     pub(super) sent_to: Instant,
@@ -153,6 +156,7 @@ impl<'a> Runner<'a> {
             line_before: link.now(),
             deadline: plan.deadline,
             corrected: 0,
+            disturbed: Vec::new(),
             sent: 0,
             sent_from: link.now(),
             sent_to: link.now(),

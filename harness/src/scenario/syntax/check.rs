@@ -1,7 +1,7 @@
 //! What a scenario can check.
 
-use super::Drives;
 use super::cell::{CellCheck, Place};
+use super::{Drives, LinkEnds};
 use crate::link::Mode;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
@@ -33,6 +33,17 @@ pub enum Check {
     },
     /// So many check sequences came back whole.
     Corrected(Located),
+    /// The driver has named this link as the first thing that was wrong in its last job.
+    Named {
+        /// Which ring, counted from 0.
+        ring: usize,
+        /// Whether it is broken; damaged otherwise.
+        broken: bool,
+        /// Where the link stands.
+        link: Located,
+        /// Its ends.
+        ends: LinkEnds,
+    },
     /// So many bytes were sent since the last check, and took this long.
     Sent {
         /// How many.
