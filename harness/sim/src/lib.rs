@@ -12,6 +12,7 @@
 
 pub mod bench;
 pub mod cells;
+pub mod counted;
 pub mod deviation;
 pub mod device;
 pub mod drive;

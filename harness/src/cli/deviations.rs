@@ -91,13 +91,6 @@ pub(super) fn deviations(
                 // Writing to a String cannot fail.
                 let _infallible = writeln!(text, "{name:32} {section:9} {about}");
             };
-            if !rows.is_empty() {
-                line(
-                    "wrong drives",
-                    "section",
-                    "`drive 2 deviates NAME` in a scenario",
-                );
-            }
             for row in rows {
                 line(row.name, row.section, row.about);
             }

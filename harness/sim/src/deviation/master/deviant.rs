@@ -124,10 +124,11 @@ impl DeviantMaster {
             }
             let phase = self.inner.phase();
             let byte = self.inner.poll_transmit(now)?;
-            if byte == PAUSE && phase == Phase::Running {
+            let spoken = self.speech.read(byte, phase);
+            // The first drive swallows it: nothing comes back.
+            if byte == PAUSE && spoken.what == What::Idle {
                 return Some(byte);
             }
-            let spoken = self.speech.read(byte, phase);
             let sending = match self.deviation.how {
                 How::Sends(sends) | How::Mistakes(sends, _) => sends(&spoken),
                 _ => Sending::Byte(byte),

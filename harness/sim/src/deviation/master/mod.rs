@@ -8,6 +8,8 @@ mod deviant;
 mod how;
 mod speech;
 mod table;
+#[cfg(test)]
+mod tests;
 
 pub use deviant::DeviantMaster;
 pub use how::{MasterDeviation, master_deviation, master_deviations};

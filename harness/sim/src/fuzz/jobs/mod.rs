@@ -1,0 +1,31 @@
+//! Jobs for a master on a ring with faults, judged by the truth: what the drives hold, which faults there were, and what went over the wire.
+//!
+//! The input is a description of the work, so that a fuzzer can write it: see [`Work::read`]. The master is given nothing but its line; the
+//! judge looks into the drives.
+
+mod judge;
+mod play;
+mod wire;
+mod work;
+
+pub use judge::Lie;
+pub use work::{Fault, Order, Work};
+
+use crate::deviation::MasterDeviation;
+
+/// A body for fuzz targets: the jobs of the input end with the truth.
+///
+/// # Panics
+/// The master tells something that is not so, or sends what the manual does not allow.
+pub fn jobs(data: &[u8]) {
+    let work = Work::read(data);
+    if let Some(lie) = judged(&work, None) {
+        panic!("{lie}: {work:?}");
+    }
+}
+
+/// The first thing in which a master is wrong; `None` where everything that it did and told is as it must be.
+#[must_use]
+pub fn judged(work: &Work, deviates: Option<&'static MasterDeviation>) -> Option<Lie> {
+    play::play(work, deviates).err()
+}
