@@ -100,6 +100,14 @@ impl AnyMaster {
         }
     }
 
+    /// Lets one more round begin, at [`Pace::OnRequest`].
+    pub fn start_round(&mut self) {
+        match self {
+            Self::Right(master) => master.start_round(),
+            Self::Deviant(master) => master.inner_mut().start_round(),
+        }
+    }
+
     /// Sets what a drive gets in the cyclic exchange.
     ///
     /// # Errors

@@ -13,6 +13,7 @@ mod control;
 mod discovery;
 mod eeprom;
 mod error;
+mod exchange;
 mod positioning;
 mod pump;
 mod s_ramp;
@@ -22,6 +23,8 @@ pub use axis::Axis;
 pub(crate) use discovery::count_behind;
 pub use discovery::{Identity, Recovery, State, count_drives, recover};
 pub use error::Error;
+/// What a master may send, by the rules of the bus alone.
+pub use harness_sim::fuzz::jobs::conduct;
 pub use s_ramp::SkStatus;
 pub use scope::{Measurement, Scope, Trigger};
 
@@ -245,16 +248,24 @@ impl<'l> Bus<'l> {
     /// result has been fetched.
     #[doc(alias = "NB_Result")]
     pub fn result(&self, order: Order) -> Result<Option<u32>, Error> {
+        match self.outcome(order)? {
+            Outcome::Read(data) => Ok(data.value()),
+            Outcome::Done { .. } => Ok(None),
+            Outcome::Unknown(fault) => Err(Error::Unknown(fault)),
+            Outcome::Failed(stop) => Err(Error::Stopped(stop)),
+        }
+    }
+
+    /// Waits for the end of a job and fetches how it ended, whatever that is; a second time there is nothing to fetch.
+    ///
+    /// # Errors
+    /// [`Error::TimeOut`], [`Error::Link`] or [`Error::NoSuchOrder`]: the job has not ended.
+    pub fn outcome(&self, order: Order) -> Result<Outcome, Error> {
         let end = self.lock().now() + self.options.patience;
         loop {
             let mut pump = self.lock();
             if let Some(outcome) = pump.take(order.ring, order.id) {
-                return match outcome {
-                    Outcome::Read(data) => Ok(data.value()),
-                    Outcome::Done { .. } => Ok(None),
-                    Outcome::Unknown(fault) => Err(Error::Unknown(fault)),
-                    Outcome::Failed(stop) => Err(Error::Stopped(stop)),
-                };
+                return Ok(outcome);
             }
             if !pump.knows(order.ring, order.id) {
                 return Err(Error::NoSuchOrder);

@@ -105,6 +105,11 @@ impl<'l> Pump<'l> {
         Some(id)
     }
 
+    /// The master of a ring; `None` where there is no such ring.
+    pub(super) fn master(&mut self, ring: usize) -> Option<&mut AnyMaster> {
+        Some(&mut self.rings.get_mut(ring)?.master)
+    }
+
     /// The outcome of a job has come.
     pub(super) fn has(&self, ring: usize, id: JobId) -> bool {
         let result = self.rings.get(ring).and_then(|ring| ring.results.get(&id));

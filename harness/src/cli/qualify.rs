@@ -10,10 +10,10 @@ use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
 use crate::link::Link as _;
 use crate::qualify::{
-    Evidence, Hypothesis, Profile, Settled, conversations, deviating, explaining, hypotheses,
-    probes,
+    Evidence, Hypothesis, Profile, Settled, conversations, deviating, deviating_masters,
+    explaining, hypotheses, probes,
 };
-use crate::rig::{Played, Run, state};
+use crate::rig::{Driven, Played, Run, state};
 use crate::scenario::verdict::Verdict;
 use crate::twin::Conversation;
 use std::collections::BTreeMap;
@@ -36,11 +36,23 @@ pub(super) struct Findings {
     diverged: Vec<Vec<Conversation>>,
     /// The drives that were named.
     suspects: Vec<u8>,
+    /// What the bench's own master did, and whether it was ever wrong.
+    driven: Vec<Driven>,
+    master_is_wrong: bool,
 }
 
 impl Findings {
+    /// Whether the bench's own master was wrong: then no drive can be judged by what it did.
+    pub(super) const fn master_is_wrong(&self) -> bool {
+        self.master_is_wrong
+    }
+
     /// Notes what came of a scenario.
     pub(super) fn note(&mut self, played: &Played) {
+        for attempt in &played.attempts {
+            self.driven.extend(attempt.driven.clone());
+            self.master_is_wrong |= !attempt.master_is_right;
+        }
         // What was late once and not again says nothing of a drive.
         let steady = played.outcome.verdict == Verdict::Marginal;
         for attempt in &played.attempts {
@@ -120,10 +132,15 @@ pub(super) fn settle(
         true => None,
         false => Some(profile(run, findings, folder.as_deref_mut(), output)?),
     };
-    let named = name(run, findings, output)?;
-    let exit = match findings.diverged.is_empty() {
-        true => Exit::Passed,
-        false => Exit::Failed,
+    let named = format!(
+        "{}{}",
+        name_master(findings, output)?,
+        name(run, findings, output)?
+    );
+    let exit = match (findings.master_is_wrong, findings.diverged.is_empty()) {
+        (true, _) => Exit::RigError,
+        (false, true) => Exit::Passed,
+        (false, false) => Exit::Failed,
     };
     if let Some(folder) = folder {
         if let Some(profile) = profile {
@@ -133,6 +150,28 @@ pub(super) fn settle(
         folder.add("deviations.txt", &named)?;
     }
     Ok(exit)
+}
+
+/// What the bench's own master does otherwise, if it does.
+fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<String> {
+    if !findings.master_is_wrong {
+        return Ok(String::new());
+    }
+    let mut text = String::new();
+    for deviation in deviating_masters(&findings.driven).iter().take(MOST_TOLD) {
+        text.push_str(&format!(
+            "the master: {} (ND21 {}): {}\n",
+            deviation.name, deviation.section, deviation.about
+        ));
+    }
+    if text.is_empty() {
+        text.push_str("the master: it is otherwise than the master of the manual, and no single known deviation explains it\n");
+    }
+    text.push_str(
+        "the bench is wrong, not a drive: what its master did says nothing of the drives\n",
+    );
+    output.result(&text)?;
+    Ok(text)
 }
 
 /// The deviations that explain every byte of every attempt that diverged.

@@ -142,7 +142,8 @@ fn all(
         bar.suspend(|| output.say(&told));
         bar.inc(1);
         findings.note(&played);
-        if played.outcome.verdict == Verdict::RigError || over(&mut run, output) {
+        let ill = played.outcome.verdict == Verdict::RigError && !findings.master_is_wrong();
+        if ill || over(&mut run, output) {
             break;
         }
     }
@@ -150,7 +151,7 @@ fn all(
     output.result(&summary(&verdicts, took))?;
     let mut exit = Exit::of(&verdicts, job.require_all);
     if job.qualify && !over(&mut run, output) {
-        let ill = exit == Exit::RigError;
+        let ill = exit == Exit::RigError && !findings.master_is_wrong();
         match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
             // What a drive does wrong is the drive's fault, whatever came of it.
             Exit::Failed => exit = Exit::Failed,

@@ -5,7 +5,7 @@ use super::record::{Line, capabilities, read};
 use crate::library::Entry;
 use crate::link::{Event, Replay};
 use crate::rig::run::{judge, known, twin};
-use crate::rig::{Rig, Way, parse, play_one};
+use crate::rig::{Driven, Rig, Way, parse, play_one};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
 use crate::twin::{Conversation, Exactness, Twin};
@@ -215,7 +215,7 @@ fn again(
         text: text.to_owned().into(),
     };
     let size = header.rings.first().map(|ring| ring.drives());
-    let plan = match Entry::new(source, size) {
+    let mut plan = match Entry::new(source, size) {
         Ok(Entry {
             plan: Some(plan), ..
         }) => plan,
@@ -227,6 +227,8 @@ fn again(
         }
         Err(problems) => return (Outcome::rig_error(problems.to_string()), false),
     };
+    let own = rig.plan().ok().and_then(|rig| rig.master);
+    plan.master = own.or(plan.master);
     let mut replay = Replay::new(
         recorded.events.clone(),
         header.rate,
@@ -248,6 +250,17 @@ fn again(
         .verdict
         .as_ref()
         .map_or(0, |(.., unplaced)| *unplaced);
+    let capabilities = (header.exactness.tolerance, header.capabilities.as_slice());
+    let driven = Driven::new(
+        &plan,
+        &recorded.events,
+        &header.way,
+        capabilities,
+        &outcome,
+    );
+    if let Some(driven) = driven.filter(|_| header.simulated) {
+        driven.judge(&mut outcome);
+    }
     judge(&mut outcome, &comparisons, unplaced, &rig.file.deviation);
     (outcome, stale)
 }

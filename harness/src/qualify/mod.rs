@@ -8,6 +8,6 @@ mod hypothesis;
 mod probes;
 
 pub use crate::rig::{Profile, ProfileError, Settled};
-pub use diagnose::deviating;
+pub use diagnose::{deviating, deviating_masters};
 pub use hypothesis::{Evidence, Hypothesis, explaining};
 pub use probes::{Probe, conversations, hypotheses, probes};

@@ -1,12 +1,13 @@
 //! Checks: `? located 97`, `? drive 3 memory FF08 = 1234`, `? error 0502 at 97`.
 
 use super::drive;
+use super::job;
 use super::step;
 use super::words::{drives, named, required};
 use crate::scenario::expression::{self, Located};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Check, Drives};
+use crate::scenario::syntax::{Check, Drives, Ending};
 use crate::scenario::times;
 use harness_proto::novobus::error::BusError;
 
@@ -20,6 +21,8 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         Error,
         Corrected,
         Named,
+        Ended,
+        Rules,
         Sent,
         Received,
     }
@@ -31,6 +34,8 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         ("error", Word::Error),
         ("corrected", Word::Corrected),
         ("named", Word::Named),
+        ("ended", Word::Ended),
+        ("rules", Word::Rules),
         ("sent", Word::Sent),
         ("received", Word::Received),
     ];
@@ -65,6 +70,14 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
                 link,
                 ends,
             })
+        }
+        Word::Ended => {
+            let ending = named(scanner, &Ending::NAMES, "how a job has ended")?;
+            Ok(Check::Ended(ending))
+        }
+        Word::Rules => {
+            required(scanner, &["kept"])?;
+            Ok(Check::RulesKept(job::which_ring(scanner)?))
         }
         Word::Sent => {
             let bytes = expression::sum(scanner)?;

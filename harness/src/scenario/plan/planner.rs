@@ -444,6 +444,8 @@ impl Planner {
                 link,
                 ends,
             } => PlannedCheck::Named(*ring, self.link(*ring, link.span, ends)?, *broken),
+            Check::Ended(ending) => PlannedCheck::Ended(*ending),
+            Check::RulesKept(ring) => PlannedCheck::RulesKept(*ring),
             Check::Sent { bytes, time } => {
                 let time = time.map(|t| (t.on(self.byte_time), t.tolerance(self.byte_time)));
                 PlannedCheck::Sent(count(bytes)?, time)

@@ -66,6 +66,21 @@ impl Runner<'_> {
                 self.corrected
             )),
             PlannedCheck::Named(ring, link, broken) => self.named((*ring, *link), *broken, span),
+            PlannedCheck::Ended(ending) => {
+                let other = self.ended.iter().find(|own| *own != ending);
+                match (self.ended.is_empty(), other) {
+                    (false, None) => Ok(()),
+                    (true, _) => failed("the driver has had no command before".to_owned()),
+                    (_, Some(other)) => failed(format!(
+                        "the driver's command ended as \"{}\", expected is \"{}\"",
+                        other.name(),
+                        ending.name()
+                    )),
+                }
+            }
+            PlannedCheck::RulesKept(ring) => self
+                .rules_kept(*ring)
+                .map_err(|wrong| Stop::failed(span, wrong)),
             PlannedCheck::Sent(bytes, time) => {
                 if *bytes != self.sent {
                     return failed(format!(

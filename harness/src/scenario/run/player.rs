@@ -9,9 +9,11 @@ use crate::scenario::plan::{
     MAX_CARRIED, Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow,
 };
 use crate::scenario::problem::Span;
+use crate::scenario::syntax::Ending;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
+use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Fault;
 use harness_proto::time::{self, Instant};
 use std::collections::{BTreeMap, BTreeSet};
@@ -144,6 +146,12 @@ pub(super) struct Runner<'a> {
     pub(super) corrected: u64,
     /// What the driver said was wrong in its last job, the first first.
     pub(super) disturbed: Vec<Fault>,
+    /// How the commands of that job have ended.
+    pub(super) ended: Vec<Ending>,
+    /// What the driver was asked for in each ring; `None` where a call of several steps was among it.
+    pub(super) asked: Vec<Option<Vec<(u8, Command)>>>,
+    /// When the driver last left the line of a ring free in the middle of its work, if it did.
+    pub(super) gap: Option<Instant>,
     pub(super) sent: u64,
     pub(super) sent_from: Instant,
     pub(super) sent_to: Instant,
@@ -157,6 +165,9 @@ impl<'a> Runner<'a> {
             deadline: plan.deadline,
             corrected: 0,
             disturbed: Vec::new(),
+            ended: Vec::new(),
+            asked: plan.rings.iter().map(|_| Some(Vec::new())).collect(),
+            gap: None,
             sent: 0,
             sent_from: link.now(),
             sent_to: link.now(),
@@ -291,7 +302,7 @@ impl Runner<'_> {
                     .and_then(|()| self.read(*ring, expected.len(), reading.as_ref(), step.span))
             }
             PlannedAction::Recover(ring) => self.recover(*ring, step.span),
-            PlannedAction::Master(ring, calls) => self.master(*ring, calls, step.span),
+            PlannedAction::Master(ring, calls, once) => self.master(*ring, calls, *once, step.span),
             PlannedAction::Count(ring, drives) => self.count(*ring, *drives, step.span),
         }
     }

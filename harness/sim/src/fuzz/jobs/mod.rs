@@ -12,6 +12,7 @@ pub use judge::Lie;
 pub use work::{Fault, Order, Work};
 
 use crate::deviation::MasterDeviation;
+use harness_proto::novobus::command::Command;
 
 /// A body for fuzz targets: the jobs of the input end with the truth.
 ///
@@ -22,6 +23,15 @@ pub fn jobs(data: &[u8]) {
     if let Some(lie) = judged(&work, None) {
         panic!("{lie}: {work:?}");
     }
+}
+
+/// Whether what a master has sent into a ring of so many drives is as the manual says (ND21 9.1-9.8, 10), and each command is one that it was
+/// asked for: once, and once more behind each check sequence.
+///
+/// # Errors
+/// The first thing that is otherwise.
+pub fn conduct(drives: u8, sent: &[u8], asked: &[(u8, Command)]) -> Result<(), Lie> {
+    wire::read(drives, sent)?.asked_for(asked)
 }
 
 /// The first thing in which a master is wrong; `None` where everything that it did and told is as it must be.

@@ -37,6 +37,24 @@ pub(super) struct Read {
     pub(super) sequences: usize,
 }
 
+impl Read {
+    /// Whether every command is one of those asked for, and was not sent too often.
+    pub(super) fn asked_for(&self, asked: &[(u8, Command)]) -> Result<(), Lie> {
+        for own in &self.commands {
+            let asked = asked.iter().filter(|asked| *asked == own).count();
+            let sent = self.commands.iter().filter(|sent| *sent == own).count();
+            if sent > asked * (1 + self.sequences) {
+                let (drive, command) = own;
+                let text = format!(
+                    "it sent {command:?} to drive {drive} {sent} times, asked for {asked} times"
+                );
+                return Err(Lie::new("11.6", text));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Reads all bytes that were sent into a ring of so many drives.
 pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
     let mut read = Read::default();
