@@ -13,12 +13,13 @@ use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
-use harness_sim::deviation::{Deviation, deviations};
+use harness_sim::deviation::{Deviation, deviations, master_deviations};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const FILE: &str = "corpora/deviations.toml";
+const MASTERS: &str = "corpora/masters.toml";
 
 const HEAD: &str = "\
 # Which scenario finds which deviation of a drive (`drivebench deviations`), and by what means:
@@ -202,6 +203,34 @@ fn every_deviation_is_found() {
     let names: Vec<_> = deviations().map(|d| d.name).collect();
     let unknown = found.keys().find(|name| !names.contains(&name.as_str()));
     assert_eq!(unknown, None, "{FILE} names a deviation that there is not");
+}
+
+/// Every deviation of the bench's own master is found by a scenario, over the bus alone.
+#[test]
+fn every_wrong_master_is_found() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(MASTERS));
+    let found: BTreeMap<String, String> = toml::from_str(&text.expect("a file")).expect("a table");
+    let scenarios = scenarios();
+    for deviation in master_deviations() {
+        let name = found.get(deviation.name).map_or("", String::as_str);
+        let entry = scenarios.iter().find(|entry| entry.short_name() == name);
+        let entry = entry.unwrap_or_else(|| panic!("{}: no scenario {name:?}", deviation.name));
+        let mut plan = entry.plan.clone().expect("a plan");
+        for (master, verdict) in [(None, Verdict::Passed), (Some(deviation), Verdict::Failed)] {
+            plan.master = master;
+            let mut link = simulated(&plan);
+            let mut forgotten: Vec<harness::link::Event> = Vec::new();
+            let mut seen = harness::link::Recording::new(&mut link, &mut forgotten);
+            let outcome = run(&plan, &mut seen);
+            assert_eq!(outcome.verdict, verdict, "{}: {name}", deviation.name);
+        }
+    }
+    let names: Vec<_> = master_deviations().map(|d| d.name).collect();
+    let unknown = found.keys().find(|name| !names.contains(&name.as_str()));
+    assert_eq!(
+        unknown, None,
+        "{MASTERS} names a deviation that there is not"
+    );
 }
 
 #[test]

@@ -42,11 +42,6 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Whether the bench's own master was wrong: then no drive can be judged by what it did.
-    pub(super) const fn master_is_wrong(&self) -> bool {
-        self.master_is_wrong
-    }
-
     /// Notes what came of a scenario.
     pub(super) fn note(&mut self, played: &Played) {
         for attempt in &played.attempts {

@@ -125,6 +125,7 @@ fn all(
     let bar = progress_bar(entries.len(), output.progress);
     let mut findings = Findings::default();
     let mut verdicts = Vec::new();
+    let mut ill = false;
     let mut took = Span::ZERO;
     for entry in entries {
         bar.set_message(entry.short_name().to_owned());
@@ -142,7 +143,11 @@ fn all(
         bar.suspend(|| output.say(&told));
         bar.inc(1);
         findings.note(&played);
-        let ill = played.outcome.verdict == Verdict::RigError && !findings.master_is_wrong();
+        ill = played.outcome.verdict == Verdict::RigError
+            && played
+                .attempts
+                .last()
+                .is_none_or(|last| last.master_is_right);
         if ill || over(&mut run, output) {
             break;
         }
@@ -151,7 +156,6 @@ fn all(
     output.result(&summary(&verdicts, took))?;
     let mut exit = Exit::of(&verdicts, job.require_all);
     if job.qualify && !over(&mut run, output) {
-        let ill = exit == Exit::RigError && !findings.master_is_wrong();
         match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
             // What a drive does wrong is the drive's fault, whatever came of it.
             Exit::Failed => exit = Exit::Failed,

@@ -251,13 +251,7 @@ fn again(
         .as_ref()
         .map_or(0, |(.., unplaced)| *unplaced);
     let capabilities = (header.exactness.tolerance, header.capabilities.as_slice());
-    let driven = Driven::new(
-        &plan,
-        &recorded.events,
-        &header.way,
-        capabilities,
-        &outcome,
-    );
+    let driven = Driven::new(&plan, &recorded.events, &header.way, capabilities, &outcome);
     if let Some(driven) = driven.filter(|_| header.simulated) {
         driven.judge(&mut outcome);
     }

@@ -37,7 +37,7 @@ impl Driven {
         (tolerance, capabilities): (Span, &[Capability]),
         outcome: &Outcome,
     ) -> Option<Self> {
-        let played = outcome.verdict != Verdict::Skipped;
+        let played = !matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError);
         (played && plan.asks_the_driver()).then(|| Self {
             plan: plan.clone(),
             events: events.to_vec(),

@@ -204,6 +204,38 @@ fn named(names: &[&str]) {
     }
 }
 
+/// Every deviation of the bench's own master is among those that `qualify` names, in the evidence too; and the bench is to blame, not a drive.
+#[test]
+fn wrong_masters_are_named() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("corpora/masters.toml")).expect("a file");
+    for line in text.lines() {
+        let Some((name, scenario)) = line.split_once(" = ") else {
+            continue;
+        };
+        let desk = Desk::new(3, "tcp", "127.0.0.1:1");
+        let text = format!(
+            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = [\"master deviates {name}\"]\n\
+             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n"
+        );
+        std::fs::write(desk.path("desk.toml"), text).expect("room");
+        let folder = desk.path("evidence");
+        let evidence = folder.to_str().expect("a name");
+        let scenario = scenario.trim_matches('"');
+        let output = desk.run(&[
+            "qualify",
+            scenario,
+            "--allow-motion",
+            "--evidence",
+            evidence,
+        ]);
+        ended(&output, 3, &format!("the master: {name} "));
+        let named = std::fs::read_to_string(folder.join("deviations.txt")).expect("a file");
+        assert!(named.contains("the bench is wrong, not a drive"), "{named}");
+        ended(&verify(&folder), 0, "0 things wrong");
+    }
+}
+
 /// ND21 9.6: the same over a socket, where the ring is another process.
 #[test]
 fn a_wrong_drive_behind_a_socket_is_named() {
