@@ -7,7 +7,7 @@ use harness_sim::fuzz::jobs::{Work, judged};
 /// Cases of the right master; `CASES` asks for more.
 const RIGHT: u64 = 3_000;
 /// Inputs within which every wrong master is found.
-const WRONG: u64 = 2_000;
+const WRONG: u64 = 20_000;
 
 /// An input of the fuzz target, as a fuzzer begins with: any bytes.
 fn input(case: u64) -> Vec<u8> {

@@ -6,6 +6,7 @@ use super::player::Runner;
 use crate::locate::{self, Location};
 use crate::scenario::plan::PlannedCheck;
 use crate::scenario::problem::Span;
+use crate::scenario::syntax::Ending;
 use harness_proto::novobus::master::{End, Fault, RingLink};
 
 /// SYNCO sent to let a ring spell out an address: the bound of 25 zeros, and enough behind it to see
@@ -66,18 +67,7 @@ impl Runner<'_> {
                 self.corrected
             )),
             PlannedCheck::Named(ring, link, broken) => self.named((*ring, *link), *broken, span),
-            PlannedCheck::Ended(ending) => {
-                let other = self.ended.iter().find(|own| *own != ending);
-                match (self.ended.is_empty(), other) {
-                    (false, None) => Ok(()),
-                    (true, _) => failed("the driver has had no command before".to_owned()),
-                    (_, Some(other)) => failed(format!(
-                        "the driver's command ended as \"{}\", expected is \"{}\"",
-                        other.name(),
-                        ending.name()
-                    )),
-                }
-            }
+            PlannedCheck::Ended(ending) => self.all_ended(*ending, span),
             PlannedCheck::RulesKept(ring) => self
                 .rules_kept(*ring)
                 .map_err(|wrong| Stop::failed(span, wrong)),
@@ -109,6 +99,21 @@ impl Runner<'_> {
                 ))
             }
         }
+    }
+
+    /// Whether all commands of the driver's last job have ended so.
+    fn all_ended(&self, ending: Ending, span: Span) -> Result<(), Stop> {
+        let other = self.ended.iter().find(|own| **own != ending);
+        let message = match (self.ended.is_empty(), other) {
+            (false, None) => return Ok(()),
+            (true, _) => "the driver has had no command before".to_owned(),
+            (_, Some(other)) => format!(
+                "the driver's command ended as \"{}\", expected is \"{}\"",
+                other.name(),
+                ending.name()
+            ),
+        };
+        Err(Stop::failed(span, message))
     }
 
     /// Whether the driver said first that this link is broken, or damages bytes.

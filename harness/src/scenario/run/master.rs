@@ -131,6 +131,13 @@ impl Runner<'_> {
         result
     }
 
+    /// A line sends by itself what the driver is not asked for.
+    pub(super) fn not_the_driver(&mut self, ring: usize) {
+        if let Some(asked) = self.asked.get_mut(ring) {
+            *asked = None;
+        }
+    }
+
     /// Notes what the driver is asked for; calls of several steps ask for more than is known here.
     fn ask(&mut self, ring: usize, calls: &[(u8, PlannedCall)]) {
         let Some(own) = self.asked.get_mut(ring) else {
@@ -152,11 +159,8 @@ impl Runner<'_> {
         let sent = record.into_iter().flat_map(|record| &record.sent);
         let sent: Vec<u8> = sent.map(|(byte, _)| *byte).collect();
         let asked = self.asked.get(ring).and_then(Option::as_deref);
-        let conduct = match asked {
-            Some(asked) => conduct(drives, &sent, asked),
-            None => Ok(()),
-        };
-        conduct.map_err(|wrong| format!("of the bench's own master: {wrong}"))?;
+        conduct(drives, &sent, asked)
+            .map_err(|wrong| format!("of the bench's own master: {wrong}"))?;
         match self.gap {
             Some(gap) => Err(format!(
                 "of the bench's own master: it left a gap on the line behind {gap} (ND21 9.1)"

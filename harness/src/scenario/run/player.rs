@@ -148,7 +148,7 @@ pub(super) struct Runner<'a> {
     pub(super) disturbed: Vec<Fault>,
     /// How the commands of that job have ended.
     pub(super) ended: Vec<Ending>,
-    /// What the driver was asked for in each ring; `None` where a call of several steps was among it.
+    /// The commands that each ring was sent by the driver; `None` where there may be others.
     pub(super) asked: Vec<Option<Vec<(u8, Command)>>>,
     /// When the driver last left the line of a ring free in the middle of its work, if it did.
     pub(super) gap: Option<Instant>,
@@ -258,6 +258,7 @@ impl Runner<'_> {
     fn act(&mut self, step: &PlannedStep) -> Result<(), Stop> {
         match &step.action {
             PlannedAction::Send(ring, bytes) => {
+                self.not_the_driver(*ring);
                 self.send(*ring, bytes);
                 Ok(())
             }
@@ -290,6 +291,7 @@ impl Runner<'_> {
                 result
             }
             PlannedAction::Telegram(ring, bytes, expected, reading) => {
+                self.not_the_driver(*ring);
                 self.settle();
                 let asked = self.nothing_unasked(step.span);
                 if asked.is_err() && self.at_finding == AtFinding::Stop {

@@ -84,26 +84,13 @@ pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
             }
             continue;
         };
-        let drive = match header.addressing() {
-            Addressing::AddressFollows => {
-                let Some(&address) = sent.get(at) else { break };
-                at += 1;
-                let sum = address.wrapping_add(drives);
-                read.back.push(Back::Byte(sum));
-                if sum >= drives && address != 0 {
-                    let text =
-                        format!("it sent the address byte {address:02X}, which is no drive's");
-                    return Err(Lie::new("9.3", text));
-                }
-                (sum < drives).then_some(sum)
-            }
-            Addressing::SameDrive => last,
-            Addressing::NextDrive => last.map(|drive: u8| drive + 1),
+        let follows = header.addressing() == Addressing::AddressFollows;
+        let Some(drive) = addressed(drives, header.addressing(), last, sent.get(at))? else {
+            break;
         };
-        let short = header.addressing() != Addressing::AddressFollows;
-        if short && drive.is_none_or(|drive| drive >= drives) {
-            let text = "it sent a short address, and no drive was addressed before";
-            return Err(Lie::new("9.2", text));
+        if let (true, Some(address)) = (follows, sent.get(at)) {
+            read.back.push(Back::Byte(address.wrapping_add(drives)));
+            at += 1;
         }
         last = drive;
         let net = usize::from(header.net_length());
@@ -129,6 +116,33 @@ pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
         }
     }
     Ok(read)
+}
+
+/// The drive that a telegram is for, `Some(None)` for nobody (9.2, 9.3); `None` where the address byte has not been sent.
+fn addressed(
+    drives: u8,
+    addressing: Addressing,
+    last: Option<u8>,
+    byte: Option<&u8>,
+) -> Result<Option<Option<u8>>, Lie> {
+    let drive = match (addressing, byte) {
+        (Addressing::AddressFollows, None) => return Ok(None),
+        (Addressing::AddressFollows, Some(&address)) => {
+            let sum = address.wrapping_add(drives);
+            if sum >= drives && address != 0 {
+                let text = format!("it sent the address byte {address:02X}, which is no drive's");
+                return Err(Lie::new("9.3", text));
+            }
+            return Ok(Some((sum < drives).then_some(sum)));
+        }
+        (Addressing::SameDrive, _) => last,
+        (Addressing::NextDrive, _) => last.and_then(|drive| drive.checked_add(1)),
+    };
+    if drive.is_none_or(|drive| drive >= drives) {
+        let text = "it sent a short address, and no drive was addressed before";
+        return Err(Lie::new("9.2", text));
+    }
+    Ok(Some(drive))
 }
 
 /// How long the check sequence is that begins here (9.8); shorter where nothing more was sent.
