@@ -34,6 +34,8 @@ const PROBED: usize = 3;
 pub(super) struct Findings {
     /// The conversations of each attempt that diverged.
     diverged: Vec<Vec<Conversation>>,
+    /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
+    with_driver: Vec<Vec<Conversation>>,
     /// The drives that were named.
     suspects: Vec<u8>,
     /// What the bench's own master did, and whether it was ever wrong.
@@ -42,6 +44,14 @@ pub(super) struct Findings {
 }
 
 impl Findings {
+    /// The attempts that are to be explained.
+    fn attempts(&self) -> &[Vec<Conversation>] {
+        match self.diverged.is_empty() {
+            true => &self.with_driver,
+            false => &self.diverged,
+        }
+    }
+
     /// Notes what came of a scenario.
     pub(super) fn note(&mut self, played: &Played) {
         for attempt in &played.attempts {
@@ -57,7 +67,11 @@ impl Findings {
             });
             let drives: Vec<_> = diverged.map(|divergence| divergence.drive).collect();
             if !drives.is_empty() {
-                self.diverged.push(attempt.conversations.clone());
+                let own = match attempt.driven {
+                    Some(_) => &mut self.with_driver,
+                    None => &mut self.diverged,
+                };
+                own.push(attempt.conversations.clone());
                 self.suspects.extend(drives.into_iter().flatten());
             }
         }
@@ -132,7 +146,7 @@ pub(super) fn settle(
         name_master(findings, output)?,
         name(run, findings, output)?
     );
-    let exit = match (findings.master_is_wrong, findings.diverged.is_empty()) {
+    let exit = match (findings.master_is_wrong, findings.attempts().is_empty()) {
         (true, _) => Exit::RigError,
         (false, true) => Exit::Passed,
         (false, false) => Exit::Failed,
@@ -171,7 +185,7 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
 
 /// The deviations that explain every byte of every attempt that diverged.
 fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<String, Stop> {
-    if findings.diverged.is_empty() {
+    if findings.attempts().is_empty() {
         output.result("deviations: none; every byte is as the model of the manual says\n")?;
         return Ok("none\n".to_owned());
     }
@@ -182,7 +196,7 @@ fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<S
     // A drive that a deviation has left in another state explains what comes behind in its own way: the deviations count
     // that explain the most.
     let mut explained: BTreeMap<&str, (usize, &Hypothesis)> = BTreeMap::new();
-    for attempt in findings.diverged.iter().take(MOST_ATTEMPTS) {
+    for attempt in findings.attempts().iter().take(MOST_ATTEMPTS) {
         for (hypothesis, _) in explaining(&all, attempt, exactness, &twin).unwrap_or_default() {
             explained
                 .entry(&hypothesis.name)
