@@ -1,24 +1,26 @@
 #!/usr/bin/env bash
-# Builds every target into $OUT, each with its inputs and, where it takes bytes of the bus, the dictionary.
+# Builds every target into $OUT, each with its inputs and, where it takes bytes of the bus, the dictionary. $SANITIZER is the fuzzing
+# service's; cargo-fuzz knows address, leak, memory and thread, and anything else is none of them. FUZZ_PROFILE=dev takes the quickly built programs.
 set -euo pipefail
 : "${OUT:?the folder for the results}"
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-[[ -d fuzz ]] || cd "$SRC/drivebench"
+[[ -d fuzz ]] || cd "${SRC:?the folder with the sources}/drivebench"
 
-(cd fuzz && cargo fuzz build --release --debug-assertions)
-built=fuzz/target/x86_64-unknown-linux-gnu/release
-for target in bus_end codec detector links ring drive master guard scenario rig; do
-    cp "$built/$target" "$OUT/"
+sanitizer=${SANITIZER:-address}
+case "$sanitizer" in address | leak | memory | thread) ;; *) sanitizer=none ;; esac
+case "${FUZZ_PROFILE:-release}" in
+    dev) profile=--dev folder=debug ;;
+    *) profile=--release folder=release ;;
+esac
+host=$(rustc -vV | sed -n 's/^host: //p')
+cargo fuzz build --sanitizer "$sanitizer" "$profile" --debug-assertions
+mapfile -t with_dictionary < <(scripts/fuzz-targets --dictionary)
+for target in $(scripts/fuzz-targets); do
+    cp "fuzz/target/$host/$folder/$target" "$OUT/"
     seeds=$(mktemp -d)
-    for file in corpora/fuzz/"$target"/*; do
-        name=$(basename "$file")
-        if [[ $name == *.hex ]]; then
-            sed 's/#.*//' "$file" | tr -dc '0-9A-Fa-f' | sed 's/../\\x&/g' | xargs -0 printf '%b' >"$seeds/${name%.hex}"
-        else
-            cp "$file" "$seeds/$name"
-        fi
-    done
+    scripts/fuzz-seeds "$target" "$seeds"
+    rm -f "$OUT/${target}_seed_corpus.zip"
     (cd "$seeds" && zip -q -r "$OUT/${target}_seed_corpus.zip" .)
     rm -rf "$seeds"
-    case "$target" in bus_end | codec | detector | ring | guard) cp fuzz/novobus.dict "$OUT/$target.dict" ;; esac
+    if [[ " ${with_dictionary[*]} " == *" $target "* ]]; then cp fuzz/novobus.dict "$OUT/$target.dict"; fi
 done

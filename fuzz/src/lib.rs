@@ -2,14 +2,15 @@
 //! repairs commands.
 
 use harness_sim::fuzz::repair;
-use harness_sim::transitions::{CELLS, Reached};
+use harness_sim::transitions::{REACHABLE, Reached};
 use std::sync::atomic::{AtomicU8, Ordering};
 
 // libFuzzer takes the counters in steps of eight bytes.
-const COUNTERS: usize = CELLS.next_multiple_of(8);
+const COUNTERS: usize = REACHABLE.next_multiple_of(8);
 
-/// One counter a cell of the matrix of protocol transitions. libFuzzer finds them by the name of the section, sets them to 0 before each
-/// case and keeps an input that makes one of them rise for the first time. `used` keeps the linker from leaving them out.
+/// One counter a cell of the matrix of protocol transitions that can be reached. libFuzzer finds them by the name of the section, sets them
+/// to 0 before each case, reads all of them behind it and keeps an input that makes one of them rise for the first time. `used` keeps the
+/// linker from leaving them out.
 // Unsafe, since a section of a wrong form would harm the program; this one is an array of bytes, as libFuzzer documents it.
 #[used]
 #[unsafe(link_section = "__libfuzzer_extra_counters")]
@@ -17,8 +18,8 @@ static TRANSITIONS: [AtomicU8; COUNTERS] = [const { AtomicU8::new(0) }; COUNTERS
 
 /// Tells libFuzzer which transitions a case went through.
 pub fn count(reached: &Reached) {
-    for index in reached.indices() {
-        TRANSITIONS[index].store(1, Ordering::Relaxed);
+    for number in reached.reachable_numbers() {
+        TRANSITIONS[number].store(1, Ordering::Relaxed);
     }
 }
 

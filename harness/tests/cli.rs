@@ -496,3 +496,48 @@ fn fuzz_coverage() {
     assert_eq!(code(&half), 2);
     assert!(stderr(&half).contains("two.hex: line 1 ends within a byte"));
 }
+
+/// What a grown folder reaches beyond the kept one is put beside it as a readable file; a second time nothing is left to do.
+#[test]
+fn fuzz_distil() {
+    let kept = file("fuzz_distil/kept", "one.hex", "00 80");
+    let kept = kept.parent().expect("a folder");
+    std::fs::remove_dir_all(kept).expect("there");
+    file("fuzz_distil/kept", "one.hex", "00 80");
+    // SYNCO; SYNCO and PAUSE with a SYNCO that adds nothing.
+    file("fuzz_distil/grown", "a", [0, 0x80]);
+    let grown = file("fuzz_distil/grown", "b", [0, 0x80, 0x81, 0x80]);
+    let grown = grown.parent().expect("a folder");
+    let folders = ["--from", text(grown), "--to", text(kept)];
+    let distil = |target| drivebench(&[&["fuzz", "distil", target][..], &folders].concat());
+    let output = distil("detector");
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let name = "9.2-sync-byte-due-no-address-byte-seen--pause.hex";
+    let page = stdout(&output);
+    assert_eq!(
+        page,
+        format!("{name}\n1 inputs: 1 transitions more, 1 before\n")
+    );
+    let written = std::fs::read_to_string(kept.join(name)).expect("written");
+    // What stands in front of the PAUSE is the number of the damaged byte: any will do that is none of this wire.
+    assert!(written.ends_with("PAUSE\n80 81\n"), "{written}");
+    let again = distil("detector");
+    assert_eq!(
+        stdout(&again),
+        "0 inputs: 0 transitions more, 2 before\n",
+        "{}",
+        stderr(&again)
+    );
+    assert_eq!(code(&distil("codec")), 2);
+    let nothing = drivebench(&[
+        "fuzz",
+        "distil",
+        "ring",
+        "--from",
+        text(kept),
+        "--to",
+        "/nowhere/at/all",
+    ]);
+    assert_eq!(code(&nothing), 2);
+    assert!(stderr(&nothing).contains("/nowhere/at/all"));
+}

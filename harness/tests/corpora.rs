@@ -6,6 +6,7 @@ use harness::fuzz::targets;
 use harness_sim::transitions::{State, tour};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("corpora/fuzz")
@@ -79,6 +80,56 @@ fn kept(path: &Path, text: &str) {
         "{} differs; UPDATE_SNAPSHOTS=1 writes it",
         path.display()
     );
+}
+
+/// What a script prints, by lines; it ends well.
+fn script(name: &str, arguments: &[&str]) -> Vec<String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scripts")
+        .join(name);
+    let output = Command::new(path).args(arguments).output();
+    let output = output.expect("the script starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name} {arguments:?}: {said}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    text.lines().map(str::to_owned).collect()
+}
+
+/// The scripts take the targets from fuzz/Cargo.toml: they are those that are played here.
+#[test]
+fn the_scripts_know_every_target() {
+    let known: BTreeSet<_> = targets().map(|(name, _)| name.to_owned()).collect();
+    let listed = script("fuzz-targets", &[]);
+    assert_eq!(listed.iter().cloned().collect::<BTreeSet<_>>(), known);
+    let with_dictionary = script("fuzz-targets", &["--dictionary"]);
+    let wanted = ["bus_end", "codec", "detector", "guard", "ring"].map(str::to_owned);
+    assert_eq!(
+        with_dictionary.into_iter().collect::<BTreeSet<_>>(),
+        BTreeSet::from(wanted)
+    );
+}
+
+/// What the script makes of the kept inputs for libFuzzer is what is played here.
+#[test]
+fn the_script_converts_as_the_tests_do() {
+    let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fuzz-seeds");
+    for (target, _) in targets() {
+        let to = to.join(target);
+        let _none_before = std::fs::remove_dir_all(&to);
+        script("fuzz-seeds", &[target, &to.display().to_string()]);
+        let mut written = std::fs::read_dir(&to).expect("a folder").count();
+        for entry in std::fs::read_dir(folder().join(target)).expect("a folder") {
+            let path = entry.expect("readable").path();
+            let name = path.file_name().expect("a name").to_string_lossy();
+            let content = std::fs::read(&path).expect("readable");
+            let wanted = input(&name, &content).expect("an input");
+            let seed = to.join(name.strip_suffix(".hex").unwrap_or(&name));
+            let found = std::fs::read(&seed).expect("written");
+            assert_eq!(found, wanted, "{}", path.display());
+            written -= 1;
+        }
+        assert_eq!(written, 0, "{target}: more seeds than inputs");
+    }
 }
 
 #[test]

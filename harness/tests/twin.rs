@@ -2,7 +2,7 @@
 
 use harness::library::{Entry, sources};
 use harness::link::{Event, Link, Recording, Replay};
-use harness::qualify::{Hypothesis, explaining, hypotheses, probes};
+use harness::qualify::{Answer, Asked, Hypothesis, Probe, answer, explaining, hypotheses, probes};
 use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus};
 use harness::scenario::simulate::bench;
@@ -15,6 +15,7 @@ const EXACT: Exactness = Exactness {
     tolerance: Span::ZERO,
     line_errors: true,
     knows_cells: true,
+    looks: None,
 };
 
 fn entry(text: &str) -> Entry {
@@ -97,27 +98,127 @@ fn a_record_is_played_again() {
 #[test]
 fn probes_tell_properties() {
     for probe in probes(3).expect("no mistakes") {
-        let Some(entry) = probe.entry else { continue };
-        let plan = entry.plan.expect("novobus");
+        if probe.asked != Asked::Ring || probe.entries.is_err() {
+            continue;
+        }
         let alike = |h: &Hypothesis| h.lines.len() == 1;
         for hypothesis in hypotheses(probe.property, 3).into_iter().filter(alike) {
-            let (_, mut link) = model(&hypothesis.lines);
-            let seen = conversations(&plan, &mut link);
-            let twin = |lines: &[String]| -> Result<Twin, ()> {
-                let (plan, link) = model(lines);
-                Ok(Twin::new(link, &plan.rings))
-            };
-            let all = hypotheses(probe.property, 3);
-            let found = explaining(&all, &seen, EXACT, &twin).expect("rings");
-            // A drive behind one that has gone into the error mode is not asked: it may be of either kind.
-            let names: Vec<_> = found
-                .iter()
-                .filter(|(h, _)| alike(h))
-                .map(|(h, _)| h.name.as_str())
-                .collect();
-            assert_eq!(names, [hypothesis.name.as_str()], "{}", probe.property);
+            let value = hypothesis.name.clone();
+            let lines = hypothesis.lines.clone();
+            let settled = Answer::Settled { value, lines };
+            let answer = answered(&probe, EXACT, &hypothesis.lines);
+            assert_eq!(answer, settled, "{}", probe.property);
         }
     }
+}
+
+/// ND21 9.9: silence, the wait behind it and what becomes of a byte in it show together, and are told apart.
+#[test]
+fn a_time_out_is_told_from_the_wait_behind_it() {
+    let all = |property: &str, ms: u64| format!("drive 0..last property {property} = {ms}ms");
+    for (time_out, wait) in [(13, 7), (11, 8), (18, 12)] {
+        for silent in [false, true] {
+            let mut lines = vec![all("time-out", time_out), all("time-out-wait", wait)];
+            let answered_not = "drive 0..last property time-out-answer = silent".to_owned();
+            lines.extend(silent.then_some(answered_not));
+            let probes = probes(3).expect("no mistakes");
+            let mut own = probes.iter().filter(|probe| probe.property == "time-out");
+            let found = answered(own.next().expect("a probe"), EXACT, &lines);
+            // Silences of 12.5, 15.5 and 18.5 ms were tried: it is known between which, and exactly when the zeros came.
+            let same = |ms: u64| [13, 16, 19].map(|gap| ms < gap);
+            let found_is = |time_out: u64, wait: u64| {
+                let mut lines = lines.clone();
+                lines[0] = all("time-out", time_out);
+                lines[1] = all("time-out-wait", wait);
+                let value = format!("{time_out}ms");
+                found == Answer::Settled { value, lines }
+            };
+            let alike = (10..=20).filter(|ms| same(*ms) == same(time_out));
+            let sum = time_out + wait;
+            let mut alike = alike.filter(|ms| (5..=15).contains(&(sum - ms)) && sum - ms != 10);
+            assert!(
+                alike.any(|ms| found_is(ms, sum - ms)),
+                "{lines:?}: {found:?}"
+            );
+        }
+    }
+}
+
+/// What a ring of three with these lines answers to a probe.
+fn answered(probe: &Probe, exactness: Exactness, lines: &[String]) -> Answer {
+    let entries = probe.entries.as_ref().expect("a conversation").iter();
+    let seen = entries.map(|entry| {
+        let (_, mut link) = model(lines);
+        conversations(entry.plan.as_ref().expect("novobus"), &mut link)
+    });
+    let twin = |lines: &[String]| -> Result<Twin, ()> {
+        let (plan, link) = model(lines);
+        Ok(Twin::new(link, &plan.rings))
+    };
+    answer(probe, 3, &seen.collect::<Vec<_>>(), exactness, &twin).expect("rings")
+}
+
+/// ND21 11.8, 13.3.2, 14.10.5, 14.11.14: what the manual leaves open of the drive itself is told by its cells, drive by drive.
+#[test]
+fn what_a_drive_leaves_open_is_settled() {
+    // What is found is a span of times around the true one, as wide as the questions are apart.
+    let times = [
+        ("eeprom-read-time", 1, 0, 8),
+        ("eeprom-read-time", 300, 280, 320),
+        ("eeprom-write-time", 1, 0, 2),
+        ("eeprom-write-time", 20, 19, 21),
+        ("self-test-time", 50, 40, 60),
+        ("self-test-time", 4_000, 3_980, 4_020),
+        ("ps-calculation-time", 10, 0, 20),
+        ("ps-calculation-time", 400, 370, 430),
+    ];
+    for (property, is, from, to) in times {
+        let Answer::Settled { value, lines } = asked(property, &format!("{is}ms")) else {
+            panic!("{property} = {is} is not settled");
+        };
+        let (low, high) = value.split_once(" to ").expect("a span");
+        let ms = |text: &str| text.trim_end_matches("ms").parse::<f64>().expect("a time");
+        let (low, high) = (ms(low), ms(high));
+        let is = f64::from(is);
+        // A cycle of 432 us (4.1) more or less is not to be seen.
+        assert!(
+            low - 0.5 <= is && is <= high + 0.5,
+            "{property}: {is}: {value}"
+        );
+        assert!(
+            low >= f64::from(from) && high <= f64::from(to),
+            "{property}: {value}"
+        );
+        assert!(lines[0].starts_with(&format!("drive 1 property {property} = ")));
+    }
+    let words = [
+        ("ps-position", "mode-bit"),
+        ("ps-position", "whole-word"),
+        ("bus-errors", "block"),
+        ("bus-errors", "time-out-only"),
+    ];
+    for (property, word) in words {
+        let answer = asked(property, word);
+        let is_it = matches!(&answer, Answer::Settled { value, .. } if value == word);
+        assert!(is_it, "{property} = {word}: {answer:?}");
+    }
+}
+
+/// What drive 1 of three answers to the probe for a property, where it is so.
+fn asked(property: &str, value: &str) -> Answer {
+    let probes = probes(3).expect("no mistakes").into_iter();
+    let mut own = probes.filter(|probe| probe.property == property);
+    let probe = own
+        .find(|probe| matches!(probe.asked, Asked::Drive(1, _)))
+        .expect("a probe");
+    let ready = "drive 0..last input GPIN3 GPIN5 high".to_owned();
+    let so = format!("drive 0..last property {property} = {value}");
+    // As on a rig, where nobody knows what the cells hold that a drive writes itself.
+    let real = Exactness {
+        knows_cells: false,
+        ..EXACT
+    };
+    answered(&probe, real, &[ready, so])
 }
 
 fn model(lines: &[String]) -> (Plan, harness::link::SimulatedLink) {

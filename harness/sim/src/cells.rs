@@ -66,6 +66,11 @@ impl Cells {
         true
     }
 
+    /// RAM and the register field, FD80 to FFFF (ND21 10.1).
+    pub(crate) fn ram_and_registers(&self) -> &[u8; RAM_AND_REGISTERS] {
+        &self.ram
+    }
+
     /// The byte at an address of RAM or the register field.
     #[inline]
     pub(crate) fn byte(&self, address: u16) -> u8 {

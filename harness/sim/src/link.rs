@@ -175,6 +175,14 @@ impl Link {
         self.log.as_deref().unwrap_or_default()
     }
 
+    /// Makes room for so many bytes.
+    pub(crate) fn reserve(&mut self, bytes: usize) {
+        self.under_way.reserve(bytes);
+        if let Some(log) = &mut self.log {
+            log.reserve(bytes);
+        }
+    }
+
     pub(crate) fn stop_recording(&mut self) {
         self.log = None;
     }

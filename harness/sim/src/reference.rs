@@ -4,14 +4,20 @@
 //! (ND21 9.9) are out of its reach. Where the manual contradicts its byte tables, the tables win.
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::Deref;
 
 // First and last cell that a command may touch (ND21 10.1, 10.2).
 const RAM: (u16, u16) = (0xFD80, 0xFF7F);
 const READ_BYTE_RANGES: [(u16, u16); 2] = [(0x2F00, 0x2FBF), (0xFD80, 0xFFFF)];
 const READ_WORD_RANGES: [(u16, u16); 2] = [(0x2F00, 0x2FDF), RAM];
 
-// Kept address (ND21 9.2, the RAM map), and the port of GPO1 (bit 7) and GPO2 (bit 5) (ND21 10.4).
+/// Where RAM and the registers behind it begin, and how many cells they have (ND21 10.1).
+const RAM_AND_REGISTERS: (u16, usize) = (RAM.0, 0x280);
+
+// Kept address (ND21 9.2, the RAM map), the flag of the time-out monitoring (14.10.2), and the port of GPO1 (bit 7) and GPO2 (bit 5) (ND21 10.4).
 const BUS_ADDR: u16 = 0xFF36;
+const FLAGS2: u16 = 0xFF57;
 const PORT: u16 = 0xFFB7;
 /// The check sequence, without its 17 zeros (ND21 9.8).
 const CHECK_SEQUENCE: [u8; 5] = [0xFF, 0x44, 0x72, 0x4C, 0x41];
@@ -55,19 +61,67 @@ enum State {
     Error,
 }
 
+/// A few bytes, six at most: the longest command (ND21 10).
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub struct Bytes {
+    bytes: [u8; 6],
+    length: usize,
+}
+
+impl Bytes {
+    fn push(&mut self, byte: u8) {
+        self.bytes[self.length] = byte;
+        self.length += 1;
+    }
+
+    fn clear(&mut self) {
+        self.length = 0;
+    }
+}
+
+impl Deref for Bytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.bytes[..self.length]
+    }
+}
+
+impl fmt::Debug for Bytes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self[..].fmt(f)
+    }
+}
+
+/// Memory cells; one never set reads 00.
+#[derive(Clone, Debug)]
+struct Memory {
+    ram: [u8; RAM_AND_REGISTERS.1],
+    /// Cells elsewhere that were set.
+    elsewhere: BTreeMap<u16, u8>,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self {
+            ram: [0; RAM_AND_REGISTERS.1],
+            elsewhere: BTreeMap::new(),
+        }
+    }
+}
+
 /// One drive of the ring: its memory and its place in the protocol (ND21 9, 10).
 #[derive(Clone, Debug, Default)]
 pub struct Drive {
-    /// Cells that were set; all others read 00.
-    memory: BTreeMap<u16, u8>,
+    memory: Memory,
     state: State,
     /// An explicit address was seen, so `BusAddr` means something to a short telegram (ND21 9.2).
     address_valid: bool,
     /// First process data byte received, second one to be sent (ND21 9.4).
     process: (u8, u8),
     /// The command as far as received, its answer as far as sent (ND21 9.5).
-    command: Vec<u8>,
-    answer: Vec<u8>,
+    command: Bytes,
+    answer: Bytes,
     /// What a read command fetched, lowest address first (ND21 10.1).
     fetched: [u8; 4],
     /// Error mode: good zeros in a row, zeros sent, "*" seen, check sequence bytes seen (ND21 9.7).
@@ -76,7 +130,9 @@ pub struct Drive {
     preceding: bool,
     matched: usize,
     /// What was executed, oldest first: a command without its checking byte, or 00 and two process data bytes.
-    executed: Vec<Vec<u8>>,
+    executed: Vec<Bytes>,
+    /// Time-outs have been monitored at some time (ND21 14.10.2).
+    monitored: bool,
 }
 
 impl Drive {
@@ -86,25 +142,42 @@ impl Drive {
         Self::default()
     }
 
-    /// The cells that were set, in order of their addresses.
-    pub fn cells(&self) -> impl Iterator<Item = (u16, u8)> + '_ {
-        self.memory.iter().map(|(address, byte)| (*address, *byte))
+    /// The cells FD80 to FFFF (ND21 10.1).
+    #[must_use]
+    pub fn ram_and_registers(&self) -> &[u8; 0x280] {
+        &self.memory.ram
     }
 
     /// Sets any memory cell, past the bus and its ranges (ND21 10).
     pub fn poke(&mut self, address: u16, byte: u8) {
-        self.memory.insert(address, byte);
+        self.monitored |= address == FLAGS2 && byte & 0x04 != 0;
+        match address.checked_sub(RAM_AND_REGISTERS.0) {
+            Some(place) => self.memory.ram[usize::from(place)] = byte,
+            None => {
+                self.memory.elsewhere.insert(address, byte);
+            }
+        }
     }
 
     /// Reads any memory cell, past the bus and its ranges (ND21 10); one never set reads 00.
     #[must_use]
     pub fn peek(&self, address: u16) -> u8 {
-        self.memory.get(&address).copied().unwrap_or(0)
+        match address.checked_sub(RAM_AND_REGISTERS.0) {
+            Some(place) => self.memory.ram[usize::from(place)],
+            None => self.memory.elsewhere.get(&address).map_or(0, |byte| *byte),
+        }
+    }
+
+    /// Whether time-outs were monitored at any time (bit 2 of `Flags2`, ND21 14.10.2), be they not any more: from there on silence may have
+    /// done what this model does not know (9.9).
+    #[must_use]
+    pub fn has_monitored(&self) -> bool {
+        self.monitored
     }
 
     /// Fetches what was executed since the last call, oldest first: commands without their checking byte; 00 and two bytes
     /// for process data, as 00 begins no command (ND21 9.5).
-    pub fn take_executed(&mut self) -> Vec<Vec<u8>> {
+    pub fn take_executed(&mut self) -> Vec<Bytes> {
         std::mem::take(&mut self.executed)
     }
 
@@ -203,7 +276,11 @@ impl Drive {
             self.process = (byte, self.peek(from.wrapping_add(1)));
             return self.peek(from);
         }
-        self.executed.push(vec![0, self.process.0, byte]);
+        let mut executed = Bytes::default();
+        executed.push(0);
+        executed.push(self.process.0);
+        executed.push(byte);
+        self.executed.push(executed);
         self.poke_word([0xFF, self.peek(0xFF32)], [self.process.0, byte]);
         self.process.1
     }
@@ -268,7 +345,7 @@ impl Drive {
 
     /// ND21 10.2 to 10.5: what a complete command does.
     fn execute(&mut self) {
-        self.executed.push(self.command.clone());
+        self.executed.push(self.command);
         match *self.command {
             [0x82, data, low, high] => self.poke(u16::from_be_bytes([high, low]), data),
             [0x63, lower, upper, low, high] => self.poke_word([high, low], [upper, lower]),
@@ -279,7 +356,7 @@ impl Drive {
             [0xC8, 2] => self.change(PORT, 0xDF, 0),
             [0xC8, 3] => self.change(PORT, 0xFF, 0x20),
             [0xDD, _] => {
-                self.memory.retain(|cell, _| *cell < RAM.0 || *cell > RAM.1);
+                self.memory.ram[..usize::from(RAM.1 - RAM.0) + 1].fill(0);
                 self.restart();
             }
             _ => {}
@@ -301,11 +378,13 @@ impl Drive {
 
     /// After a reset and a check sequence all but the memory is as after power-up.
     fn restart(&mut self) {
-        let memory = std::mem::take(&mut self.memory);
-        let executed = std::mem::take(&mut self.executed);
-        *self = Self::new();
-        self.memory = memory;
-        self.executed = executed;
+        self.state = State::Sync;
+        self.address_valid = false;
+        self.process = (0, 0);
+        self.forget_half();
+        self.fetched = [0; 4];
+        (self.zeros_received, self.zeros_sent) = (0, 0);
+        (self.preceding, self.matched) = (false, 0);
     }
 
     /// ND21 9.7, 9.8: from the offending byte on, zeros, then increments, until the check sequence.
@@ -338,10 +417,13 @@ impl Drive {
 /// transmitted there, fault): link 0 leads from the master to the first drive, link n from the last
 /// one to the master. Faults at one byte act in the order given, one at no byte does nothing.
 pub fn run(drives: &mut [Drive], sent: &[u8], faults: &[(usize, usize, Fault)]) -> Vec<Vec<Cell>> {
-    let mut links = vec![transmit(0, sent, faults)];
+    let mut links = Vec::with_capacity(drives.len() + 1);
+    let mut outbound = Vec::with_capacity(sent.len() + faults.len());
+    links.push(transmit(0, sent, faults));
     for (drive, link) in drives.iter_mut().zip(1..) {
-        let inbound = links[link - 1].iter();
-        let outbound: Vec<u8> = inbound.filter_map(|cell| drive.receive(*cell)).collect();
+        let inbound: &Vec<Cell> = &links[link - 1];
+        outbound.clear();
+        outbound.extend(inbound.iter().filter_map(|cell| drive.receive(*cell)));
         links.push(transmit(link, &outbound, faults));
     }
     links
@@ -349,7 +431,7 @@ pub fn run(drives: &mut [Drive], sent: &[u8], faults: &[(usize, usize, Fault)]) 
 
 /// What is read of the bytes transmitted on one link.
 fn transmit(link: usize, sent: &[u8], faults: &[(usize, usize, Fault)]) -> Vec<Cell> {
-    let mut read = Vec::new();
+    let mut read = Vec::with_capacity(sent.len() + faults.len());
     for (&byte, number) in sent.iter().zip(1..) {
         let (mut byte, mut parity, mut framing, mut copies) = (byte, false, false, 1);
         for (_, _, fault) in faults.iter().filter(|at| (at.0, at.1) == (link, number)) {
@@ -367,7 +449,7 @@ fn transmit(link: usize, sent: &[u8], faults: &[(usize, usize, Fault)]) -> Vec<C
             }
         }
         let error = parity || framing;
-        read.extend(vec![Cell { byte, error }; copies]);
+        read.extend(std::iter::repeat_n(Cell { byte, error }, copies));
     }
     read
 }

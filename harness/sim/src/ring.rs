@@ -50,6 +50,19 @@ impl<D: Device> Ring<D> {
         }
     }
 
+    /// Makes room for so many bytes on every link at once: a short run then does not ask for memory again and again.
+    pub fn reserve(&mut self, bytes: usize) {
+        self.links.iter_mut().for_each(|link| link.reserve(bytes));
+        self.outbox.reserve(bytes);
+        self.inbox.reserve(bytes);
+    }
+
+    /// What link `link` has carried so far, as far as it was recorded; what was taken by [`Self::take_record`] is gone.
+    #[must_use]
+    pub fn carried_by(&self, link: usize) -> &[LineByte] {
+        self.links.get(link).map_or(&[], Link::log)
+    }
+
     /// Keeps no record of bytes and marks from now on: for runs that are too long for one.
     pub fn stop_recording(&mut self) {
         self.links.iter_mut().for_each(Link::stop_recording);

@@ -295,6 +295,12 @@ pub struct Differs {
 }
 
 impl Finished {
+    /// A link as people write it: `98->97`; `place` counts from the master's outgoing one.
+    #[must_use]
+    pub fn link(&self, place: usize) -> String {
+        crate::link::link_name(0, self.drives, place)
+    }
+
     /// How many cases there are of a class.
     #[must_use]
     pub fn count(&self, class: Class) -> u64 {

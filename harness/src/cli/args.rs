@@ -8,7 +8,7 @@ use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shrink::ShrinkArguments;
 use crate::rig::values::{Time, ValueError};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use harness_proto::line::Rate;
 use std::path::PathBuf;
@@ -81,6 +81,8 @@ pub enum Command {
         /// The folder.
         folder: PathBuf,
     },
+    /// Make the reports of a run's folder again, from its record and captures: the same bytes as the run wrote.
+    Report(ReportArguments),
     /// Look for what nobody has thought of: conversations from a seed, on simulated rings or on a rig.
     Fuzz {
         /// What to do.
@@ -144,7 +146,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub allow_motion: bool,
     /// How long to wait for a rig that somebody else has, such as 30s.
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
     /// Keep the evidence of a run on a rig in this folder, which is not there or is empty; `verify` judges it again.
     #[arg(long, value_name = "FOLDER", requires = "rig")]
@@ -152,6 +154,9 @@ pub struct RunArguments {
     /// Show what scenarios recorded, also where several are played.
     #[arg(long)]
     pub records: bool,
+    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Count a skipped scenario as missing (exit code 5).
     #[arg(long)]
     pub require_all: bool,
@@ -170,14 +175,31 @@ pub struct QualifyArguments {
     #[arg(long)]
     pub allow_motion: bool,
     /// How long to wait for a rig that somebody else has, such as 30s.
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
     /// Where the evidence goes: a folder that is not there or is empty; evidence-RIG-DATE where nothing is said.
     #[arg(long, value_name = "FOLDER")]
     pub evidence: Option<PathBuf>,
+    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Count a skipped scenario as missing (exit code 5).
     #[arg(long)]
     pub require_all: bool,
+}
+
+/// For `report`.
+#[derive(Clone, Debug, Args)]
+#[command(group = ArgGroup::new("form").required(true).multiple(true))]
+pub struct ReportArguments {
+    /// The folder that `run --evidence`, `qualify` or `fuzz run` has written.
+    pub folder: PathBuf,
+    /// Write one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE", group = "form")]
+    pub html: Option<PathBuf>,
+    /// Write the verdicts as JUnit's XML into this file.
+    #[arg(long, value_name = "FILE", group = "form")]
+    pub junit: Option<PathBuf>,
 }
 
 /// For `check`.
@@ -303,6 +325,9 @@ pub struct CampaignArguments {
     /// Play nothing but this case, and print the scenario that replays it: LINK:BYTE:WHAT, such as 98->97:10:0.
     #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
     pub case: Option<String>,
+    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// On how many threads; on all cores where nothing is said. The outcome is the same.
     #[arg(long, value_name = "NUMBER", value_parser = threads)]
     pub threads: Option<usize>,

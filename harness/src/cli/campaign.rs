@@ -3,11 +3,13 @@
 use super::args::{CampaignArguments, Format};
 use super::exit::Exit;
 use super::output::Output;
+use super::page::{writable, write};
 use super::run::progress_bar;
 use crate::campaign::find::{FindError, find, names};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line, table};
 use crate::campaign::{Campaign, Case, Class, Finished};
+use crate::report::html;
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -34,9 +36,12 @@ pub(super) fn campaign(
     if let Some(name) = &arguments.case {
         return replay(name, &campaigns, output);
     }
-    let threads = arguments
-        .threads
-        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+    if let Some(path) = &arguments.html
+        && writable(path, output).is_err()
+    {
+        return Ok(Exit::Usage);
+    }
+    let threads = arguments.threads.unwrap_or_else(cores);
     let mut all = Vec::new();
     for campaign in &campaigns {
         let bar = progress_bar(campaign.cases.len(), output.progress);
@@ -62,8 +67,18 @@ pub(super) fn campaign(
             json(&all, arguments.only.map(Class::from))
         ))?;
     }
+    if let Some(path) = &arguments.html
+        && !write(path, &html::campaigns(&all), output)
+    {
+        return Ok(Exit::RigError);
+    }
     let differs = all.iter().any(|finished| !finished.differs().is_empty());
     Ok(if differs { Exit::Failed } else { Exit::Passed })
+}
+
+/// How many threads there is room for.
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
 fn shown(finished: &Finished, only: Option<ClassName>) -> String {

@@ -13,8 +13,10 @@ mod list;
 mod man;
 mod manual;
 mod output;
+mod page;
 mod promote;
 mod qualify;
+mod report;
 mod rig;
 mod rig_check;
 mod rig_failure;
@@ -74,6 +76,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Cells(arguments) => cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify { folder } => verify::verify(&folder, output),
+        Command::Report(arguments) => report::report(&arguments, output),
         Command::Fuzz { command } => fuzz::fuzz(&command, output),
         Command::Shrink(arguments) => shrink::shrink(&arguments, output),
         Command::Promote(arguments) => promote::promote(&arguments, output),

@@ -4,18 +4,20 @@
 use super::args::QualifyArguments;
 use super::exit::Exit;
 use super::output::Output;
+use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run::{details, line, select};
 use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
 use crate::link::Link as _;
 use crate::qualify::{
-    Evidence, Hypothesis, Profile, Settled, conversations, deviating, deviating_masters,
-    explaining, hypotheses, probes,
+    Answer, Asked, Hypothesis, Probe, Profile, answer, conversations, deviating, deviating_masters,
+    explaining, probes,
 };
 use crate::rig::{Driven, Played, Run, state};
 use crate::scenario::verdict::Verdict;
 use crate::twin::Conversation;
+use harness_proto::time::Span;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -93,6 +95,9 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
             return Ok(Exit::Usage);
         }
     };
+    let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
+        return Ok(Exit::Usage);
+    };
     let stamp = state::utc(SystemTime::now()).replace([':', ' '], "-");
     let evidence = arguments
         .evidence
@@ -107,7 +112,7 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         require_all: arguments.require_all,
         qualify: true,
     };
-    work(&rig, &entries, &job, output)
+    work(&rig, &entries, &job, page, output)
 }
 
 /// Plays what is judged by the model alone, settles what the manual leaves open, and names what drives do otherwise.
@@ -186,8 +191,19 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
 /// The deviations that explain every byte of every attempt that diverged.
 fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<String, Stop> {
     if findings.attempts().is_empty() {
-        output.result("deviations: none; every byte is as the model of the manual says\n")?;
-        return Ok("none\n".to_owned());
+        let known = &run.session().rig().file.deviation;
+        let text = match known.is_empty() {
+            true => "deviations: none; every byte is as the model of the manual says\n".to_owned(),
+            false => {
+                let names: Vec<_> = known.iter().map(|entry| entry.name.as_str()).collect();
+                format!(
+                    "deviations: none beside the known ones: {}\n",
+                    names.join(", ")
+                )
+            }
+        };
+        output.result(&text)?;
+        return Ok(text);
     }
     let drives = run.session().rig().file.ring.first.drives;
     let exactness = run.exactness();
@@ -233,7 +249,8 @@ fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<S
     Ok(text)
 }
 
-/// Asks by probes how the drives behave where the manual leaves it open.
+/// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus is part of every later
+/// question; a time of a drive is the middle of a span, and no later answer rests on it.
 fn profile(
     run: &mut Run<'_>,
     findings: &mut Findings,
@@ -250,79 +267,95 @@ fn profile(
         property: BTreeMap::new(),
         open: BTreeMap::new(),
     };
+    let mut known = Vec::new();
+    let mut ended = false;
     for probe in probes(drives).unwrap_or_default() {
+        ended = ended || over(run, output);
+        if ended {
+            profile.leave_open(probe.property, "not asked: the run ended before");
+            continue;
+        }
         let section = format!("nd21 {}", probe.section);
-        let Some(entry) = &probe.entry else {
-            let why = "no conversation on the bus alone shows it";
-            profile
-                .open
-                .insert(probe.property.to_owned(), why.to_owned());
-            continue;
+        let property = probe.property;
+        let whose = match (probe.asked, &probe.entries) {
+            (Asked::Drive(drive, _), Ok(_)) => format!("drive {drive}: "),
+            _ => String::new(),
         };
-        let all = hypotheses(probe.property, drives);
-        let exactness = run.exactness();
-        let mut found = Vec::new();
-        let mut not_asked = None;
-        let mut last = None;
-        for _ in 0..PROBED {
-            let played = play(run, entry, folder.as_deref_mut())?;
-            let Some(attempt) = played.attempts.last() else {
-                not_asked = Some(played.outcome.remarks.join("; "));
-                break;
-            };
-            let twin = |lines: &[String]| run.twin_with(lines);
-            found = explaining(&all, &attempt.conversations, exactness, &twin).unwrap_or_default();
-            let done = !found.is_empty();
-            last = Some(played);
-            if done || over(run, output) {
-                break;
-            }
-        }
-        if let Some(why) = not_asked {
-            output.result(&format!(
-                "{} ({section}): not asked: {why}\n",
-                probe.property
-            ))?;
-            profile.open.insert(probe.property.to_owned(), why);
-            continue;
-        }
-        match best(&found) {
-            Some(hypothesis) => {
-                output.result(&format!(
-                    "{} ({section}): {}\n",
-                    probe.property, hypothesis.name
-                ))?;
-                let settled = Settled {
-                    value: hypothesis.name.clone(),
-                    section,
-                    setup: hypothesis.lines.clone(),
-                };
-                profile.property.insert(probe.property.to_owned(), settled);
-            }
-            None => {
-                if let Some(played) = &last {
-                    findings.note(played);
+        let why = match ask(run, findings, &probe, &known, folder.as_deref_mut(), output)? {
+            Asking::Answer(Answer::Settled { value, lines }) => {
+                output.result(&format!("{property} ({section}): {whose}{value}\n"))?;
+                if probe.asked == Asked::Ring {
+                    known.extend(lines.iter().cloned());
                 }
-                let why = "no value of it gives the bytes that came".to_owned();
-                output.result(&format!("{} ({section}): {why}\n", probe.property))?;
-                profile.open.insert(probe.property.to_owned(), why);
+                profile.settle(property, &section, &format!("{whose}{value}"), lines);
+                continue;
             }
-        }
+            Asking::Answer(Answer::NoDifference) => {
+                "every value of it gives the bytes that came: the drive was not in a state that shows it".to_owned()
+            }
+            Asking::Answer(Answer::NotDone(time)) => {
+                format!("longer than {time}: it was not done when it was asked for the last time")
+            }
+            Asking::Answer(Answer::Unexplained) => {
+                "no value of it gives the bytes that came".to_owned()
+            }
+            Asking::Not(why) => format!("not asked: {why}"),
+        };
+        output.result(&format!("{property} ({section}): {whose}{why}\n"))?;
+        profile.leave_open(property, &format!("{whose}{why}"));
     }
     Ok(profile)
 }
 
-/// The simplest hypothesis that explains what came; among those that are as simple, the one whose times fit best.
-fn best<'h>(found: &[(&'h Hypothesis, Evidence)]) -> Option<&'h Hypothesis> {
-    let simplest = found.iter().map(|(h, _)| h.lines.len()).min()?;
-    let mut simple = found.iter().filter(|(h, _)| h.lines.len() == simplest);
-    let first = simple.next()?;
-    let best = simple.fold(first, |best, other| {
-        if other.1.latest < best.1.latest {
-            other
-        } else {
-            best
+/// What came of asking.
+enum Asking {
+    Answer(Answer),
+    /// It could not be asked, and why.
+    Not(String),
+}
+
+/// Plays a probe, and again where no value explains it.
+fn ask(
+    run: &mut Run<'_>,
+    findings: &mut Findings,
+    probe: &Probe,
+    known: &[String],
+    mut folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<Asking, Stop> {
+    let entries = match &probe.entries {
+        Ok(entries) => entries,
+        Err(why) => return Ok(Asking::Not((*why).to_owned())),
+    };
+    let drives = run.session().rig().file.ring.first.drives;
+    let exactness = run.exactness();
+    // Simulated drives answer alike each time.
+    let most = match exactness.tolerance {
+        Span::ZERO => 1,
+        _ => PROBED,
+    };
+    let mut last = Vec::new();
+    for _ in 0..most {
+        let mut conversations = Vec::new();
+        last.clear();
+        for entry in entries {
+            let played = play(run, entry, folder.as_deref_mut())?;
+            let Some(attempt) = played.attempts.last() else {
+                return Ok(Asking::Not(played.outcome.remarks.join("; ")));
+            };
+            conversations.push(attempt.conversations.clone());
+            last.push(played);
         }
-    });
-    Some(best.0)
+        let twin = |lines: &[String]| run.twin_with(&[known, lines].concat());
+        match answer(probe, drives, &conversations, exactness, &twin) {
+            Ok(Answer::Unexplained) => {}
+            Ok(answer) => return Ok(Asking::Answer(answer)),
+            Err(problems) => return Ok(Asking::Not(problems.to_string())),
+        }
+        if over(run, output) {
+            break;
+        }
+    }
+    last.iter().for_each(|played| findings.note(played));
+    Ok(Asking::Answer(Answer::Unexplained))
 }

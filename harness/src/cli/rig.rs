@@ -151,6 +151,13 @@ fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure
         }
         RigCommand::Quarantine { rig, reason, .. } => {
             let rig = find(rig)?;
+            if rig.is_simulated() {
+                let message = format!(
+                    "rig {} is simulated: everybody has one of their own, and nothing of it can be put into quarantine",
+                    rig.id()
+                );
+                return Err(Failure::Said(Exit::Usage, message));
+            }
             state::set_quarantine(&folder()?, rig.id(), reason.as_deref())
                 .map_err(|error| Failure::state(&error))?;
             match (reason, &rig.file.quarantine) {

@@ -3,10 +3,12 @@
 use super::args::{RunArguments, Selection};
 use super::exit::Exit;
 use super::output::Output;
+use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run_rig::{Job, work};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Link;
+use crate::report::html::Head;
 use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
 use crate::rig::Rig;
@@ -73,6 +75,9 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         output.complain("no scenario was selected; `drivebench list` shows what there is");
         return Ok(Exit::NothingSelected);
     }
+    let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
+        return Ok(Exit::Usage);
+    };
     let recorded = arguments.evidence.is_some();
     if let Some(rig) = rig.as_ref().filter(|rig| recorded || !rig.is_bare()) {
         let job = Job {
@@ -84,14 +89,25 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             require_all: arguments.require_all,
             qualify: false,
         };
-        return work(rig, &entries, &job, output);
+        return work(rig, &entries, &job, page, output);
     }
+    on_simulated(arguments, &entries, rig.as_ref(), page, output)
+}
+
+/// Plays scenarios on simulated rings, each of its own.
+fn on_simulated(
+    arguments: &RunArguments,
+    entries: &[Entry],
+    rig: Option<&Rig>,
+    mut page: Option<Page>,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let bar = progress_bar(entries.len(), output.progress);
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
-    for entry in &entries {
+    for entry in entries {
         bar.set_message(entry.short_name().to_owned());
-        let played = match rig.as_ref().and_then(|rig| too_large(entry, rig)) {
+        let played = match rig.and_then(|rig| too_large(entry, rig)) {
             Some(why) => Played {
                 outcome: Outcome::skipped(why),
                 traces: Vec::new(),
@@ -108,10 +124,20 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         bar.suspend(|| output.result(&line))?;
         let details = details(entry, outcome, &played.traces);
         bar.suspend(|| output.say(&details));
+        if let Some(page) = &mut page {
+            page.add(entry, outcome, &played.traces);
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
     output.result(&summary(&verdicts, took))?;
+    let head = Head {
+        title: "drivebench: scenarios on simulated rings",
+        facts: Vec::new(),
+    };
+    if page.is_some_and(|page| !page.write(&head, output)) {
+        return Ok(Exit::RigError);
+    }
     Ok(Exit::of(&verdicts, arguments.require_all))
 }
 

@@ -2,12 +2,14 @@
 
 use super::exit::Exit;
 use super::output::Output;
+use super::page::{Page, write};
 use super::qualify::{Findings, settle};
 use super::rig_failure::{alarm, exit_of, give_back, interrupt_flag};
 use super::run::{details, line, progress_bar, summary};
-use crate::evidence::{About, EvidenceError, Folder};
+use crate::evidence::{About, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
 use crate::link::{Line, Trouble};
+use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Options, Played, Rig, Run, Session, SessionError};
 use crate::scenario::run::Outcome;
@@ -59,6 +61,7 @@ pub(super) fn work(
     rig: &Rig,
     entries: &[Entry],
     job: &Job,
+    mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let options = Options {
@@ -76,7 +79,7 @@ pub(super) fn work(
             return Ok(exit_of(&error));
         }
     };
-    let (exit, folder) = match all(&mut session, entries, job, output) {
+    let (exit, folder) = match all(&mut session, entries, job, page.as_mut(), output) {
         Ok(done) => done,
         Err(Stop::Session(error)) => {
             output.complain(&error.to_string());
@@ -92,23 +95,53 @@ pub(super) fn work(
         }
     };
     let (end, exit) = give_back(session, exit, output);
-    if let Some(folder) = folder {
-        let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
-        match folder.finish(safe) {
-            Ok(path) => output.say(&format!("evidence in {}\n", path.display())),
-            Err(error) => {
-                output.complain(&error.to_string());
-                return Ok(exit.max(Exit::RigError));
+    let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
+    Ok(match reports(rig, folder, page, safe, output) {
+        true => exit,
+        false => exit.max(Exit::RigError),
+    })
+}
+
+/// Ends the folder and writes the page; false where that failed, which has been said then. The page of a run with a folder is
+/// the folder's.
+fn reports(
+    rig: &Rig,
+    folder: Option<Folder>,
+    page: Option<Page>,
+    safe: Option<bool>,
+    output: &mut Output,
+) -> bool {
+    let Some(folder) = folder else {
+        let head = Head {
+            title: "drivebench: scenarios on a rig",
+            facts: vec![("Rig", rig.id().to_owned())],
+        };
+        return page.is_none_or(|page| page.write(&head, output));
+    };
+    match folder.finish(safe) {
+        Ok(path) => {
+            output.say(&format!("evidence in {}\n", path.display()));
+            let Some(page) = page else { return true };
+            match std::fs::read_to_string(path.join(PAGE)) {
+                Ok(text) => write(page.path(), &text, output),
+                Err(error) => {
+                    output.complain(&format!("failed to read the folder's {PAGE}: {error}"));
+                    false
+                }
             }
         }
+        Err(error) => {
+            output.complain(&error.to_string());
+            false
+        }
     }
-    Ok(exit)
 }
 
 fn all(
     session: &mut Session,
     entries: &[Entry],
     job: &Job,
+    mut page: Option<&mut Page>,
     output: &mut Output,
 ) -> Result<(Exit, Option<Folder>), Stop> {
     let mut run = match Run::new(session) {
@@ -141,6 +174,9 @@ fn all(
         let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
         let told = details(entry, outcome, traces);
         bar.suspend(|| output.say(&told));
+        if let (Some(page), None) = (&mut page, &folder) {
+            page.add(entry, outcome, traces);
+        }
         bar.inc(1);
         findings.note(&played);
         ill = played.outcome.verdict == Verdict::RigError

@@ -1,12 +1,11 @@
 //! The folder of a run, written as the run goes on.
 
-use super::junit::{Case, junit};
+use super::derive::{Settled, derive, xml};
 use super::record::{Line, SCHEMA, Writer};
 use crate::link::{Capability, Event, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
-use crate::scenario::verdict::Verdict;
 use crate::twin::Exactness;
 use harness_proto::line::Rate;
 use sha2::{Digest, Sha256};
@@ -15,20 +14,24 @@ use std::fmt::Write as _;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 /// The file of sums.
 pub(super) const SUMS: &str = "SHA256SUMS";
 /// The file of the record.
 pub(super) const RECORD: &str = "run.jsonl";
 /// The file of the rig.
-pub(super) const RIG: &str = "rig.toml";
+pub const RIG: &str = "rig.toml";
 /// The profile that the rig's file names.
 const KNOWN_PROFILE: &str = "known-profile.toml";
+/// The file of verdicts for programs.
+const JUNIT: &str = "junit.xml";
+/// The file of the page for people.
+pub const PAGE: &str = "report.html";
 /// The folder of scenarios.
 pub(super) const SCENARIOS: &str = "scenarios";
 /// The folder of captures.
-const CAPTURES: &str = "captures";
+pub(super) const CAPTURES: &str = "captures";
 
 /// Why a folder cannot be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -76,7 +79,7 @@ pub struct Folder {
     path: PathBuf,
     writer: Writer,
     names: BTreeSet<String>,
-    cases: Vec<Case>,
+    cases: Vec<Settled>,
     rig: String,
     report: String,
 }
@@ -153,19 +156,23 @@ impl Folder {
 
     /// Counts a scenario, all its attempts done.
     pub fn done(&mut self, name: &str, drives: &str, title: &str, outcome: &Outcome) {
-        let found = outcome.finding.as_ref().map(|found| found.message.clone());
-        let message: Vec<_> = found.into_iter().chain(outcome.remarks.clone()).collect();
+        let case = Line::Case {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            drives: drives.to_owned(),
+            verdict: outcome.verdict.name().to_owned(),
+            finding: outcome.finding.as_ref().map(|found| found.message.clone()),
+            remarks: outcome.remarks.clone(),
+            took: outcome.took.units(),
+        };
+        self.writer.line(&case);
+        let settled = Settled::of(&case);
         // Writing to a String cannot fail.
         let _infallible = writeln!(self.report, "{:12} {name}: {title}", outcome.verdict);
-        for line in &message {
+        for line in settled.iter().flat_map(Settled::messages) {
             let _infallible = writeln!(self.report, "             {line}");
         }
-        self.cases.push(Case {
-            name: format!("{name}[rig={},drives={drives}]", self.rig),
-            verdict: outcome.verdict,
-            message: message.join("; "),
-            took: Duration::from_nanos(outcome.took.as_nanos()),
-        });
+        self.cases.extend(settled);
     }
 
     /// Adds a file of the run's own: a profile, findings.
@@ -181,19 +188,18 @@ impl Folder {
     /// # Errors
     /// [`EvidenceError::File`].
     pub fn finish(mut self, safe: Option<bool>) -> Result<PathBuf, EvidenceError> {
-        let verdicts: Vec<Verdict> = self.cases.iter().map(|case| case.verdict).collect();
-        self.writer.line(&Line::End {
-            verdicts: verdicts.iter().map(|v| v.name().to_owned()).collect(),
-            safe,
-        });
+        let verdicts = self.cases.iter().map(|case| case.verdict.name().to_owned());
+        let verdicts = verdicts.collect();
+        self.writer.line(&Line::End { verdicts, safe });
         self.check()?;
-        let xml = junit(&format!("rig {}", self.rig), &self.cases);
-        self.write("junit.xml", &xml)?;
+        self.write(JUNIT, &xml(&self.rig, &self.cases))?;
         let report = format!("rig {}\n\n{}", self.rig, self.report);
         self.write("report.txt", &report)?;
+        // A page that cannot be made is no reason to leave a folder without its sums.
+        let page = derive(&self.path).and_then(|derived| self.write(PAGE, &derived.html));
         let sums = sums(&self.path)?;
         self.write(SUMS, &sums)?;
-        Ok(self.path)
+        page.map(|()| self.path)
     }
 
     fn unique(&mut self, name: &str) -> String {

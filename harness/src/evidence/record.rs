@@ -131,6 +131,24 @@ pub enum Line {
         #[serde(default)]
         unplaced: u64,
     },
+    /// What came of a scenario, all its attempts together.
+    Case {
+        /// Its name; that of its file where it was played.
+        name: String,
+        /// Its title.
+        title: String,
+        /// How many drives its rings have.
+        drives: String,
+        /// The verdict.
+        verdict: String,
+        /// What was otherwise, in a sentence.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        finding: Option<String>,
+        /// What is worth saying.
+        remarks: Vec<String>,
+        /// How long it took.
+        took: u64,
+    },
     /// The last line: how many scenarios had each verdict.
     End {
         /// The verdicts of all scenarios in order.
@@ -335,9 +353,11 @@ impl Line {
                     .collect::<Option<Vec<_>>>()?;
                 Event::Probe(index(ring)?, instant(t), *count, bytes)
             }
-            Self::Run { .. } | Self::Scenario { .. } | Self::Verdict { .. } | Self::End { .. } => {
-                return None;
-            }
+            Self::Run { .. }
+            | Self::Scenario { .. }
+            | Self::Verdict { .. }
+            | Self::Case { .. }
+            | Self::End { .. } => return None,
         })
     }
 }

@@ -49,10 +49,11 @@ struct Header {
     way: Way,
 }
 
-struct Recorded {
-    name: String,
+/// An attempt as it stands in a record.
+pub(super) struct Recorded {
+    pub(super) name: String,
     sha256: String,
-    attempt: usize,
+    pub(super) attempt: usize,
     events: Vec<Event>,
     verdict: Option<(String, Option<String>, u64)>,
 }
@@ -62,60 +63,97 @@ struct Recorded {
 /// # Errors
 /// It is no folder of evidence, or its record is damaged; with the place.
 pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
-    let text = |file: &str| {
-        std::fs::read_to_string(path.join(file)).map_err(|error| {
-            let path = path.display().to_string();
-            EvidenceError::Foreign(path, format!("{file}: {error}"))
-        })
-    };
     let mut verified = Verified {
         files: compare_sums(path)?,
         ..Verified::default()
     };
-    let (lines, whole) = read(&text(RECORD)?)?;
-    let rig_text = text(RIG)?;
-    let rig = parse(&Source {
-        name: path.join(RIG).display().to_string(),
-        text: rig_text.clone().into(),
-    })
-    .map_err(|problems| EvidenceError::Foreign(path.display().to_string(), problems.to_string()))?;
-    let header = header(&lines, &rig, &rig_text, &mut verified).ok_or_else(|| {
-        EvidenceError::Foreign(
-            path.display().to_string(),
-            "the record's first line holds what cannot be".to_owned(),
-        )
-    })?;
+    let opened = Opened::open(path, &mut verified)?;
     // The sums are written last.
-    verified.complete =
-        whole && path.join(SUMS).exists() && matches!(lines.last(), Some(Line::End { .. }));
-    let fresh = || {
-        twin(&rig, &known(&rig)).map_err(|problems| {
-            EvidenceError::Foreign(path.display().to_string(), problems.to_string())
-        })
-    };
-    let mut own = fresh()?;
-    for recorded in group(&lines[1..]) {
-        let file = format!("{SCENARIOS}/{}.scn", recorded.name);
-        let finding = match std::fs::read_to_string(path.join(&file)) {
-            _ if !is_name(&recorded.name) => {
-                recorded.with("aborted", Some("this is no name of a scenario".to_owned()))
-            }
-            Err(error) => recorded.with("aborted", Some(format!("{file}: {error}"))),
-            Ok(text) if sum(text.as_bytes()) != recorded.sha256 => recorded.with(
-                "aborted",
-                Some(format!("{file} is not the text that was played")),
-            ),
-            Ok(text) => {
-                let (outcome, stale) = again(&recorded, &text, &header, &rig, &mut own);
-                if stale {
-                    own = fresh()?;
-                }
-                recorded.compare(&outcome)
-            }
-        };
-        verified.attempts.push(finding);
-    }
+    verified.complete = opened.whole
+        && path.join(SUMS).exists()
+        && matches!(opened.lines.last(), Some(Line::End { .. }));
+    opened.judged(|recorded, judged| {
+        verified.attempts.push(match judged {
+            Ok((_, outcome)) => recorded.compare(&outcome),
+            Err(why) => recorded.with("aborted", Some(why)),
+        });
+    })?;
     Ok(verified)
+}
+
+/// A folder that is read.
+pub(super) struct Opened<'p> {
+    path: &'p Path,
+    pub(super) lines: Vec<Line>,
+    /// Whether the last line is.
+    whole: bool,
+    pub(super) rig: Rig,
+    header: Header,
+}
+
+impl<'p> Opened<'p> {
+    /// Reads the record and the rig's file; what is wrong with the files goes into `verified`.
+    pub(super) fn open(path: &'p Path, verified: &mut Verified) -> Result<Self, EvidenceError> {
+        let foreign = |why: String| EvidenceError::Foreign(path.display().to_string(), why);
+        let text = |file: &str| {
+            std::fs::read_to_string(path.join(file))
+                .map_err(|error| foreign(format!("{file}: {error}")))
+        };
+        let (lines, whole) = read(&text(RECORD)?)?;
+        let rig_text = text(RIG)?;
+        let rig = parse(&Source {
+            name: path.join(RIG).display().to_string(),
+            text: rig_text.clone().into(),
+        })
+        .map_err(|problems| foreign(problems.to_string()))?;
+        let header = header(&lines, &rig, &rig_text, verified)
+            .ok_or_else(|| foreign("the record's first line holds what cannot be".to_owned()))?;
+        Ok(Self {
+            path,
+            lines,
+            whole,
+            rig,
+            header,
+        })
+    }
+
+    /// The rate of the line.
+    pub(super) fn rate(&self) -> Rate {
+        self.header.rate
+    }
+
+    /// Plays every attempt again from its record: its text and what came of it, or why it cannot be.
+    pub(super) fn judged(
+        &self,
+        mut each: impl FnMut(Recorded, Result<(String, Outcome), String>),
+    ) -> Result<(), EvidenceError> {
+        let fresh = || {
+            twin(&self.rig, &known(&self.rig)).map_err(|problems| {
+                EvidenceError::Foreign(self.path.display().to_string(), problems.to_string())
+            })
+        };
+        let mut own = fresh()?;
+        for recorded in group(&self.lines[1..]) {
+            let file = format!("{SCENARIOS}/{}.scn", recorded.name);
+            let judged = match std::fs::read_to_string(self.path.join(&file)) {
+                _ if !is_name(&recorded.name) => Err("this is no name of a scenario".to_owned()),
+                Err(error) => Err(format!("{file}: {error}")),
+                Ok(text) if sum(text.as_bytes()) != recorded.sha256 => {
+                    Err(format!("{file} is not the text that was played"))
+                }
+                Ok(text) => {
+                    let (outcome, stale) =
+                        again(&recorded, &text, &self.header, &self.rig, &mut own);
+                    if stale {
+                        own = fresh()?;
+                    }
+                    Ok((text, outcome))
+                }
+            };
+            each(recorded, judged);
+        }
+        Ok(())
+    }
 }
 
 fn header(lines: &[Line], rig: &Rig, rig_text: &str, verified: &mut Verified) -> Option<Header> {
@@ -148,6 +186,7 @@ fn header(lines: &[Line], rig: &Rig, rig_text: &str, verified: &mut Verified) ->
             tolerance: Span::from_units(*tolerance),
             line_errors: capabilities.contains(&crate::link::Capability::LineErrors),
             knows_cells: *simulated,
+            looks: None,
         },
         capabilities,
         simulated: *simulated,
@@ -197,7 +236,7 @@ fn group(lines: &[Line]) -> Vec<Recorded> {
 }
 
 /// Whether a name leads to a file of the folder and nowhere else.
-fn is_name(name: &str) -> bool {
+pub(super) fn is_name(name: &str) -> bool {
     let safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
     !name.is_empty() && !name.starts_with('.') && name.chars().all(safe)
 }

@@ -105,6 +105,8 @@ pub struct Kept {
     pub lines: Vec<Line>,
     /// The last line of progress.
     pub progress: Progress,
+    /// All lines of progress, in order.
+    pub history: Vec<Progress>,
 }
 
 /// The record of a run under way.
@@ -224,6 +226,7 @@ pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
     let mut about = None;
     let mut lines = Vec::new();
     let mut settled = None;
+    let mut history = Vec::new();
     let mut at = 0;
     for (number, line) in text.split_inclusive('\n').enumerate() {
         at += line.len();
@@ -236,7 +239,10 @@ pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
         match line {
             Line::Run(own) if number == 0 && own.schema == About::SCHEMA => about = Some(own),
             Line::Run(_) => return Err(damaged(number, "another kind of record")),
-            Line::Progress(progress) => settled = Some((progress, at, lines.len())),
+            Line::Progress(progress) => {
+                history.push(progress);
+                settled = Some((progress, at, lines.len()));
+            }
             other => lines.push(other),
         }
         if about.is_none() {
@@ -251,6 +257,7 @@ pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
         about,
         lines,
         progress,
+        history,
     };
     Ok((kept, length))
 }

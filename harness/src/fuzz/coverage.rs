@@ -25,9 +25,17 @@ const MAX_FILES: usize = 100_000;
 pub enum CoverageError {
     /// A folder or file cannot be read.
     #[error(
-        "failed to read {name}: {error}; a corpus is a folder with a folder for each of bus_end, detector and ring"
+        "failed to read {name}: {error}; a corpus is a folder with a folder for each of bus_end, detector and ring, and inputs in these"
     )]
     Unreadable {
+        /// Which.
+        name: String,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error("failed to write {name}: {error}")]
+    Unwritable {
         /// Which.
         name: String,
         /// What the system said.
@@ -54,7 +62,7 @@ pub enum CoverageError {
         name: String,
     },
     /// There is no input.
-    #[error("the corpus is empty: no file in bus_end, detector or ring")]
+    #[error("the corpus is empty: no input for bus_end, detector or ring")]
     Empty,
     /// The list of what was reached on hardware is damaged.
     #[error("corpora/fuzz/hardware.toml: {0}")]
@@ -118,30 +126,13 @@ impl Coverage {
     /// # Errors
     /// It cannot be read, holds no input, or one breaks a rule.
     pub fn of_folder(folder: &Path) -> Result<Self, CoverageError> {
-        let name = |path: &Path| path.display().to_string();
         let mut files = Vec::new();
-        let unreadable = |path: &Path| {
-            let name = name(path);
-            move |error| CoverageError::Unreadable { name, error }
-        };
         std::fs::read_dir(folder).map_err(unreadable(folder))?;
         for (target, _) in WATCHING {
             let inner = folder.join(target);
-            if !inner.is_dir() {
-                continue;
-            }
-            for entry in std::fs::read_dir(&inner).map_err(unreadable(&inner))? {
-                let path = entry.map_err(unreadable(&inner))?.path();
-                let metadata = path.metadata().map_err(unreadable(&path))?;
-                if !metadata.is_file() {
-                    continue;
-                }
-                if metadata.len() > MAX_SIZE || files.len() >= MAX_FILES {
-                    return Err(CoverageError::TooLarge { name: name(&path) });
-                }
-                let content = std::fs::read(&path).map_err(unreadable(&path))?;
-                let file = path.file_name().unwrap_or_default().to_string_lossy();
-                files.push((format!("{target}/{file}"), content));
+            if inner.is_dir() {
+                let inputs = read_folder(&inner)?.into_iter();
+                files.extend(inputs.map(|(file, content)| (format!("{target}/{file}"), content)));
             }
         }
         Self::of(files)
@@ -271,6 +262,32 @@ impl Coverage {
         }
         text
     }
+}
+
+/// The files of a folder with their names, in order of these; folders in it are left out.
+pub(crate) fn read_folder(folder: &Path) -> Result<Vec<(String, Vec<u8>)>, CoverageError> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable(folder))? {
+        let path = entry.map_err(unreadable(folder))?.path();
+        let metadata = path.metadata().map_err(unreadable(&path))?;
+        if !metadata.is_file() {
+            continue;
+        }
+        if metadata.len() > MAX_SIZE || files.len() >= MAX_FILES {
+            let name = path.display().to_string();
+            return Err(CoverageError::TooLarge { name });
+        }
+        let content = std::fs::read(&path).map_err(unreadable(&path))?;
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        files.push((file.into_owned(), content));
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn unreadable(path: &Path) -> impl FnOnce(std::io::Error) -> CoverageError + use<> {
+    let name = path.display().to_string();
+    move |error| CoverageError::Unreadable { name, error }
 }
 
 /// Reads the list of what was reached on hardware.

@@ -15,10 +15,8 @@ pub struct Hypothesis {
 /// How well a hypothesis explains what came.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Evidence {
-    /// How many bytes were as it says.
-    pub bytes: u64,
-    /// The largest difference of times.
-    pub latest: Span,
+    /// All differences of times together.
+    pub apart: Span,
     /// Whether every byte also came when it says.
     pub timely: bool,
 }
@@ -52,12 +50,11 @@ fn judge(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -
         timely: true,
         ..Evidence::default()
     };
-    for comparison in twin.follow_all(conversations, exactness).0 {
+    for comparison in twin.follow_while_alike(conversations, exactness) {
         if comparison.divergence.is_some() {
             return None;
         }
-        evidence.bytes += comparison.compared;
-        evidence.latest = evidence.latest.max(comparison.latest);
+        evidence.apart = evidence.apart + comparison.apart;
         evidence.timely &= comparison.untimely.is_none();
     }
     Some(evidence)

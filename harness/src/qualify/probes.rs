@@ -1,15 +1,21 @@
-//! The probes: a conversation for each property of the bus that the manual leaves open, and its possible values.
+//! The probes: a conversation for each property that the manual leaves open, and its possible values.
 
 use super::hypothesis::Hypothesis;
 use crate::library::Entry;
 use crate::link::link_name;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
+use crate::twin::Look;
+use harness_proto::nd21::bits::{ps_status, status};
+use harness_proto::nd21::ram;
 use harness_proto::novobus::properties::PROPERTIES;
+use harness_sim::nd21::PROPERTIES as OF_THE_DRIVE;
 use include_dir::{Dir, include_dir};
 use std::collections::BTreeSet;
 
 static FILES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/novobus");
+
+static OF_DRIVES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/nd21");
 
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/novobus");
 
@@ -17,8 +23,15 @@ static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualif
 /// last one.
 const EACH: &str = "{drive}";
 
+/// What stands for a silence, and what is put there: halves, since computers are not on time.
+const GAP: &str = "{gap}";
+const GAPS: [&str; 3] = ["12.5ms", "15.5ms", "18.5ms"];
+
 /// Times that a time-out may have, in milliseconds (ND21 9.9: 10 to 20).
 const TIME_OUTS: std::ops::RangeInclusive<u64> = 10..=20;
+
+/// Times that a drive may wait behind it, in milliseconds, the manual's first (9.9).
+const WAITS: [u64; 11] = [10, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15];
 
 /// A probe for a ring of a given size.
 #[derive(Clone, Debug)]
@@ -29,11 +42,67 @@ pub struct Probe {
     pub section: &'static str,
     /// What the property decides.
     pub about: &'static str,
-    /// The conversation; `None` where no conversation on the bus alone shows it.
-    pub entry: Option<Entry>,
+    /// Who is asked.
+    pub asked: Asked,
+    /// What is taken for granted: the header lines of the scenario language that make it so.
+    pub assumed: Vec<String>,
+    /// The conversations; or why there is none.
+    pub entries: Result<Vec<Entry>, &'static str>,
 }
 
-/// The probes for a ring of `drives`, one for each property of the bus.
+/// Who is asked by a probe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// The whole ring: every drive answers with its end of the bus.
+    Ring,
+    /// One drive, by these cells.
+    Drive(u8, &'static [Look]),
+}
+
+/// The cells by which a drive is asked for a property of its own.
+const LOOKS: &[(&str, &[Look])] = &[
+    ("eeprom-read-time", &[look(ram::EEPROM_CONTROL, 0x20)]),
+    ("eeprom-write-time", &[look(ram::EEPROM_CONTROL, 0x10)]),
+    ("self-test-time", &[look(ram::STATUS, status::RESET)]),
+    (
+        "ps-calculation-time",
+        &[look(ram::PS_STATUS, ps_status::CALCULATED)],
+    ),
+    // 4096 turns are to be told from 28,672 of them, some more or less.
+    ("ps-position", &[look(ram::PS_UMDREHUNG, 0x60)]),
+    (
+        "bus-errors",
+        &[
+            look(ram::STATUS, status::ERROR),
+            look(ram::ERRORCODE, 0xFF),
+            look(ram::ERRORCODE + 1, 0xFF),
+        ],
+    ),
+];
+
+/// Properties of the drive that no conversation shows, and why.
+const NOT_SHOWN: &[(&str, &str)] = &[
+    (
+        "i2t-time",
+        "only a motor that needs its peak current for so long shows it",
+    ),
+    (
+        "s-ramp-wire",
+        "the manual does not say how the points come to the drive; the other value is this project's own",
+    ),
+];
+
+const fn look(address: u16, mask: u8) -> Look {
+    Look { address, mask }
+}
+
+/// The drives of a ring that are asked one by one: the first ones, the middle one and the last one.
+fn some_drives(drives: u8) -> BTreeSet<u8> {
+    let some = [0, 1, drives / 2, drives.saturating_sub(1)];
+    some.into_iter().filter(|drive| *drive < drives).collect()
+}
+
+/// The probes for a ring of `drives`: those of the bus, then those of the drives behind it.
 ///
 /// # Errors
 /// A probe has mistakes.
@@ -41,25 +110,71 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
     let mut probes = Vec::new();
     for property in &PROPERTIES {
         let file = FILES.get_file(format!("{}.scn", property.name));
-        let entry = match file.and_then(|file| file.contents_utf8()) {
-            None => None,
-            Some(text) => {
-                let source = Source {
-                    name: format!("probe-{}", property.name),
-                    text: text.into(),
-                };
-                Some(Entry::new(source, Some(drives))?)
+        let text = file.and_then(|file| file.contents_utf8());
+        let entries = match text {
+            None => Err("no conversation on the bus alone shows it"),
+            Some(text) if text.contains(GAP) => {
+                let mut entries = Vec::new();
+                for gap in GAPS {
+                    let name = format!("{}-{gap}", property.name);
+                    entries.push(probe(&name, &text.replace(GAP, gap), drives)?);
+                }
+                Ok(entries)
             }
+            Some(text) => Ok(vec![probe(property.name, text, drives)?]),
         };
         probes.push(Probe {
             property: property.name,
             section: property.section,
             about: property.about,
-            entry,
+            asked: Asked::Ring,
+            assumed: Vec::new(),
+            entries,
         });
+    }
+    for property in &OF_THE_DRIVE {
+        let file = OF_DRIVES.get_file(format!("{}.scn", property.name));
+        let text = file.and_then(|file| file.contents_utf8());
+        let looks = LOOKS.iter().find(|(name, _)| *name == property.name);
+        let Some((text, (_, looks))) = text.zip(looks) else {
+            let known = NOT_SHOWN.iter().find(|(name, _)| *name == property.name);
+            probes.push(Probe {
+                property: property.name,
+                section: property.section,
+                about: property.about,
+                asked: Asked::Drive(0, &[]),
+                assumed: Vec::new(),
+                entries: Err(known.map_or("no conversation shows it", |(_, why)| why)),
+            });
+            continue;
+        };
+        for drive in some_drives(drives) {
+            let name = format!("{}-drive-{drive}", property.name);
+            let text = text.replace(EACH, &drive.to_string());
+            probes.push(Probe {
+                property: property.name,
+                section: property.section,
+                about: property.about,
+                asked: Asked::Drive(drive, looks),
+                // 5.3.3: the two inputs that release and start a drive, of which the bus shows nothing.
+                assumed: vec![format!("drive {drive} input GPIN3 GPIN5 high")],
+                entries: Ok(vec![probe(&name, &text, drives)?]),
+            });
+        }
     }
     Ok(probes)
 }
+
+fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
+    let source = Source {
+        name: format!("probe-{name}"),
+        text: text.into(),
+    };
+    Entry::new(source, Some(drives))
+}
+
+/// The longest silence before a drive sends zeros that the manual allows, in milliseconds: 20 and 10 (9.9).
+const LONGEST_SILENCE: u64 = 30;
 
 /// What stands for a link in a conversation that is played for every link that faults can be put on, and for the drive behind it.
 const LINK: &str = "{link}";
@@ -113,14 +228,9 @@ pub fn conversations(
             }
             continue;
         }
-        let each: Vec<u8> = match text.contains(EACH) {
-            false => vec![0],
-            true => [0, 1, drives / 2, drives.saturating_sub(1)]
-                .into_iter()
-                .filter(|drive| *drive < drives)
-                .collect::<BTreeSet<_>>()
-                .into_iter()
-                .collect(),
+        let each = match text.contains(EACH) {
+            false => BTreeSet::from([0]),
+            true => some_drives(drives),
         };
         for drive in each {
             let several = text.contains(EACH);
@@ -137,20 +247,17 @@ pub fn conversations(
     Ok(entries)
 }
 
-/// What a property may be: every drive alike, and then one drive otherwise than the others.
+/// What a property of the bus may be: every drive alike, and then one drive otherwise than the others.
 #[must_use]
 pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
     let known = PROPERTIES.iter().find(|known| known.name == property);
-    let values: Vec<String> = match known.map(|known| known.values) {
-        None => return Vec::new(),
-        Some(["10ms", _]) => TIME_OUTS.map(|ms| format!("{ms}ms")).collect(),
-        Some(words) => words.iter().map(|&word| word.to_owned()).collect(),
+    let values: Vec<String> = match (property, known.map(|known| known.values)) {
+        (_, None) => return Vec::new(),
+        ("time-out", _) => return time_outs(),
+        ("time-out-wait", _) => WAITS.iter().map(|ms| format!("{ms}ms")).collect(),
+        (_, Some(words)) => words.iter().map(|&word| word.to_owned()).collect(),
     };
-    let all = |value: &String| Hypothesis {
-        name: value.clone(),
-        lines: vec![format!("drive 0..last property {property} = {value}")],
-    };
-    let mut hypotheses: Vec<_> = values.iter().map(all).collect();
+    let mut hypotheses: Vec<_> = values.iter().map(|value| alike(property, value)).collect();
     let differing = values.iter().flat_map(|value| {
         let others = values.iter().filter(move |other| *other != value);
         others.flat_map(move |other| {
@@ -167,6 +274,36 @@ pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
             format!("drive {drive} property {property} = {other}"),
         ],
     }));
+    hypotheses
+}
+
+fn alike(property: &str, value: &str) -> Hypothesis {
+    Hypothesis {
+        name: value.to_owned(),
+        lines: vec![format!("drive 0..last property {property} = {value}")],
+    }
+}
+
+/// When drives may miss their bytes: with the manual's wait behind it and an answer, then with what else the two other
+/// properties of a time-out may be, since all three show together.
+fn time_outs() -> Vec<Hypothesis> {
+    let mut hypotheses = Vec::new();
+    // The first is what a drive does where nothing is said.
+    let waits = std::iter::once(None).chain(WAITS.into_iter().skip(1).map(Some));
+    for wait in waits {
+        for silent in [false, true] {
+            let longest = LONGEST_SILENCE - wait.unwrap_or(10);
+            for ms in TIME_OUTS.filter(|ms| *ms <= longest) {
+                let mut hypothesis = alike("time-out", &format!("{ms}ms"));
+                let wait = wait.map(|ms| alike("time-out-wait", &format!("{ms}ms")));
+                let silent = silent.then(|| alike("time-out-answer", "silent"));
+                for more in wait.into_iter().chain(silent) {
+                    hypothesis.lines.extend(more.lines);
+                }
+                hypotheses.push(hypothesis);
+            }
+        }
+    }
     hypotheses
 }
 
@@ -193,15 +330,17 @@ mod tests {
     }
 
     #[test]
-    fn every_property_of_the_bus_has_a_probe_or_none_can_show_it() {
+    fn every_property_has_a_probe_or_a_reason() {
         let probes = probes(3).expect("no mistakes");
-        let without: Vec<_> = probes
-            .iter()
-            .filter(|probe| probe.entry.is_none())
-            .map(|probe| probe.property)
-            .collect();
-        // The zeros tell time-out and wait together.
-        assert_eq!(without, ["time-out-wait"]);
+        let without = probes.iter().filter(|probe| probe.entries.is_err());
+        let without: Vec<_> = without.map(|probe| probe.property).collect();
+        assert_eq!(without, ["i2t-time", "s-ramp-wire"]);
+        let asked = probes.iter().map(|probe| probe.property);
+        let asked: BTreeSet<_> = asked.collect();
+        let of_the_bus = PROPERTIES.iter().map(|property| property.name);
+        let of_drives = OF_THE_DRIVE.iter().map(|property| property.name);
+        let all: BTreeSet<_> = of_the_bus.chain(of_drives).collect();
+        assert_eq!(asked, all);
         assert_eq!(hypotheses("read-long", 3).len(), 2 + 2 * 3);
         assert_eq!(hypotheses("read-long", 1).len(), 2);
     }

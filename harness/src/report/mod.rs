@@ -1,6 +1,7 @@
 //! Reports: pure functions of a finished run.
 
 pub mod csv;
+pub mod html;
 pub mod json;
 pub mod meaning;
 pub mod mismatch;

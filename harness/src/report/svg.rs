@@ -5,7 +5,7 @@
 //! byte reads what it is, by which rule and section. Equal bytes side by side are one rectangle. No scripts; colours
 //! follow the reader's light or dark scheme; a long run is cut, and the picture says so.
 
-mod cells;
+pub(super) mod cells;
 
 use super::pcapng::name;
 use super::walk::State;
@@ -108,7 +108,7 @@ const STYLE: &str = "\
 .nb .f{fill:#5d3f8f}.nb .g{fill:#474e57}.nb .x{stroke:#ff8a80}}";
 
 /// The class of a state's colour.
-fn class(state: State) -> char {
+pub(super) fn class(state: State) -> char {
     match state {
         State::Idle => 'a',
         State::Forwarding => 'b',

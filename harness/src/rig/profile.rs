@@ -68,9 +68,33 @@ impl Profile {
         }
     }
 
+    /// Notes what was found of a property, of one drive after another.
+    pub fn settle(&mut self, property: &str, section: &str, value: &str, lines: Vec<String>) {
+        let settled = self.property.entry(property.to_owned());
+        let settled = settled.or_insert_with(|| Settled {
+            value: String::new(),
+            section: section.to_owned(),
+            setup: Vec::new(),
+        });
+        add(&mut settled.value, value);
+        settled.setup.extend(lines);
+    }
+
+    /// Notes why a property is not known, of one drive after another.
+    pub fn leave_open(&mut self, property: &str, why: &str) {
+        add(self.open.entry(property.to_owned()).or_default(), why);
+    }
+
     /// The header lines that make simulated drives behave as was found.
     pub fn lines(&self) -> impl Iterator<Item = &str> + '_ {
         let settled = self.property.values();
         settled.flat_map(|settled| settled.setup.iter().map(String::as_str))
     }
+}
+
+fn add(text: &mut String, more: &str) {
+    if !text.is_empty() {
+        text.push_str("; ");
+    }
+    text.push_str(more);
 }

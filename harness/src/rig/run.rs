@@ -93,6 +93,7 @@ impl<'s> Run<'s> {
                 tolerance,
                 line_errors,
                 knows_cells: simulated,
+                looks: None,
             },
             beats: session.ports().map(|ports| ports.beats()),
             session,
@@ -352,9 +353,12 @@ impl Played {
         }
     }
 
-    /// The last attempt speaks for all; one that passed behind one that did not is flaky.
+    /// The last attempt that was played speaks for all; one that passed behind one that did not is flaky.
     fn of(attempts: Vec<Attempt>) -> Self {
-        let mut outcome = match attempts.last() {
+        // What could not be played again takes nothing back.
+        let was_played = |attempt: &&Attempt| attempt.outcome.verdict != Verdict::Skipped;
+        let last = attempts.iter().rfind(was_played).or(attempts.last());
+        let mut outcome = match last {
             Some(last) => last.outcome.clone(),
             None => Outcome::skipped("it was not played".to_owned()),
         };
@@ -474,8 +478,7 @@ pub(crate) fn twin(rig: &Rig, lines: &[String]) -> Result<Twin, Problems> {
     }
     let plan = model.plan_with(lines)?;
     let mut twin = Twin::new(simulate::bench(&plan), &plan.rings);
-    // The self-tests are over (11.8).
-    twin.rest(Span::from_millis(200));
+    twin.rest_through_self_tests();
     Ok(twin)
 }
 
@@ -484,5 +487,39 @@ fn sizes(rings: &[RingSize]) -> String {
     match sizes.len() {
         1 => format!("a ring of {}", sizes[0]),
         _ => format!("rings of {}", sizes.join(" and ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(verdicts: &[Verdict]) -> Verdict {
+        let attempt = |verdict: &Verdict| Attempt {
+            driven: None,
+            master_is_right: true,
+            outcome: Outcome {
+                verdict: *verdict,
+                ..Outcome::skipped("it does not answer ResetH8".to_owned())
+            },
+            conversations: Vec::new(),
+            comparisons: Vec::new(),
+            traces: Vec::new(),
+            unplaced: 0,
+        };
+        Played::of(verdicts.iter().map(attempt).collect())
+            .outcome
+            .verdict
+    }
+
+    #[test]
+    fn attempts_together() {
+        use Verdict::{Failed, Flaky, Marginal, Passed, Skipped};
+        assert_eq!(of(&[Passed]), Passed);
+        assert_eq!(of(&[Failed, Passed]), Flaky);
+        assert_eq!(of(&[Marginal, Passed]), Passed);
+        assert_eq!(of(&[Failed, Skipped]), Failed);
+        assert_eq!(of(&[Marginal, Skipped]), Marginal);
+        assert_eq!(of(&[Skipped]), Skipped);
     }
 }

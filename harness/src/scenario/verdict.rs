@@ -34,6 +34,18 @@ impl Verdict {
         Self::RigError,
     ];
 
+    /// All of them, in order of gravity.
+    pub const ALL: [Self; 8] = [
+        Self::Skipped,
+        Self::Passed,
+        Self::Marginal,
+        Self::Flaky,
+        Self::Inconclusive,
+        Self::Failed,
+        Self::Aborted,
+        Self::RigError,
+    ];
+
     /// The word in records and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -29,6 +29,17 @@ pub struct Exactness {
     pub line_errors: bool,
     /// Whether the twin knows what every cell holds: a rig whose drives are simulated too.
     pub knows_cells: bool,
+    /// Cells of a drive that are compared although it writes them itself.
+    pub looks: Option<(u8, &'static [Look])>,
+}
+
+/// Bits of a cell that a question is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// The address of the byte.
+    pub address: u16,
+    /// The bits.
+    pub mask: u8,
 }
 
 /// How two bytes differ.
@@ -132,8 +143,35 @@ pub struct Comparison {
     pub divergence: Option<Divergence>,
     /// The first byte at another time.
     pub untimely: Option<Divergence>,
-    /// The largest difference of times.
-    pub latest: Span,
+    /// All differences of times together.
+    pub apart: Span,
+}
+
+/// What a ring sent back, beside what its twin received.
+struct Rows<'a> {
+    ring: usize,
+    /// What each byte is for, as far as that is known.
+    roles: &'a [Role],
+    /// Up to which byte the roles stand at their places.
+    known: usize,
+    expected: &'a [(Instant, Received)],
+    received: &'a [(Instant, Received)],
+}
+
+impl Rows<'_> {
+    fn role(&self, index: usize) -> Role {
+        self.roles.get(index).copied().unwrap_or(Role::Foreign)
+    }
+
+    /// Whether a byte is missing or too many because a conversation in real time ended with it under way.
+    fn cut_short(&self, index: usize, what: &What, tail: Instant) -> bool {
+        match (what, self.expected.get(index), self.received.get(index)) {
+            (What::Missing, Some((at, _)), None) | (What::Surplus, None, Some((at, _))) => {
+                *at >= tail
+            }
+            _ => false,
+        }
+    }
 }
 
 /// What is compared, ring by ring.
@@ -176,59 +214,73 @@ impl Comparer<'_> {
         };
         // What was still coming when the conversation ended came a moment sooner or later.
         let tail = conversation.end - self.exactness.tolerance - TAIL;
-        let role_at = |index: usize| roles.get(index).copied().unwrap_or(Role::Foreign);
-        let step_at = |index: usize| {
-            let place = places.get(index).copied().unwrap_or(index);
-            conversation.step_at(ring, place)
+        let rows = Rows {
+            ring,
+            roles: &roles,
+            known,
+            expected,
+            received,
         };
         for index in 0..received.len().max(expected.len()) {
-            let role = role_at(index);
-            let pair = (expected.get(index).copied(), received.get(index).copied());
-            let what = match pair {
-                (Some((due, wanted)), Some((at, found))) => {
-                    let found_good = found.error.is_none() || !self.exactness.line_errors;
-                    let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
-                    let same = wanted.byte == found.byte
-                        || index < known && self.may_differ(ring, &roles, received, index);
-                    self.note_write(ring, role);
-                    match (same, wanted_good == found_good) {
-                        (true, true) => {
-                            let step = || step_at(index);
-                            let pair = ((due, wanted), (at, found));
-                            self.time((ring, index), role, step, pair);
-                            None
-                        }
-                        (true, false) => Some(What::LineStatus),
-                        (false, _) => Some(what_of(expected, received, index)),
-                    }
-                }
-                (Some(_), None) => Some(What::Missing),
-                (None, _) => Some(What::Surplus),
+            let step = || {
+                let place = places.get(index).copied().unwrap_or(index);
+                conversation.step_at(ring, place)
             };
+            let what = self.row(&rows, index, step);
             self.comparison.compared += 1;
-            let cut_short = match (&what, pair) {
-                (Some(What::Missing), (Some((at, _)), None))
-                | (Some(What::Surplus), (None, Some((at, _)))) => real_time && at >= tail,
-                _ => false,
+            let Some(what) = what else { continue };
+            if real_time && rows.cut_short(index, &what, tail) {
+                return;
+            }
+            let heard = &expected[..index.min(expected.len())];
+            let role = rows.role(index);
+            let found = Divergence {
+                ring,
+                byte: index + 1,
+                what,
+                expected: expected.get(index).copied(),
+                received: received.get(index).copied(),
+                role,
+                step: step(),
+                drive: role.drive().or_else(|| spelled(heard, size)),
             };
-            if cut_short {
-                return;
+            self.comparison.divergence.get_or_insert(found);
+            return;
+        }
+    }
+
+    /// What is otherwise at one place, apart from the time.
+    fn row(
+        &mut self,
+        rows: &Rows<'_>,
+        index: usize,
+        step: impl FnOnce() -> Option<usize>,
+    ) -> Option<What> {
+        let Rows {
+            ring,
+            expected,
+            received,
+            ..
+        } = *rows;
+        let role = rows.role(index);
+        let (due, wanted, at, found) = match (expected.get(index), received.get(index)) {
+            (Some((due, wanted)), Some((at, found))) => (*due, *wanted, *at, *found),
+            (Some(_), None) => return Some(What::Missing),
+            (None, _) => return Some(What::Surplus),
+        };
+        let found_good = found.error.is_none() || !self.exactness.line_errors;
+        let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
+        let same = wanted.byte == found.byte
+            || index < rows.known
+                && self.may_differ(ring, rows.roles, (wanted.byte, received), index);
+        self.note_write(ring, role);
+        match (same, wanted_good == found_good) {
+            (true, true) => {
+                self.time((ring, index), role, step, ((due, wanted), (at, found)));
+                None
             }
-            if let Some(what) = what {
-                let heard = &expected[..index.min(expected.len())];
-                let found = Divergence {
-                    ring,
-                    byte: index + 1,
-                    what,
-                    expected: pair.0,
-                    received: pair.1,
-                    role,
-                    step: step_at(index),
-                    drive: role.drive().or_else(|| spelled(heard, size)),
-                };
-                self.comparison.divergence.get_or_insert(found);
-                return;
-            }
+            (true, false) => Some(What::LineStatus),
+            (false, _) => Some(what_of(expected, received, index)),
         }
     }
 
@@ -238,15 +290,23 @@ impl Comparer<'_> {
         &mut self,
         ring: usize,
         roles: &[Role],
-        received: &[(Instant, Received)],
+        (wanted, received): (u8, &[(Instant, Received)]),
         index: usize,
     ) -> bool {
         let value = received[index].1.byte;
+        let looks_at = |drive, address| {
+            let (asked, looks) = self.exactness.looks?;
+            let mut own = looks.iter().filter(|_| asked == drive);
+            own.find(|look| look.address == address)
+        };
         match roles[index] {
             Role::Data {
                 drive: Some(drive),
                 address,
             } => {
+                if let Some(look) = looks_at(drive, address) {
+                    return (value ^ wanted) & look.mask == 0;
+                }
                 if measured(address) || !self.exactness.knows_cells && moves(address) {
                     self.comparison.measured += 1;
                     return true;
@@ -315,7 +375,7 @@ impl Comparer<'_> {
             .0
             .since(received.0)
             .max(received.0.since(expected.0));
-        self.comparison.latest = self.comparison.latest.max(apart);
+        self.comparison.apart = self.comparison.apart + apart;
         if apart > self.exactness.tolerance && self.comparison.untimely.is_none() {
             self.comparison.untimely = Some(Divergence {
                 ring,

@@ -3,6 +3,7 @@
 use super::compare::{Comparer, Comparison, Exactness, unknowable};
 use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
+use harness_proto::nd21::bits::status as status_bits;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::PAGE;
@@ -197,19 +198,39 @@ impl Twin {
         conversations: &[Conversation],
         exactness: Exactness,
     ) -> (Vec<Comparison>, bool) {
-        let real_time = exactness.tolerance > Span::ZERO;
         let mut comparisons = Vec::new();
         for conversation in conversations {
             comparisons.push(self.follow(conversation, exactness));
-            let rings = 0..self.sizes.len();
-            let unasked =
-                |ring| conversation.received_in(ring).len() > conversation.sent_in(ring).len();
-            if real_time && rings.into_iter().any(unasked) {
+            if exactness.tolerance > Span::ZERO && self.is_a_race(conversation) {
                 return (comparisons, true);
             }
         }
         let diverged = comparisons.iter().any(|c| c.divergence.is_some());
         (comparisons, diverged)
+    }
+
+    /// The same up to the first conversation in which a byte is otherwise.
+    pub fn follow_while_alike(
+        &mut self,
+        conversations: &[Conversation],
+        exactness: Exactness,
+    ) -> Vec<Comparison> {
+        let mut comparisons = Vec::new();
+        for conversation in conversations {
+            let comparison = self.follow(conversation, exactness);
+            let otherwise = comparison.divergence.is_some();
+            comparisons.push(comparison);
+            if otherwise || exactness.tolerance > Span::ZERO && self.is_a_race(conversation) {
+                break;
+            }
+        }
+        comparisons
+    }
+
+    /// Whether drives sent unasked in a conversation.
+    fn is_a_race(&self, conversation: &Conversation) -> bool {
+        let mut rings = 0..self.sizes.len();
+        rings.any(|ring| conversation.received_in(ring).len() > conversation.sent_in(ring).len())
     }
 
     /// Lives through a conversation, and `slack` longer, and gives what it received, ring by ring.
@@ -266,9 +287,27 @@ impl Twin {
         }
     }
 
-    /// Lets time pass in which nothing is sent.
-    pub fn rest(&mut self, span: Span) {
-        let end = self.link.now() + span;
-        self.pass_until(end);
+    /// Lets time pass in which nothing is sent, until every drive has tested itself after its power-up (11.8).
+    pub fn rest_through_self_tests(&mut self) {
+        const STEP: Span = Span::from_millis(200);
+        const LONGEST: Span = Span::from_millis(61_000);
+        let end = self.link.now() + LONGEST;
+        loop {
+            let next = self.link.now() + STEP;
+            self.pass_until(next);
+            if next >= end || !self.in_reset() {
+                return;
+            }
+        }
+    }
+
+    /// Whether a drive is in its reset mode (11.8).
+    fn in_reset(&self) -> bool {
+        let rings = self.sizes.iter().enumerate();
+        let mut drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
+        drives.any(|(ring, drive)| {
+            let status = self.link.peek(ring, drive, ram::STATUS).unwrap_or(0);
+            status & status_bits::RESET != 0
+        })
     }
 }

@@ -8,6 +8,6 @@
 mod compare;
 mod follow;
 
-pub use compare::{Adopted, Comparison, Divergence, Exactness, What};
+pub use compare::{Adopted, Comparison, Divergence, Exactness, Look, What};
 pub(crate) use compare::{unknowable, what_of};
 pub use follow::{Conversation, Done, Twin};

@@ -66,7 +66,7 @@ impl Desk {
 }
 
 fn finish(mut child: Child) -> Output {
-    let end = Instant::now() + Duration::from_secs(90);
+    let end = Instant::now() + Duration::from_secs(240);
     while child.try_wait().expect("a process").is_none() {
         if Instant::now() > end {
             let _gone = child.kill();

@@ -49,10 +49,15 @@ fn right_drives_have_no_deviations() {
 #[test]
 fn a_profile_is_loaded_again() {
     let folder = tempfile::tempdir().expect("a folder");
-    let open = ", \"drive 0..last property read-long = as-printed\", \"drive 0..last property time-out = 13ms\"";
+    let open = ", \"drive 0..last property read-long = as-printed\", \"drive 0..last property time-out = 13ms\", \
+                \"drive 1 property bus-errors = time-out-only\", \"drive 1 property self-test-time = 300ms\"";
     let found = [
         "read-long (nd21 10.1): as-printed",
         "time-out (nd21 9.9): 13ms",
+        "time-out-wait (nd21 9.9): 10ms",
+        "bus-errors (nd21 11.8): drive 1: time-out-only",
+        "self-test-time (nd21 11.8): drive 1: ",
+        "eeprom-write-time (nd21 14.10.5.3): drive 0: 10ms to 10ms",
     ];
     let first = qualify(folder.path(), "first", &rig(2, true, "", open));
     let profile = "profile = \"first/profile.toml\"";

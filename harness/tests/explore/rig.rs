@@ -157,7 +157,7 @@ fn executed(drives: u8, cells: &[reference::Cell]) -> Vec<Vec<u8>> {
             .filter_map(|cell| drive.receive(*cell))
             .map(good)
             .collect();
-        all.extend(drive.take_executed());
+        all.extend(drive.take_executed().iter().map(|bytes| bytes.to_vec()));
     }
     all
 }

@@ -124,6 +124,7 @@ pub enum Place {
 impl BusEnd {
     /// A bus end as it is after power-up: waiting for a sync byte.
     #[must_use]
+    #[inline]
     pub fn new(properties: Properties) -> Self {
         Self {
             state: State::Sync,
@@ -161,6 +162,7 @@ impl BusEnd {
 
     /// What the next byte is.
     #[must_use]
+    #[inline]
     pub fn place(&self) -> Place {
         match &self.state {
             State::Sync => Place::Sync,
@@ -182,6 +184,7 @@ impl BusEnd {
 
     /// Whether the drive is in the error mode.
     #[must_use]
+    #[inline]
     pub const fn in_error(&self) -> bool {
         matches!(self.state, State::Error(..))
     }
@@ -210,6 +213,7 @@ impl BusEnd {
     }
 
     /// Takes a byte that this drive looks at.
+    #[inline]
     fn consider<M: Memory>(&mut self, received: Received, memory: &mut M) -> Step {
         if let State::Error(mode, silence) = &mut self.state {
             let waiting = matches!(silence, Silence::Waiting { .. });
@@ -384,6 +388,7 @@ impl BusEnd {
         };
     }
 
+    #[inline]
     fn detect<M: Memory>(&mut self, error: BusError, offending: Received, memory: &mut M) -> Step {
         self.blame(error, memory);
         self.state = State::Error(ErrorMode::enter(offending, self.rules), Silence::None);
@@ -393,6 +398,7 @@ impl BusEnd {
         }
     }
 
+    #[inline]
     fn blame<M: Memory>(&mut self, error: BusError, memory: &mut M) {
         self.cause = Some(error);
         memory.bus_error(error);
@@ -400,6 +406,7 @@ impl BusEnd {
 
     /// After the 41 of a check sequence: normal mode, half-received commands forgotten, no short
     /// address valid.
+    #[inline]
     fn leave_error_mode(&mut self) {
         self.state = State::Sync;
         self.channel = ParameterChannel::default();

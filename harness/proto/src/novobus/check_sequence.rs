@@ -45,6 +45,7 @@ impl Watch {
     }
 
     /// Takes the next byte; `good` is false where the line status said that it was damaged.
+    #[inline]
     pub fn see(&mut self, byte: u8, good: bool) -> Progress {
         if !good {
             self.matched = 0;

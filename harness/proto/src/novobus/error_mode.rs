@@ -119,6 +119,7 @@ pub struct Response {
 impl ErrorMode {
     /// Enters the error mode with the offending byte; 00 goes out in its place.
     #[must_use]
+    #[inline]
     pub fn enter(offending: Received, rules: Rules) -> Self {
         Self {
             rules,
@@ -151,6 +152,7 @@ impl ErrorMode {
     }
 
     /// Takes the next byte (rules 1 to 4).
+    #[inline]
     pub fn receive(&mut self, received: Received, broken_sequence: BrokenSequence) -> Response {
         let good = received.error.is_none();
         let mut marks = self.count(received.is(0));
@@ -203,6 +205,7 @@ impl ErrorMode {
 
     /// How far it is.
     #[must_use]
+    #[inline]
     pub const fn stage(&self) -> Stage {
         Stage {
             zeros_received: self.zeros_received,
@@ -214,6 +217,7 @@ impl ErrorMode {
     }
 
     /// Notes that a 00 goes out, asked for or not.
+    #[inline]
     pub fn send_zero(&mut self) -> Marks {
         self.zeros_sent = self.zeros_sent.saturating_add(1);
         if self.zeros_sent == self.rules.sent_zeros {
@@ -224,6 +228,7 @@ impl ErrorMode {
     }
 
     /// Rule 2.
+    #[inline]
     fn count(&mut self, good_zero: bool) -> Marks {
         if !good_zero {
             self.zeros_received = 0;
@@ -238,6 +243,7 @@ impl ErrorMode {
     }
 
     /// Rule 3.
+    #[inline]
     const fn increments(&self) -> bool {
         self.upstream && (self.after_time_out || self.zeros_sent >= self.rules.sent_zeros)
     }

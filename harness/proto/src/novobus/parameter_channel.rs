@@ -56,6 +56,7 @@ pub(super) struct Answer {
 
 impl ParameterChannel {
     /// What the next byte of the command under way is; `None` where none is.
+    #[inline]
     pub(super) fn next(&self) -> Option<Parameter> {
         let partial = self.partial.as_ref()?;
         let index = usize::from(partial.received);

@@ -3,10 +3,9 @@
 use harness_proto::novobus::address::passed_on;
 use harness_proto::novobus::check_sequence::{Progress, Watch};
 use harness_proto::novobus::checksum::Checksum;
-use harness_proto::novobus::command::{Field, layout};
+use harness_proto::novobus::command::{Field, Layout, layout};
 use harness_proto::novobus::properties::ReadLongAnswer;
 use harness_proto::novobus::sync::{Addressing, SyncByte};
-use std::collections::BTreeMap;
 
 /// Sets the fixed bytes and the checking byte of every command in `wire`, for every drive; lengths, addresses and data stay as
 /// they are. Behind a byte that is no sync byte or no command everything stays, up to the next check sequence (9.8).
@@ -31,8 +30,17 @@ struct Reader {
     address_next: bool,
     /// The last address byte, counted on by "next drive".
     address: u8,
-    begun: BTreeMap<u8, Vec<u8>>,
+    /// Commands half received: there are few, so they are looked for one after another.
+    begun: Vec<Begun>,
     lost: bool,
+}
+
+/// A command as far as received, and by which drive.
+struct Begun {
+    address: u8,
+    layout: &'static Layout,
+    received: usize,
+    sum: Checksum,
 }
 
 impl Reader {
@@ -69,20 +77,29 @@ impl Reader {
     }
 
     fn parameter(&mut self, byte: &mut u8) {
-        let begun = self.begun.entry(self.address).or_default();
-        let code = begun.first().copied().unwrap_or(*byte);
-        let Some(layout) = layout(code, ReadLongAnswer::default()) else {
-            self.lost = true;
+        let address = self.address;
+        let Some(place) = self.begun.iter().position(|one| one.address == address) else {
+            match layout(*byte, ReadLongAnswer::default()) {
+                None => self.lost = true,
+                Some(layout) => self.begun.push(Begun {
+                    address,
+                    layout,
+                    received: 1,
+                    sum: Checksum::EMPTY.with(*byte),
+                }),
+            }
             return;
         };
-        match begun.len().checked_sub(1).map(|at| layout.command[at]) {
-            Some(Field::Fixed(fixed)) => *byte = fixed,
-            Some(Field::Check) => *byte = Checksum::over(begun).plus(),
+        let begun = &mut self.begun[place];
+        match begun.layout.command[begun.received - 1] {
+            Field::Fixed(fixed) => *byte = fixed,
+            Field::Check => *byte = begun.sum.plus(),
             _ => {}
         }
-        begun.push(*byte);
-        if begun.len() == layout.length() {
-            begun.clear();
+        begun.received += 1;
+        begun.sum = begun.sum.with(*byte);
+        if begun.received == begun.layout.length() {
+            self.begun.swap_remove(place);
         }
     }
 }

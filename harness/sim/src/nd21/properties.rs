@@ -199,6 +199,24 @@ impl Property {
         }
     }
 
+    /// The longest time that it can be set to; `None` where it is a word.
+    #[must_use]
+    pub const fn longest(&self) -> Option<Span> {
+        match self.values {
+            Values::Time(longest, _) => Some(longest),
+            Values::Words(_) => None,
+        }
+    }
+
+    /// The words that it can be set to, the default first; none where it is a time.
+    pub fn words(&self) -> impl Iterator<Item = &'static str> {
+        let words: &[Word] = match self.values {
+            Values::Time(..) => &[],
+            Values::Words(words) => words,
+        };
+        words.iter().map(|(word, _)| *word)
+    }
+
     /// Sets it; false where it has no such value.
     pub fn set(&self, properties: &mut Nd21Properties, setting: Setting<'_>) -> bool {
         match (self.values, setting) {

@@ -16,6 +16,7 @@ use harness_proto::novobus::sync::{Addressing, SyncByte};
 
 /// The cell that a byte is for a bus end on this memory, before it is received.
 #[must_use]
+#[inline]
 pub fn classify(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transition {
     let place = bus_end.place();
     let event = match received.error {
@@ -38,6 +39,7 @@ pub fn state(bus_end: &BusEnd, memory: &Cells) -> State {
     state_at(bus_end.place(), bus_end, memory)
 }
 
+#[inline]
 fn state_at(place: Place, bus_end: &BusEnd, memory: &Cells) -> State {
     let remaining = bus_end.remaining();
     match place {
@@ -67,6 +69,7 @@ fn state_at(place: Place, bus_end: &BusEnd, memory: &Cells) -> State {
     }
 }
 
+#[inline]
 fn between_telegrams(bus_end: &BusEnd, memory: &Cells) -> State {
     if !bus_end.short_address_valid() {
         return State::SyncNoAddress;
@@ -80,6 +83,7 @@ fn between_telegrams(bus_end: &BusEnd, memory: &Cells) -> State {
     }
 }
 
+#[inline]
 fn error_mode(stage: Stage, silent: Silent) -> State {
     const SEQUENCES: [[State; 4]; 4] = [
         [
@@ -137,6 +141,7 @@ fn error_mode(stage: Stage, silent: Silent) -> State {
 }
 
 /// What a good byte is that is no 00.
+#[inline]
 fn good(place: Place, bus_end: &BusEnd, memory: &Cells, byte: u8) -> Event {
     match place {
         Place::Sync => match SyncByte::decode(byte) {

@@ -38,6 +38,9 @@ pub struct Transition {
 /// How many cells the matrix has.
 pub const CELLS: usize = State::ALL.len() * Event::ALL.len();
 
+/// How many cells of the matrix can be reached.
+pub const REACHABLE: usize = 435;
+
 impl Transition {
     /// All of them, state by state.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -61,6 +64,18 @@ impl Transition {
     pub const fn index(self) -> usize {
         self.state.index() * Event::ALL.len() + self.event.index()
     }
+}
+
+/// The name of a state or an event as part of a file's name.
+#[must_use]
+pub fn slug(name: &str) -> String {
+    let name = name.replace('*', "upstream").replace("+ 1", "plus 1");
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    let words: Vec<_> = words
+        .filter(|word| !word.is_empty())
+        .map(str::to_ascii_lowercase)
+        .collect();
+    words.join("-")
 }
 
 impl std::fmt::Display for Transition {

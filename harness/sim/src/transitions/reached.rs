@@ -30,6 +30,16 @@ impl Reached {
         }
     }
 
+    /// Those that are not among those of another.
+    #[must_use]
+    pub fn beyond(&self, other: &Self) -> Self {
+        let mut beyond = self.clone();
+        for (word, other) in beyond.0.iter_mut().zip(&other.0) {
+            *word &= !other;
+        }
+        beyond
+    }
+
     /// Whether a cell is among them.
     #[must_use]
     pub const fn contains(&self, cell: Transition) -> bool {
@@ -55,6 +65,20 @@ impl Reached {
         })
     }
 
+    /// The numbers that those have among the cells that can be reached, from 0 to [`REACHABLE`](super::REACHABLE) less 1; in order.
+    pub fn reachable_numbers(&self) -> impl Iterator<Item = usize> + '_ {
+        static NUMBERS: OnceLock<[Option<u16>; CELLS]> = OnceLock::new();
+        let numbers = NUMBERS.get_or_init(|| {
+            let mut numbers = [None; CELLS];
+            for (number, cell) in (0..).zip(Transition::reachable()) {
+                numbers[cell.index()] = Some(number);
+            }
+            numbers
+        });
+        self.indices()
+            .filter_map(|index| numbers[index].map(usize::from))
+    }
+
     /// A cell among them that the matrix calls unreachable; there is none unless the matrix or the drive is wrong.
     #[must_use]
     pub fn impossible(&self) -> Option<Transition> {
@@ -66,8 +90,9 @@ impl Reached {
                 .for_each(|cell| cells.add(cell));
             cells
         });
-        let mut pairs = self.0.iter().zip(&unreachable.0);
-        if pairs.all(|(reached, not)| reached & not == 0) {
+        let pairs = self.0.iter().zip(&unreachable.0);
+        // No end before the last word: nearly always there is none, and without branches this costs next to nothing.
+        if pairs.fold(0, |all, (reached, not)| all | reached & not) == 0 {
             return None;
         }
         Transition::all().find(|cell| self.contains(*cell) && unreachable.contains(*cell))

@@ -38,7 +38,7 @@ fn feed(drive: &mut Watched, now: &mut Instant, stimulus: Stimulus) {
 fn the_size_is_what_it_was_reviewed_at() {
     let reachable = Transition::reachable().count();
     let size = (State::ALL.len(), Event::ALL.len(), CELLS, reachable);
-    assert_eq!(size, (49, 34, 1_666, 435));
+    assert_eq!(size, (49, 34, 1_666, REACHABLE));
     let names: BTreeSet<_> = State::ALL.iter().map(|state| state.name()).collect();
     assert_eq!(names.len(), State::ALL.len());
     let names: BTreeSet<_> = Event::ALL.iter().map(|event| event.name()).collect();
@@ -79,6 +79,8 @@ fn the_tour_reaches_every_reachable_cell() {
     }
     assert_eq!(all.count(), Transition::reachable().count());
     assert_eq!(all.indices().count(), all.count());
+    // Each has a number of its own, and none is left out.
+    assert!(all.reachable_numbers().eq(0..REACHABLE));
 }
 
 /// A cell that the matrix calls unreachable fails whoever reaches it.

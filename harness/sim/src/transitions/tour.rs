@@ -1,7 +1,7 @@
 //! A tour through every reachable cell: for each state the shortest way to it that we know, and for each event what
 //! brings it about there. The inputs of the target `bus_end` in `corpora/fuzz` are this tour, a file a state.
 
-use super::{Event, State, Transition};
+use super::{Event, State, Transition, slug};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 
@@ -203,14 +203,6 @@ const fn byte(cell: Transition) -> u8 {
 /// sequence (9.8), after which the drive is where it began.
 #[must_use]
 pub fn file(state: State) -> (String, String) {
-    let slug: Vec<String> = state
-        .name()
-        .replace('*', "upstream")
-        .replace("+ 1", "plus 1")
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .map(str::to_ascii_lowercase)
-        .collect();
     let mut text = format!(
         "# ND21 {}: {}; the way there, one event, 17 zeros and the check sequence\n01 # time-outs are monitored\n",
         state.section(),
@@ -230,5 +222,5 @@ pub fn file(state: State) -> (String, String) {
         let parts = [hex(way(state)), hex(vec![last]), hex(back)];
         text.push_str(&format!("{} # {}\n", parts.join("  "), event.name()));
     }
-    (format!("{}-{}", state.section(), slug.join("-")), text)
+    (format!("{}-{}", state.section(), slug(state.name())), text)
 }

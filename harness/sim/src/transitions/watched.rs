@@ -13,6 +13,7 @@ use harness_proto::time::Instant;
 pub struct Watched {
     drive: PlainDrive,
     reached: Reached,
+    timed_out: bool,
 }
 
 impl Watched {
@@ -22,6 +23,7 @@ impl Watched {
         Self {
             drive,
             reached: Reached::default(),
+            timed_out: false,
         }
     }
 
@@ -35,6 +37,18 @@ impl Watched {
     #[must_use]
     pub const fn reached(&self) -> &Reached {
         &self.reached
+    }
+
+    /// Whether there has been a time-out (ND21 9.9).
+    #[must_use]
+    pub const fn timed_out(&self) -> bool {
+        self.timed_out
+    }
+
+    /// What it has gone through; the drive is done with.
+    #[must_use]
+    pub fn into_reached(self) -> Reached {
+        self.reached
     }
 
     /// What a byte would be to it.
@@ -61,6 +75,7 @@ impl Device for Watched {
             state: state(self.drive.bus_end(), self.drive.memory()),
             event: Event::Silence,
         });
+        self.timed_out = true;
         self.drive.handle_deadline(now)
     }
 

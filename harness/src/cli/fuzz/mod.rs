@@ -1,6 +1,7 @@
 //! `drivebench fuzz`: conversations that nobody has written, and what the kept inputs of the fuzz targets reach.
 
 mod coverage;
+mod distil;
 mod power;
 mod replay;
 mod rig;
@@ -24,6 +25,8 @@ pub enum FuzzCommand {
     Power(power::PowerArguments),
     /// Show which protocol transitions the kept inputs reach; exit code 1 where a reachable one is missing.
     Coverage(coverage::CoverageArguments),
+    /// Choose from a grown corpus the few small inputs that reach what the kept ones do not, and put them beside those.
+    Distil(distil::DistilArguments),
 }
 
 /// Does it.
@@ -33,5 +36,6 @@ pub(super) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
         FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
         FuzzCommand::Power(arguments) => power::power(arguments, output),
         FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
+        FuzzCommand::Distil(arguments) => distil::distil(arguments, output),
     }
 }

@@ -5,10 +5,11 @@ use super::watch::{Telling, summary};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::cli::page::{writable, write};
 use crate::cli::rig_failure::find_rig;
 use crate::explore::{
     About, Bounds, Campaign, ExploreError, Kept, OnRig, OnSim, Planted, Record, Scope, Setup,
-    Target, read,
+    Target, page, read,
 };
 use crate::rig::{Rig, state};
 use clap::Args;
@@ -59,6 +60,9 @@ pub struct FuzzRunArguments {
     /// Go on with the run of this folder; rig, seed, deviations and confirmation are those that it began with.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "rig", "seed", "deviates", "whole", "confirm"])]
     pub resume: Option<PathBuf>,
+    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Let motors turn, where the rig's file allows it too.
     #[arg(long)]
     pub allow_motion: bool,
@@ -96,6 +100,11 @@ fn k_of_n(text: &str) -> Result<(u8, u8), String> {
 
 /// Explores.
 pub(super) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io::Result<Exit> {
+    if let Some(path) = &arguments.html
+        && writable(path, output).is_err()
+    {
+        return Ok(Exit::Usage);
+    }
     // What a run that goes on is, its record says.
     let before = match arguments.resume.as_deref().map(read).transpose() {
         Ok(before) => before.map(|(kept, _)| kept),
@@ -254,6 +263,13 @@ fn explore(
     }
     output.result(&summary(&campaign, &end))?;
     output.say(&format!("the run is in {}\n", folder.display()));
+    if let Some(path) = &arguments.html {
+        match page(&folder) {
+            Ok(text) if write(path, &text, output) => {}
+            Ok(_) => return Ok(Exit::RigError),
+            Err(error) => return Ok(tell(&error, output)),
+        }
+    }
     Ok(match campaign.findings() {
         (0, 0) => Exit::Passed,
         (0, _) => Exit::Incomplete,

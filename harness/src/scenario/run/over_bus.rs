@@ -18,7 +18,7 @@ use harness_proto::novobus::role::at_rest;
 use harness_proto::time::{Instant, Span};
 
 /// How long an answer may take, beside what the ring itself needs.
-const PATIENCE: Span = Span::from_millis(200);
+const PATIENCE: Span = Span::from_millis(1_000);
 
 impl Runner<'_> {
     /// Whether a check is on something that the link shows only in the answer to a telegram.

@@ -26,18 +26,21 @@ pub struct Remaining {
 impl BusEnd {
     /// Whether an address byte has passed since power-up and since the last check sequence (ND21 9.2).
     #[must_use]
+    #[inline]
     pub const fn short_address_valid(&self) -> bool {
         self.short_address_valid
     }
 
     /// Whether a command has been received in part (ND21 9.5).
     #[must_use]
+    #[inline]
     pub fn command_begun(&self) -> bool {
         self.channel.next().is_some()
     }
 
     /// What of the present telegram is still to come; `None` between telegrams and in the error mode.
     #[must_use]
+    #[inline]
     pub const fn remaining(&self) -> Option<Remaining> {
         let (net_bytes, process_data) = match &self.state {
             State::Address(header) => (header.net_length(), header.process_data()),
@@ -53,6 +56,7 @@ impl BusEnd {
 
     /// How far the error mode is, and how long the line has been silent; `None` in normal mode (ND21 9.7, 9.9).
     #[must_use]
+    #[inline]
     pub const fn error_stage(&self) -> Option<(Stage, Silent)> {
         let State::Error(mode, silence) = &self.state else {
             return None;

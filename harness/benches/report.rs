@@ -1,0 +1,88 @@
+//! How long the page of a 100-axis run takes (the parity error of ND21 9.7 and the check sequence of 9.8), beside a baseline that
+//! only reads what every byte is.
+
+use harness::library::Entry;
+use harness::link::Link;
+use harness::report::html::{Head, Played, run, section};
+use harness::report::walk::Reader;
+use harness::scenario::run::{AtFinding, Outcome, play};
+use harness::scenario::simulate::simulated;
+use harness::scenario::source::Source;
+use harness_sim::trace::Trace;
+
+fn main() {
+    divan::main();
+}
+
+const TEXTS: [(&str, &str); 2] = [
+    (
+        "9.7-parity-error",
+        include_str!("../../corpora/scenarios/novobus/9.7-parity-error.scn"),
+    ),
+    (
+        "9.8-check-sequence",
+        include_str!("../../corpora/scenarios/novobus/9.8-check-sequence.scn"),
+    ),
+];
+
+fn played() -> Vec<(Entry, Outcome, Vec<Trace>)> {
+    let all = TEXTS.map(|(name, text)| {
+        let source = Source::from_bytes(name.to_owned(), text.into()).expect("a text");
+        let entry = Entry::new(source, None).expect("a scenario");
+        let plan = entry.plan.as_ref().expect("novobus");
+        let mut link = simulated(plan);
+        let outcome = play(plan, &mut link, AtFinding::Stop);
+        let traces = vec![link.trace(0)];
+        (entry, outcome, traces)
+    });
+    all.into()
+}
+
+/// The page, from the finished runs to its last byte.
+#[divan::bench]
+fn page(bencher: divan::Bencher<'_, '_>) {
+    let all = played();
+    bencher.bench_local(|| {
+        let shown = all
+            .iter()
+            .enumerate()
+            .map(|(number, (entry, outcome, traces))| {
+                let played = Played {
+                    name: entry.short_name(),
+                    title: &entry.scenario.title,
+                    sources: &[],
+                    drives: "100",
+                    text: &entry.source.text,
+                    outcome,
+                    traces,
+                    rate: harness_proto::line::Rate::default(),
+                    again: "",
+                };
+                section(number, &played)
+            });
+        let head = Head {
+            title: "100 axes",
+            facts: Vec::new(),
+        };
+        run(&head, shown.collect())
+    });
+}
+
+/// The baseline: what every byte is, and nothing written.
+#[divan::bench]
+fn bytes_read(bencher: divan::Bencher<'_, '_>) {
+    let all = played();
+    bencher.bench_local(|| {
+        let traces = all.iter().flat_map(|(.., traces)| traces);
+        let links = traces.flat_map(|trace| trace.links.iter().zip(Reader::all(trace)));
+        links
+            .map(|(link, mut reader)| {
+                let known = link
+                    .bytes
+                    .iter()
+                    .filter(|byte| reader.see(byte).meaning.drive.is_some());
+                known.count()
+            })
+            .sum::<usize>()
+    });
+}

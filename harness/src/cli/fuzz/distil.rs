@@ -1,0 +1,109 @@
+//! `drivebench fuzz distil`: what of a grown corpus is worth keeping.
+
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::fuzz::coverage::{CoverageError, read_folder};
+use crate::fuzz::distil::distil as distilled;
+use crate::fuzz::input::input;
+use clap::Args;
+use harness_sim::fuzz::WATCHING;
+use harness_sim::transitions::Reached;
+use std::path::{Path, PathBuf};
+
+/// For `fuzz distil`.
+#[derive(Clone, Debug, Args)]
+pub struct DistilArguments {
+    /// The target: bus_end, detector or ring.
+    #[arg(value_parser = WATCHING.map(|(name, _)| name))]
+    pub target: String,
+    /// The folder that the fuzzer has filled.
+    #[arg(long, value_name = "FOLDER")]
+    pub from: PathBuf,
+    /// The folder with what is kept; what reaches more is put beside it.
+    #[arg(long, value_name = "FOLDER")]
+    pub to: PathBuf,
+}
+
+/// Chooses, makes small, and writes a file an input; what is there stays as it is.
+pub(super) fn distil(arguments: &DistilArguments, output: &mut Output) -> std::io::Result<Exit> {
+    match chosen(arguments) {
+        Ok(text) => {
+            output.result(&text)?;
+            Ok(Exit::Passed)
+        }
+        Err(error) => {
+            output.complain(&error.to_string());
+            Ok(match error {
+                CoverageError::Rule { .. } => Exit::Failed,
+                CoverageError::Empty => Exit::NothingSelected,
+                _ => Exit::Usage,
+            })
+        }
+    }
+}
+
+fn chosen(arguments: &DistilArguments) -> Result<String, CoverageError> {
+    let target = WATCHING.iter().find(|(name, _)| *name == arguments.target);
+    let Some((_, body)) = target else {
+        return Err(CoverageError::Empty);
+    };
+    let grown = inputs(&arguments.from)?;
+    if grown.is_empty() {
+        return Err(CoverageError::Empty);
+    }
+    let rule = |_| CoverageError::Rule {
+        name: arguments.from.display().to_string(),
+    };
+    let kept = inputs(&arguments.to)?;
+    let (before, new) = std::panic::catch_unwind(|| {
+        let mut before = Reached::default();
+        kept.iter().for_each(|input| before.join(&body(input)));
+        let new = distilled(*body, &grown, &before);
+        (before, new)
+    })
+    .map_err(rule)?;
+    let mut names = Vec::new();
+    for one in &new {
+        let mut name = one.name() + ".hex";
+        let mut number = 2;
+        while arguments.to.join(&name).exists() {
+            name = format!("{}-{number}.hex", one.name());
+            number += 1;
+        }
+        write(&arguments.to.join(&name), &one.text())?;
+        names.push(name);
+    }
+    let more: usize = new.iter().map(|one| one.new.len()).sum();
+    Ok(format!(
+        "{}{} inputs: {more} transitions more, {} before\n",
+        names
+            .iter()
+            .map(|name| format!("{name}\n"))
+            .collect::<String>(),
+        names.len(),
+        before.count(),
+    ))
+}
+
+/// The inputs of a folder.
+fn inputs(folder: &Path) -> Result<Vec<Vec<u8>>, CoverageError> {
+    let mut inputs = Vec::new();
+    for (name, content) in read_folder(folder)? {
+        let read = input(&name, &content);
+        inputs.push(read.map_err(|error| CoverageError::Input { name, error })?);
+    }
+    Ok(inputs)
+}
+
+/// Writes a file under another name first: it is there whole or not at all.
+fn write(path: &Path, text: &str) -> Result<(), CoverageError> {
+    let part = path.with_extension("part");
+    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
+    written.map_err(|error| {
+        let _gone = std::fs::remove_file(&part);
+        CoverageError::Unwritable {
+            name: path.display().to_string(),
+            error,
+        }
+    })
+}

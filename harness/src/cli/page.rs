@@ -1,0 +1,118 @@
+//! `--html FILE`: the page of a run, collected while it goes on and written at its end.
+
+use super::output::Output;
+use super::trace::into_file;
+use crate::library::Entry;
+use crate::report::html::{Head, Played, Shown, run, section};
+use crate::scenario::run::Outcome;
+use harness_sim::trace::Trace;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// A page that is being collected.
+pub(super) struct Page {
+    path: PathBuf,
+    shown: Vec<Shown>,
+}
+
+impl Page {
+    /// A page for a file, where one is wanted; false where it could not be written anyway, which has been said then: a run may take
+    /// hours.
+    pub(super) fn new(path: Option<&Path>, output: &mut Output) -> Result<Option<Self>, Refused> {
+        let Some(path) = path else { return Ok(None) };
+        writable(path, output)?;
+        Ok(Some(Self {
+            path: path.to_owned(),
+            shown: Vec::new(),
+        }))
+    }
+
+    /// Where it goes.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Adds a scenario that was played.
+    pub(super) fn add(&mut self, entry: &Entry, outcome: &Outcome, traces: &[Trace]) {
+        let sources: Vec<_> = entry
+            .scenario
+            .sources
+            .iter()
+            .map(|s| s.text.clone())
+            .collect();
+        let rings = entry.plan.iter().flat_map(|plan| &plan.rings);
+        let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
+        let rate = entry
+            .plan
+            .as_ref()
+            .map(|plan| plan.rate)
+            .unwrap_or_default();
+        let name = entry.name.as_str();
+        let played = Played {
+            name: entry.short_name(),
+            title: &entry.scenario.title,
+            sources: &sources,
+            drives: &drives.join("+"),
+            text: &entry.source.text,
+            outcome,
+            traces,
+            rate,
+            again: &format!("drivebench trace {}", word(name)),
+        };
+        self.shown.push(section(self.shown.len() + 1, &played));
+    }
+
+    /// Writes it; false where that failed, which has been said then.
+    pub(super) fn write(self, head: &Head<'_>, output: &mut Output) -> bool {
+        let text = run(head, self.shown);
+        write(&self.path, &text, output)
+    }
+}
+
+/// A file that cannot be written, which has been said.
+pub(super) struct Refused;
+
+/// Looks whether a file could be written.
+pub(super) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let why = if path.is_dir() {
+        "it is a folder; name a file in it"
+    } else if !folder.is_dir() {
+        "there is no such folder; make it first"
+    } else {
+        return Ok(());
+    };
+    output.complain(&format!("failed to write {}: {why}", path.display()));
+    Err(Refused)
+}
+
+/// Writes a page, whole or not at all; false where that failed, which has been said then.
+pub(super) fn write(path: &Path, text: &str, output: &mut Output) -> bool {
+    let written = into_file(path, |mut out| {
+        out.write_all(text.as_bytes())?;
+        out.flush()
+    });
+    match written {
+        Ok(()) => {
+            output.say(&format!("the report is in {}\n", path.display()));
+            true
+        }
+        Err(error) => {
+            output.complain(&format!("failed to write {}: {error}", path.display()));
+            false
+        }
+    }
+}
+
+/// A word of a command line, as a shell reads it.
+pub(super) fn word(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@%".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}

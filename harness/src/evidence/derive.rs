@@ -1,0 +1,298 @@
+//! The reports of a folder, made again from its record, its captures and nothing else.
+//!
+//! A run makes them in the same way when it ends, so that whoever makes them again gets the same bytes. What was expected is not in a
+//! record: as `verify` does, each attempt is played again from what was received, and where that says the same as the record
+//! the bytes that differ are shown.
+
+use super::folder::{CAPTURES, EvidenceError};
+use super::junit::{Case, junit};
+use super::record::Line;
+use super::verify::{Opened, Verified, is_name};
+use crate::capture::{CaptureError, read_file};
+use crate::library::Entry;
+use crate::report::html::{Head, Played, Shown, run, section};
+use crate::scenario::problem;
+use crate::scenario::run::{Finding, Outcome};
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::line::Rate;
+use harness_proto::time::Span;
+use harness_sim::trace::Trace;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+/// The reports of a folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Derived {
+    /// The page for people.
+    pub html: String,
+    /// The verdicts for programs (JUnit).
+    pub junit: String,
+}
+
+/// Makes the reports of a folder again; of a run that was killed, of what it came to.
+///
+/// # Errors
+/// It is no folder of evidence, or its record or a capture is damaged; with the place.
+pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
+    let opened = Opened::open(path, &mut Verified::default())?;
+    let mut attempts: BTreeMap<String, Attempt> = BTreeMap::new();
+    opened.judged(|recorded, judged| {
+        let (text, outcome) = judged.map_or((String::new(), None), |(t, o)| (t, Some(o)));
+        // The last attempt is shown.
+        let attempt = Attempt {
+            number: recorded.attempt,
+            text,
+            outcome,
+        };
+        attempts.insert(recorded.name, attempt);
+    })?;
+    let mut settled = Vec::new();
+    for (number, line) in opened.lines.iter().enumerate() {
+        match (line, Settled::of(line)) {
+            (_, Some(case)) => settled.push(case),
+            (Line::Case { verdict, .. }, None) => {
+                let why = format!(
+                    "line {} of its record: there is no verdict `{verdict}`",
+                    number + 1
+                );
+                return Err(EvidenceError::Foreign(path.display().to_string(), why));
+            }
+            _ => {}
+        }
+    }
+    for (name, attempt) in &attempts {
+        // A run that was killed has not settled its last scenario.
+        if settled.iter().all(|case| case.name != *name) {
+            settled.push(Settled::unsettled(name, attempt));
+        }
+    }
+    let mut shown = Vec::new();
+    for case in &settled {
+        let attempt = attempts.get(&case.name);
+        let traces = match attempt {
+            Some(attempt) if is_name(&case.name) => {
+                traces(path, &case.name, attempt.number, opened.rate())?
+            }
+            _ => Vec::new(),
+        };
+        shown.push(show(shown.len() + 1, case, attempt, &traces, opened.rate()));
+    }
+    Ok(Derived {
+        html: run(&head(&opened), shown),
+        junit: xml(opened.rig.id(), &settled),
+    })
+}
+
+/// The last attempt at a scenario.
+struct Attempt {
+    number: usize,
+    text: String,
+    /// What its record says when it is played again.
+    outcome: Option<Outcome>,
+}
+
+/// What came of a scenario, as a record says it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Settled {
+    name: String,
+    title: String,
+    drives: String,
+    pub(super) verdict: Verdict,
+    finding: Option<String>,
+    remarks: Vec<String>,
+    took: Span,
+}
+
+impl Settled {
+    /// Reads its line; `None` for all others, and where it names a verdict that there is not.
+    pub(super) fn of(line: &Line) -> Option<Self> {
+        let Line::Case {
+            name,
+            title,
+            drives,
+            verdict,
+            finding,
+            remarks,
+            took,
+        } = line
+        else {
+            return None;
+        };
+        let verdict = Verdict::ALL.into_iter().find(|own| own.name() == verdict)?;
+        Some(Self {
+            name: name.clone(),
+            title: title.clone(),
+            drives: drives.clone(),
+            verdict,
+            finding: finding.clone(),
+            remarks: remarks.clone(),
+            took: Span::from_units(*took),
+        })
+    }
+
+    fn unsettled(name: &str, attempt: &Attempt) -> Self {
+        let why = "the record ends before this scenario was settled";
+        Self {
+            name: name.to_owned(),
+            title: entry(name, attempt).map_or_else(String::new, |entry| entry.scenario.title),
+            drives: String::new(),
+            verdict: Verdict::Aborted,
+            finding: None,
+            remarks: vec![why.to_owned()],
+            took: attempt
+                .outcome
+                .as_ref()
+                .map_or(Span::ZERO, |outcome| outcome.took),
+        }
+    }
+
+    /// What there is to say beside the verdict.
+    pub(super) fn messages(&self) -> impl Iterator<Item = &String> {
+        self.finding.iter().chain(&self.remarks)
+    }
+}
+
+/// The verdicts as JUnit.
+pub(super) fn xml(rig: &str, settled: &[Settled]) -> String {
+    let cases: Vec<_> = settled
+        .iter()
+        .map(|case| {
+            let messages: Vec<_> = case.messages().map(String::as_str).collect();
+            Case {
+                name: format!("{}[rig={rig},drives={}]", case.name, case.drives),
+                verdict: case.verdict,
+                message: messages.join("; "),
+                took: Duration::from_nanos(case.took.as_nanos()),
+            }
+        })
+        .collect();
+    junit(&format!("rig {rig}"), &cases)
+}
+
+fn entry(name: &str, attempt: &Attempt) -> Option<Entry> {
+    let source = Source {
+        name: name.to_owned(),
+        text: attempt.text.as_str().into(),
+    };
+    Entry::new(source, None).ok()
+}
+
+/// What the links carried; nothing where no capture was kept.
+fn traces(
+    path: &Path,
+    name: &str,
+    attempt: usize,
+    rate: Rate,
+) -> Result<Vec<Trace>, EvidenceError> {
+    let file = format!("{CAPTURES}/{name}.{attempt}.json");
+    let whole = path.join(&file);
+    if !whole.exists() {
+        return Ok(Vec::new());
+    }
+    let read = read_file(&whole, Some(rate));
+    let capture = read.map_err(|error: CaptureError| {
+        EvidenceError::Foreign(path.display().to_string(), format!("{file}: {error}"))
+    })?;
+    Ok(capture.traces)
+}
+
+fn show(
+    number: usize,
+    case: &Settled,
+    attempt: Option<&Attempt>,
+    traces: &[Trace],
+    rate: Rate,
+) -> Shown {
+    let entry = attempt.and_then(|attempt| entry(&case.name, attempt));
+    let sources = entry.map_or_else(Vec::new, |entry| {
+        let sources = entry.scenario.sources.into_iter();
+        sources.map(|source| source.text).collect()
+    });
+    let judged = attempt.and_then(|attempt| attempt.outcome.as_ref());
+    let found = case.finding.as_ref().map(|message| {
+        let same = judged.and_then(|outcome| outcome.finding.clone());
+        same.filter(|own| own.message == *message)
+            .unwrap_or_else(|| Finding {
+                span: problem::Span { start: 0, end: 0 },
+                message: message.clone(),
+                difference: None,
+                in_error: String::new(),
+            })
+    });
+    let outcome = Outcome {
+        verdict: case.verdict,
+        finding: found,
+        remarks: case.remarks.clone(),
+        took: case.took,
+        records: judged.map_or_else(Vec::new, |outcome| outcome.records.clone()),
+    };
+    let again = match attempt {
+        Some(attempt) => format!(
+            "drivebench import {CAPTURES}/{}.{}.json --format table",
+            case.name, attempt.number
+        ),
+        None => "it was not played".to_owned(),
+    };
+    section(
+        number,
+        &Played {
+            name: &case.name,
+            title: &case.title,
+            sources: &sources,
+            drives: &case.drives,
+            text: attempt.map_or("", |attempt| &attempt.text),
+            outcome: &outcome,
+            traces,
+            rate,
+            again: &again,
+        },
+    )
+}
+
+fn head(opened: &Opened<'_>) -> Head<'static> {
+    let mut facts = vec![("Rig", opened.rig.id().to_owned())];
+    if let Some(Line::Run {
+        drivebench,
+        started,
+        rate,
+        rings,
+        simulated,
+        ..
+    }) = opened.lines.first()
+    {
+        let rings: Vec<_> = rings.iter().map(u8::to_string).collect();
+        facts.push(("Began", started.clone()));
+        facts.push(("Played by", format!("drivebench {drivebench}")));
+        facts.push(("Drives", rings.join("+")));
+        facts.push(("Line", format!("{rate} bit/s")));
+        facts.push((
+            "Rings",
+            if *simulated {
+                "simulated"
+            } else {
+                "behind ports"
+            }
+            .to_owned(),
+        ));
+    }
+    let safe = opened.lines.iter().find_map(|line| match line {
+        Line::End { safe, .. } => Some(*safe),
+        _ => None,
+    });
+    facts.push((
+        "End",
+        match safe {
+            None => "the record ends before the run did",
+            Some(None) => "regular",
+            Some(Some(true)) => "regular; the safe state was confirmed",
+            Some(Some(false)) => "the safe state was not confirmed: look at the machine",
+        }
+        .to_owned(),
+    ));
+    Head {
+        title: "drivebench: scenarios on a rig",
+        facts,
+    }
+}

@@ -1,0 +1,164 @@
+//! The page of a run of fuzzing, made from its folder and nothing else: the same folder gives the same page.
+
+use super::case::Case;
+use super::error::ExploreError;
+use super::finding::Finding;
+use super::play::play;
+use super::record::{Kept, Line, read};
+use crate::library::Entry;
+use crate::link::Link;
+use crate::report::html::{Explored, Played, Shown, explored, section};
+use crate::scenario::problem::Span;
+use crate::scenario::run::{self, AtFinding, Outcome};
+use crate::scenario::simulate::simulated;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::line::{Rate, Received};
+use harness_sim::device::Device as _;
+use harness_sim::trace::{LinkTrace, Trace};
+use harness_sim::transitions::{Reached, Watched};
+use std::path::Path;
+
+/// Findings shown at most.
+const MOST: usize = 40;
+
+/// The page of the run in a folder.
+///
+/// # Errors
+/// It holds no run, or its record or a finding is damaged.
+pub fn page(folder: &Path) -> Result<String, ExploreError> {
+    let (kept, _) = read(folder)?;
+    let mut findings = Vec::new();
+    let mut features = vec![(0, 0)];
+    let mut reached = Reached::default();
+    for line in &kept.lines {
+        match line {
+            Line::Finding { file, .. } if findings.len() < MOST && is_name(file) => {
+                let path = folder.join(format!("{file}.json"));
+                let (finding, _) = Finding::read(&path)?;
+                let number = findings.len() + 1;
+                findings.push(shown(number, &finding, file, &path)?);
+            }
+            Line::Kept { number, new, case } => {
+                let before = features.last().map_or(0, |(_, all)| *all);
+                features.push((number + 1, before + *new as u64));
+                reach(&kept, case, &mut reached)?;
+            }
+            _ => {}
+        }
+    }
+    Ok(explored(Explored {
+        about: &kept.about,
+        history: &kept.history,
+        features: &features,
+        reached: &reached,
+        findings,
+        again: "drivebench fuzz run --resume FOLDER, the folder of this run",
+    }))
+}
+
+/// Whether a name leads to a file of the folder and nowhere else.
+fn is_name(name: &str) -> bool {
+    !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-')
+}
+
+/// What the drives of the model go through in a case: each hears again what its link carried.
+fn reach(kept: &Kept, case: &Case, reached: &mut Reached) -> Result<(), ExploreError> {
+    if !case.is_bounded() {
+        return Err(ExploreError::File(
+            "a kept case in the record is larger than a case may be".to_owned(),
+        ));
+    }
+    let mut link = kept.about.setup.model(case.drives)?;
+    play(&mut link, case);
+    for own in link.trace(0).links.iter().filter(|own| own.to.is_some()) {
+        reached.join(&heard(own));
+    }
+    Ok(())
+}
+
+fn heard(link: &LinkTrace) -> Reached {
+    let mut drive = Watched::default();
+    for byte in &link.bytes {
+        if let Some(value) = byte.received {
+            let received = Received {
+                byte: value,
+                error: byte.error,
+            };
+            drive.receive(byte.at, received);
+        }
+    }
+    drive.reached().clone()
+}
+
+/// A finding as a section: the ring under test, or its model where the ring is behind ports.
+fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Shown, ExploreError> {
+    let sources = finding.sources();
+    let text = finding.scenario(&finding.difference.kind(), &sources)?;
+    let (text, mut outcome, traces) = played(finding, &text)?;
+    outcome.verdict = match finding.confirmed {
+        true => Verdict::Failed,
+        false => Verdict::Flaky,
+    };
+    let again = format!("seen again {} of {} times", finding.seen_again, finding.of);
+    outcome.remarks.insert(0, again);
+    if finding.ports {
+        let model = "the picture shows the model, not the rig: what drives on a rig say to each other nobody hears";
+        outcome.remarks.push(model.to_owned());
+    }
+    let about = &finding.difference.about;
+    match &mut outcome.finding {
+        Some(found) => found.message = format!("{about}; the scenario says: {}", found.message),
+        None => {
+            outcome.finding = Some(run::Finding {
+                span: Span { start: 0, end: 0 },
+                message: about.clone(),
+                difference: None,
+                in_error: String::new(),
+            });
+        }
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let again = match finding.ports {
+        true => format!(
+            "drivebench run --rig {} {file}.scn, in the folder of the run",
+            finding.rig
+        ),
+        false => format!("drivebench shrink {name}, in the folder of the run"),
+    };
+    let played = Played {
+        name: file,
+        title: &finding.difference.signature(),
+        sources: &sources,
+        drives: &finding.case.drives.to_string(),
+        text: &text,
+        outcome: &outcome,
+        traces: &traces,
+        rate: Rate::default(),
+        again: &again,
+    };
+    Ok(section(number, &played))
+}
+
+/// Plays the scenario of a finding, with what is planted.
+fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>), ExploreError> {
+    // The header ends with the first empty line.
+    let (head, steps) = text.split_once("\n\n").unwrap_or((text, ""));
+    let planted = finding.setup.deviates.iter();
+    let planted: String = planted
+        .map(|own| format!("\ndrive {} deviates {}", own.drive, own.name))
+        .collect();
+    let text = format!("{head}{planted}\n\n{steps}");
+    let source = Source {
+        name: "the ring under test".to_owned(),
+        text: text.as_str().into(),
+    };
+    let entry = Entry::new(source, None)?;
+    let Some(plan) = &entry.plan else {
+        return Ok((text, Outcome::skipped(String::new()), Vec::new()));
+    };
+    let mut link = simulated(plan);
+    let outcome = run::play(plan, &mut link, AtFinding::GoOn);
+    let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+    Ok((text, outcome, traces))
+}

@@ -1,0 +1,276 @@
+//! What the answers to a probe say of its property.
+
+use super::hypothesis::{Evidence, Hypothesis, explaining};
+use super::probes::{Asked, Probe, hypotheses};
+use crate::twin::{Conversation, Exactness, Twin};
+use harness_proto::novobus::role::Role;
+use harness_proto::time::Span;
+use harness_sim::nd21::PROPERTIES;
+
+/// The most header lines of a hypothesis of the bus.
+const MOST_LINES: usize = 3;
+
+/// What came of a probe.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// A value explains every byte.
+    Settled {
+        /// It, for people.
+        value: String,
+        /// The header lines of the scenario language that make a simulated drive behave so.
+        lines: Vec<String>,
+    },
+    /// Every value explains every byte.
+    NoDifference,
+    /// The drive was not done when it was asked for the last time, after so long.
+    NotDone(String),
+    /// No value does.
+    Unexplained,
+}
+
+/// What the conversations of a probe in a ring of `drives` say, those of each of its entries by themselves. `twin` gives a ring
+/// with more lines in its header.
+///
+/// # Errors
+/// What `twin` says of lines that make no ring.
+pub fn answer<E>(
+    probe: &Probe,
+    drives: u8,
+    conversations: &[Vec<Conversation>],
+    exactness: Exactness,
+    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+) -> Result<Answer, E> {
+    let Asked::Drive(drive, looks) = probe.asked else {
+        let all = hypotheses(probe.property, drives);
+        // The simplest ones first.
+        for lines in 1..=MOST_LINES {
+            let own = all.iter().filter(|h| h.lines.len() == lines).cloned();
+            let own: Vec<_> = own.collect();
+            let found = explaining_all(own, conversations, exactness, twin)?;
+            if let Some(hypothesis) = best(&found) {
+                let value = hypothesis.name.clone();
+                return Ok(Answer::settled(value, &hypothesis.lines));
+            }
+        }
+        return Ok(Answer::Unexplained);
+    };
+    let exactness = Exactness {
+        looks: Some((drive, looks)),
+        ..exactness
+    };
+    let asked = |assumed: &[String]| {
+        let twin = |lines: &[String]| twin(&[assumed, lines].concat());
+        of_the_drive(
+            probe.property,
+            drive,
+            &conversations.concat(),
+            exactness,
+            &twin,
+        )
+    };
+    match asked(&probe.assumed)? {
+        Answer::Unexplained if !probe.assumed.is_empty() => asked(&[]),
+        answer => Ok(answer),
+    }
+}
+
+/// What the conversations say of a property of one drive.
+fn of_the_drive<E>(
+    property: &str,
+    drive: u8,
+    conversations: &[Conversation],
+    exactness: Exactness,
+    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+) -> Result<Answer, E> {
+    let line = |value: &str| vec![format!("drive {drive} property {property} = {value}")];
+    let known = PROPERTIES.iter().find(|known| known.name == property);
+    let explained = |value: &str| -> Result<Explained, E> {
+        Ok(explained(twin(&line(value))?, conversations, exactness))
+    };
+    if let Some(longest) = known.and_then(|property| property.longest()) {
+        let explained = |tenths: u64| explained(&written(tenths));
+        return Ok(match bracket(tenths(longest), &explained)? {
+            Bracket::Between(from, to) if to == tenths(longest) => Answer::NotDone(written(from)),
+            Bracket::Between(from, to) => {
+                let value = format!("{} to {}", written(from), written(to));
+                Answer::settled(value, &line(&written(from.midpoint(to))))
+            }
+            Bracket::Anything => Answer::NoDifference,
+            Bracket::Nothing => Answer::Unexplained,
+        });
+    }
+    let mut explaining = Vec::new();
+    for word in known.into_iter().flat_map(|property| property.words()) {
+        if explained(word)? == Explained::Whole {
+            explaining.push(word);
+        }
+    }
+    Ok(match explaining.as_slice() {
+        [] => Answer::Unexplained,
+        [word] => Answer::settled((*word).to_owned(), &line(word)),
+        _ => Answer::NoDifference,
+    })
+}
+
+impl Answer {
+    fn settled(value: String, lines: &[String]) -> Self {
+        let lines = lines.to_vec();
+        Self::Settled { value, lines }
+    }
+}
+
+/// The hypotheses that explain each of several sets of conversations.
+fn explaining_all<E>(
+    hypotheses: Vec<Hypothesis>,
+    sets: &[Vec<Conversation>],
+    exactness: Exactness,
+    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+) -> Result<Vec<(Hypothesis, Evidence)>, E> {
+    let mut found: Vec<_> = hypotheses
+        .into_iter()
+        .map(|hypothesis| (hypothesis, Evidence::default()))
+        .collect();
+    for set in sets {
+        let all: Vec<_> = found.iter().map(|(h, _)| h.clone()).collect();
+        let here = explaining(&all, set, exactness, twin)?;
+        found.retain_mut(|(hypothesis, evidence)| {
+            let own = here.iter().find(|(h, _)| *h == hypothesis);
+            own.inspect(|(_, here)| evidence.apart = evidence.apart + here.apart)
+                .is_some()
+        });
+    }
+    Ok(found)
+}
+
+/// The hypothesis whose times fit best. Where the
+/// manual's own value, which stands in front, fits as well but for a sixth, it is that: a computer's clock is always a little late.
+fn best(found: &[(Hypothesis, Evidence)]) -> Option<&Hypothesis> {
+    let (first, evidence) = found.first()?;
+    let (best, better) = found.iter().min_by_key(|(_, evidence)| evidence.apart)?;
+    match better.apart * 6 < evidence.apart * 5 {
+        true => Some(best),
+        false => Some(first),
+    }
+}
+
+/// A time in tenths of a millisecond: a cycle of a drive's program is 432 us (ND21 4.1).
+fn tenths(time: Span) -> u64 {
+    time.as_nanos() / 100_000
+}
+
+/// A time in tenths of a millisecond as the scenario language writes it.
+fn written(tenths: u64) -> String {
+    match tenths % 10 {
+        0 => format!("{}ms", tenths / 10),
+        tenth => format!("{}.{tenth}ms", tenths / 10),
+    }
+}
+
+/// How a model explains what came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Explained {
+    /// All of it.
+    Whole,
+    /// Where the cell was read in which the drive says whether it is done, the model has these bits of it and the drive others.
+    Cell(u8),
+    /// Not, in something that the question is not about.
+    Not,
+}
+
+fn explained(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -> Explained {
+    let comparisons = twin.follow_while_alike(conversations, exactness);
+    let Some(found) = comparisons.into_iter().find_map(|c| c.divergence) else {
+        return Explained::Whole;
+    };
+    let (Some((asked, looks)), Some((_, wanted))) = (exactness.looks, found.expected) else {
+        return Explained::Not;
+    };
+    let look = match found.role {
+        Role::Data {
+            drive: Some(drive),
+            address,
+        } if drive == asked => looks.iter().find(|look| look.address == address),
+        _ => None,
+    };
+    look.map_or(Explained::Not, |look| {
+        Explained::Cell(wanted.byte & look.mask)
+    })
+}
+
+/// The times that explain what came, in tenths of a millisecond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Bracket {
+    /// From the first to the last of these.
+    Between(u64, u64),
+    Anything,
+    Nothing,
+}
+
+/// Which times up to `longest` explain everything, where a drive is asked again and again whether it is done. Where the model
+/// says what it says with the longest time, its time is too long, and otherwise too short.
+fn bracket<E>(longest: u64, explained: &dyn Fn(u64) -> Result<Explained, E>) -> Result<Bracket, E> {
+    let not_yet = explained(longest)?;
+    if not_yet == Explained::Whole && explained(0)? == Explained::Whole {
+        return Ok(Bracket::Anything);
+    }
+    // The shortest that is not too short.
+    let (mut low, mut high) = (0, longest);
+    while low < high {
+        let middle = low.midpoint(high);
+        let here = explained(middle)?;
+        match here == Explained::Whole || here == not_yet {
+            true => high = middle,
+            false => low = middle + 1,
+        }
+    }
+    let shortest = low;
+    if explained(shortest)? != Explained::Whole {
+        return Ok(Bracket::Nothing);
+    }
+    let mut high = longest;
+    while low < high {
+        let middle = low.midpoint(high + 1);
+        match explained(middle)? == Explained::Whole {
+            true => low = middle,
+            false => high = middle - 1,
+        }
+    }
+    Ok(Bracket::Between(shortest, low))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that needs `time`, asked at these times whether it is done.
+    fn asked(time: u64, questions: &[u64]) -> Bracket {
+        let explained = |model: u64| -> Result<Explained, ()> {
+            let done = questions.iter().map(|at| (*at >= time, *at >= model));
+            let wrong = done.into_iter().find(|(real, model)| real != model);
+            Ok(wrong.map_or(Explained::Whole, |(_, model)| Explained::Cell(model.into())))
+        };
+        bracket(1_000, &explained).expect("a bracket")
+    }
+
+    #[test]
+    fn a_time_lies_between_the_last_no_and_the_first_yes() {
+        let questions: Vec<u64> = (1..=20).map(|at| at * 50).collect();
+        assert_eq!(asked(120, &questions), Bracket::Between(101, 150));
+        // Done before the first question, and never done.
+        assert_eq!(asked(10, &questions), Bracket::Between(0, 50));
+        assert_eq!(asked(600, &questions[..10]), Bracket::Between(501, 1_000));
+        assert_eq!(asked(600, &[]), Bracket::Anything);
+        // Asked late in the first place, and then from the beginning.
+        assert_eq!(asked(120, &[300, 50, 100, 150]), Bracket::Between(101, 150));
+        // What the question is not about.
+        let other = bracket(1_000, &|_| Ok::<_, ()>(Explained::Not));
+        assert_eq!(other, Ok(Bracket::Nothing));
+    }
+
+    #[test]
+    fn times_are_written_as_a_header_reads_them() {
+        assert_eq!(written(tenths(Span::from_millis(12))), "12ms");
+        assert_eq!(written(17), "1.7ms");
+        assert_eq!(written(0), "0ms");
+    }
+}

@@ -1,0 +1,35 @@
+//! One page of HTML for people: what was played, what came of it, and pictures of it.
+//!
+//! A page stands for itself: style, script and pictures are in it, nothing is loaded from anywhere (its own
+//! `Content-Security-Policy` forbids it), and without scripts the pictures and tables stand as they are. It never has more than
+//! [`MAX_PAGE`] bytes: where a run has more to show, the gravest comes first, and the page says what was left out.
+//!
+//! | file | what it makes |
+//! |---|---|
+//! | `write.rs` | the only way into a page: everything but the program's own words is escaped |
+//! | `page.rs` | the page around its sections, within its bounds |
+//! | `summary.rs` | the verdicts of a run in a table |
+//! | `scenario.rs` | the section of a scenario: verdict, section of the manual, expected beside received |
+//! | `diagram.rs` | the space-time diagram of a ring, and the data that the script shows of it |
+//! | `sequence.rs` | what the master and the drives said, one after another |
+//! | `campaign.rs` | the page of campaigns: maps of the ring |
+//! | `explored.rs` | the page of a run of fuzzing |
+//! | `lines.rs` | recorded cells against time |
+//! | `style.css`, `script.js` | how it looks, and what it does for whoever points at a byte |
+
+mod campaign;
+mod diagram;
+mod explored;
+mod lines;
+mod page;
+mod scenario;
+mod sequence;
+mod summary;
+mod write;
+
+pub use campaign::campaigns;
+pub use explored::{Explored, explored};
+pub use page::{MAX_PAGE, Part, Section, page};
+pub use scenario::{Played, section};
+pub use summary::{Head, Shown, run};
+pub use write::{Attribute, Html};
