@@ -411,7 +411,9 @@ fn deviations_are_listed() {
     assert!(all.lines().count() >= 40, "{all}");
     assert!(all.contains("sends-16-zeros"), "{all}");
     let some = stdout(&drivebench(&["deviations", "16 ZEROS"]));
-    assert_eq!(some.lines().count(), 2, "{some}");
+    // Two drives, and below a heading one master.
+    assert_eq!(some.lines().count(), 4, "{some}");
+    assert!(some.contains("check-sequence-of-16-zeros"), "{some}");
     let json = drivebench(&["deviations", "sends-16", "--format", "json"]);
     let json: serde_json::Value = serde_json::from_slice(&json.stdout).expect("JSON");
     assert_eq!(json["schema"], 1);
@@ -421,6 +423,7 @@ fn deviations_are_listed() {
         json["deviations"][0]["models"],
         serde_json::json!(["plain", "nd21"])
     );
+    assert_eq!(json["masters"], serde_json::json!([]));
     assert_eq!(code(&drivebench(&["deviations", "no such"])), 4);
 }
 

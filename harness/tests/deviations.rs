@@ -9,16 +9,19 @@ mod blind;
 use blind::Blind;
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Line, Link};
+use harness::qualify::deviating_masters;
+use harness::rig::{Options, Run, Session, parse};
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
-use harness_sim::deviation::{Deviation, deviations};
+use harness_sim::deviation::{Deviation, deviations, master_deviations};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const FILE: &str = "corpora/deviations.toml";
+const MASTERS: &str = "corpora/masters.toml";
 
 const HEAD: &str = "\
 # Which scenario finds which deviation of a drive (`drivebench deviations`), and by what means:
@@ -202,6 +205,82 @@ fn every_deviation_is_found() {
     let names: Vec<_> = deviations().map(|d| d.name).collect();
     let unknown = found.keys().find(|name| !names.contains(&name.as_str()));
     assert_eq!(unknown, None, "{FILE} names a deviation that there is not");
+}
+
+/// The scenario that finds each deviation of the bench's own master.
+fn masters() -> BTreeMap<String, String> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(MASTERS));
+    let found: BTreeMap<String, String> = toml::from_str(&text.expect("a file")).expect("a table");
+    let names: Vec<_> = master_deviations().map(|d| d.name).collect();
+    let unknown = found.keys().find(|name| !names.contains(&name.as_str()));
+    assert_eq!(
+        unknown, None,
+        "{MASTERS} names a deviation that there is not"
+    );
+    found
+}
+
+fn found_by<'s>(name: &str, by: &BTreeMap<String, String>, scenarios: &'s [Entry]) -> &'s Entry {
+    let scenario = by.get(name).map_or("", String::as_str);
+    let entry = scenarios
+        .iter()
+        .find(|entry| entry.short_name() == scenario);
+    entry.unwrap_or_else(|| panic!("{name}: no scenario {scenario:?}"))
+}
+
+#[test]
+fn every_wrong_master_is_found() {
+    let (by, scenarios) = (masters(), scenarios());
+    for deviation in master_deviations() {
+        let entry = found_by(deviation.name, &by, &scenarios);
+        let mut plan = entry.plan.clone().expect("a plan");
+        for (master, verdict) in [(None, Verdict::Passed), (Some(deviation), Verdict::Failed)] {
+            plan.master = master;
+            let outcome = run(&plan, &mut simulated(&plan));
+            assert_eq!(outcome.verdict, verdict, "{}", deviation.name);
+        }
+    }
+}
+
+/// On a rig the bench is to blame, and the record, played again, tells with which master it was made.
+#[test]
+fn every_wrong_master_is_named() {
+    let (by, scenarios) = (masters(), scenarios());
+    for deviation in master_deviations() {
+        let text = format!(
+            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n\
+             [sim]\nsetup = [\"master deviates {}\"]\n\
+             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n",
+            deviation.name
+        );
+        let source = Source::from_bytes("desk.toml".to_owned(), text.into_bytes());
+        let rig = parse(&source.expect("a text")).expect("a rig");
+        let options = Options {
+            allow_motion: true,
+            ..Options::default()
+        };
+        let mut session = Session::open(&rig, &options).expect("a rig in use");
+        let plan = found_by(deviation.name, &by, &scenarios).plan.clone();
+        let mut on_rig = Run::new(&mut session).expect("a twin");
+        let played = on_rig
+            .play(&plan.expect("a plan"), None)
+            .expect("a healthy rig");
+        assert_eq!(
+            played.outcome.verdict,
+            Verdict::RigError,
+            "{}",
+            deviation.name
+        );
+        let driven: Vec<_> = played
+            .attempts
+            .iter()
+            .filter_map(|a| a.driven.clone())
+            .collect();
+        assert!(!driven.is_empty(), "{}", deviation.name);
+        let named = deviating_masters(&driven);
+        assert!(named.contains(&deviation), "{}: {named:?}", deviation.name);
+        let _end = session.close();
+    }
 }
 
 #[test]

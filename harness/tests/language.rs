@@ -1,5 +1,7 @@
 //! The scenario language: what is read, what is refused and how, and what each line does.
 
+mod language_masters;
+
 use harness::library::Entry;
 use harness::link::Link;
 use harness::report::json;

@@ -12,12 +12,14 @@
 
 pub mod bench;
 pub mod cells;
+pub mod counted;
 pub mod deviation;
 pub mod device;
 pub mod drive;
 pub mod fault;
 pub mod fuzz;
 pub mod link;
+pub mod master;
 pub mod nd21;
 pub mod node;
 pub mod plain;

@@ -13,6 +13,7 @@ mod control;
 mod discovery;
 mod eeprom;
 mod error;
+mod exchange;
 mod positioning;
 mod pump;
 mod s_ramp;
@@ -23,6 +24,8 @@ pub use axis::Axis;
 pub(crate) use discovery::count_behind;
 pub use discovery::{Identity, Recovery, State, count_drives, recover};
 pub use error::Error;
+/// What a master may send, by the rules of the bus alone.
+pub use harness_sim::fuzz::jobs::conduct;
 pub use s_ramp::SkStatus;
 pub use scope::{Measurement, Scope, Trigger};
 
@@ -30,6 +33,7 @@ use crate::link::Line;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{self, Counters, Event, Job, JobId, Outcome, Phase, Refused};
 use harness_proto::time::{Instant, Span};
+use harness_sim::deviation::MasterDeviation;
 use pump::Pump;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -47,6 +51,8 @@ pub struct Options {
     /// Whether the points of the S-ramp go over the wire `puffer`, an invention of this project for its
     /// simulated drives: the manual does not say how they come to the drive (13.5.3).
     pub s_ramp_puffer: bool,
+    /// How the masters break the manual on purpose, for tests of what must find a wrong one.
+    pub deviates: Option<&'static MasterDeviation>,
 }
 
 impl Default for Options {
@@ -57,6 +63,7 @@ impl Default for Options {
             drive_patience: Span::from_millis(5_000),
             motion_patience: Span::from_millis(60_000),
             s_ramp_puffer: false,
+            deviates: None,
         }
     }
 }
@@ -90,7 +97,7 @@ impl<'l> Bus<'l> {
         options: Options,
     ) -> Result<Self, Error> {
         let bus = Self {
-            pump: Arc::new(Mutex::new(Pump::new(link, rings, options.master))),
+            pump: Arc::new(Mutex::new(Pump::new(link, rings, &options))),
             options,
         };
         bus.wait_until_open()?;
@@ -248,16 +255,24 @@ impl<'l> Bus<'l> {
     /// result has been fetched.
     #[doc(alias = "NB_Result")]
     pub fn result(&self, order: Order) -> Result<Option<u32>, Error> {
+        match self.outcome(order)? {
+            Outcome::Read(data) => Ok(data.value()),
+            Outcome::Done { .. } => Ok(None),
+            Outcome::Unknown(fault) => Err(Error::Unknown(fault)),
+            Outcome::Failed(stop) => Err(Error::Stopped(stop)),
+        }
+    }
+
+    /// Waits for the end of a job and fetches how it ended, whatever that is; a second time there is nothing to fetch.
+    ///
+    /// # Errors
+    /// [`Error::TimeOut`], [`Error::Link`] or [`Error::NoSuchOrder`]: the job has not ended.
+    pub fn outcome(&self, order: Order) -> Result<Outcome, Error> {
         let end = self.lock().now() + self.options.patience;
         loop {
             let mut pump = self.lock();
             if let Some(outcome) = pump.take(order.ring, order.id) {
-                return match outcome {
-                    Outcome::Read(data) => Ok(data.value()),
-                    Outcome::Done { .. } => Ok(None),
-                    Outcome::Unknown(fault) => Err(Error::Unknown(fault)),
-                    Outcome::Failed(stop) => Err(Error::Stopped(stop)),
-                };
+                return Ok(outcome);
             }
             if !pump.knows(order.ring, order.id) {
                 return Err(Error::NoSuchOrder);

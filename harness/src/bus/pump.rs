@@ -1,13 +1,14 @@
 //! Masters and their link, coupled: bytes out when the line is free, bytes in as they come.
 
-use super::Error;
+use super::{Error, Options};
 use crate::link::{Line, Trouble};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{
-    Counters, Event, Job, JobId, Master, Options, Outcome, Phase, Refused, Stop,
+    self, Counters, Event, Job, JobId, Outcome, Phase, Refused, Stop,
 };
 use harness_proto::time::{Instant, Span};
+use harness_sim::master::AnyMaster;
 use std::collections::BTreeMap;
 
 /// The most events that wait to be fetched.
@@ -20,7 +21,7 @@ const BUSY_HOST: Span = Span::from_millis(400);
 const PAUSE: Span = Span::from_millis(500);
 
 struct Ring {
-    master: Master,
+    master: AnyMaster,
     /// When the line is free for the next byte.
     free: Instant,
     results: BTreeMap<JobId, Option<Outcome>>,
@@ -36,22 +37,22 @@ pub(super) struct Pump<'l> {
 }
 
 impl<'l> Pump<'l> {
-    pub(super) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: Options) -> Self {
+    pub(super) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: &Options) -> Self {
         let now = link.now();
         // A byte that is only late must not count as lost: the recovery stops every drive.
-        let options = Options {
+        let own = master::Options {
             slack: match link.lead() {
-                Span::ZERO => options.slack,
-                _ => options.slack.max(BUSY_HOST),
+                Span::ZERO => options.master.slack,
+                _ => options.master.slack.max(BUSY_HOST),
             },
-            ..options
+            ..options.master
         };
         let rate = Rate::ALL
             .into_iter()
             .find(|rate| rate.byte_time() == link.byte_time())
             .unwrap_or_default();
         let rings = sizes.iter().map(|&size| Ring {
-            master: Master::new(size, rate, options),
+            master: AnyMaster::new(size, rate, own, options.deviates),
             free: now,
             results: BTreeMap::new(),
             stopped: None,
@@ -102,6 +103,11 @@ impl<'l> Pump<'l> {
             ring.results.insert(id, None);
         }
         Some(id)
+    }
+
+    /// The master of a ring; `None` where there is no such ring.
+    pub(super) fn master(&mut self, ring: usize) -> Option<&mut AnyMaster> {
+        Some(&mut self.rings.get_mut(ring)?.master)
     }
 
     /// The outcome of a job has come.

@@ -57,7 +57,7 @@ pub fn talk(plan: &Plan) -> Result<Talk, Problem> {
             PlannedAction::Send(_, sent) | PlannedAction::Telegram(_, sent, ..) => {
                 bytes.extend_from_slice(sent);
             }
-            PlannedAction::Master(_, all) => calls.push(all.clone()),
+            PlannedAction::Master(_, all, false) => calls.push(all.clone()),
             _ => return refused(step.span, "a campaign does not play this"),
         }
         if bytes.len().max(calls.iter().map(Vec::len).sum()) > MAX_LENGTH {

@@ -134,6 +134,14 @@ impl Campaign {
                 "drives by the manual expected in a campaign",
             )));
         }
+        if let Some(master) = &entry.scenario.master {
+            let message = "what a wrong master does is no measure of the bus";
+            return Err(own(Problem::new(
+                master.span,
+                message,
+                "a master by the manual expected in a campaign",
+            )));
+        }
         let Some(plan) = &entry.plan else {
             let message = "its bus is not built yet";
             return Err(mistake(read.wrong(

@@ -1,9 +1,9 @@
-//! `drivebench deviations`: the wrong drives that a scenario can ask for.
+//! `drivebench deviations`: the wrong drives and the wrong masters that a scenario can ask for.
 
 use super::args::{DeviationsArguments, Format};
 use super::exit::Exit;
 use super::output::Output;
-use harness_sim::deviation::{Deviation, deviations as all};
+use harness_sim::deviation::{Deviation, MasterDeviation, deviations as all, master_deviations};
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -32,11 +32,30 @@ impl From<&Deviation> for Row {
     }
 }
 
+/// One deviation of the bench's own master, for tools.
+#[derive(Serialize)]
+struct MasterRow {
+    name: &'static str,
+    section: &'static str,
+    about: &'static str,
+}
+
+impl From<&MasterDeviation> for MasterRow {
+    fn from(deviation: &MasterDeviation) -> Self {
+        Self {
+            name: deviation.name,
+            section: deviation.section,
+            about: deviation.about,
+        }
+    }
+}
+
 /// All of them, for tools.
 #[derive(Serialize)]
 struct Table {
     schema: u8,
     deviations: Vec<Row>,
+    masters: Vec<MasterRow>,
 }
 
 /// Shows the deviations.
@@ -46,14 +65,20 @@ pub(super) fn deviations(
 ) -> std::io::Result<Exit> {
     let filter = arguments.filter.as_deref().unwrap_or_default();
     let filter = filter.to_lowercase();
-    let wanted = |d: &&Deviation| {
-        let texts = [d.name, d.section, d.about];
+    let holds = |texts: [&str; 3]| {
         texts
             .iter()
             .any(|text| text.to_lowercase().contains(&filter))
     };
-    let rows: Vec<Row> = all().filter(wanted).map(Row::from).collect();
-    if rows.is_empty() {
+    let rows: Vec<Row> = all()
+        .filter(|d| holds([d.name, d.section, d.about]))
+        .map(Row::from)
+        .collect();
+    let masters: Vec<MasterRow> = master_deviations()
+        .filter(|d| holds([d.name, d.section, d.about]))
+        .map(MasterRow::from)
+        .collect();
+    if rows.is_empty() && masters.is_empty() {
         output.complain(
             "no deviation has this text in it; `drivebench deviations` shows all of them",
         );
@@ -62,15 +87,29 @@ pub(super) fn deviations(
     let mut text = String::new();
     match arguments.format {
         Format::Table => {
-            for row in rows {
+            let mut line = |name, section, about| {
                 // Writing to a String cannot fail.
-                let _infallible = writeln!(text, "{:32} {:9} {}", row.name, row.section, row.about);
+                let _infallible = writeln!(text, "{name:32} {section:9} {about}");
+            };
+            for row in rows {
+                line(row.name, row.section, row.about);
+            }
+            if !masters.is_empty() {
+                line(
+                    "wrong masters",
+                    "section",
+                    "`master deviates NAME` in a scenario",
+                );
+            }
+            for row in masters {
+                line(row.name, row.section, row.about);
             }
         }
         Format::Json => {
             text = serde_json::to_string(&Table {
                 schema: 1,
                 deviations: rows,
+                masters,
             })?;
             text.push('\n');
         }

@@ -11,9 +11,10 @@ use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
 use crate::link::Link as _;
 use crate::qualify::{
-    Answer, Asked, Hypothesis, Probe, Profile, answer, conversations, deviating, explaining, probes,
+    Answer, Asked, Hypothesis, Probe, Profile, answer, conversations, deviating, deviating_masters,
+    explaining, probes,
 };
-use crate::rig::{Played, Run, state};
+use crate::rig::{Driven, Played, Run, state};
 use crate::scenario::verdict::Verdict;
 use crate::twin::Conversation;
 use harness_proto::time::Span;
@@ -35,13 +36,30 @@ const PROBED: usize = 3;
 pub(super) struct Findings {
     /// The conversations of each attempt that diverged.
     diverged: Vec<Vec<Conversation>>,
+    /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
+    with_driver: Vec<Vec<Conversation>>,
     /// The drives that were named.
     suspects: Vec<u8>,
+    /// What the bench's own master did, and whether it was ever wrong.
+    driven: Vec<Driven>,
+    master_is_wrong: bool,
 }
 
 impl Findings {
+    /// The attempts that are to be explained.
+    fn attempts(&self) -> &[Vec<Conversation>] {
+        match self.diverged.is_empty() {
+            true => &self.with_driver,
+            false => &self.diverged,
+        }
+    }
+
     /// Notes what came of a scenario.
     pub(super) fn note(&mut self, played: &Played) {
+        for attempt in &played.attempts {
+            self.driven.extend(attempt.driven.clone());
+            self.master_is_wrong |= !attempt.master_is_right;
+        }
         // What was late once and not again says nothing of a drive.
         let steady = played.outcome.verdict == Verdict::Marginal;
         for attempt in &played.attempts {
@@ -51,7 +69,11 @@ impl Findings {
             });
             let drives: Vec<_> = diverged.map(|divergence| divergence.drive).collect();
             if !drives.is_empty() {
-                self.diverged.push(attempt.conversations.clone());
+                let own = match attempt.driven {
+                    Some(_) => &mut self.with_driver,
+                    None => &mut self.diverged,
+                };
+                own.push(attempt.conversations.clone());
                 self.suspects.extend(drives.into_iter().flatten());
             }
         }
@@ -125,10 +147,15 @@ pub(super) fn settle(
         true => None,
         false => Some(profile(run, findings, folder.as_deref_mut(), output)?),
     };
-    let named = name(run, findings, output)?;
-    let exit = match findings.diverged.is_empty() {
-        true => Exit::Passed,
-        false => Exit::Failed,
+    let named = format!(
+        "{}{}",
+        name_master(findings, output)?,
+        name(run, findings, output)?
+    );
+    let exit = match (findings.master_is_wrong, findings.attempts().is_empty()) {
+        (true, _) => Exit::RigError,
+        (false, true) => Exit::Passed,
+        (false, false) => Exit::Failed,
     };
     if let Some(folder) = folder {
         if let Some(profile) = profile {
@@ -140,9 +167,31 @@ pub(super) fn settle(
     Ok(exit)
 }
 
+/// What the bench's own master does otherwise, if it does.
+fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<String> {
+    if !findings.master_is_wrong {
+        return Ok(String::new());
+    }
+    let mut text = String::new();
+    for deviation in deviating_masters(&findings.driven).iter().take(MOST_TOLD) {
+        text.push_str(&format!(
+            "the master: {} (ND21 {}): {}\n",
+            deviation.name, deviation.section, deviation.about
+        ));
+    }
+    if text.is_empty() {
+        text.push_str("the master: it is otherwise than the master of the manual, and no single known deviation explains it\n");
+    }
+    text.push_str(
+        "the bench is wrong, not a drive: what its master did says nothing of the drives\n",
+    );
+    output.result(&text)?;
+    Ok(text)
+}
+
 /// The deviations that explain every byte of every attempt that diverged.
 fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<String, Stop> {
-    if findings.diverged.is_empty() {
+    if findings.attempts().is_empty() {
         let known = &run.session().rig().file.deviation;
         let text = match known.is_empty() {
             true => "deviations: none; every byte is as the model of the manual says\n".to_owned(),
@@ -164,7 +213,7 @@ fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<S
     // A drive that a deviation has left in another state explains what comes behind in its own way: the deviations count
     // that explain the most.
     let mut explained: BTreeMap<&str, (usize, &Hypothesis)> = BTreeMap::new();
-    for attempt in findings.diverged.iter().take(MOST_ATTEMPTS) {
+    for attempt in findings.attempts().iter().take(MOST_ATTEMPTS) {
         for (hypothesis, _) in explaining(&all, attempt, exactness, &twin).unwrap_or_default() {
             explained
                 .entry(&hypothesis.name)

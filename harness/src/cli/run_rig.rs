@@ -170,6 +170,7 @@ fn all(
     let name = run.session().rig().id().to_owned();
     let mut cases = Cases::new(&name, job.junit.as_deref());
     let mut verdicts = Vec::new();
+    let mut ill = false;
     let mut took = Span::ZERO;
     for entry in entries {
         bar.set_message(entry.short_name().to_owned());
@@ -198,7 +199,12 @@ fn all(
         }
         bar.inc(1);
         findings.note(&played);
-        if played.outcome.verdict == Verdict::RigError || over(&mut run, output) {
+        ill = played.outcome.verdict == Verdict::RigError
+            && played
+                .attempts
+                .last()
+                .is_none_or(|last| last.master_is_right);
+        if ill || over(&mut run, output) {
             break;
         }
     }
@@ -206,7 +212,6 @@ fn all(
     output.result(&summary(&verdicts, took))?;
     let mut exit = cases.write(Exit::of(&verdicts, job.require_all), output);
     if job.qualify && !over(&mut run, output) {
-        let ill = exit == Exit::RigError;
         match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
             // What a drive does wrong is the drive's fault, whatever came of it.
             Exit::Failed => exit = Exit::Failed,

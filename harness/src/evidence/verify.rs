@@ -6,7 +6,7 @@ use super::record::{Line, capabilities};
 use crate::library::Entry;
 use crate::link::{Event, LinkFault, PlacedFault, Replay};
 use crate::rig::run::{judge, known, twin};
-use crate::rig::{Rig, Way, parse_beside, play_one};
+use crate::rig::{Driven, Rig, Way, parse_beside, play_one};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -356,11 +356,13 @@ fn again(recorded: &Recorded, text: &str, header: &Header, rig: &Rig, twin: &mut
     let size = header.rings.first().map(|ring| ring.drives());
     let entry = Entry::new(source, size).map_err(|problems| problems.to_string());
     let plan = entry.and_then(|entry| entry.plan.ok_or("no scenario of this bus".to_owned()));
-    let plan = match plan {
+    let mut plan = match plan {
         Ok(plan) if plan.rings == header.rings => plan,
         Ok(_) => return Again::impossible("it is for other rings than the rig has".to_owned()),
         Err(why) => return Again::impossible(why),
     };
+    let own = rig.plan().ok().and_then(|rig| rig.master);
+    plan.master = own.or(plan.master);
     let mut replay = Replay::new(
         recorded.events.clone(),
         header.rate,
@@ -382,6 +384,11 @@ fn again(recorded: &Recorded, text: &str, header: &Header, rig: &Rig, twin: &mut
         .verdict
         .as_ref()
         .map_or(0, |recalled| recalled.unplaced);
+    let capabilities = (header.exactness.tolerance, header.capabilities.as_slice());
+    let driven = Driven::new(&plan, &recorded.events, &header.way, capabilities, &outcome);
+    if let Some(driven) = driven.filter(|_| header.simulated) {
+        driven.judge(&mut outcome);
+    }
     judge(&mut outcome, &comparisons, unplaced, &rig.file.deviation);
     Again {
         outcome,

@@ -14,6 +14,7 @@ mod files;
 mod finding;
 mod generate;
 mod idiom;
+pub mod masters;
 mod mutate;
 mod novelty;
 mod on_rig;

@@ -1,7 +1,9 @@
-//! What a drive that is otherwise is: the known deviations that explain every byte of a run.
+//! What a drive that is otherwise is: the known deviations that explain every byte of a run. And what the bench's own master is, where it is the
+//! one that is otherwise.
 
 use super::hypothesis::Hypothesis;
-use harness_sim::deviation::deviations;
+use crate::rig::Driven;
+use harness_sim::deviation::{MasterDeviation, deviations, master_deviations};
 
 /// Rings up to this size are asked drive by drive; in larger ones the drives that were named and all together.
 const SMALL: u8 = 16;
@@ -35,4 +37,14 @@ pub fn deviating(drives: u8, suspects: &[u8]) -> Vec<Hypothesis> {
         }
     }
     hypotheses
+}
+
+/// The deviations of the master under which everything is as it was recorded, in every attempt in which the driver had a part.
+#[must_use]
+pub fn deviating_masters(attempts: &[Driven]) -> Vec<&'static MasterDeviation> {
+    let explains = |deviation: &&'static MasterDeviation| {
+        let mut all = attempts.iter();
+        all.all(|driven| driven.is_explained_by(Some(deviation)))
+    };
+    master_deviations().filter(explains).collect()
 }

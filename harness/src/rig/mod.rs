@@ -7,6 +7,7 @@
 mod around;
 mod check;
 mod check_sim;
+mod driven;
 mod ends;
 pub mod figures;
 pub mod file;
@@ -28,6 +29,7 @@ pub mod values;
 mod watchdog;
 
 pub use check::{FindProfile, Rig, parse, parse_beside};
+pub use driven::Driven;
 pub use ends::Ends;
 pub use find::{FindError, find};
 pub use health::{Health, Unhealthy, examine};

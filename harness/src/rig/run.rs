@@ -2,6 +2,7 @@
 //! kept.
 
 use super::Rig;
+use super::driven::Driven;
 use super::file::Deviation;
 use super::health::{Unhealthy, examine};
 use super::session::{Session, SessionError};
@@ -14,7 +15,7 @@ use crate::scenario::verdict::Verdict;
 use crate::twin::{Comparison, Conversation, Exactness, Twin};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
-use harness_sim::deviation;
+use harness_sim::deviation::{self, MasterDeviation};
 use harness_sim::trace::Trace;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -35,6 +36,10 @@ pub struct Attempt {
     pub traces: Vec<Trace>,
     /// Line errors that the transport told of without their bytes.
     pub unplaced: u64,
+    /// What the bench's own master did in it on a simulated rig, if it had a part.
+    pub driven: Option<Driven>,
+    /// Whether that is what the master of the manual does.
+    pub master_is_right: bool,
 }
 
 /// Keeps attempts: events as they happen, and what came of each.
@@ -65,6 +70,8 @@ pub struct Run<'s> {
     beats: Option<Arc<AtomicU64>>,
     /// Drives are not reset before a scenario, whatever is allowed.
     as_they_are: bool,
+    /// How the bench's own master breaks the manual on this rig, on purpose.
+    master: Option<&'static MasterDeviation>,
 }
 
 impl<'s> Run<'s> {
@@ -79,7 +86,9 @@ impl<'s> Run<'s> {
         let abilities = session.link().capabilities();
         let line_errors = abilities.contains(&crate::link::Capability::LineErrors);
         let byte_time = session.link().byte_time();
+        let master = session.rig().plan()?.master;
         Ok(Self {
+            master,
             exactness: Exactness {
                 tolerance,
                 line_errors,
@@ -177,7 +186,11 @@ impl<'s> Run<'s> {
         plan: &Plan,
         sink: Option<&mut dyn Sink>,
     ) -> Result<Attempt, SessionError> {
+        let mut own = plan.clone();
+        own.master = self.master.or(plan.master);
+        let plan = &own;
         let way = self.way();
+        let capabilities = self.capabilities();
         let simulated = self.session.rig().is_simulated();
         if matches!(self.session.link().trouble(), Some(Trouble::Denied(_))) {
             // Nobody knows where in a telegram the drives are; where rings are not examined between scenarios, they are now.
@@ -214,9 +227,16 @@ impl<'s> Run<'s> {
             self.twin = twin;
         }
         let comparisons = self.follow(&conversations);
+        let recorded = (self.exactness.tolerance, capabilities.as_slice());
+        let driven = Driven::new(plan, &both.events, &way, recorded, &outcome);
+        // In real time a record does not hold every moment at which the master was asked.
+        let driven = driven.filter(|_| simulated);
         let deviations = &self.session.rig().file.deviation;
+        let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
         judge(&mut outcome, &comparisons, unplaced, deviations);
         Ok(Attempt {
+            driven,
+            master_is_right,
             outcome,
             conversations,
             comparisons,
@@ -476,6 +496,8 @@ mod tests {
 
     fn of(verdicts: &[Verdict]) -> Verdict {
         let attempt = |verdict: &Verdict| Attempt {
+            driven: None,
+            master_is_right: true,
             outcome: Outcome {
                 verdict: *verdict,
                 ..Outcome::skipped("it does not answer ResetH8".to_owned())

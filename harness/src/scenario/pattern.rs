@@ -152,7 +152,7 @@ pub(super) fn pattern(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
 fn items(scanner: &mut Scanner<'_>, depth: u32) -> Result<Vec<Item>, Problem> {
     let mut items = Vec::new();
     while let Some(next) = scanner.peek() {
-        if next == ']' {
+        if matches!(next, ']' | ';') {
             break;
         }
         let here = scanner.here();

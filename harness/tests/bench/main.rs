@@ -204,6 +204,37 @@ fn named(names: &[&str]) {
     }
 }
 
+/// A wrong master of the bench's own is named, in the evidence too; and the bench is to blame, not a drive. `deviations` has all of them.
+#[test]
+fn wrong_masters_are_named() {
+    for (name, scenario) in [
+        ("check-byte-off-by-one", "11.6-driver-jobs"),
+        ("names-the-link-behind", "9.7-driver-names-the-link"),
+        ("never-gives-up", "11.5-driver-gives-up"),
+    ] {
+        let desk = Desk::new(3, "tcp", "127.0.0.1:1");
+        let text = format!(
+            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = [\"master deviates {name}\"]\n\
+             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n"
+        );
+        std::fs::write(desk.path("desk.toml"), text).expect("room");
+        let folder = desk.path("evidence");
+        let evidence = folder.to_str().expect("a name");
+        let more = [
+            "qualify",
+            scenario,
+            "--allow-motion",
+            "--evidence",
+            evidence,
+        ];
+        let output = desk.run(&more);
+        ended(&output, 3, &format!("the master: {name} "));
+        let named = std::fs::read_to_string(folder.join("deviations.txt")).expect("a file");
+        assert!(named.contains("the bench is wrong, not a drive"), "{named}");
+        ended(&verify(&folder), 0, "0 things wrong");
+    }
+}
+
 /// ND21 9.6: the same over a socket, where the ring is another process.
 #[test]
 fn a_wrong_drive_behind_a_socket_is_named() {

@@ -2,6 +2,7 @@
 
 mod command;
 mod findings;
+mod masters;
 mod rig;
 mod runs;
 mod texts;

@@ -4,14 +4,18 @@
 //! arrives before the drive's bus end does, says what goes out after it, stands between the bus end and the
 //! memory, and changes what the drive's program finds in its cells. The drive inside knows nothing of it.
 //! [`deviations`] are the table: a name, a sentence, the section that is broken, and the injection.
+//!
+//! [`DeviantMaster`] and [`master_deviations`] are the same for the other end of the ring: the bench's own master.
 
 mod behind;
 mod channel;
 mod deviant;
 mod errors;
 mod how;
+mod master;
 mod proxy;
 mod telegram;
 
 pub use deviant::Deviant;
 pub use how::{Deviation, deviation, deviations};
+pub use master::{DeviantMaster, MasterDeviation, master_deviation, master_deviations};

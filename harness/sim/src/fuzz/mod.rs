@@ -8,6 +8,7 @@ mod bus_end;
 mod drive;
 mod guard;
 mod hostile;
+pub mod jobs;
 mod links;
 mod repair;
 
@@ -15,6 +16,7 @@ pub use bus_end::{bus_end, bus_end_watched};
 pub use drive::drive;
 pub use guard::guard;
 pub use hostile::master;
+pub use jobs::jobs;
 pub use links::links;
 pub use repair::repair;
 
@@ -46,7 +48,7 @@ pub const WATCHING: [Watching; 3] = [
 ];
 
 /// Every target whose body is here.
-pub const TARGETS: [Target; 8] = [
+pub const TARGETS: [Target; 9] = [
     ("bus_end", bus_end),
     ("codec", codec),
     ("detector", detector),
@@ -54,6 +56,7 @@ pub const TARGETS: [Target; 8] = [
     ("ring", ring),
     ("drive", drive),
     ("master", master),
+    ("jobs", jobs),
     ("guard", guard),
 ];
 

@@ -3,13 +3,13 @@
 //! the ring is sound again (ND21 9.7-9.9, 11.5).
 
 use crate::common::{Couple, Random, repeat, seed, size};
-use crate::counted::Counted;
 use harness_proto::line::Rate;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{
     Event, Job, JobId, Master, Options, Outcome, Pace, Packing, Phase,
 };
 use harness_proto::time::Span;
+use harness_sim::counted::Counted;
 use harness_sim::fault::{DriveFault, Flips, LinkFault};
 
 const CASES: u64 = 1_500;

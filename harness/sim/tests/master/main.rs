@@ -2,10 +2,10 @@
 //! elsewhere.
 
 mod common;
-mod counted;
 mod faults;
 mod figures;
 mod hostile;
 mod named;
 mod recovery;
 mod thin;
+mod truth;

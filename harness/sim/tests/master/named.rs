@@ -1,7 +1,6 @@
 //! Each fault by its name, and what becomes of the jobs (ND21 9.7-9.9, 11.5).
 
 use crate::common::{Couple, size};
-use crate::counted::Counted;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, Kind};
@@ -10,6 +9,7 @@ use harness_proto::novobus::master::{
 };
 use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::time::Span;
+use harness_sim::counted::Counted;
 use harness_sim::device::Device;
 use harness_sim::fault::{DriveFault, Flips, LinkFault};
 use harness_sim::plain::PlainDrive;

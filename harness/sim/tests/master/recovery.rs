@@ -1,7 +1,6 @@
 //! Recovery: the example of ND21 9.8 byte by byte, and every single bit on every link (9.7).
 
 use crate::common::Couple;
-use crate::counted::Counted;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
@@ -13,6 +12,7 @@ use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::novobus::telegram::{Address, Telegram};
 use harness_proto::time::Span;
+use harness_sim::counted::Counted;
 use harness_sim::fault::{Flips, LinkFault};
 use std::collections::BTreeSet;
 

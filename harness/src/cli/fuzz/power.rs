@@ -1,21 +1,23 @@
-//! `drivebench fuzz power`: how many cases it takes to find each planned deviation.
+//! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
 use super::rig::{simulated, tell};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::explore::{
     About, Bounds, Campaign, ExploreError, Finding, OnSim, Planted, Pool, Progress, Setup, Swarm,
-    Watcher,
+    Watcher, masters,
 };
 use crate::rig::find::find;
 use clap::Args;
 use harness_proto::novobus::guard::Limits;
-use harness_sim::deviation::{Deviation, deviations};
+use harness_sim::deviation::{Deviation, deviations, master_deviations};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 const FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/deviations.toml");
+
+const MASTERS_FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/masters.toml");
 
 /// How many drives the ring has; one of them deviates, another one with each seed.
 const DRIVES: u8 = 3;
@@ -59,32 +61,39 @@ impl ByScenario {
     }
 }
 
-/// Shows the table.
-pub(super) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let filter = arguments.filter.as_deref().unwrap_or_default();
-    let wanted: Vec<_> = deviations()
-        .filter(|own| own.name.contains(filter))
-        .collect();
-    if wanted.is_empty() {
-        output
-            .complain("no deviation has this text in its name; `drivebench deviations` shows them");
-        return Ok(Exit::NothingSelected);
+/// What each deviation of a table took.
+struct Table<'a> {
+    arguments: &'a PowerArguments,
+    /// How many deviations there are, and how many cases those took that were found.
+    all: usize,
+    within: Vec<u64>,
+}
+
+impl<'a> Table<'a> {
+    fn begin(
+        arguments: &'a PowerArguments,
+        head: &str,
+        output: &mut Output,
+    ) -> std::io::Result<Self> {
+        output.result(&format!("{head}\n"))?;
+        Ok(Self {
+            arguments,
+            all: 0,
+            within: Vec::new(),
+        })
     }
-    // A test of the file keeps it whole.
-    let by: BTreeMap<String, ByScenario> = toml::from_str(FOUND_BY_SCENARIOS).unwrap_or_default();
-    let head = "cases until found: median of the seeds (least, most), and by which means a scenario finds it";
-    output.result(&format!("{head}\n"))?;
-    let (mut found, mut within) = (0, Vec::new());
-    for deviation in &wanted {
-        let counts = match counts(deviation, arguments) {
-            Ok(counts) => counts,
-            Err(error) => return Ok(tell(&error, output)),
-        };
+
+    /// Shows what the seeds took, the least first; `by` says what else finds it.
+    fn row(
+        &mut self,
+        name: &str,
+        counts: &[Option<u64>],
+        by: &str,
+        output: &mut Output,
+    ) -> std::io::Result<()> {
+        self.all += 1;
         let median = counts.get(counts.len() / 2).copied().flatten();
-        if let Some(median) = median {
-            found += 1;
-            within.push(median);
-        }
+        self.within.extend(median);
         let show = |count: Option<&Option<u64>>| match count {
             Some(Some(count)) => count.to_string(),
             _ => "-".to_owned(),
@@ -92,24 +101,81 @@ pub(super) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io:
         let mut line = String::new();
         let _infallible = write!(
             line,
-            "{:38} {:>7} ({:>6}, {:>6})  {}",
-            deviation.name,
+            "{name:38} {:>7} ({:>6}, {:>6})  {by}",
             show(Some(&median)),
             show(counts.first()),
             show(counts.last()),
-            by.get(deviation.name)
-                .map_or_else(|| "-".to_owned(), ByScenario::words)
         );
-        output.result(&format!("{}\n", line.trim_end()))?;
+        output.result(&format!("{}\n", line.trim_end()))
     }
-    within.sort_unstable();
-    let middle = within.get(within.len() / 2).copied().unwrap_or(0);
-    output.result(&format!(
-        "{found} of {} found within {} cases (median of {} seeds); the median of these is {middle}\n",
-        wanted.len(),
-        arguments.cases,
-        arguments.seeds
-    ))?;
+
+    fn end(mut self, output: &mut Output) -> std::io::Result<()> {
+        self.within.sort_unstable();
+        let middle = self.within.get(self.within.len() / 2).copied().unwrap_or(0);
+        output.result(&format!(
+            "{} of {} found within {} cases (median of {} seeds); the median of these is {middle}\n",
+            self.within.len(),
+            self.all,
+            self.arguments.cases,
+            self.arguments.seeds
+        ))
+    }
+}
+
+/// Shows the tables.
+pub(super) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let filter = arguments.filter.as_deref().unwrap_or_default();
+    let wanted: Vec<_> = deviations()
+        .filter(|own| own.name.contains(filter))
+        .collect();
+    let masters: Vec<_> = master_deviations()
+        .filter(|own| own.name.contains(filter))
+        .collect();
+    if wanted.is_empty() && masters.is_empty() {
+        output
+            .complain("no deviation has this text in its name; `drivebench deviations` shows them");
+        return Ok(Exit::NothingSelected);
+    }
+    if !wanted.is_empty() {
+        // A test of the file keeps it whole.
+        let by: BTreeMap<String, ByScenario> =
+            toml::from_str(FOUND_BY_SCENARIOS).unwrap_or_default();
+        let head = "drives: cases until found: median of the seeds (least, most), and by which means a scenario finds it";
+        let mut table = Table::begin(arguments, head, output)?;
+        for deviation in wanted {
+            let counts = match counts(deviation, arguments) {
+                Ok(counts) => counts,
+                Err(error) => return Ok(tell(&error, output)),
+            };
+            let by = by.get(deviation.name).map(ByScenario::words);
+            table.row(
+                deviation.name,
+                &counts,
+                &by.unwrap_or_else(|| "-".to_owned()),
+                output,
+            )?;
+        }
+        table.end(output)?;
+    }
+    if !masters.is_empty() {
+        let by: BTreeMap<String, String> =
+            toml::from_str(MASTERS_FOUND_BY_SCENARIOS).unwrap_or_default();
+        let head = "masters: cases until found: median of the seeds (least, most), and the scenario that finds it";
+        let mut table = Table::begin(arguments, head, output)?;
+        for deviation in masters {
+            let seeds = 1..=arguments.seeds;
+            let mut counts: Vec<_> = seeds
+                .map(|seed| {
+                    let found = masters::cases_until_found(deviation, seed, arguments.cases);
+                    found.map(|(cases, _)| cases)
+                })
+                .collect();
+            counts.sort_unstable_by_key(|count| count.unwrap_or(u64::MAX));
+            let by = by.get(deviation.name).map_or("-", String::as_str);
+            table.row(deviation.name, &counts, by, output)?;
+        }
+        table.end(output)?;
+    }
     Ok(Exit::Passed)
 }
 

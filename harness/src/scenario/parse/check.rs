@@ -1,11 +1,13 @@
 //! Checks: `? located 97`, `? drive 3 memory FF08 = 1234`, `? error 0502 at 97`.
 
 use super::drive;
+use super::job;
+use super::step;
 use super::words::{drives, named, required};
 use crate::scenario::expression::{self, Located};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Check, Drives};
+use crate::scenario::syntax::{Check, Drives, Ending};
 use crate::scenario::times;
 use harness_proto::novobus::error::BusError;
 
@@ -18,6 +20,9 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         Drive,
         Error,
         Corrected,
+        Named,
+        Ended,
+        Rules,
         Sent,
         Received,
     }
@@ -28,6 +33,9 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         ("drives", Word::Drive),
         ("error", Word::Error),
         ("corrected", Word::Corrected),
+        ("named", Word::Named),
+        ("ended", Word::Ended),
+        ("rules", Word::Rules),
         ("sent", Word::Sent),
         ("received", Word::Received),
     ];
@@ -52,6 +60,25 @@ pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
             Ok(Check::Error { error, drive })
         }
         Word::Corrected => Ok(Check::Corrected(expression::sum(scanner)?)),
+        Word::Named => {
+            let kinds = [("damaged", false), ("broken", true)];
+            let broken = named(scanner, &kinds, "what is wrong with a link")?;
+            let (ring, link, ends) = step::link(scanner)?;
+            Ok(Check::Named {
+                ring,
+                broken,
+                link,
+                ends,
+            })
+        }
+        Word::Ended => {
+            let ending = named(scanner, &Ending::NAMES, "how a job has ended")?;
+            Ok(Check::Ended(ending))
+        }
+        Word::Rules => {
+            required(scanner, &["kept"])?;
+            Ok(Check::RulesKept(job::which_ring(scanner)?))
+        }
         Word::Sent => {
             let bytes = expression::sum(scanner)?;
             required(scanner, &["bytes", "byte"])?;

@@ -2,7 +2,7 @@
 //! from outside the bus, and what must hold of it.
 
 use super::value::{assigned, bytes, cell_by_name, cell_check, cell_names, eeprom_place, place};
-use super::words::{drives, equals, named, required};
+use super::words::{deviates, drives, equals, named, required};
 use crate::link::{Mode, Stimulus};
 use crate::scenario::expression;
 use crate::scenario::problem::{Problem, Spanned};
@@ -14,7 +14,6 @@ use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::units::{Device, INCREMENTS_PER_TURN};
 use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::deviation::{Deviation, deviation, deviations};
 use harness_sim::drive::Model;
 use harness_sim::nd21;
 
@@ -220,17 +219,6 @@ fn device(scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
         }
         None => Err(scanner.unexpected("a type: 5605, 5610, 5615 or 5620 (ND21 4.2.2)")),
     }
-}
-
-fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, Problem> {
-    let names: Vec<_> = deviations().map(|d| d.name).collect();
-    let before = scanner.clone();
-    let word = scanner.word().map_or("", |word| word.value);
-    deviation(word).ok_or_else(|| {
-        *scanner = before;
-        let expected = "the name of a deviation (`drivebench deviations` lists them)";
-        scanner.unexpected(expected).did_you_mean(word, &names)
-    })
 }
 
 fn property(scanner: &mut Scanner<'_>) -> Result<SetupKind, Problem> {

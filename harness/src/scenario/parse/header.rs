@@ -2,7 +2,7 @@
 
 use super::drive::{self, Line};
 use super::step;
-use super::words::named;
+use super::words::{master_deviates, named};
 use crate::link::Capability;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
@@ -11,9 +11,13 @@ use crate::scenario::syntax::{Bus, Citation, RingRange, Scenario, Setup, SetupKi
 use crate::scenario::times;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
+use harness_sim::deviation::MasterDeviation;
 
 /// The most lines of a scenario.
 const MAX_LINES: usize = 20_000;
+
+/// The word behind `master` that makes a header line of it.
+pub(super) const DEVIATES: &str = "deviates";
 
 const HEADER_WORDS: [&str; 8] = [
     "title", "source", "bus", "ring", "needs", "line", "strict", "deadline",
@@ -90,6 +94,7 @@ struct Reader {
     rings: Option<Vec<RingRange>>,
     rate: Option<Rate>,
     setups: Vec<Setup>,
+    master: Option<Spanned<&'static MasterDeviation>>,
     needs: Vec<Capability>,
     strict: bool,
     deadline: Option<times::Duration>,
@@ -110,6 +115,11 @@ impl Reader {
         if let Some(word) = word.as_ref().filter(|w| drive::WORDS.contains(&w.value)) {
             return self.drive(word, scanner);
         }
+        if let Some(word) = word.as_ref().filter(|w| w.value == "master")
+            && scanner.eat_word(DEVIATES)
+        {
+            return self.master(word, scanner);
+        }
         let Some(header) = header else {
             let mut scanner = before;
             self.steps.push(step::step(&mut scanner)?);
@@ -124,6 +134,26 @@ impl Reader {
             );
         }
         self.header(header, &mut scanner)
+    }
+
+    /// `master deviates NAME`
+    fn master(&mut self, word: &Spanned<&str>, mut scanner: Scanner<'_>) -> Result<(), Problem> {
+        if !self.steps.is_empty() {
+            let problem = step::behind_the_first(word.span, "master deviates");
+            return Err(problem.help("move the line up, above the first step"));
+        }
+        let here = scanner.here();
+        let value = master_deviates(&mut scanner)?;
+        let span = scanner.since(here);
+        scanner.expect_end()?;
+        once(
+            &mut self.master,
+            Spanned { value, span },
+            &Spanned {
+                value: "master deviates",
+                span: word.span,
+            },
+        )
     }
 
     /// A line that begins with `drive` is a header line where it can be one.
@@ -234,6 +264,7 @@ impl Reader {
             rings,
             rate: self.rate.unwrap_or_default(),
             setups: self.setups,
+            master: self.master,
             needs: self.needs,
             strict: self.strict,
             deadline: self.deadline,

@@ -3,7 +3,7 @@
 use super::master;
 use super::value::{assigned, place, tolerance};
 use super::words::{drives, equals};
-use crate::scenario::pattern;
+use crate::scenario::pattern::{self, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::{Drives, Job, JobKind, MasterCall, Place, Written};
@@ -89,6 +89,18 @@ pub(super) fn which_ring(scanner: &mut Scanner<'_>) -> Result<usize, Problem> {
 
 fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     let drive = one(scanner)?;
+    let (send, receive) = process_data(scanner)?;
+    Ok(Job::Exchange {
+        drive,
+        send,
+        receive,
+    })
+}
+
+/// `1234 = ABCD`: what a drive gets as process data, and what it gives.
+pub(super) fn process_data(
+    scanner: &mut Scanner<'_>,
+) -> Result<(Pattern, Option<Pattern>), Problem> {
     let here = scanner.here();
     let text = scanner
         .take_while(|c| c.is_ascii_hexdigit() || c == ' ')
@@ -100,11 +112,7 @@ fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     } else {
         None
     };
-    Ok(Job::Exchange {
-        drive,
-        send,
-        receive,
-    })
+    Ok((send, receive))
 }
 
 /// What stands behind the drive: the cell and the data.
@@ -119,7 +127,7 @@ fn operands(
     };
     let data = match (form.data, &place) {
         (Data::None, _) => None,
-        (Data::Read, _) if scanner.at_end() => None,
+        (Data::Read, _) if scanner.at_end() || scanner.peek() == Some(';') => None,
         (_, Some(place)) => Some(assigned(scanner, place)?),
         (_, None) => {
             equals(scanner)?;
@@ -133,12 +141,12 @@ fn operands(
 pub(super) fn driver_command(
     name: &str,
     scanner: &mut Scanner<'_>,
-) -> Option<Result<Job, Problem>> {
+) -> Option<Result<(Drives, MasterCall), Problem>> {
     let form = FORMS.iter().find(|form| form.name == name)?;
     let job = drives(scanner).and_then(|drives| {
         let (place, data) = operands(*form, scanner)?;
         let call = MasterCall::Command(form.kind, place, data);
-        Ok(Job::Master(drives, call))
+        Ok((drives, call))
     });
     Some(job)
 }

@@ -1,6 +1,6 @@
 //! What the driver is to do: `master reference 1`, `master read-byte 95..99 FE13 = 88`.
 
-use super::job::{driver_command, which_ring};
+use super::job::{driver_command, process_data, which_ring};
 use super::value::eeprom_place;
 use super::words::{drives, equals};
 use crate::scenario::expression;
@@ -8,10 +8,10 @@ use crate::scenario::pattern;
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::{self, Dimension};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Job, MasterCall, Target};
+use crate::scenario::syntax::{Drives, Job, MasterCall, Target};
 
 /// The calls that are more than one command.
-const CALLS: [&str; 10] = [
+const CALLS: [&str; 11] = [
     "read-eeprom",
     "write-eeprom",
     "ram-to-eeprom",
@@ -22,27 +22,64 @@ const CALLS: [&str; 10] = [
     "start-ps",
     "wait-for-end",
     "count",
+    "exchange",
 ];
 
-/// Reads what stands behind `master`.
+/// The most jobs in one line.
+const MOST_CALLS: usize = 64;
+
+/// Reads what stands behind `master`: one call, or several behind semicolons that go out together.
 pub(super) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+    let once = scanner.eat_word("once");
+    let mut ahead = scanner.clone();
+    if !once && ahead.eat_word("count") {
+        *scanner = ahead;
+        let ring = which_ring(scanner)?;
+        equals(scanner)?;
+        return Ok(Job::Count(ring, expression::sum(scanner)?));
+    }
+    let mut calls = Vec::new();
+    loop {
+        let here = scanner.here();
+        let (drives, call) = one_call(scanner)?;
+        let span = scanner.since(here);
+        if once && !matches!(call, MasterCall::Command(..)) {
+            let message = "`once` is for jobs that are one command";
+            return Err(Problem::new(span, message, "a command expected here"));
+        }
+        let first = calls.first().map(|(drives, _): &(Drives, _)| drives.ring);
+        if first.is_some_and(|ring| ring != drives.ring) {
+            let message = "jobs that go out together are for one ring";
+            return Err(Problem::new(
+                span,
+                message,
+                "a drive of the same ring expected",
+            ));
+        }
+        calls.push((drives, call));
+        if !scanner.eat(";") {
+            return Ok(Job::Master { calls, once });
+        }
+        if calls.len() == MOST_CALLS {
+            return Err(scanner.unexpected("the end of the line (so many jobs in one line)"));
+        }
+    }
+}
+
+fn one_call(scanner: &mut Scanner<'_>) -> Result<(Drives, MasterCall), Problem> {
     let before = scanner.clone();
     let name = scanner.word().map_or("", |word| word.value);
     if let Some(job) = driver_command(name, scanner) {
         return job;
     }
-    if !CALLS.contains(&name) {
+    if !CALLS.contains(&name) || name == "count" {
         *scanner = before;
         let mut known = super::job::names();
         known.extend(CALLS);
-        known.retain(|name| !["master", "recover", "exchange"].contains(name));
+        known.retain(|name| !["master", "recover"].contains(name));
+        known.extend([super::header::DEVIATES, "once"]);
         let problem = scanner.unexpected("what the driver is to do");
         return Err(problem.did_you_mean(name, &known));
-    }
-    if name == "count" {
-        let ring = which_ring(scanner)?;
-        equals(scanner)?;
-        return Ok(Job::Count(ring, expression::sum(scanner)?));
     }
     let drives = drives(scanner)?;
     let call = match name {
@@ -66,10 +103,14 @@ pub(super) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
         "set-actual-value" => MasterCall::SetActualValue(target(scanner, false)?),
         "init-ps" => MasterCall::InitPs,
         "write-ps" => MasterCall::WritePs(target(scanner, true)?),
+        "exchange" => {
+            let (send, receive) = process_data(scanner)?;
+            MasterCall::Exchange(send, receive)
+        }
         "start-ps" => MasterCall::StartPs,
         _ => MasterCall::WaitForEnd,
     };
-    Ok(Job::Master(drives, call))
+    Ok((drives, call))
 }
 
 fn target(scanner: &mut Scanner<'_>, relative: bool) -> Result<Target, Problem> {

@@ -202,6 +202,19 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
             at,
         });
     }
+    let (ring, link, ends) = link(scanner)?;
+    let (byte, at) = place(scanner)?;
+    let kind = link_fault(scanner)?;
+    Ok(Fault {
+        ring,
+        what: FaultKind::Link(link, ends, kind),
+        byte,
+        at,
+    })
+}
+
+/// A link by its two ends: its ring, where it stands, and the ends.
+pub(super) fn link(scanner: &mut Scanner<'_>) -> Result<(usize, Located, LinkEnds), Problem> {
     let here = scanner.here();
     let ring = ring_prefix(scanner);
     let from = end(scanner)?;
@@ -209,19 +222,11 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
         return Err(scanner.unexpected("`->`, as in 98->97"));
     }
     let to = end(scanner)?;
-    let span = scanner.since(here);
-    let (byte, at) = place(scanner)?;
-    let kind = link_fault(scanner)?;
     let place = Located {
-        span,
+        span: scanner.since(here),
         ..Located::number(0)
     };
-    Ok(Fault {
-        ring,
-        what: FaultKind::Link(place, LinkEnds { from, to }, kind),
-        byte,
-        at,
-    })
+    Ok((ring, place, LinkEnds { from, to }))
 }
 
 /// An end of a link: a drive, or `master` (`None`).

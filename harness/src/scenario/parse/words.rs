@@ -4,6 +4,8 @@ use crate::scenario::expression;
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Drives;
+use harness_sim::deviation::{Deviation, MasterDeviation};
+use harness_sim::deviation::{deviation, deviations, master_deviation, master_deviations};
 
 /// Reads one of a list of words.
 pub(super) fn named<T: Copy>(
@@ -25,6 +27,46 @@ pub(super) fn named<T: Copy>(
                 .did_you_mean(word.value, &known))
         }
     }
+}
+
+/// The name of a deviation of a drive.
+pub(super) fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, Problem> {
+    let names: Vec<_> = deviations().map(|d| d.name).collect();
+    let masters: Vec<_> = master_deviations().map(|d| d.name).collect();
+    let other = ("a drive", "a master", "`master deviates NAME`");
+    one_of(scanner, deviation, &names, &masters, other)
+}
+
+/// The name of a deviation of the master.
+pub(super) fn master_deviates(
+    scanner: &mut Scanner<'_>,
+) -> Result<&'static MasterDeviation, Problem> {
+    let names: Vec<_> = master_deviations().map(|d| d.name).collect();
+    let drives: Vec<_> = deviations().map(|d| d.name).collect();
+    let other = ("a master", "a drive", "`drive 2 deviates NAME`");
+    one_of(scanner, master_deviation, &names, &drives, other)
+}
+
+/// Reads a name that `find` knows; `others` are names of the other end of the ring.
+fn one_of<T>(
+    scanner: &mut Scanner<'_>,
+    find: impl Fn(&str) -> Option<T>,
+    names: &[&str],
+    others: &[&str],
+    (own, other, line): (&str, &str, &str),
+) -> Result<T, Problem> {
+    let before = scanner.clone();
+    let word = scanner.word().map_or("", |word| word.value);
+    find(word).ok_or_else(|| {
+        *scanner = before;
+        let expected =
+            format!("the name of a deviation of {own} (`drivebench deviations` lists them)");
+        let problem = scanner.unexpected(&expected);
+        match others.contains(&word) {
+            true => problem.help(format!("{word} is a deviation of {other}: {line}")),
+            false => problem.did_you_mean(word, names),
+        }
+    })
 }
 
 /// `95..99`, `N-1`, `2:0..last`.

@@ -22,7 +22,7 @@ impl Planner {
                 self.ring(*ring, Span::default())?;
                 Ok(PlannedAction::Recover(*ring))
             }
-            Job::Master(drives, call) => self.master(drives, call),
+            Job::Master { calls, once } => self.master(calls, *once),
             Job::Count(ring, number) => {
                 self.ring(*ring, number.span)?;
                 let drives = number.value(self.size(*ring))?;

@@ -12,15 +12,17 @@ use harness_proto::nd21::units::turns_to_raw;
 impl Planner {
     pub(super) fn master(
         &self,
-        drives: &Drives,
-        call: &MasterCall,
+        calls: &[(Drives, MasterCall)],
+        once: bool,
     ) -> Result<PlannedAction, Problem> {
-        let ring = drives.ring;
-        let calls = self
-            .drives(drives)?
-            .map(|drive| Ok((drive, self.call((ring, drive), call)?)));
-        let calls = calls.collect::<Result<_, Problem>>()?;
-        Ok(PlannedAction::Master(ring, calls))
+        let ring = calls.first().map_or(0, |(drives, _)| drives.ring);
+        let mut planned = Vec::new();
+        for (drives, call) in calls {
+            for drive in self.drives(drives)? {
+                planned.push((drive, self.call((ring, drive), call)?));
+            }
+        }
+        Ok(PlannedAction::Master(ring, planned, once))
     }
 
     fn call(&self, drive: (usize, u8), call: &MasterCall) -> Result<PlannedCall, Problem> {
@@ -51,6 +53,14 @@ impl Planner {
                 Target::At(turns) => position(Mode::Absolute, *turns)?,
                 Target::By(turns) => position(Mode::Relative, *turns)?,
             }),
+            MasterCall::Exchange(send, receive) => {
+                let sent = self.known(send, 2, ring)?;
+                let expected = match receive {
+                    Some(pattern) => self.data(pattern, 2, ring)?,
+                    None => vec![Expected::Any; 2],
+                };
+                PlannedCall::Exchange(u16::from_be_bytes([sent[0], sent[1]]), expected)
+            }
             MasterCall::StartPs => PlannedCall::StartPs,
             MasterCall::WaitForEnd => PlannedCall::WaitForEnd,
         })

@@ -100,6 +100,8 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         needs.push(Capability::TwoRings);
     }
     needs.extend(planner.setups.iter().filter_map(|setup| setup.what.needs()));
+    // What a wrong master does to a machine nobody knows.
+    needs.extend(scenario.master.as_ref().map(|_| Capability::Simulator));
     needs.sort();
     needs.dedup();
     Ok(Plan {
@@ -109,6 +111,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
             .deadline
             .map_or(DEADLINE, |deadline| deadline.on(planner.byte_time)),
         needs,
+        master: scenario.master.as_ref().map(|master| master.value),
         steps,
         setups: planner.setups,
         units: planner.units,
@@ -435,6 +438,14 @@ impl Planner {
                 PlannedCheck::Error(ring, drive, *error)
             }
             Check::Corrected(times) => PlannedCheck::Corrected(count(times)?),
+            Check::Named {
+                ring,
+                broken,
+                link,
+                ends,
+            } => PlannedCheck::Named(*ring, self.link(*ring, link.span, ends)?, *broken),
+            Check::Ended(ending) => PlannedCheck::Ended(*ending),
+            Check::RulesKept(ring) => PlannedCheck::RulesKept(*ring),
             Check::Sent { bytes, time } => {
                 let time = time.map(|t| (t.on(self.byte_time), t.tolerance(self.byte_time)));
                 PlannedCheck::Sent(count(bytes)?, time)

@@ -4,7 +4,7 @@ use crate::link::{Capability, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
-use crate::scenario::syntax::{Influence, Place, Relation, Showing};
+use crate::scenario::syntax::{Ending, Influence, Place, Relation, Showing};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::Position;
 use harness_proto::nd21::units::{self, Device, Scale};
@@ -14,7 +14,7 @@ use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time;
-use harness_sim::deviation::Deviation;
+use harness_sim::deviation::{Deviation, MasterDeviation};
 use harness_sim::drive::Model;
 use harness_sim::nd21::Nd21Properties;
 use std::ops::RangeInclusive;
@@ -36,6 +36,8 @@ pub struct Plan {
     pub deadline: time::Span,
     /// What a rig must have.
     pub needs: Vec<Capability>,
+    /// How the bench's own master breaks the manual, on purpose.
+    pub master: Option<&'static MasterDeviation>,
     /// The steps, in order.
     pub steps: Vec<PlannedStep>,
     pub(super) setups: Vec<PlannedSetup>,
@@ -164,8 +166,8 @@ pub enum PlannedAction {
     Telegram(usize, Vec<u8>, Vec<Expected>, Option<Reading>),
     /// 17 zeros and the check sequence.
     Recover(usize),
-    /// The driver does this of these drives.
-    Master(usize, Vec<(u8, PlannedCall)>),
+    /// The driver does this of these drives; whether its commands must not run twice, and may end in any way.
+    Master(usize, Vec<(u8, PlannedCall)>, bool),
     /// The driver counts so many drives.
     Count(usize, u8),
     /// Time passes until a check holds, at most so long.
@@ -262,6 +264,8 @@ pub enum CellTest {
 /// What the driver is to do of one drive.
 #[derive(Clone, Debug)]
 pub enum PlannedCall {
+    /// Process data are exchanged: what it gets, and what it must give.
+    Exchange(u16, Vec<Expected>),
     /// A command, and the data that must be read.
     Command(Command, Vec<Expected>),
     /// A byte of the EEPROM, and what it must be.
@@ -329,6 +333,12 @@ pub enum PlannedCheck {
     Error(usize, u8, BusError),
     /// So many check sequences came back whole.
     Corrected(u64),
+    /// The driver has named this link of this ring, as broken or as damaged.
+    Named(usize, usize, bool),
+    /// The commands of the driver's last job have ended so.
+    Ended(Ending),
+    /// What the driver has sent into this ring is as the manual says.
+    RulesKept(usize),
     /// So many bytes were sent since the last check, in this time (and its tolerance).
     Sent(u64, Option<(time::Span, time::Span)>),
     /// So many bytes were received since the start.
@@ -336,6 +346,13 @@ pub enum PlannedCheck {
 }
 
 impl Plan {
+    /// Whether the bench's own master has a part in it.
+    #[must_use]
+    pub fn asks_the_driver(&self) -> bool {
+        let asks = |step: &PlannedStep| matches!(step.action, PlannedAction::Master(..));
+        self.steps.iter().any(asks)
+    }
+
     /// The model of drive `drive`.
     #[must_use]
     pub fn model(&self, ring: usize, drive: u8) -> Model {

@@ -6,6 +6,8 @@ use super::player::Runner;
 use crate::locate::{self, Location};
 use crate::scenario::plan::PlannedCheck;
 use crate::scenario::problem::Span;
+use crate::scenario::syntax::Ending;
+use harness_proto::novobus::master::{End, Fault, RingLink};
 
 /// SYNCO sent to let a ring spell out an address: the bound of 25 zeros, and enough behind it to see
 /// that the address stays (ND21 9.7).
@@ -64,6 +66,11 @@ impl Runner<'_> {
                 "{} check sequences came back, expected are {times}",
                 self.corrected
             )),
+            PlannedCheck::Named(ring, link, broken) => self.named((*ring, *link), *broken, span),
+            PlannedCheck::Ended(ending) => self.all_ended(*ending, span),
+            PlannedCheck::RulesKept(ring) => self
+                .rules_kept(*ring)
+                .map_err(|wrong| Stop::failed(span, wrong)),
             PlannedCheck::Sent(bytes, time) => {
                 if *bytes != self.sent {
                     return failed(format!(
@@ -91,6 +98,49 @@ impl Runner<'_> {
                     "{received} bytes were received, expected are {bytes}"
                 ))
             }
+        }
+    }
+
+    /// Whether all commands of the driver's last job have ended so.
+    fn all_ended(&self, ending: Ending, span: Span) -> Result<(), Stop> {
+        let other = self.ended.iter().find(|own| **own != ending);
+        let message = match (self.ended.is_empty(), other) {
+            (false, None) => return Ok(()),
+            (true, _) => "the driver has had no command before".to_owned(),
+            (_, Some(other)) => format!(
+                "the driver's command ended as \"{}\", expected is \"{}\"",
+                other.name(),
+                ending.name()
+            ),
+        };
+        Err(Stop::failed(span, message))
+    }
+
+    /// Whether the driver said first that this link is broken, or damages bytes.
+    fn named(&self, (ring, link): (usize, usize), broken: bool, span: Span) -> Result<(), Stop> {
+        let what = if broken { "broken" } else { "damaged" };
+        let expected = format!("{what} {}", self.plan.link_name(ring, link));
+        let Some(fault) = self.disturbed.first() else {
+            let message =
+                format!("the driver says of nothing that it is wrong, expected is {expected}");
+            return Err(Stop::failed(span, message));
+        };
+        let drives = usize::from(self.link.drives(ring));
+        let place = |named: RingLink| match named.to {
+            End::Master => drives,
+            End::Drive(drive) => drives.saturating_sub(1 + usize::from(drive)),
+        };
+        let right = match fault {
+            Fault::Damaged(named) => !broken && place(*named) == link,
+            Fault::Broken(named) => broken && place(*named) == link,
+            _ => false,
+        };
+        match right {
+            true => Ok(()),
+            false => Err(Stop::failed(
+                span,
+                format!("the driver says: {fault}; expected is {expected}"),
+            )),
         }
     }
 

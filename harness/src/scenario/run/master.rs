@@ -3,15 +3,16 @@
 
 use super::outcome::Stop;
 use super::player::{Halt, Runner};
-use crate::bus::{Axis, Bus, Error, Options, count_drives};
+use crate::bus::{Axis, Bus, Error, Options, conduct, count_drives};
 use crate::link::{Line, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::PlannedCall;
 use crate::scenario::problem::Span;
+use crate::scenario::syntax::Ending;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::Job;
+use harness_proto::novobus::master::{Event, Job, Outcome};
 use harness_proto::time::{self, Instant};
 
 /// The line as a master sees it that works in the middle of a scenario.
@@ -21,6 +22,8 @@ struct Through<'r, 'a> {
     ring: usize,
     /// Why the scenario cannot go on, if so: its time stands still then.
     halted: Option<Trouble>,
+    /// When the last byte sent has left.
+    left: Option<Instant>,
 }
 
 impl Line for Through<'_, '_> {
@@ -33,7 +36,15 @@ impl Line for Through<'_, '_> {
     }
 
     fn send(&mut self, _ring: usize, bytes: &[u8]) -> Instant {
-        self.runner.send(self.ring, bytes)
+        let end = self.runner.send(self.ring, bytes);
+        let start = end - self.byte_time() * bytes.len() as u64;
+        let tolerance = self.runner.link.time_tolerance();
+        if let Some(left) = self.left.replace(end)
+            && left + tolerance < start
+        {
+            self.runner.gap = Some(left);
+        }
+        end
     }
 
     fn receive(&mut self, _ring: usize) -> Option<(Instant, Received)> {
@@ -72,6 +83,7 @@ impl Runner<'_> {
         &mut self,
         ring: usize,
         calls: &[(u8, PlannedCall)],
+        once: bool,
         span: Span,
     ) -> Result<(), Stop> {
         self.settle();
@@ -81,22 +93,80 @@ impl Runner<'_> {
         let Ok(size) = RingSize::new(u64::from(size)) else {
             return Err(Stop::failed(span, "the ring has no drives"));
         };
+        let options = Options {
+            deviates: self.plan.master,
+            ..Options::default()
+        };
+        self.ask(ring, calls);
+        let gap = self.gap;
         let line = Through {
             runner: self,
             ring,
             halted: None,
+            left: None,
         };
-        let result = Bus::open(Box::new(line), &[size], Options::default())
+        let (mut events, mut ended) = (Vec::new(), Vec::new());
+        let result = Bus::open(Box::new(line), &[size], options)
             .map_err(failed)
             .and_then(|bus| {
-                let result = do_all(&bus, calls).map_err(|message| Stop::failed(span, message));
+                let result = do_all(&bus, calls, once, &mut ended)
+                    .map_err(|message| Stop::failed(span, message));
+                events = bus.take_events();
                 bus.close();
                 result
             });
+        let faults = events.into_iter().filter_map(|(_, event)| match event {
+            Event::Disturbed { fault, .. } => Some(fault),
+            _ => None,
+        });
+        self.disturbed = faults.collect();
+        if !self.disturbed.is_empty() {
+            // Between two recoveries the driver leaves the line free (9.9).
+            self.gap = gap;
+        }
+        self.ended = ended;
         self.settle();
         self.forget(ring);
         self.line_before = self.link.now();
         result
+    }
+
+    /// A line sends by itself what the driver is not asked for.
+    pub(super) fn not_the_driver(&mut self, ring: usize) {
+        if let Some(asked) = self.asked.get_mut(ring) {
+            *asked = None;
+        }
+    }
+
+    /// Notes what the driver is asked for; calls of several steps ask for more than is known here.
+    fn ask(&mut self, ring: usize, calls: &[(u8, PlannedCall)]) {
+        let Some(own) = self.asked.get_mut(ring) else {
+            return;
+        };
+        for (drive, call) in calls {
+            match (call, &mut *own) {
+                (PlannedCall::Command(command, _), Some(asked)) => asked.push((*drive, *command)),
+                (PlannedCall::Exchange(..), _) => {}
+                (_, asked) => *asked = None,
+            }
+        }
+    }
+
+    /// Whether what was sent into a ring is as the manual says, without a gap where nothing was wrong.
+    pub(super) fn rules_kept(&self, ring: usize) -> Result<(), String> {
+        let drives = self.link.drives(ring);
+        let record = self.rings.get(ring);
+        let sent = record.into_iter().flat_map(|record| &record.sent);
+        let sent: Vec<u8> = sent.map(|(byte, _)| *byte).collect();
+        let asked = self.asked.get(ring).and_then(Option::as_deref);
+        conduct(drives, &sent, asked)
+            .map_err(|wrong| format!("of the bench's own master: {wrong}"))?;
+        match self.gap {
+            Some(gap) => Err(format!(
+                "of the bench's own master: it left a gap on the line behind {gap} (ND21 9.1)"
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Lets the driver count the drives.
@@ -107,6 +177,7 @@ impl Runner<'_> {
             runner: self,
             ring,
             halted: None,
+            left: None,
         };
         let counted = count_drives(&mut line, 0);
         self.settle();
@@ -126,8 +197,15 @@ impl Runner<'_> {
     }
 }
 
-fn do_all(bus: &Bus<'_>, calls: &[(u8, PlannedCall)]) -> Result<(), String> {
+/// Does it all; how commands have ended is added to `ended`. With `once` they must not run twice, and may end in any way.
+fn do_all(
+    bus: &Bus<'_>,
+    calls: &[(u8, PlannedCall)],
+    once: bool,
+    ended: &mut Vec<Ending>,
+) -> Result<(), String> {
     let mut orders = Vec::new();
+    let mut values = Vec::new();
     for (drive, call) in calls {
         let Some(axis) = Axis::new(0, *drive) else {
             continue;
@@ -135,19 +213,55 @@ fn do_all(bus: &Bus<'_>, calls: &[(u8, PlannedCall)]) -> Result<(), String> {
         let words = |error: Error| format!("drive {axis}: {error}");
         match call {
             PlannedCall::Command(command, expected) => {
-                let job = job(*command);
+                let job = match once {
+                    true => job(*command).once(),
+                    false => job(*command),
+                };
                 let order = bus
                     .start(axis, |drive| Job { drive, ..job })
                     .map_err(words)?;
                 orders.push((axis, order, expected));
             }
+            PlannedCall::Exchange(value, expected) => values.push((axis, *value, expected)),
             other => do_one(bus, axis, other).map_err(words)?,
         }
     }
     for (axis, order, expected) in orders {
         let words = |error: Error| format!("drive {axis}: {error}");
-        let value = bus.result(order).map_err(words)?;
-        compare(axis, value, expected)?;
+        let outcome = bus.outcome(order).map_err(words)?;
+        ended.push(match outcome {
+            Outcome::Read(_)
+            | Outcome::Done {
+                perhaps_twice: false,
+            } => Ending::Done,
+            Outcome::Done {
+                perhaps_twice: true,
+            } => Ending::Twice,
+            Outcome::Unknown(_) => Ending::Unknown,
+            Outcome::Failed(_) => Ending::Failed,
+        });
+        match outcome {
+            Outcome::Read(data) => compare(axis, data.value(), expected)?,
+            Outcome::Unknown(fault) if !once => return Err(words(Error::Unknown(fault))),
+            Outcome::Failed(stop) if !once => return Err(words(Error::Stopped(stop))),
+            _ => {}
+        }
+    }
+    exchange(bus, &values)
+}
+
+/// Exchanges process data with all of these drives in one round.
+fn exchange(bus: &Bus<'_>, values: &[(Axis, u16, &Vec<Expected>)]) -> Result<(), String> {
+    if values.is_empty() {
+        return Ok(());
+    }
+    let nominal: Vec<_> = values
+        .iter()
+        .map(|(axis, value, _)| (*axis, *value))
+        .collect();
+    let actual = bus.exchange(&nominal).map_err(|error| error.to_string())?;
+    for ((axis, _, expected), actual) in values.iter().zip(actual) {
+        compare(*axis, Some(u32::from(actual)), expected)?;
     }
     Ok(())
 }
@@ -158,7 +272,7 @@ fn job(command: Command) -> Job {
 
 fn do_one(bus: &Bus<'_>, axis: Axis, call: &PlannedCall) -> Result<(), Error> {
     match call {
-        PlannedCall::Command(..) => Ok(()),
+        PlannedCall::Command(..) | PlannedCall::Exchange(..) => Ok(()),
         PlannedCall::ReadEeprom(address, expected) => {
             let byte = bus.read_eeprom(axis, *address)?;
             compare(axis, Some(u32::from(byte)), &[*expected]).map_err(Error::Value)

@@ -9,9 +9,12 @@ use crate::scenario::plan::{
     MAX_CARRIED, Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow,
 };
 use crate::scenario::problem::Span;
+use crate::scenario::syntax::Ending;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::Fault;
 use harness_proto::time::{self, Instant};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -141,6 +144,14 @@ pub(super) struct Runner<'a> {
     pub(super) line_before: Instant,
     deadline: time::Span,
     pub(super) corrected: u64,
+    /// What the driver said was wrong in its last job, the first first.
+    pub(super) disturbed: Vec<Fault>,
+    /// How the commands of that job have ended.
+    pub(super) ended: Vec<Ending>,
+    /// The commands that each ring was sent by the driver; `None` where there may be others.
+    pub(super) asked: Vec<Option<Vec<(u8, Command)>>>,
+    /// When the driver last left the line of a ring free in the middle of its work, if it did.
+    pub(super) gap: Option<Instant>,
     pub(super) sent: u64,
     pub(super) sent_from: Instant,
     pub(super) sent_to: Instant,
@@ -153,6 +164,10 @@ impl<'a> Runner<'a> {
             line_before: link.now(),
             deadline: plan.deadline,
             corrected: 0,
+            disturbed: Vec::new(),
+            ended: Vec::new(),
+            asked: plan.rings.iter().map(|_| Some(Vec::new())).collect(),
+            gap: None,
             sent: 0,
             sent_from: link.now(),
             sent_to: link.now(),
@@ -243,6 +258,7 @@ impl Runner<'_> {
     fn act(&mut self, step: &PlannedStep) -> Result<(), Stop> {
         match &step.action {
             PlannedAction::Send(ring, bytes) => {
+                self.not_the_driver(*ring);
                 self.send(*ring, bytes);
                 Ok(())
             }
@@ -275,6 +291,7 @@ impl Runner<'_> {
                 result
             }
             PlannedAction::Telegram(ring, bytes, expected, reading) => {
+                self.not_the_driver(*ring);
                 self.settle();
                 let asked = self.nothing_unasked(step.span);
                 if asked.is_err() && self.at_finding == AtFinding::Stop {
@@ -287,7 +304,7 @@ impl Runner<'_> {
                     .and_then(|()| self.read(*ring, expected.len(), reading.as_ref(), step.span))
             }
             PlannedAction::Recover(ring) => self.recover(*ring, step.span),
-            PlannedAction::Master(ring, calls) => self.master(*ring, calls, step.span),
+            PlannedAction::Master(ring, calls, once) => self.master(*ring, calls, *once, step.span),
             PlannedAction::Count(ring, drives) => self.count(*ring, *drives, step.span),
         }
     }

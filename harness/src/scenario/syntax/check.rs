@@ -1,7 +1,7 @@
 //! What a scenario can check.
 
-use super::Drives;
 use super::cell::{CellCheck, Place};
+use super::{Drives, LinkEnds};
 use crate::link::Mode;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
@@ -33,6 +33,21 @@ pub enum Check {
     },
     /// So many check sequences came back whole.
     Corrected(Located),
+    /// The driver has named this link as the first thing that was wrong in its last job.
+    Named {
+        /// Which ring, counted from 0.
+        ring: usize,
+        /// Whether it is broken; damaged otherwise.
+        broken: bool,
+        /// Where the link stands.
+        link: Located,
+        /// Its ends.
+        ends: LinkEnds,
+    },
+    /// The commands of the driver's last job have ended so.
+    Ended(Ending),
+    /// What the driver has sent into this ring is as the manual says.
+    RulesKept(usize),
     /// So many bytes were sent since the last check, and took this long.
     Sent {
         /// How many.
@@ -42,6 +57,36 @@ pub enum Check {
     },
     /// So many bytes were received since the start.
     Received(Located),
+}
+
+/// How a job of the driver can end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// It has run once, or has read.
+    Done,
+    /// It may have run twice.
+    Twice,
+    /// Nobody knows whether it has run.
+    Unknown,
+    /// It has not run, and the bus is stopped.
+    Failed,
+}
+
+impl Ending {
+    /// The names in a scenario.
+    pub const NAMES: [(&'static str, Self); 4] = [
+        ("done", Self::Done),
+        ("twice", Self::Twice),
+        ("unknown", Self::Unknown),
+        ("failed", Self::Failed),
+    ];
+
+    /// The name in a scenario.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        let own = Self::NAMES.iter().find(|(_, ending)| *ending == self);
+        own.map_or("", |(name, _)| name)
+    }
 }
 
 /// What must hold of drives.

@@ -35,7 +35,12 @@ pub enum Job {
         tolerance: Option<Tolerance>,
     },
     /// `master ...`: the driver does it, of one drive or of several at once (ND21 11 to 13).
-    Master(Drives, MasterCall),
+    Master {
+        /// What, and of which drives.
+        calls: Vec<(Drives, MasterCall)>,
+        /// Whether its commands must not run twice, and may end in any way: `master once`.
+        once: bool,
+    },
     /// `master count = N`: the drives of a ring are counted (ND21 9.3).
     Count(usize, Located),
 }
@@ -59,6 +64,8 @@ pub enum MasterCall {
     InitPs,
     /// `write-ps K = TURNS` or `= by TURNS` (13.2.2)
     WritePs(Target),
+    /// `exchange K HHHH [= HHHH]` (9.4)
+    Exchange(Pattern, Option<Pattern>),
     /// `start-ps K` (13.2.3)
     StartPs,
     /// `wait-for-end K` (13.2.4)
@@ -117,15 +124,22 @@ impl Job {
             } => Some(Capability::Reset),
             Self::Command {
                 kind: JobKind::Go, ..
-            }
-            | Self::Master(
-                _,
-                MasterCall::Command(JobKind::Go, ..) | MasterCall::Reference | MasterCall::StartPs,
-            ) => Some(Capability::Motion),
-            Self::Master(_, MasterCall::Command(JobKind::Reset, ..)) => Some(Capability::Reset),
-            Self::Master(_, MasterCall::WriteEeprom(..) | MasterCall::RamToEeprom) => {
-                Some(Capability::Eeprom)
-            }
+            } => Some(Capability::Motion),
+            Self::Master { calls, .. } => calls.iter().find_map(|(_, call)| call.needs()),
+            _ => None,
+        }
+    }
+}
+
+impl MasterCall {
+    fn needs(&self) -> Option<Capability> {
+        match self {
+            Self::Command(JobKind::Go, ..)
+            | Self::Reference
+            | Self::StartPs
+            | Self::Exchange(..) => Some(Capability::Motion),
+            Self::Command(JobKind::Reset, ..) => Some(Capability::Reset),
+            Self::WriteEeprom(..) | Self::RamToEeprom => Some(Capability::Eeprom),
             _ => None,
         }
     }

@@ -6,6 +6,6 @@ mod job;
 mod scenario;
 
 pub use cell::{CellCheck, Place, Relation, Written};
-pub use check::{Check, Condition, DriveCheck, Showing};
+pub use check::{Check, Condition, DriveCheck, Ending, Showing};
 pub use job::{Job, JobKind, MasterCall, Target};
 pub use scenario::*;

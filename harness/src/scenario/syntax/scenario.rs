@@ -11,7 +11,7 @@ use crate::scenario::times::{Duration, Window};
 use harness_proto::line::Rate;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::units::Device;
-use harness_sim::deviation::Deviation;
+use harness_sim::deviation::{Deviation, MasterDeviation};
 use harness_sim::drive::Model;
 use harness_sim::fault::{DriveFault, Flips};
 
@@ -30,6 +30,8 @@ pub struct Scenario {
     pub rate: Rate,
     /// What drives hold and how they behave before anything is sent.
     pub setups: Vec<Setup>,
+    /// How the bench's own master breaks the manual, on purpose: `master deviates NAME`.
+    pub master: Option<Spanned<&'static MasterDeviation>>,
     /// What it says that it needs of a rig.
     pub needs: Vec<Capability>,
     /// Whether bytes that no line asked for are a failure.

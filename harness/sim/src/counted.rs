@@ -1,5 +1,8 @@
-//! A plain drive that counts what is written to it.
+//! A plain drive that counts what is written to it: the truth of which jobs ran.
 
+use crate::cells::Cells;
+use crate::device::Device;
+use crate::plain::PlainDrive;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::command::Kind;
@@ -8,35 +11,44 @@ use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Instant;
-use harness_sim::cells::Cells;
-use harness_sim::device::Device;
-use harness_sim::plain::PlainDrive;
 use std::collections::BTreeMap;
 
 /// A plain drive's cells, with a count of the writes to each.
-pub(crate) struct CountedCells {
+#[derive(Clone, Debug)]
+pub struct CountedCells {
     cells: Cells,
     written: BTreeMap<u16, u32>,
-    pub(crate) resets: u32,
+    /// How often the drive was reset over the bus.
+    pub resets: u32,
     refused: Option<u16>,
 }
 
 impl CountedCells {
-    pub(crate) fn written(&self, address: u16) -> u32 {
+    /// How often this cell was written over the bus.
+    #[must_use]
+    pub fn written(&self, address: u16) -> u32 {
         self.written.get(&address).copied().unwrap_or(0)
     }
 
     /// From now on the drive takes no command for this address.
-    pub(crate) fn refuse(&mut self, address: u16) {
+    pub fn refuse(&mut self, address: u16) {
         self.refused = Some(address);
     }
 
-    pub(crate) fn peek(&self, address: u16) -> u8 {
+    /// The cells that were written over the bus.
+    pub fn all_written(&self) -> impl Iterator<Item = u16> + '_ {
+        self.written.keys().copied()
+    }
+
+    /// What a cell holds.
+    #[must_use]
+    pub fn peek(&self, address: u16) -> u8 {
         self.cells.peek(address)
     }
 
-    pub(crate) fn poke(&mut self, address: u16, byte: u8) {
-        assert!(self.cells.poke(address, byte));
+    /// Sets a cell from outside the bus; false where the drive has none there.
+    pub fn poke(&mut self, address: u16, byte: u8) -> bool {
+        self.cells.poke(address, byte)
     }
 }
 
@@ -73,16 +85,19 @@ impl Memory for CountedCells {
 }
 
 /// A plain drive with counted cells.
-pub(crate) struct Counted {
+#[derive(Clone, Debug)]
+pub struct Counted {
     bus_end: BusEnd,
-    pub(crate) memory: CountedCells,
+    /// Its cells.
+    pub memory: CountedCells,
     /// How often the power came back.
-    pub(crate) starts: u32,
+    pub starts: u32,
 }
 
 impl Counted {
     /// After power-up, with time-out monitoring or without (EESelftest bit 7, ND21 14.3.6).
-    pub(crate) fn new(monitoring: bool) -> Self {
+    #[must_use]
+    pub fn new(monitoring: bool) -> Self {
         let mut eeprom = [0; 256];
         eeprom[0x47] = if monitoring { 0x80 } else { 0 };
         let drive = PlainDrive::new(Properties::default(), eeprom);

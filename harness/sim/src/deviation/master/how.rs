@@ -1,0 +1,126 @@
+//! What a deviation of the master is, and the ways to inject one.
+
+use super::speech::Spoken;
+use super::table::DEVIATIONS;
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::master::{Data, Event, Job, JobId, Options, Phase};
+use harness_proto::time::{Instant, Span};
+use std::collections::VecDeque;
+use std::fmt;
+
+/// A way in which a master breaks the manual.
+pub struct MasterDeviation {
+    /// Its name in files: `address-not-counted-up`.
+    pub name: &'static str,
+    /// The section of the ND21's manual that it breaks: `9.3`.
+    pub section: &'static str,
+    /// What such a master does, in one sentence.
+    pub about: &'static str,
+    pub(super) how: How,
+}
+
+impl fmt::Debug for MasterDeviation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("MasterDeviation").field(&self.name).finish()
+    }
+}
+
+impl PartialEq for MasterDeviation {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for MasterDeviation {}
+
+/// All of them: what is wrong with the bytes that go out, with what is made of those that come back, with the work, with what is told.
+pub fn master_deviations() -> impl Iterator<Item = &'static MasterDeviation> {
+    DEVIATIONS.iter()
+}
+
+/// The deviation of this name.
+#[must_use]
+pub fn master_deviation(name: &str) -> Option<&'static MasterDeviation> {
+    master_deviations().find(|deviation| deviation.name == name)
+}
+
+/// What becomes of a byte that the master inside sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sending {
+    /// This goes out.
+    Byte(u8),
+    /// It does not go out, and the next one takes its place.
+    LeftOut,
+    /// Nothing goes out in its byte time.
+    Silence,
+}
+
+/// A byte that has come back, beside the one that it is the answer to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heard {
+    /// What came.
+    pub(super) received: Received,
+    /// What the master inside has sent for it.
+    pub(super) spoken: Spoken,
+    /// What must come; `None` for data.
+    pub(super) expected: Option<u8>,
+}
+
+impl Heard {
+    /// What must come, where that is known and no line error is in it.
+    pub(super) fn believed(&self) -> Received {
+        match self.expected {
+            Some(byte) if self.received.error.is_none() => Received::good(byte),
+            _ => self.received,
+        }
+    }
+}
+
+/// What a wrong master keeps in mind.
+#[derive(Clone, Debug)]
+pub(super) struct Notes {
+    /// Its ring.
+    pub(super) ring: RingSize,
+    /// Jobs that have not ended.
+    pub(super) open: Vec<(JobId, Job)>,
+    /// Jobs of whose end nobody is told any more.
+    pub(super) told: Vec<JobId>,
+    /// What the last read brought.
+    pub(super) last: Option<Data>,
+    /// A result that is held back.
+    pub(super) held: Option<(JobId, Data)>,
+    /// What is told next.
+    pub(super) queue: VecDeque<Event>,
+}
+
+/// The deadline of the master inside: in which phase, when, the slack of its options and the time of a byte.
+pub(super) type Due = (Phase, Instant, Span, Span);
+
+/// How a deviation is injected.
+pub(super) enum How {
+    /// It works by other options.
+    Options(fn(Options) -> Options),
+    /// It sends other bytes.
+    Sends(fn(&Spoken) -> Sending),
+    /// It takes bytes for others.
+    Hears(fn(&Heard) -> Received),
+    /// Both, so that it does not notice.
+    Mistakes(fn(&Spoken) -> Sending, fn(&Heard) -> Received),
+    /// It does another job than the one that it is given.
+    Submits(fn(RingSize, Job) -> Job),
+    /// It does what it is given twice, where this says so.
+    Doubles(fn(&Job) -> bool),
+    /// It tells something as soon as it has taken a job.
+    Takes(fn(&mut Notes, JobId, &Job)),
+    /// It tells something else.
+    Tells(fn(&mut Notes, Event) -> Option<Event>),
+    /// It gives the drives other nominal values.
+    Nominal(fn(u16) -> u16),
+    /// It gives the actual value of another drive.
+    Actual(fn(RingSize, u8) -> u8),
+    /// It waits for another time; `None` for ever.
+    Waits(fn(Due) -> Option<Instant>),
+    /// It sends no check sequence.
+    NoSequence,
+}

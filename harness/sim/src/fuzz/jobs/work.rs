@@ -1,0 +1,244 @@
+//! What a master is to do, and the faults that meet it.
+
+use crate::fault::{Flips, LinkFault};
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::{Job, Options, Packing};
+use harness_proto::time::Span;
+
+/// The most jobs: each has a cell of its own.
+pub(super) const MOST_JOBS: usize = 20;
+
+/// The most faults: fewer than the master may try to correct.
+const MOST_FAULTS: usize = 3;
+
+/// Cells that no job writes; every drive holds other bytes there.
+pub(super) const CONSTANTS: u16 = 0xFD90;
+
+/// How many of them there are.
+pub(super) const CONSTANT_CELLS: u16 = 0x60;
+
+/// How many bytes of the input are one job or one fault.
+const RECORD: usize = 6;
+
+/// A job, and when it is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Order {
+    /// The job.
+    pub job: Job,
+    /// The first cell that it reads or writes.
+    pub address: u16,
+    /// How many byte times after the order before it.
+    pub gap: u16,
+}
+
+/// A fault on a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Which link, counted from the master's outgoing one.
+    pub link: usize,
+    /// The byte on it, counted from 1.
+    pub byte: u64,
+    /// What happens.
+    pub what: LinkFault,
+}
+
+/// What a master is to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Work {
+    /// How many drives its ring has.
+    pub drives: u8,
+    /// What it may pack.
+    pub packing: Packing,
+    /// Whether it exchanges process data with all drives (ND21 9.4).
+    pub exchange: bool,
+    /// Whether the drives report a time-out (9.9).
+    pub monitoring: bool,
+    /// The jobs, in order.
+    pub orders: Vec<Order>,
+    /// The faults.
+    pub faults: Vec<Fault>,
+}
+
+impl Work {
+    /// Reads what stands in an input. The first byte says how many drives there are (1 to 6). Of the second the lowest two bits are the
+    /// packing (all, none, no "next", not cut), bit 2 switches the exchange on and bit 3 the monitoring. Then come jobs and faults of six
+    /// bytes each: a kind (its low half: 0 to 9 jobs, 10 to 13 faults at a byte, 14 a cut, 15 another byte on the last link), a drive or
+    /// link, a gap or the number of a byte, two bytes of data, and a last one whose lowest bit forbids a second run.
+    #[must_use]
+    pub fn read(data: &[u8]) -> Self {
+        let head = |i: usize| data.get(i).copied().unwrap_or(0);
+        let packing = match head(1) & 3 {
+            0 => Packing::ALL,
+            1 => Packing::NONE,
+            2 => Packing {
+                next: false,
+                ..Packing::ALL
+            },
+            _ => Packing {
+                cut: false,
+                ..Packing::ALL
+            },
+        };
+        let mut work = Self {
+            drives: 1 + head(0) % 6,
+            packing,
+            exchange: head(1) & 4 != 0,
+            monitoring: head(1) & 8 != 0,
+            orders: Vec::new(),
+            faults: Vec::new(),
+        };
+        let mut replaced = None;
+        for record in data.get(2..).unwrap_or_default().chunks_exact(RECORD) {
+            let &[kind, place, at, high, low, last] = record else {
+                continue;
+            };
+            match kind & 15 {
+                0..10 => work.order(kind & 15, place, at, [high, low], last),
+                15 => replaced = Some((u64::from(at) + 1 + 256 * u64::from(place & 1), low)),
+                kind => work.fault(kind, place, at, [high, low], last),
+            }
+        }
+        // Another byte with good parity fools whoever has but 8 bits to check by, together with others.
+        if let (Some((byte, other)), true) = (replaced, work.faults.is_empty()) {
+            work.faults.push(Fault {
+                link: usize::from(work.drives),
+                byte,
+                what: LinkFault::Replace(other),
+            });
+        }
+        work
+    }
+
+    fn order(&mut self, kind: u8, place: u8, at: u8, data: [u8; 2], last: u8) {
+        let number = self.orders.len() as u16;
+        if self.orders.len() >= MOST_JOBS {
+            return;
+        }
+        let drive = place % self.drives;
+        let cell = 0xFE00 + 4 * number;
+        let bit_cell = 0x40 + number as u8;
+        let constant = CONSTANTS + u16::from(data[0]) % (CONSTANT_CELLS - 4);
+        let word = u16::from_be_bytes(data);
+        let (command, address) = match kind {
+            0 | 1 => (Command::ReadByte { address: constant }, constant),
+            2 => (Command::ReadWord { address: constant }, constant),
+            3 => (Command::ReadLong { address: constant }, constant),
+            4 | 5 => {
+                let [_, data] = data;
+                let address = cell;
+                (Command::WriteByte { address, data }, cell)
+            }
+            6 | 7 => {
+                let address = cell;
+                (
+                    Command::WriteWord {
+                        address,
+                        data: word,
+                    },
+                    cell,
+                )
+            }
+            _ => {
+                let (address_low, data) = (bit_cell, data[1]);
+                let command = match kind {
+                    8 => Command::And { address_low, data },
+                    _ => Command::Or { address_low, data },
+                };
+                (command, 0xFF00 | u16::from(bit_cell))
+            }
+        };
+        let job = Job::new(drive, command);
+        self.orders.push(Order {
+            job: if last & 1 == 1 { job.once() } else { job },
+            address,
+            gap: u16::from(at % 64),
+        });
+    }
+
+    fn fault(&mut self, kind: u8, place: u8, at: u8, data: [u8; 2], last: u8) {
+        if self.faults.len() >= MOST_FAULTS {
+            return;
+        }
+        let flips = |data| {
+            LinkFault::Flip(Flips {
+                data,
+                ..Flips::default()
+            })
+        };
+        let what = match (kind, data[1] % 8) {
+            (14, _) => LinkFault::Cut,
+            (_, 0..5) => flips(1 << (last % 8)),
+            (_, 5) => LinkFault::Drop,
+            (_, 6) => LinkFault::Duplicate,
+            _ => LinkFault::Delay(Span::from_micros(100 * u64::from(last))),
+        };
+        self.faults.push(Fault {
+            link: usize::from(place) % (usize::from(self.drives) + 1),
+            byte: 1 + u64::from(u16::from_be_bytes([data[0] & 1, at])),
+            what,
+        });
+    }
+
+    /// How its master works.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        Options {
+            capacity: 64,
+            packing: self.packing,
+            ..Options::default()
+        }
+    }
+
+    /// Whether a link is cut and stays so.
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.faults.iter().any(|fault| fault.what == LinkFault::Cut)
+    }
+
+    /// Whether the master may stop the bus: a link is cut, or delays follow one another, of which the bytes behind them stay late.
+    pub(super) fn may_stop(&self) -> bool {
+        let late = |fault: &&Fault| matches!(fault.what, LinkFault::Delay(_));
+        self.is_cut() || self.faults.iter().filter(late).count() > 1
+    }
+
+    /// Whether bytes are lost or come twice. Eight bits of checking miss that once in some ten thousand times, and who looks for long finds
+    /// such a case: what is told of jobs is no measure then.
+    pub(super) fn may_fool(&self) -> bool {
+        let fools = |fault: &Fault| matches!(fault.what, LinkFault::Drop | LinkFault::Duplicate);
+        self.faults.iter().any(fools)
+    }
+
+    /// Whether what has no check of its own, process data and the data of `ReadLong`, can come wrong and unnoticed.
+    pub(super) fn unchecked(&self) -> bool {
+        let other = |fault: &Fault| matches!(fault.what, LinkFault::Replace(_));
+        self.may_fool() || self.faults.iter().any(other)
+    }
+
+    /// The link on which one bit of one byte is inverted, where that is all that happens.
+    pub(super) fn damaged(&self) -> Option<usize> {
+        match self.faults.as_slice() {
+            [
+                Fault {
+                    link,
+                    what: LinkFault::Flip(_),
+                    ..
+                },
+            ] => Some(*link),
+            _ => None,
+        }
+    }
+}
+
+/// What a drive holds in a cell that no job writes.
+pub(super) fn constant(drive: u8, address: u16) -> u8 {
+    let [_, low] = address.to_be_bytes();
+    low.wrapping_mul(37) ^ drive.wrapping_mul(11) | 1
+}
+
+/// What it holds in the cells of And and Or.
+pub(super) const BITS: u8 = 0x5A;
+
+/// What it gets as process data.
+pub(super) fn nominal(drive: u8) -> u16 {
+    0x1234 + 0x0101 * u16::from(drive)
+}

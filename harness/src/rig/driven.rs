@@ -1,0 +1,88 @@
+//! Whether the bench's own master did what the master of the manual does: its part of a scenario, played again beside the record.
+//!
+//! The bytes that a ring answers say nothing of a master that sends the wrong ones, or tells of right ones what is not so. But a master is a
+//! function of what it is asked for and of what comes back: one that is given the record must send and tell the same.
+
+use super::run::{Way, play_one};
+use crate::link::{Capability, Event, Line as _, Replay};
+use crate::scenario::plan::Plan;
+use crate::scenario::run::Outcome;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+use harness_sim::deviation::MasterDeviation;
+
+/// What is said of an attempt in which the bench's own master is wrong: no drive is to blame.
+const WRONG: &str =
+    "the bench's own master: it sent or told something else than the master of the manual does";
+
+/// What the driver did in an attempt.
+#[derive(Clone, Debug)]
+pub struct Driven {
+    plan: Plan,
+    events: Vec<Event>,
+    way: Way,
+    tolerance: Span,
+    capabilities: Vec<Capability>,
+    /// What came of it, before a twin was heard.
+    verdict: Verdict,
+    finding: Option<String>,
+}
+
+impl Driven {
+    /// An attempt at a plan, as it was recorded; `None` where the driver had no part in it.
+    pub(crate) fn new(
+        plan: &Plan,
+        events: &[Event],
+        way: &Way,
+        (tolerance, capabilities): (Span, &[Capability]),
+        outcome: &Outcome,
+    ) -> Option<Self> {
+        let played = !matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError);
+        (played && plan.asks_the_driver()).then(|| Self {
+            plan: plan.clone(),
+            events: events.to_vec(),
+            way: way.clone(),
+            tolerance,
+            capabilities: capabilities.to_vec(),
+            verdict: outcome.verdict,
+            finding: message(outcome),
+        })
+    }
+
+    /// Whether the master was the right one; an attempt in which it was not is the bench's fault.
+    pub(crate) fn judge(&self, outcome: &mut Outcome) -> bool {
+        let right = self.is_explained_by(None);
+        if !right {
+            outcome.verdict = Verdict::RigError;
+            outcome.remarks.push(WRONG.to_owned());
+        }
+        right
+    }
+
+    /// Whether a master with this deviation, or the right one, does and tells what was recorded.
+    #[must_use]
+    pub fn is_explained_by(&self, master: Option<&'static MasterDeviation>) -> bool {
+        let mut plan = self.plan.clone();
+        plan.master = master;
+        let drives = plan.rings.iter().map(|ring| ring.drives()).collect();
+        let mut replay = Replay::new(
+            self.events.clone(),
+            plan.rate,
+            self.tolerance,
+            drives,
+            self.capabilities.clone(),
+        );
+        let Ok(outcome) = play_one(&mut replay, &plan, &self.way) else {
+            return false;
+        };
+        let told = (outcome.verdict, message(&outcome));
+        replay.trouble().is_none()
+            && replay.left().is_none()
+            && told == (self.verdict, self.finding.clone())
+    }
+}
+
+fn message(outcome: &Outcome) -> Option<String> {
+    let finding = outcome.finding.as_ref();
+    finding.map(|finding| finding.message.clone())
+}
