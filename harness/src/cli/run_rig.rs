@@ -162,6 +162,9 @@ fn all(
             return Ok(Exit::Usage);
         }
     };
+    if job.qualify {
+        run.rehearse();
+    }
     if let Some(path) = &job.evidence {
         *folder = Some(Folder::create(path, &about(&mut run))?);
     }

@@ -6,6 +6,7 @@ use super::driven::Driven;
 use super::file::Deviation;
 use super::health::{Unhealthy, examine};
 use super::session::{Session, SessionError};
+use crate::guard::Guarded;
 use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
@@ -70,6 +71,8 @@ pub struct Run<'s> {
     beats: Option<Arc<AtomicU64>>,
     /// Drives are not reset before a scenario, whatever is allowed.
     as_they_are: bool,
+    /// What the rig's limits do not let be played to its end is not begun.
+    rehearses: bool,
     /// How the bench's own master breaks the manual on this rig, on purpose.
     master: Option<&'static MasterDeviation>,
 }
@@ -100,6 +103,7 @@ impl<'s> Run<'s> {
             twin,
             byte_time,
             as_they_are: false,
+            rehearses: false,
         })
     }
 
@@ -154,6 +158,12 @@ impl<'s> Run<'s> {
                 sizes(&plan.rings),
                 sizes(self.session.rings())
             )));
+        }
+        if self.rehearses
+            && let Some(why) = self.denied(plan)
+        {
+            let why = format!("the rig's [limits] do not let it be played to its end: {why}");
+            return Ok(Played::skipped(why));
         }
         let mut attempts = Vec::new();
         let most = usize::from(self.session.rig().file.retry.attempts.max(1));
@@ -254,6 +264,26 @@ impl<'s> Run<'s> {
             rings: self.session.rings().to_vec(),
             attempts: file.health.between.then_some(file.health.attempts),
             anew: limits.reset && limits.motion && !self.as_they_are,
+        }
+    }
+
+    /// Skips from now on what the rig's limits do not let be played to its end: it is played on the model first, and nothing of it
+    /// is sent.
+    pub fn rehearse(&mut self) {
+        self.rehearses = !self.session.limits().allow_everything();
+    }
+
+    /// What the guard refuses of a plan on the model.
+    fn denied(&self, plan: &Plan) -> Option<String> {
+        let rig = self.session.rig();
+        let model = rig.plan_with(&known(rig)).ok()?;
+        let mut guarded = Guarded::new(simulate::bench(&model), self.session.limits());
+        let mut forgotten: Vec<Event> = Vec::new();
+        let mut recording = Recording::new(&mut guarded, &mut forgotten);
+        let _outcome = play_one(&mut recording, plan, &self.way());
+        match guarded.trouble() {
+            Some(Trouble::Denied(why)) => Some(why.clone()),
+            _ => None,
         }
     }
 
