@@ -11,8 +11,8 @@ use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
 use crate::link::Link as _;
 use crate::qualify::{
-    Answer, Asked, Hypothesis, Probe, Profile, answer, conversations, deviating, deviating_masters,
-    explaining, probes,
+    Answer, Asked, Probe, Profile, answer, conversations, deviating, deviating_masters,
+    explaining_most, probes,
 };
 use crate::rig::{Driven, Played, Run, state};
 use crate::scenario::verdict::Verdict;
@@ -210,30 +210,9 @@ fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<S
     let exactness = run.exactness();
     let twin = |lines: &[String]| run.twin_with(lines);
     let all = deviating(drives, &findings.suspects);
-    // A drive that a deviation has left in another state explains what comes behind in its own way: the deviations count
-    // that explain the most.
-    let mut explained: BTreeMap<&str, (usize, &Hypothesis)> = BTreeMap::new();
-    for attempt in findings.attempts().iter().take(MOST_ATTEMPTS) {
-        for (hypothesis, _) in explaining(&all, attempt, exactness, &twin).unwrap_or_default() {
-            explained
-                .entry(&hypothesis.name)
-                .or_insert((0, hypothesis))
-                .0 += 1;
-        }
-    }
-    let most = explained
-        .values()
-        .map(|(count, _)| *count)
-        .max()
-        .unwrap_or(0);
-    let found: Vec<_> = all
-        .iter()
-        .filter(|h| {
-            explained
-                .get(h.name.as_str())
-                .is_some_and(|(count, _)| *count == most)
-        })
-        .collect();
+    let attempts = findings.attempts();
+    let attempts = &attempts[..attempts.len().min(MOST_ATTEMPTS)];
+    let found = explaining_most(all, attempts, exactness, &twin);
     let mut text = String::new();
     match found.as_slice() {
         [] => text.push_str("deviations: the ring is otherwise than the model, and no single known deviation explains it\n"),

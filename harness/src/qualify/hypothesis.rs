@@ -2,6 +2,7 @@
 
 use crate::twin::{Conversation, Exactness, Twin};
 use harness_proto::time::Span;
+use std::collections::BTreeMap;
 
 /// A model with something changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,6 +44,34 @@ pub fn explaining<'h, E>(
         explaining.retain(|(_, evidence)| evidence.timely);
     }
     Ok(explaining)
+}
+
+/// How many attempts every hypothesis is asked for.
+const ASKED_OF_ALL: usize = 3;
+
+/// The hypotheses that explain the most of several attempts, in the order given: a drive that a deviation has left in another
+/// state explains what comes behind in its own way. Where one has explained every attempt so far, those that have explained none
+/// are asked no more.
+pub fn explaining_most<E>(
+    mut hypotheses: Vec<Hypothesis>,
+    attempts: &[Vec<Conversation>],
+    exactness: Exactness,
+    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+) -> Vec<Hypothesis> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    let most = |counts: &BTreeMap<String, usize>| counts.values().max().copied();
+    for (number, attempt) in attempts.iter().enumerate() {
+        let found = explaining(&hypotheses, attempt, exactness, twin);
+        for (hypothesis, _) in found.unwrap_or_default() {
+            *counts.entry(hypothesis.name.clone()).or_default() += 1;
+        }
+        if number + 1 >= ASKED_OF_ALL && most(&counts) == Some(number + 1) {
+            hypotheses.retain(|hypothesis| counts.contains_key(&hypothesis.name));
+        }
+    }
+    let most = most(&counts);
+    hypotheses.retain(|hypothesis| most.is_some() && counts.get(&hypothesis.name).copied() == most);
+    hypotheses
 }
 
 fn judge(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -> Option<Evidence> {

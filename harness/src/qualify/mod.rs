@@ -10,6 +10,6 @@ mod settle;
 
 pub use crate::rig::{Profile, ProfileError, Settled};
 pub use diagnose::{deviating, deviating_masters};
-pub use hypothesis::{Evidence, Hypothesis, explaining};
+pub use hypothesis::{Evidence, Hypothesis, explaining, explaining_most};
 pub use probes::{Asked, Probe, conversations, hypotheses, probes};
 pub use settle::{Answer, answer};
