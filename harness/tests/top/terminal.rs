@@ -223,25 +223,24 @@ fn a_lost_rig_is_told_on_the_first_screen() {
     }
 }
 
-/// What a test below plays in a terminal.
-#[test]
-#[ignore = "it panics; the test below plays it in a terminal of its own"]
-fn a_screen_whose_owner_panics() {
-    let mut screen = Screen::enter(true).expect("a terminal");
-    let mut top = Top::new(Heading {
-        rig: "of a test".to_owned(),
-        rings: Vec::new(),
-    });
-    screen.draw(&mut top).expect("drawn");
-    panic!("out of order");
-}
-
 #[test]
 fn a_panic_leaves_the_terminal_as_it_was_and_its_message_to_be_read() {
+    const OWN: &str = "DRIVEBENCH_TEST_PANICS";
+    if std::env::var_os(OWN).is_some() {
+        // This test again, in a terminal of its own.
+        let mut screen = Screen::enter(true).expect("a terminal");
+        let mut top = Top::new(Heading {
+            rig: "of a test".to_owned(),
+            rings: Vec::new(),
+        });
+        screen.draw(&mut top).expect("drawn");
+        panic!("out of order");
+    }
     let own = std::env::current_exe().expect("this program");
-    let name = "terminal::a_screen_whose_owner_panics";
-    let arguments = [name, "--exact", "--ignored", "--nocapture"];
-    let mut tty = Tty::start(in_session(&own, &arguments));
+    let name = "terminal::a_panic_leaves_the_terminal_as_it_was_and_its_message_to_be_read";
+    let mut again = in_session(&own, &[name, "--exact", "--nocapture"]);
+    again.env(OWN, "1");
+    let mut tty = Tty::start(again);
     assert_ne!(tty.ended().code(), Some(0));
     let seen = tty.is_as_before();
     assert!(seen.first.contains("out of order"), "{}", seen.first);

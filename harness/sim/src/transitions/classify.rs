@@ -83,34 +83,36 @@ fn between_telegrams(bus_end: &BusEnd, memory: &Cells) -> State {
     }
 }
 
+/// The states with a check sequence half-way: by how the drive is otherwise, then by how many of its bytes have come (ND21 9.8).
+pub(super) const SEQUENCES: [[State; 4]; 4] = [
+    [
+        State::Sequence1,
+        State::Sequence2,
+        State::Sequence3,
+        State::Sequence4,
+    ],
+    [
+        State::IncrementsSequence1,
+        State::IncrementsSequence2,
+        State::IncrementsSequence3,
+        State::IncrementsSequence4,
+    ],
+    [
+        State::WaitingSequence1,
+        State::WaitingSequence2,
+        State::WaitingSequence3,
+        State::WaitingSequence4,
+    ],
+    [
+        State::SendingSequence1,
+        State::SendingSequence2,
+        State::SendingSequence3,
+        State::SendingSequence4,
+    ],
+];
+
 #[inline]
 fn error_mode(stage: Stage, silent: Silent) -> State {
-    const SEQUENCES: [[State; 4]; 4] = [
-        [
-            State::Sequence1,
-            State::Sequence2,
-            State::Sequence3,
-            State::Sequence4,
-        ],
-        [
-            State::IncrementsSequence1,
-            State::IncrementsSequence2,
-            State::IncrementsSequence3,
-            State::IncrementsSequence4,
-        ],
-        [
-            State::WaitingSequence1,
-            State::WaitingSequence2,
-            State::WaitingSequence3,
-            State::WaitingSequence4,
-        ],
-        [
-            State::SendingSequence1,
-            State::SendingSequence2,
-            State::SendingSequence3,
-            State::SendingSequence4,
-        ],
-    ];
     let form = match silent {
         Silent::No => usize::from(stage.increments),
         Silent::Waiting => 2,

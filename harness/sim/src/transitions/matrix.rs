@@ -1,5 +1,6 @@
 //! Which cells of the matrix nothing can reach, each with its reason.
 
+use super::classify::SEQUENCES;
 use super::{Event, State, Transition};
 
 /// Why some events cannot happen in most states.
@@ -115,24 +116,7 @@ pub static RULES: [Rule; 10] = [
 const ERROR_MODE: &[State] = State::ALL.split_at(State::ErrorZeros.index()).1;
 
 /// Those with a check sequence half-way.
-const IN_SEQUENCE: &[State] = &[
-    State::Sequence1,
-    State::Sequence2,
-    State::Sequence3,
-    State::Sequence4,
-    State::IncrementsSequence1,
-    State::IncrementsSequence2,
-    State::IncrementsSequence3,
-    State::IncrementsSequence4,
-    State::WaitingSequence1,
-    State::WaitingSequence2,
-    State::WaitingSequence3,
-    State::WaitingSequence4,
-    State::SendingSequence1,
-    State::SendingSequence2,
-    State::SendingSequence3,
-    State::SendingSequence4,
-];
+const IN_SEQUENCE: &[State] = SEQUENCES.as_flattened();
 
 /// The rule by which nothing can reach a cell; `None` for one that can be reached.
 #[must_use]

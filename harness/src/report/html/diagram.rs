@@ -113,23 +113,9 @@ fn picture(
 ) {
     let width = (LEFT + frame.column * trace.links.len() + 16).max(240);
     let height = TOP + ROW * frame.rows + 8;
-    let view = format!("0 0 {width} {height}");
-    let named = format!("{id}-t {id}-d");
-    let attributes: [(&str, &dyn std::fmt::Display); 6] = [
-        ("class", &"nb"),
-        ("role", &"img"),
-        ("aria-labelledby", &named),
-        ("viewBox", &view),
-        ("width", &width),
-        ("height", &height),
-    ];
-    html.element("svg", &attributes, |html| {
-        html.line(
-            "title",
-            &[("id", &format!("{id}-t"))],
-            format_args!("Space-time diagram: {title}"),
-        );
-        html.line("desc", &[("id", &format!("{id}-d"))], description);
+    let title = format!("Space-time diagram: {title}");
+    let id = format!("{id}-");
+    html.picture(&id, (width, height), (&title, description), |html| {
         heads(html, trace, frame.column);
         html.element("g", &[("class", &"by-index")], |html| {
             numbers(html, frame.rows);

@@ -394,31 +394,41 @@ fn picture(html: &mut Html, id: &str, events: &[Event]) {
     };
     let width = 20 + COLUMN * who.len() + 560;
     let height = TOP + ROW * drawn.len() + 16;
-    let view = format!("0 0 {width} {height}");
-    let named = format!("{id}-qt {id}-qd");
-    let attributes: [(&str, &dyn std::fmt::Display); 6] = [
-        ("class", &"nb"),
-        ("role", &"img"),
-        ("aria-labelledby", &named),
-        ("viewBox", &view),
-        ("width", &width),
-        ("height", &height),
-    ];
+    let words = "A line downwards for the master, for each drive that had a part, and for the ring; an arrow for each event. \
+                 The table below says the same.";
+    let title = "Sequence of jobs and answers";
     html.scroll("What was said, as a picture", |html| {
-        html.element("svg", &attributes, |html| {
-            html.line("title", &[("id", &format!("{id}-qt"))], "Sequence of jobs and answers");
-            let words = "A line downwards for the master, for each drive that had a part, and for the ring; an arrow for each event. \
-                         The table below says the same.";
-            html.line("desc", &[("id", &format!("{id}-qd"))], words);
-            for one in &who {
-                let at = x(*one);
-                html.line("text", &[("class", &"m"), ("x", &at), ("y", &16)], one.name());
-                html.shape("path", &[("class", &"zero"), ("d", &format!("M{at} 22V{}", height - 8))]);
-            }
-            for (row, event) in drawn.iter().enumerate() {
-                arrow(html, event, (x(event.from), x(event.to)), TOP + ROW * row + 16, width - 550);
-            }
-        });
+        html.picture(
+            &format!("{id}-q"),
+            (width, height),
+            (&title, words),
+            |html| {
+                for one in &who {
+                    let at = x(*one);
+                    html.line(
+                        "text",
+                        &[("class", &"m"), ("x", &at), ("y", &16)],
+                        one.name(),
+                    );
+                    html.shape(
+                        "path",
+                        &[
+                            ("class", &"zero"),
+                            ("d", &format!("M{at} 22V{}", height - 8)),
+                        ],
+                    );
+                }
+                for (row, event) in drawn.iter().enumerate() {
+                    arrow(
+                        html,
+                        event,
+                        (x(event.from), x(event.to)),
+                        TOP + ROW * row + 16,
+                        width - 550,
+                    );
+                }
+            },
+        );
     });
     if events.len() > DRAWN {
         let more = events.len() - DRAWN;

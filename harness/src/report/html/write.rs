@@ -73,6 +73,32 @@ impl Html {
         self.element("div", &attributes, inside);
     }
 
+    /// A picture of so many pixels, with a title and a description for who does not see it; their names are made of `id`.
+    pub fn picture(
+        &mut self,
+        id: &str,
+        (width, height): (usize, usize),
+        (title, description): (&dyn Display, &str),
+        inside: impl FnOnce(&mut Self),
+    ) {
+        let view = format!("0 0 {width} {height}");
+        let (title_id, description_id) = (format!("{id}t"), format!("{id}d"));
+        let named = format!("{title_id} {description_id}");
+        let attributes: [Attribute<'_>; 6] = [
+            ("class", &"nb"),
+            ("role", &"img"),
+            ("aria-labelledby", &named),
+            ("viewBox", &view),
+            ("width", &width),
+            ("height", &height),
+        ];
+        self.element("svg", &attributes, |html| {
+            html.line("title", &[("id", &title_id)], title);
+            html.line("desc", &[("id", &description_id)], description);
+            inside(html);
+        });
+    }
+
     /// A row of heads of columns.
     pub fn heads(&mut self, names: &[&str]) {
         self.element("tr", &[], |html| {
