@@ -109,5 +109,12 @@ fn check(problems: &Problems, source: &Source) -> String {
             "{message}: {span:?}"
         );
     }
-    format!("{all:?}")
+    // What is missing at the end of the text is missing behind its newline too.
+    let end = text.trim_end_matches('\n').len();
+    let shown = all.iter().cloned().map(|mut problem| {
+        problem.span.start = problem.span.start.min(end);
+        problem.span.end = problem.span.end.min(end);
+        problem
+    });
+    format!("{:?}", shown.collect::<Vec<_>>())
 }
