@@ -5,15 +5,21 @@
 //! that are kept; plain `cargo test` plays all of them.
 
 mod bus_end;
+mod codec;
 mod drive;
+mod drive_words;
+mod features;
 mod guard;
+mod guard_words;
 mod hostile;
 pub mod jobs;
 mod links;
 mod repair;
+mod words;
 
 pub use bus_end::{bus_end, bus_end_watched};
 pub use drive::drive;
+pub use features::{Body, Feature, NOTING, Notes, Noting, features, of_cell};
 pub use guard::guard;
 pub use hostile::master;
 pub use jobs::jobs;
