@@ -1,7 +1,7 @@
 //! What the targets share: libFuzzer's extra counters, fed with the protocol transitions of a case or with what else it reaches, and the
 //! mutator that repairs commands.
 
-use harness_sim::fuzz::{Feature, NOTING, Notes, repair};
+use harness_sim::fuzz::{Feature, NOTING, Notebook, repair};
 use harness_sim::transitions::{REACHABLE, Reached};
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -51,7 +51,7 @@ pub fn note(name: &str, data: &[u8], counters: &[AtomicU8; FEATURES]) {
         let counter = hash([feature.section, &feature.place, &feature.what]) % FEATURES;
         counters[counter].store(1, Ordering::Relaxed);
     };
-    (target.body)(data, &mut Notes::to(&mut count));
+    (target.body)(data, &mut Notebook::to(&mut count));
 }
 
 /// FNV-1a: short, and the same in every run.

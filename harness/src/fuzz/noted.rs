@@ -10,7 +10,7 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Bus;
 use harness_proto::line::LineError;
-use harness_sim::fuzz::{Feature, Notes};
+use harness_sim::fuzz::{Feature, Notebook};
 use harness_sim::link::LineByte;
 
 /// The sizes of ring for which a scenario is settled: its own, the smallest and the largest (ND21 8.4).
@@ -23,7 +23,7 @@ const STATEMENT: usize = 3;
 ///
 /// # Panics
 /// As the target.
-pub(super) fn scenario(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
     scenario_body(data);
     let Ok(source) = Source::from_bytes("input.scn".to_owned(), data.to_vec()) else {
         return notes.note(|| Feature::new("", "no text", "not UTF-8"));
@@ -51,7 +51,7 @@ pub(super) fn scenario(data: &[u8], notes: &mut Notes<'_>) {
 ///
 /// # Panics
 /// As the target.
-pub(super) fn rig(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
     rig_body(data);
     let Ok(source) = Source::from_bytes("input.toml".to_owned(), data.to_vec()) else {
         return notes.note(|| Feature::new("", "no text", "not UTF-8"));
@@ -69,7 +69,7 @@ pub(super) fn rig(data: &[u8], notes: &mut Notes<'_>) {
 ///
 /// # Panics
 /// As the target.
-pub(super) fn capture(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     capture::fuzz::import(data);
     let form = match data.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'{') => "JSON",
@@ -123,7 +123,7 @@ fn arrival(byte: &LineByte) -> &'static str {
 ///
 /// # Panics
 /// As the target.
-pub(super) fn record(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn record(data: &[u8], notes: &mut Notebook<'_>) {
     evidence::fuzz::record(data);
     evidence::fuzz::noted(data, &mut |place, what| {
         notes.note(|| Feature::new("", place, shape(&what)));
@@ -131,14 +131,14 @@ pub(super) fn record(data: &[u8], notes: &mut Notes<'_>) {
 }
 
 /// The mistakes by what they say.
-fn problems(notes: &mut Notes<'_>, place: &'static str, found: &Problems) {
+fn problems(notes: &mut Notebook<'_>, place: &'static str, found: &Problems) {
     for problem in found.all() {
         notes.note(|| Feature::new("", place, shape(&problem.message)));
     }
 }
 
 /// The keys of a file, tables in tables with points between.
-fn keys(notes: &mut Notes<'_>, table: &str, value: &toml::Value) {
+fn keys(notes: &mut Notebook<'_>, table: &str, value: &toml::Value) {
     match value {
         toml::Value::Table(inner) => {
             for (key, value) in inner {

@@ -1,6 +1,6 @@
 //! What an input of the target `codec` reaches: every command of ND21 10 and every telegram of 9.2, whole, cut and wrong.
 
-use super::features::{Feature, Notes};
+use super::features::{Feature, Notebook};
 use super::words;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Command, CommandError, Field, LAYOUTS, Layout, layout};
@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 ///
 /// # Panics
 /// As the target.
-pub(super) fn noted(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     super::codec(data);
     notes.note(|| command(data));
     notes.note(|| telegram(data));

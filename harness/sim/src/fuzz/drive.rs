@@ -2,7 +2,7 @@
 
 use super::LONGEST;
 use super::drive_words::Watch;
-use super::features::Notes;
+use super::features::Notebook;
 use crate::device::Device;
 use crate::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory};
 use harness_proto::line::Received;
@@ -25,14 +25,14 @@ const CYCLE: Span = Span::from_micros(432);
 /// # Panics
 /// An invariant of the drive is broken.
 pub fn drive(data: &[u8]) {
-    noted(data, &mut Notes::none());
+    noted(data, &mut Notebook::none());
 }
 
 /// The same, and what the drive does is noted, cycle by cycle.
 ///
 /// # Panics
 /// As [`drive`].
-pub(super) fn noted(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let properties = Nd21Properties::default();
     let mut drive = Nd21Drive::new(Properties::default(), properties, factory::eeprom());
     let mut watch = Watch::new(&drive);

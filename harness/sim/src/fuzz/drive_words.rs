@@ -1,6 +1,6 @@
 //! What the target `drive` reaches: what an ND21 does by itself, seen from its cells, its inputs and its outputs.
 
-use super::features::{Feature, Notes};
+use super::features::{Feature, Notebook};
 use crate::nd21::{Mode, Nd21Drive};
 use harness_proto::nd21::bits::{flags, flags2, ps_status, set_in};
 use harness_proto::nd21::errors::ErrorCode;
@@ -64,7 +64,7 @@ impl Watch {
     }
 
     /// Something comes from outside: what, and in which mode.
-    pub(super) fn comes(&self, notes: &mut Notes<'_>, what: &'static str) {
+    pub(super) fn comes(&self, notes: &mut Notebook<'_>, what: &'static str) {
         notes.note(|| Feature::new("11.8", format!("mode {}", mode(self.last.mode)), what));
     }
 
@@ -73,8 +73,8 @@ impl Watch {
         self.last = Seen::of(drive);
     }
 
-    /// Notes what the drive has done since it was looked at last.
-    pub(super) fn look(&mut self, notes: &mut Notes<'_>, drive: &Nd21Drive) {
+    /// Notebook what the drive has done since it was looked at last.
+    pub(super) fn look(&mut self, notes: &mut Notebook<'_>, drive: &Nd21Drive) {
         let now = Seen::of(drive);
         if now == self.last {
             return;
@@ -91,7 +91,7 @@ impl Watch {
 }
 
 /// What can be seen without the bus.
-fn outside(notes: &mut Notes<'_>, before: &Seen, now: &Seen) {
+fn outside(notes: &mut Notebook<'_>, before: &Seen, now: &Seen) {
     if before.mode != now.mode {
         let (was, is) = (mode(before.mode), mode(now.mode));
         notes.note(|| Feature::new("11.8", format!("mode {was}"), format!("then {is}")));
@@ -131,7 +131,7 @@ fn outside(notes: &mut Notes<'_>, before: &Seen, now: &Seen) {
 }
 
 fn bits(
-    notes: &mut Notes<'_>,
+    notes: &mut Notebook<'_>,
     (cell, name, section): (u16, &'static str, &'static str),
     was: u8,
     is: u8,
@@ -143,7 +143,7 @@ fn bits(
 }
 
 fn bits_gone(
-    notes: &mut Notes<'_>,
+    notes: &mut Notebook<'_>,
     (cell, name, section): (u16, &'static str, &'static str),
     was: u8,
     is: u8,
@@ -155,7 +155,7 @@ fn bits_gone(
 }
 
 /// The steps of what takes its time: referencing, positioning, the EEPROM controller.
-fn steps(notes: &mut Notes<'_>, before: &Seen, now: &Seen) {
+fn steps(notes: &mut Notebook<'_>, before: &Seen, now: &Seen) {
     let (was, is) = (
         before.bits[2] & flags2::REFERENCING,
         now.bits[2] & flags2::REFERENCING,

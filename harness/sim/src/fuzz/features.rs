@@ -80,11 +80,11 @@ impl fmt::Display for Feature {
     }
 }
 
-/// Who notes features, if anybody does: a body that is only to find mistakes does not even name them.
+/// Where features are noted, if anybody wants them: a body that is only to find mistakes does not even name them.
 #[derive(Default)]
-pub struct Notes<'n>(Option<&'n mut dyn FnMut(Feature)>);
+pub struct Notebook<'n>(Option<&'n mut dyn FnMut(Feature)>);
 
-impl<'n> Notes<'n> {
+impl<'n> Notebook<'n> {
     /// Nobody notes anything.
     #[must_use]
     pub const fn none() -> Self {
@@ -102,7 +102,7 @@ impl<'n> Notes<'n> {
         self.0.is_some()
     }
 
-    /// Notes a feature, which is made for whoever notes only.
+    /// Notebook a feature, which is made for whoever notes only.
     #[inline]
     pub fn note(&mut self, feature: impl FnOnce() -> Feature) {
         if let Some(there) = &mut self.0 {
@@ -110,7 +110,7 @@ impl<'n> Notes<'n> {
         }
     }
 
-    /// Notes the cells of the matrix.
+    /// Notebook the cells of the matrix.
     pub(super) fn reached(&mut self, reached: &Reached) {
         if self.wanted() {
             for cell in Transition::reachable().filter(|cell| reached.contains(*cell)) {
@@ -127,7 +127,7 @@ pub fn of_cell(cell: Transition) -> Feature {
 }
 
 /// A body that plays an input and names what it reaches. It panics where the target does.
-pub type Body = fn(&[u8], &mut Notes<'_>);
+pub type Body = fn(&[u8], &mut Notebook<'_>);
 
 /// A target with what its inputs reach.
 #[derive(Clone, Copy, Debug)]
@@ -199,7 +199,7 @@ pub fn features(body: Body, data: &[u8]) -> BTreeSet<Feature> {
     let mut there = |feature| {
         features.insert(feature);
     };
-    body(data, &mut Notes::to(&mut there));
+    body(data, &mut Notebook::to(&mut there));
     features
 }
 
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn nobody_makes_a_feature_that_nobody_notes() {
-        Notes::none().note(|| panic!("made all the same"));
+        Notebook::none().note(|| panic!("made all the same"));
     }
 
     /// The figures of the corpus's README.

@@ -2,7 +2,7 @@
 //! model, which shares no code with it.
 
 use super::LONGEST;
-use super::features::Notes;
+use super::features::Notebook;
 use super::guard_words::{self as words, Heard};
 use crate::reference::{Cell, Drive};
 use harness_proto::novobus::address::RingSize;
@@ -21,14 +21,14 @@ use harness_proto::time::{Instant, Span};
 /// # Panics
 /// A drive executes what the limits deny.
 pub fn guard(data: &[u8]) {
-    noted(data, &mut Notes::none());
+    noted(data, &mut Notebook::none());
 }
 
 /// The same, and what the guard took the bytes for and made of them is noted.
 ///
 /// # Panics
 /// As [`guard`].
-pub(super) fn noted(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let &[what, damaged, silent, whose, start, ref rest @ ..] = data else {
         return;
     };

@@ -1,6 +1,6 @@
 //! What the target `guard` reaches: where the drives stood, what came, and what the guard made of it.
 
-use super::features::{Feature, Notes};
+use super::features::{Feature, Notebook};
 use super::words;
 use harness_proto::novobus::command::layout;
 use harness_proto::novobus::guard::{Act, Cause, Denial, Guard, Need, Stage};
@@ -16,7 +16,7 @@ pub(super) struct Heard {
 
 /// What the guard made of a byte: where the drives stand behind it, or why it did not pass.
 pub(super) fn note(
-    notes: &mut Notes<'_>,
+    notes: &mut Notebook<'_>,
     heard: &Heard,
     admitted: Result<(), Denial>,
     guard: &Guard,
@@ -45,7 +45,7 @@ pub(super) fn note(
 }
 
 /// A byte passed while a drive is in the error mode (ND21 9.7).
-pub(super) fn note_error_mode(notes: &mut Notes<'_>, heard: &Heard) {
+pub(super) fn note_error_mode(notes: &mut Notebook<'_>, heard: &Heard) {
     notes.note(|| {
         let (_, place) = stage(heard.stage);
         Feature::new("9.7", "a drive is in the error mode", place)
@@ -53,7 +53,7 @@ pub(super) fn note_error_mode(notes: &mut Notes<'_>, heard: &Heard) {
 }
 
 /// A drive has executed a command.
-pub(super) fn note_executed(notes: &mut Notes<'_>, command: &[u8]) {
+pub(super) fn note_executed(notes: &mut Notebook<'_>, command: &[u8]) {
     notes.note(|| {
         let code = command.first().copied().unwrap_or(0);
         let kind = layout(code, ReadLongAnswer::default()).map(|layout| words::kind(layout.kind));

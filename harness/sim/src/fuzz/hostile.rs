@@ -1,7 +1,7 @@
 //! The master on a ring that answers as it likes.
 
 use super::LONGEST;
-use super::features::Notes;
+use super::features::Notebook;
 use super::words;
 use crate::reference;
 use harness_proto::line::{LineError, Rate, Received};
@@ -22,14 +22,14 @@ const SILENCE: usize = 40_000;
 /// # Panics
 /// A job ends twice or not at all, or the master holds more than it may.
 pub fn master(data: &[u8]) {
-    noted(data, &mut Notes::none());
+    noted(data, &mut Notebook::none());
 }
 
 /// The same, and what the master does and tells is noted.
 ///
 /// # Panics
 /// As [`master`].
-pub(super) fn noted(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let Some((&drives, data)) = data.split_first() else {
         return;
     };
@@ -73,7 +73,7 @@ impl Play {
     }
 
     /// One byte time.
-    fn step(&mut self, byte: u8, notes: &mut Notes<'_>) {
+    fn step(&mut self, byte: u8, notes: &mut Notebook<'_>) {
         let before = self.master.phase();
         // What somebody asks of the master takes no time on the line.
         match byte {
@@ -135,7 +135,7 @@ impl Play {
         self.sound.answer(&self.sent, place)
     }
 
-    fn give(&mut self, notes: &mut Notes<'_>) {
+    fn give(&mut self, notes: &mut Notebook<'_>) {
         let command = command(self.given);
         let drive = u8::try_from(self.given % usize::from(self.size.drives())).unwrap_or(0);
         let job = Job::new(drive, command);
@@ -147,7 +147,7 @@ impl Play {
         }
     }
 
-    fn hear(&mut self, event: &Event, notes: &mut Notes<'_>) {
+    fn hear(&mut self, event: &Event, notes: &mut Notebook<'_>) {
         let mut job = None;
         if let Event::Ended { id, .. } = event {
             let place = self.open.iter().position(|(open, ..)| open == id);

@@ -1,7 +1,7 @@
 //! In-band marks: what a stream with marks says does not depend on where it is cut.
 
 use super::LONGEST;
-use super::features::{Feature, Notes};
+use super::features::{Feature, Notebook};
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
 
@@ -45,7 +45,7 @@ pub(super) fn count() -> usize {
 ///
 /// # Panics
 /// As the target.
-pub(super) fn noted(data: &[u8], notes: &mut Notes<'_>) {
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     links(data);
     let Some((&cut, stream)) = data.split_first() else {
         return;

@@ -19,7 +19,7 @@ mod words;
 
 pub use bus_end::{bus_end, bus_end_watched};
 pub use drive::drive;
-pub use features::{Body, Feature, NOTING, Notes, Noting, features, of_cell};
+pub use features::{Body, Feature, NOTING, Notebook, Noting, features, of_cell};
 pub use guard::guard;
 pub use hostile::master;
 pub use jobs::jobs;

@@ -1,6 +1,6 @@
 //! What a master does and tells, and what a line brings, in the words of features.
 
-use super::features::{Feature, Notes};
+use super::features::{Feature, Notebook};
 use harness_proto::line::Received;
 use harness_proto::novobus::command::{Kind, LAYOUTS};
 use harness_proto::novobus::master::{Event, Fault, Outcome, Phase, Refused};
@@ -78,7 +78,7 @@ pub(super) fn heard(received: Option<Received>, due: Option<u8>) -> &'static str
 }
 
 /// A byte time of a master: what it was doing, what came, and what it does then.
-pub(super) fn step(notes: &mut Notes<'_>, before: Phase, heard: &'static str, behind: Phase) {
+pub(super) fn step(notes: &mut Notebook<'_>, before: Phase, heard: &'static str, behind: Phase) {
     let (section, place) = phase(before);
     notes.note(|| match before == behind {
         true => Feature::new(section, place, heard),
@@ -87,7 +87,7 @@ pub(super) fn step(notes: &mut Notes<'_>, before: Phase, heard: &'static str, be
 }
 
 /// What a master tells; `job`: of an end, which command it was and what the master was doing when it was given the job.
-pub(super) fn told(notes: &mut Notes<'_>, event: &Event, job: Option<(Kind, Phase)>) {
+pub(super) fn told(notes: &mut Notebook<'_>, event: &Event, job: Option<(Kind, Phase)>) {
     match event {
         Event::Ready => notes.note(|| Feature::new("9.1", "told", "the ring answers")),
         Event::Round { .. } => {
@@ -140,7 +140,7 @@ const fn times(count: u8) -> &'static str {
 }
 
 /// Why a job was not taken.
-pub(super) fn refused(notes: &mut Notes<'_>, refused: &Refused) {
+pub(super) fn refused(notes: &mut Notebook<'_>, refused: &Refused) {
     let why = match refused {
         Refused::Drive(_) => "no such drive",
         Refused::OutOfRange { .. } => "out of range",

@@ -1,6 +1,6 @@
 //! What the target `jobs` reaches: what meets a master and what it makes of it, and the states of its drives.
 
-use super::super::features::{Feature, Notes};
+use super::super::features::{Feature, Notebook};
 use super::super::words;
 use super::work::{Order, Work};
 use crate::counted::Counted;
@@ -15,13 +15,13 @@ use std::collections::BTreeMap;
 /// An onlooker.
 pub(super) struct Watch<'a, 'n> {
     work: &'a Work,
-    notes: &'a mut Notes<'n>,
+    notes: &'a mut Notebook<'n>,
     given: BTreeMap<JobId, (Kind, Phase)>,
     disturbed: bool,
 }
 
 impl<'a, 'n> Watch<'a, 'n> {
-    pub(super) fn new(work: &'a Work, notes: &'a mut Notes<'n>) -> Self {
+    pub(super) fn new(work: &'a Work, notes: &'a mut Notebook<'n>) -> Self {
         Self {
             work,
             notes,

@@ -1,6 +1,6 @@
 //! A master at its work, in virtual time.
 
-use super::super::features::Notes;
+use super::super::features::Notebook;
 use super::judge::{DATA_IN, DATA_OUT, Judge, Lie};
 use super::noted::Watch;
 use super::wire;
@@ -24,7 +24,7 @@ const AFTERWARDS: u64 = 500;
 pub(super) fn play(
     work: &Work,
     deviates: Option<&'static MasterDeviation>,
-    notes: &mut Notes<'_>,
+    notes: &mut Notebook<'_>,
 ) -> Result<(), Lie> {
     let size = RingSize::new(u64::from(work.drives))
         .map_err(|error| Lie::new("8.5", error.to_string()))?;
