@@ -405,7 +405,8 @@ impl Played {
             let remark = format!("{} attempts: {}", attempts.len(), verdicts.join(", "));
             outcome.remarks.push(remark);
             let verdict = |attempt: &Attempt| attempt.outcome.verdict;
-            let no_fault = |attempt| matches!(verdict(attempt), Verdict::Marginal | Verdict::Skipped);
+            let no_fault =
+                |attempt| matches!(verdict(attempt), Verdict::Marginal | Verdict::Skipped);
             let before = &attempts[..attempts.len() - 1];
             if let Some(unready) = before.iter().find(|a| verdict(a) == Verdict::Skipped) {
                 outcome.remarks.extend(unready.outcome.remarks.clone());
