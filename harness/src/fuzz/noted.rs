@@ -133,7 +133,10 @@ pub(super) fn record(data: &[u8], notes: &mut Notebook<'_>) {
 /// The mistakes by what they say.
 fn problems(notes: &mut Notebook<'_>, place: &'static str, found: &Problems) {
     for problem in found.all() {
-        notes.note(|| Feature::new("", place, shape(&problem.message)));
+        notes.note(|| {
+            let (what, expected) = (shape(&problem.message), shape(&problem.expected));
+            Feature::new("", place, format!("{what}; {expected} expected"))
+        });
     }
 }
 

@@ -1,5 +1,6 @@
 //! What an input of the target `codec` reaches: every command of ND21 10 and every telegram of 9.2, whole, cut and wrong.
 
+use super::LONGEST;
 use super::features::{Feature, Notebook};
 use super::words;
 use harness_proto::novobus::checksum::Checksum;
@@ -10,14 +11,50 @@ use harness_proto::novobus::sync::{Addressing, PAUSE, SyncByte, SyncError};
 use harness_proto::novobus::telegram::{Telegram, TelegramError};
 use std::collections::BTreeSet;
 
-/// Plays an input, and names what its bytes are as a command and as a telegram.
+/// A stream of commands, and the same bytes as a stream of telegrams: each begins behind the one before, or behind the byte that settled
+/// that there is none.
 ///
 /// # Panics
-/// As the target.
+/// A value is encoded as other bytes; or a part of it is a value too, or a mistake.
+pub fn codec_stream(data: &[u8]) {
+    noted(data, &mut Notebook::none());
+}
+
+/// The same, and what the bytes are is noted, each beginning of a value among it.
+///
+/// # Panics
+/// As [`codec_stream`].
 pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
-    super::codec(data);
-    notes.note(|| command(data));
-    notes.note(|| telegram(data));
+    let data = &data[..data.len().min(LONGEST)];
+    walk(data, Command::decode, command, notes);
+    walk(data, Telegram::decode, telegram, notes);
+}
+
+fn walk<T, E>(
+    data: &[u8],
+    decode: fn(&[u8]) -> Decoded<T, E>,
+    feature: fn(&[u8]) -> Feature,
+    notes: &mut Notebook<'_>,
+) {
+    let mut rest = data;
+    loop {
+        super::codec(rest);
+        notes.note(|| feature(rest));
+        let used = match decode(rest) {
+            Decoded::NeedMore => return,
+            Decoded::Bad { offset, .. } => offset + 1,
+            Decoded::Value { used, .. } => {
+                for length in 0..used {
+                    let part = &rest[..length];
+                    let needs_more = matches!(decode(part), Decoded::NeedMore);
+                    assert!(needs_more, "{part:02X?} is a part of something whole");
+                    notes.note(|| feature(part));
+                }
+                used
+            }
+        };
+        rest = &rest[used..];
+    }
 }
 
 /// How many features there are.

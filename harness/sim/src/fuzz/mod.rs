@@ -18,6 +18,7 @@ mod repair;
 mod words;
 
 pub use bus_end::{bus_end, bus_end_watched};
+pub use codec::codec_stream;
 pub use drive::drive;
 pub use features::{Body, Feature, NOTING, Notebook, Noting, features, of_cell};
 pub use guard::guard;
@@ -56,7 +57,7 @@ pub const WATCHING: [Watching; 3] = [
 /// Every target whose body is here.
 pub const TARGETS: [Target; 9] = [
     ("bus_end", bus_end),
-    ("codec", codec),
+    ("codec", codec_stream),
     ("detector", detector),
     ("links", links),
     ("ring", ring),
