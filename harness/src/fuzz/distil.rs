@@ -1,7 +1,7 @@
 //! Distils inputs: the few small ones that reach everything which all of them reach, by the names of `harness_sim::fuzz::features`.
 
 use harness_sim::fuzz::{Body, Feature, features};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt::Write as _;
 
 /// How many bytes a line of a file holds, where an input has no records.
@@ -13,8 +13,14 @@ const NAMED: usize = 8;
 /// What a file costs beside its bytes, in bytes: a few inputs that each reach much are better than many that reach one thing each.
 const FILE: usize = 64;
 
+/// The same for texts, which can less often be put one behind the other.
+const TEXT_FILE: usize = 4_096;
+
 /// The most bytes of an input that is put together of several.
 const MOST_JOINED: usize = 256;
+
+/// The same of a text.
+const MOST_JOINED_TEXT: usize = 1_500;
 
 /// The most tries at making one input smaller.
 const MOST_TRIES: usize = 20_000;
@@ -136,12 +142,16 @@ pub fn distil(
         .into_iter()
         .map(|input| (input, &features(body, input) - kept))
         .collect();
+    let file = match pieces {
+        Pieces::Bytes { .. } => FILE,
+        Pieces::Text(_) => TEXT_FILE,
+    };
     let mut chosen = Vec::new();
     loop {
         left.retain(|(_, new)| !new.is_empty());
         // The first of equal ones is the shortest.
         let worth = |(input, new): &(&Vec<u8>, BTreeSet<Feature>)| {
-            new.len() * 10_000 / (input.len() + FILE)
+            new.len() * 10_000 / (input.len() + file)
         };
         let Some((input, wanted)) = left.iter().rev().max_by_key(|one| worth(one)) else {
             return named(needed(joined(body, pieces, chosen, kept), kept), kept);
@@ -158,6 +168,21 @@ pub fn distil(
 /// An input, and all that it reaches.
 type Chosen = (Vec<u8>, BTreeSet<Feature>);
 
+/// Two inputs, one behind the other: the head of the first is that of both; a line that the first text has stands there once.
+fn together(pieces: Pieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>> {
+    let (rest, most) = match pieces {
+        Pieces::Bytes { head, .. } => (second.get(head..)?.to_vec(), MOST_JOINED),
+        Pieces::Text(_) => {
+            let lines: BTreeSet<_> = first.split_inclusive(|byte| *byte == b'\n').collect();
+            let own = second.split_inclusive(|byte| *byte == b'\n');
+            let own: Vec<_> = own.filter(|line| !lines.contains(line)).collect();
+            (own.concat(), MOST_JOINED_TEXT)
+        }
+    };
+    let both = [first, &rest].concat();
+    (!rest.is_empty() && both.len() <= most).then_some(both)
+}
+
 /// Puts inputs one behind the other where nothing gets lost by it: one conversation is better than ten.
 fn joined(
     body: Body,
@@ -165,19 +190,12 @@ fn joined(
     chosen: Vec<Chosen>,
     kept: &BTreeSet<Feature>,
 ) -> Vec<Chosen> {
-    let Pieces::Bytes { head, .. } = pieces else {
-        return chosen;
-    };
     let mut joined: Vec<Chosen> = Vec::new();
-    let mut left: std::collections::VecDeque<_> = chosen.into();
+    let mut left: VecDeque<_> = chosen.into();
     while let Some((input, reached)) = left.pop_front() {
-        let wire = input.get(head..).unwrap_or_default();
         let place = (0..joined.len()).find_map(|place| {
             let (first, reached_first) = &joined[place];
-            let both = [first, wire].concat();
-            if wire.is_empty() || both.len() > MOST_JOINED {
-                return None;
-            }
+            let both = together(pieces, first, &input)?;
             let reached_both = features(body, &both);
             let others = joined
                 .iter()
@@ -241,7 +259,7 @@ pub fn superfluous(body: Body, inputs: &[(String, Vec<u8>)]) -> Vec<String> {
         .iter()
         .map(|(_, input)| features(body, input))
         .collect();
-    let mut counts = std::collections::BTreeMap::new();
+    let mut counts = BTreeMap::new();
     for feature in reached.iter().flatten() {
         *counts.entry(feature).or_insert(0_usize) += 1;
     }

@@ -1,7 +1,7 @@
 //! What the inputs of the targets for texts, captures and records reach: which statements are taken, and which mistakes are found.
 
 use super::{rig as rig_body, scenario as scenario_body};
-use crate::capture;
+use crate::capture::{self, CaptureError};
 use crate::evidence;
 use crate::rig;
 use crate::scenario::parse::parse;
@@ -10,6 +10,7 @@ use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Bus;
 use harness_proto::line::LineError;
+use harness_proto::nd21::cells::cell;
 use harness_sim::fuzz::{Feature, Notebook};
 use harness_sim::link::LineByte;
 
@@ -78,7 +79,11 @@ pub(super) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     let read = match capture::read(data, None) {
         Ok(read) => read,
         Err(error) => {
-            let what = shape(&error.to_string());
+            let what = match error {
+                CaptureError::At { what, .. } | CaptureError::Link { what, .. } => shape(&what),
+                CaptureError::Foreign(_) => "it begins otherwise".to_owned(),
+                other => shape(&other.to_string()),
+            };
             return notes.note(|| Feature::new("", format!("no capture, {form}"), what));
         }
     };
@@ -135,7 +140,14 @@ fn problems(notes: &mut Notebook<'_>, place: &'static str, found: &Problems) {
     for problem in found.all() {
         notes.note(|| {
             let (what, expected) = (shape(&problem.message), shape(&problem.expected));
-            Feature::new("", place, format!("{what}; {expected} expected"))
+            // What is said twice is told once.
+            let is_new = !what.contains(expected.trim_end_matches(" expected here"));
+            let more = if is_new {
+                format!("; {expected}")
+            } else {
+                String::new()
+            };
+            Feature::new("", place, what + &more)
         });
     }
 }
@@ -186,37 +198,65 @@ fn statement(line: &str) -> String {
     {
         return words.next().unwrap_or_default().to_owned();
     }
-    said.extend(
-        words
-            .filter(|word| is_word(word) || is_sign(word))
-            .take(STATEMENT),
-    );
+    // Of which cell it says it is not asked.
+    let words = words.filter(|word| is_sign(word) || is_word(word) && cell(word).is_none());
+    said.extend(words.take(STATEMENT));
     said.join(" ")
 }
 
-/// What a message says, without the names and numbers that it says it of.
+/// What a message says, without the names and numbers that it says it of, and without what a parser of JSON or TOML says beyond the kind
+/// of mistake.
 pub(crate) fn shape(message: &str) -> String {
-    let mut shape = String::new();
-    let mut quote = None;
+    let mut shape: Vec<&str> = Vec::new();
     let first = message.lines().next().unwrap_or_default();
-    for letter in first.chars() {
+    // A parser says behind its message where it stands.
+    let plain = unquoted(first.split(" at line ").next().unwrap_or_default());
+    for word in plain.split_whitespace() {
+        let bare = word.trim_matches(|letter: char| !letter.is_ascii_alphanumeric());
+        let is_hex = |bare: &str| {
+            (2..=4).contains(&bare.len()) && bare.bytes().all(|byte| matches!(byte, b'A'..=b'F'))
+        };
+        let word = if bare.bytes().any(|byte| byte.is_ascii_digit()) || is_hex(bare) {
+            "N"
+        } else {
+            word
+        };
+        if word != "N" || shape.last() != Some(&word) {
+            shape.push(word);
+        }
+    }
+    let kinds = [
+        "invalid",
+        "missing",
+        "unclosed",
+        "unexpected",
+        "duplicate",
+        "extra",
+        "EOF",
+    ];
+    if shape.first().is_some_and(|first| kinds.contains(first)) {
+        shape.truncate(2);
+    }
+    shape.join(" ").trim_end_matches([',', ':']).to_owned()
+}
+
+/// A message with two points for what stands in quotes.
+fn unquoted(message: &str) -> String {
+    let mut plain = String::new();
+    let mut quote = None;
+    for letter in message.chars() {
         match quote {
             Some(end) if letter == end => {
                 quote = None;
-                shape.push_str("..");
+                plain.push_str("..");
             }
             Some(_) => {}
             None if letter == '`' || letter == '"' => quote = Some(letter),
-            None if letter.is_ascii_digit() => {
-                if !shape.ends_with('N') {
-                    shape.push('N');
-                }
-            }
-            None if letter.is_control() => shape.push(' '),
-            None => shape.push(letter),
+            None if letter.is_control() => plain.push(' '),
+            None => plain.push(letter),
         }
     }
-    shape
+    plain
 }
 
 #[cfg(test)]
@@ -227,9 +267,18 @@ mod tests {
     fn messages_without_names_and_numbers() {
         assert_eq!(
             shape("`foo` is no drive of 250: \"a\""),
-            ".. is no drive of N: .."
+            ".. is no drive of N ..",
         );
-        assert_eq!(shape("line 1, an open `quote"), "line N, an open ");
+        assert_eq!(shape("line 1, an open `quote"), "line N an open");
+        assert_eq!(
+            shape("it begins with 0A FF 3C and ends"),
+            "it begins with N and ends"
+        );
+        assert_eq!(shape("invalid type: map, expected u8"), "invalid type");
+        assert_eq!(
+            shape("trailing characters at line 1 column 2"),
+            "trailing characters"
+        );
     }
 
     #[test]
@@ -238,6 +287,7 @@ mod tests {
         assert_eq!(statement("+1ms ! link 3->2 flip"), "+ ! link flip");
         assert_eq!(statement("title a b c"), "title");
         assert_eq!(statement("? drive 0 display none"), "? drive display");
+        assert_eq!(statement("? drive 0 nist = 0rpm"), "? drive");
         assert_eq!(statement("# nothing"), "");
     }
 }

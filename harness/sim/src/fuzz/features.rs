@@ -55,7 +55,7 @@ impl Feature {
 /// A part of a file's name: few enough letters that every file system takes it.
 fn short(name: &str) -> String {
     let name = slug(name);
-    let end = name.char_indices().nth(80).map_or(name.len(), |(at, _)| at);
+    let end = name.char_indices().nth(72).map_or(name.len(), |(at, _)| at);
     name[..end].trim_end_matches('-').to_owned()
 }
 
@@ -243,7 +243,7 @@ mod tests {
             "9.2-sync-byte-due--synco-then-upstream"
         );
         let long = Feature::new("", "a text", "x".repeat(200));
-        assert_eq!(long.file_name().len(), "a-text--".len() + 80);
+        assert_eq!(long.file_name().len(), "a-text--".len() + 72);
     }
 
     #[test]
