@@ -54,6 +54,7 @@ struct Play {
     now: Instant,
     sent: Vec<u8>,
     sound: Sound,
+    steps: words::Steps,
     given: usize,
     /// The jobs that have not ended, with their commands and what the master was doing when it got them.
     open: Vec<(JobId, Kind, Phase)>,
@@ -67,6 +68,7 @@ impl Play {
             now: Instant::START,
             sent: Vec::new(),
             sound: Sound::new(size),
+            steps: words::Steps::default(),
             given: 0,
             open: Vec::new(),
         }
@@ -113,12 +115,8 @@ impl Play {
         self.sent.extend(self.master.poll_transmit(self.now));
         let under_way = self.master.under_way();
         assert!(under_way <= 1_024, "{under_way} under way");
-        words::step(
-            notes,
-            before,
-            words::heard(received, due),
-            self.master.phase(),
-        );
+        let heard = words::heard(received, due);
+        self.steps.note(notes, before, heard, self.master.phase());
         self.now += Rate::Baud38400.byte_time();
     }
 

@@ -77,13 +77,31 @@ pub(super) fn heard(received: Option<Received>, due: Option<u8>) -> &'static str
     }
 }
 
-/// A byte time of a master: what it was doing, what came, and what it does then.
-pub(super) fn step(notes: &mut Notebook<'_>, before: Phase, heard: &'static str, behind: Phase) {
-    let (section, place) = phase(before);
-    notes.note(|| match before == behind {
-        true => Feature::new(section, place, heard),
-        false => Feature::new(section, place, format!("{heard}; then {}", phase(behind).1)),
-    });
+/// The byte times of a master. One like that before it is noted no more.
+#[derive(Default)]
+pub(super) struct Steps {
+    last: Option<(Phase, &'static str, Phase)>,
+}
+
+impl Steps {
+    /// What it was doing, what came, and what it does then.
+    pub(super) fn note(
+        &mut self,
+        notes: &mut Notebook<'_>,
+        before: Phase,
+        heard: &'static str,
+        behind: Phase,
+    ) {
+        let step = Some((before, heard, behind));
+        if std::mem::replace(&mut self.last, step) == step {
+            return;
+        }
+        let (section, place) = phase(before);
+        notes.note(|| match before == behind {
+            true => Feature::new(section, place, heard),
+            false => Feature::new(section, place, format!("{heard}; then {}", phase(behind).1)),
+        });
+    }
 }
 
 /// What a master tells; `job`: of an end, which command it was and what the master was doing when it was given the job.

@@ -18,6 +18,7 @@ pub(super) struct Watch<'a, 'n> {
     notes: &'a mut Notebook<'n>,
     given: BTreeMap<JobId, (Kind, Phase)>,
     disturbed: bool,
+    steps: words::Steps,
 }
 
 impl<'a, 'n> Watch<'a, 'n> {
@@ -27,6 +28,7 @@ impl<'a, 'n> Watch<'a, 'n> {
             notes,
             given: BTreeMap::new(),
             disturbed: false,
+            steps: words::Steps::default(),
         }
     }
 
@@ -37,7 +39,8 @@ impl<'a, 'n> Watch<'a, 'n> {
     }
 
     pub(super) fn step(&mut self, before: Phase, last: Option<Received>, behind: Phase) {
-        words::step(self.notes, before, words::heard(last, None), behind);
+        let heard = words::heard(last, None);
+        self.steps.note(self.notes, before, heard, behind);
     }
 
     pub(super) fn told(&mut self, event: &Event) {
