@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::error::ExploreError;
 use super::novelty::features;
-use super::oracle::{against_model, against_reference};
+use super::oracle::{against_model, against_reference, beside};
 use super::play::play;
 use super::setup::Setup;
 use super::target::{Rehearsal, Target, Tried};
@@ -13,13 +13,13 @@ use crate::link::{Link, SimulatedLink};
 #[derive(Debug)]
 pub struct OnSim {
     setup: Setup,
-    /// Fresh rings of the size of the last case.
+    /// Fresh rings of the sizes of the last case.
     fresh: Option<Fresh>,
 }
 
 #[derive(Debug)]
 struct Fresh {
-    drives: u8,
+    sizes: Vec<u8>,
     model: SimulatedLink,
     under_test: Option<SimulatedLink>,
 }
@@ -31,16 +31,17 @@ impl OnSim {
         Self { setup, fresh: None }
     }
 
-    fn fresh(&mut self, drives: u8) -> Result<&Fresh, ExploreError> {
-        let fresh = match self.fresh.take().filter(|fresh| fresh.drives == drives) {
+    fn fresh(&mut self, case: &Case) -> Result<&Fresh, ExploreError> {
+        let sizes = case.sizes();
+        let fresh = match self.fresh.take().filter(|fresh| fresh.sizes == sizes) {
             Some(fresh) => fresh,
             None => Fresh {
-                drives,
-                model: self.setup.model(drives)?,
+                model: self.setup.model(&sizes)?,
                 under_test: match self.setup.deviates.is_empty() {
                     true => None,
-                    false => Some(self.setup.under_test(drives)?),
+                    false => Some(self.setup.under_test(&sizes)?),
                 },
+                sizes,
             },
         };
         Ok(self.fresh.insert(fresh))
@@ -50,11 +51,11 @@ impl OnSim {
 impl Target for OnSim {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
         let with_reference = self.setup.is_plain() && self.setup.deviates.is_empty();
-        let mut link = self.fresh(case.drives)?.model.clone();
+        let mut link = self.fresh(case)?.model.clone();
         let seen = play(&mut link, case);
-        let trace = link.trace(0);
+        let trace = link.trace(case.ring());
         let of_model = match with_reference {
-            true => against_reference(case, &link, &trace),
+            true => against_reference(case, &link, &trace).or_else(|| beside(case, &link)),
             false => None,
         };
         Ok(Rehearsal {
@@ -67,7 +68,7 @@ impl Target for OnSim {
     }
 
     fn attempt(&mut self, case: &Case, rehearsal: &Rehearsal) -> Result<Tried, ExploreError> {
-        let Some(mut link) = self.fresh(case.drives)?.under_test.clone() else {
+        let Some(mut link) = self.fresh(case)?.under_test.clone() else {
             return Ok(Tried {
                 took: rehearsal.took,
                 difference: rehearsal.of_model.clone(),
@@ -77,7 +78,7 @@ impl Target for OnSim {
         let seen = play(&mut link, case);
         Ok(Tried {
             took: seen.took,
-            difference: against_model(case, &rehearsal.seen, &seen),
+            difference: against_model(case, &rehearsal.seen, &seen).or_else(|| beside(case, &link)),
             not_played: None,
         })
     }

@@ -189,16 +189,18 @@ fn counts(
     let mut counts = Vec::new();
     for seed in 1..=arguments.seeds {
         let planted = Planted {
+            ring: 0,
             drive: u8::try_from(seed % u64::from(DRIVES)).unwrap_or(0),
             name: deviation.name.to_owned(),
         };
         let setup = Setup::of_rig(&rig, &[planted], false);
         let mut target = OnSim::new(setup.clone());
-        let scope = simulated(DRIVES, Limits::unlimited(), &setup);
+        let scope = simulated(&rig, Limits::unlimited(), &setup);
         let about = About {
             schema: About::SCHEMA,
             rig: format!("sim:{DRIVES}"),
             drives: DRIVES,
+            second: None,
             ports: false,
             seed,
             confirm: 1,
