@@ -41,7 +41,7 @@ pub use mutate::mutate;
 pub use novelty::{MOST_KEPT, Pool, by_novelty, features};
 pub use on_rig::OnRig;
 pub use on_sim::OnSim;
-pub use oracle::{Difference, against_model, against_reference, beside};
+pub use oracle::{Difference, against_model, against_reference, against_witnesses, beside};
 pub use order::{Command, Order, Spoil};
 pub use page::page;
 pub use play::{Seen, play};

@@ -3,11 +3,12 @@
 use super::case::Case;
 use super::error::ExploreError;
 use super::novelty::features;
-use super::oracle::{against_model, against_reference, beside};
+use super::oracle::{Difference, against_model, against_reference, against_witnesses, beside};
 use super::play::play;
 use super::setup::Setup;
 use super::target::{Rehearsal, Target, Tried};
 use crate::link::{Link, SimulatedLink};
+use harness_sim::trace::Trace;
 
 /// A simulated ring beside its model, and beside the reference model where its drives are plain and sound.
 #[derive(Debug)]
@@ -31,12 +32,30 @@ impl OnSim {
         Self { setup, fresh: None }
     }
 
+    /// How the model itself is otherwise than it must be.
+    fn judge(&self, case: &Case, link: &mut SimulatedLink, trace: &Trace) -> Option<Difference> {
+        let own = match self.setup.is_plain() {
+            true => against_reference(case, link, trace),
+            false => against_witnesses(case, link),
+        };
+        own.or_else(|| beside(case, link))
+    }
+
+    /// The model: where nothing is planted it is under test itself, beside the reference model or with witnesses.
+    fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, ExploreError> {
+        let mut model = self.setup.model(sizes)?;
+        if self.setup.deviates.is_empty() {
+            model.witness();
+        }
+        Ok(model)
+    }
+
     fn fresh(&mut self, case: &Case) -> Result<&Fresh, ExploreError> {
         let sizes = case.sizes();
         let fresh = match self.fresh.take().filter(|fresh| fresh.sizes == sizes) {
             Some(fresh) => fresh,
             None => Fresh {
-                model: self.setup.model(&sizes)?,
+                model: self.model(&sizes)?,
                 under_test: match self.setup.deviates.is_empty() {
                     true => None,
                     false => Some(self.setup.under_test(&sizes)?),
@@ -50,12 +69,11 @@ impl OnSim {
 
 impl Target for OnSim {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
-        let with_reference = self.setup.is_plain() && self.setup.deviates.is_empty();
         let mut link = self.fresh(case)?.model.clone();
         let seen = play(&mut link, case);
         let trace = link.trace(case.ring());
-        let of_model = match with_reference {
-            true => against_reference(case, &link, &trace).or_else(|| beside(case, &link)),
+        let of_model = match self.setup.deviates.is_empty() {
+            true => self.judge(case, &mut link, &trace),
             false => None,
         };
         Ok(Rehearsal {

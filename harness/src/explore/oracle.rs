@@ -15,6 +15,7 @@ use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::Instant;
 use harness_sim::reference;
 use harness_sim::trace::{LinkTrace, Trace};
+use harness_sim::witness::Complaint;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -188,6 +189,28 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
             let detail = format!(" {cell:04X}");
             beside_bus(ring, drive, "contents of a cell", "10.2", &detail)
         })
+    })
+}
+
+/// What the witnesses of whole ND21s have seen of a case.
+#[must_use]
+pub fn against_witnesses(case: &Case, link: &mut SimulatedLink) -> Option<Difference> {
+    let ring = case.ring();
+    let (drive, found) = link.complaint(ring)?;
+    let name = drive_name(ring, drive);
+    let Complaint {
+        heard, at, about, ..
+    } = found;
+    let at = at.since_start();
+    Some(Difference {
+        what: "another drive than that of the manual".to_owned(),
+        section: found.section.to_owned(),
+        rule: found.rule.to_owned(),
+        ring,
+        drive: Some(drive),
+        byte: None,
+        time: false,
+        about: format!("drive {name}, byte {heard} on the link to it, at {at}: {about}"),
     })
 }
 

@@ -9,6 +9,7 @@ use crate::rig::Rig;
 use crate::scenario::problem::Problems;
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
+use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::deviation;
 use serde::{Deserialize, Serialize};
 
@@ -85,6 +86,13 @@ impl Setup {
         Self { header, deviates }
     }
 
+    /// The same with a drive that deviates where nobody knows of it: in the model too.
+    #[must_use]
+    pub fn hides(mut self, planted: &Planted) -> Self {
+        self.header.push(planted.line());
+        self
+    }
+
     /// The model of a rig with ports, with so many rings.
     #[must_use]
     pub fn of_ports(rings: usize) -> Self {
@@ -118,6 +126,19 @@ impl Setup {
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.header.is_empty()
+    }
+
+    /// The first line that sets what the manual leaves open of the bus: the reference model, which judges where nothing is planted, knows
+    /// the defaults only.
+    #[must_use]
+    pub fn sets_property(&self) -> Option<&str> {
+        let sets = |line: &&String| {
+            let (_, setting) = line.split_once(" property ")?;
+            let name = setting.split(['=', ' ']).find(|word| !word.is_empty())?;
+            PROPERTIES.iter().find(|known| known.name == name)
+        };
+        let line = self.header.iter().find(|line| sets(line).is_some());
+        line.map(String::as_str)
     }
 
     /// The lines with the deviations.

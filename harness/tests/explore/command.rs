@@ -247,6 +247,10 @@ fn what_cannot_be() {
     std::fs::write(&file, "x").expect("room");
     let under = file.join("run");
     let out = folder.path().join("run");
+    let rig = folder.path().join("rig.toml");
+    let lines = "schema = 1\n[rig]\nid = \"rig\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\n\
+                 setup = [\"drive 0 property time-out = 15ms\"]\n";
+    std::fs::write(&rig, lines).expect("room");
     let run = |more: &[&str]| drivebench(&[&["fuzz", "run", "--cases", "60"][..], more].concat());
     ended(
         &run(&["--out", name(&under)]),
@@ -271,9 +275,9 @@ fn what_cannot_be() {
     );
     ended(&run(&["--confirm", "4/3"]), 2, "such as 2/3");
     ended(
-        &run(&["--whole", "--out", name(&out)]),
+        &run(&["--rig", name(&rig), "--out", name(&out)]),
         2,
-        "nothing to hold whole ND21s against",
+        "the rig says `drive 0 property time-out = 15ms`",
     );
     ended(
         &run(&["--deviates", "2:1=writes-ignored", "--out", name(&out)]),

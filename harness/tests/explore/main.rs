@@ -7,6 +7,7 @@ mod rig;
 mod rings;
 mod runs;
 mod texts;
+mod witness;
 
 use harness::explore::{
     About, Bounds, Campaign, Difference, End, ExploreError, Finding, OnSim, Planted, Pool,

@@ -45,7 +45,8 @@ pub struct FuzzRunArguments {
     /// Plant a deviation in a drive of a simulated ring, as DRIVE=NAME, or 2:DRIVE=NAME in ring 2; `drivebench deviations` shows the names. May repeat.
     #[arg(long, value_name = "DRIVE=NAME", value_parser = planted)]
     pub deviates: Vec<Planted>,
-    /// Let the drives of sim:N be whole ND21s; without it they are plain, as the reference model is.
+    /// Let the drives of sim:N be whole ND21s; without it they are plain, as the reference model is. Where no deviation is planted, a
+    /// witness judges each whole drive by what the manual says of the bus, the cells and the invariants of a drive.
     #[arg(long)]
     pub whole: bool,
     /// A finding counts when it is seen again K of N times, as K/N.
@@ -185,11 +186,11 @@ fn on_simulated(
         Some(kept) => kept.about.setup.clone(),
         None => Setup::of_rig(rig, &arguments.deviates, arguments.whole),
     };
-    if !setup.is_plain() && setup.deviates.is_empty() {
-        output.complain(
-            "there is nothing to hold whole ND21s against: the reference model knows plain drives only. Plant a deviation \
-             (--deviates DRIVE=NAME), or use sim:N without --whole",
-        );
+    if let Some(line) = setup.sets_property().filter(|_| setup.deviates.is_empty()) {
+        output.complain(&format!(
+            "there is nothing to hold these drives against: the reference model knows no other property of the bus than the \
+             default, and the rig says `{line}`. Plant a deviation (--deviates DRIVE=NAME), or leave the line out"
+        ));
         return Ok(Exit::Usage);
     }
     let own = &rig.file.limits;
