@@ -36,7 +36,7 @@ impl OnSim {
     fn judge(&self, case: &Case, link: &mut SimulatedLink, trace: &Trace) -> Option<Difference> {
         let own = match self.setup.is_plain() {
             true => against_reference(case, link, trace),
-            false => against_witnesses(case, link),
+            false => against_witnesses(case, link, trace),
         };
         own.or_else(|| beside(case, link))
     }

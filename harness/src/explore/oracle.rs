@@ -5,14 +5,14 @@ use super::case::{Beside, Case, Harm, What};
 use super::order::Order;
 use super::play::Seen;
 use super::setup::{drive_name, is_first};
-use crate::link::{Link, SimulatedLink, link_name};
+use crate::link::{Line as _, Link, SimulatedLink, link_name};
 use crate::twin;
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 use harness_sim::reference;
 use harness_sim::trace::{LinkTrace, Trace};
 use harness_sim::witness::Complaint;
@@ -192,11 +192,17 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
     })
 }
 
-/// What the witnesses of whole ND21s have seen of a case.
+/// What the witnesses of whole ND21s have seen of a case, or an answer that did not go out a byte time behind what came.
 #[must_use]
-pub fn against_witnesses(case: &Case, link: &mut SimulatedLink) -> Option<Difference> {
+pub fn against_witnesses(
+    case: &Case,
+    link: &mut SimulatedLink,
+    trace: &Trace,
+) -> Option<Difference> {
     let ring = case.ring();
-    let (drive, found) = link.complaint(ring)?;
+    let Some((drive, found)) = link.complaint(ring) else {
+        return untimely(case, link.byte_time(), trace);
+    };
     let name = drive_name(ring, drive);
     let Complaint {
         heard, at, about, ..
@@ -211,6 +217,35 @@ pub fn against_witnesses(case: &Case, link: &mut SimulatedLink) -> Option<Differ
         byte: None,
         time: false,
         about: format!("drive {name}, byte {heard} on the link to it, at {at}: {about}"),
+    })
+}
+
+/// A byte that did not go out as the one that it answers was in (ND21 8.2). Behind faults and silence others may stand in its way.
+fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
+    let waits = |act: &super::case::Act| matches!(act.what, What::Wait(_));
+    if !case.faults().is_empty() || case.acts.iter().any(waits) {
+        return None;
+    }
+    trace.links.windows(2).find_map(|pair| {
+        let mut heard = pair[0].bytes.iter().map(|byte| byte.at + byte_time);
+        // What is not answered is passed over: PAUSE, and all that a drive without power hears.
+        let early = |at: Instant| !heard.any(|due| due == at);
+        let place = pair[1].bytes.iter().map(|byte| byte.at).position(early)?;
+        let drive = pair[1].from?;
+        let (number, at) = (place + 1, pair[1].bytes[place].at.since_start());
+        let name = drive_name(case.ring(), drive);
+        Some(Difference {
+            what: "another time".to_owned(),
+            section: "8.2".to_owned(),
+            rule: "answer".to_owned(),
+            ring: case.ring(),
+            drive: Some(drive),
+            byte: None,
+            time: true,
+            about: format!(
+                "byte {number} that drive {name} sent came at {at}, no byte time behind one that it heard"
+            ),
+        })
     })
 }
 

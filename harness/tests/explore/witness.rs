@@ -34,7 +34,7 @@ fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, 
 fn sound_drives_pass() {
     for seed in [1, 2, 3, seed()] {
         let (found, cases) = explore(None, seed, 1_000);
-        for finding in &found {
+        if let Some(finding) = found.first() {
             let text = finding.scenario("a finding", &[]).expect("a ring");
             let again = repeat("sound_drives_pass");
             panic!("seed {seed}: {:#?}\n{text}\n{again}", finding.difference);
@@ -59,6 +59,8 @@ fn deviating_drives_are_found() {
         ("reset-keeps-parameters", "10.5, contents of a cell"),
         ("reports-parity-as-framing", "14.11.14, contents of a cell"),
         ("next-drive-is-same-drive", "14.2.1, contents of a cell"),
+        ("eeprom-not-written", "14.10.5, EEPROM controller"),
+        ("forwards-without-delay", "8.2, answer"),
         ("time-out-after-25ms", "9.9, time-out"),
         ("no-zeros-unasked", "9.9, zeros"),
         ("zeros-5ms-after-a-time-out", "9.9, zeros"),
@@ -66,8 +68,13 @@ fn deviating_drives_are_found() {
         let (found, _) = explore(Some((2, hidden)), 1, 3_000);
         let finding = found.first();
         let finding = finding.unwrap_or_else(|| panic!("{hidden} is not found"));
-        let expected = format!("drive 2: another drive than that of the manual (ND21 {rule})");
-        assert_eq!(finding.difference.signature(), expected, "{hidden}");
+        let signature = finding.difference.signature();
+        let blamed = signature.starts_with("drive 2: ");
+        let expected = format!("(ND21 {rule})");
+        assert!(
+            blamed && signature.ends_with(&expected),
+            "{hidden}: {signature}"
+        );
     }
 }
 

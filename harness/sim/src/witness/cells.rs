@@ -42,7 +42,8 @@ fn place(address: u16) -> Option<usize> {
     address.checked_sub(FIRST).map(usize::from)
 }
 
-fn at(image: &Image, address: u16) -> u8 {
+/// What a cell holds; 00 where there is none.
+pub(super) fn at(image: &Image, address: u16) -> u8 {
     place(address).map_or(0, |place| image[place])
 }
 

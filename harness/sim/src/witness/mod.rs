@@ -3,10 +3,12 @@
 //! It hears what the drive hears and says for each byte what must go out for it, by the [reference model](crate::reference) of the bus
 //! (ND21 9, 10), which shares no code with the drive's own end of the bus. What the drive changes by itself the reference is taught
 //! before each byte, out of the drive's memory; nothing else may change between two bytes, and a byte changes exactly the cells
-//! that it means, as far as the tables let them be written ([`cells`], 14.2.1). Silence is watched by the clock of 9.9, and the
-//! [invariants](crate::nd21) of the drive after every cycle. What a motor does within these it does not judge.
+//! that it means, as far as the tables let them be written ([`cells`], 14.2.1). Silence is watched by the clock of 9.9, the EEPROM
+//! controller by what stands in the EEPROM when it says that it is done ([`eeprom`]), and the [invariants](crate::nd21) of the drive after
+//! every cycle. What a motor does within these it does not judge.
 
 mod cells;
+mod eeprom;
 
 use crate::device::Device;
 use crate::drive::Drive;
@@ -57,6 +59,8 @@ pub struct Witness {
     time_out: Option<Instant>,
     /// When it last sent something.
     last_sent: Instant,
+    /// What the EEPROM controller was told to do.
+    job: Option<eeprom::Job>,
     byte_time: Span,
     complaint: Option<Complaint>,
 }
@@ -75,6 +79,7 @@ impl Witness {
             last_byte: None,
             time_out: None,
             last_sent: Instant::START,
+            job: None,
             byte_time,
             complaint: None,
         };
@@ -140,6 +145,15 @@ impl Witness {
             let about = format!("cell {address:04X} went from {was:02X} to {is:02X} by itself");
             self.complain(now, ("14.2.1", "contents of a cell"), about);
         }
+        let job = self
+            .job
+            .map(|job| eeprom::done(job, &image(&self.drive), self.drive.cells()));
+        if let Some(Some(done)) = job {
+            self.job = None;
+            if let Err(about) = done {
+                self.complain(now, ("14.10.5", "EEPROM controller"), about);
+            }
+        }
         let silent = self.last_byte.map(|at| now.since(at));
         let monitored = self.monitored();
         if monitored && self.time_out.is_none() && silent.is_some_and(|own| own > TIME_OUT.1) {
@@ -166,6 +180,7 @@ impl Witness {
         if let Some((section, about)) = found {
             self.complain(now, (section, "contents of a cell"), about);
         }
+        self.job = eeprom::order(self.job, executed, &self.last);
         if self.drive.in_error() != self.bus.in_error() {
             let about = match self.bus.in_error() {
                 true if was_in_error => "it has left the error mode",
@@ -229,6 +244,7 @@ impl Device for Witness {
         self.after(now, was_in_error, &executed, code);
         if cells::is_reset(&executed) {
             self.last_byte = None;
+            self.job = None;
         }
         if !self.bus.in_error() {
             self.time_out = None;
@@ -280,6 +296,7 @@ impl Device for Witness {
         }
         self.last_byte = None;
         self.time_out = None;
+        self.job = None;
         self.teach();
     }
 
