@@ -178,8 +178,10 @@ impl Drive {
         }
     }
 
-    /// Puts a [witness](Witness) beside a drive that is a whole ND21, on a line with this time for a byte. Nobody has spoken to it.
-    pub fn witness(&mut self, byte_time: Span) {
+    /// Puts a [witness](Witness) beside a drive to which nobody has spoken, on a line with this time for a byte; false where it is no
+    /// whole ND21 and has none.
+    #[must_use]
+    pub fn witness(&mut self, byte_time: Span) -> bool {
         let whole = match &*self {
             Self::Plain(_) | Self::Witnessed(_) => false,
             Self::Nd21(_) => true,
@@ -188,6 +190,7 @@ impl Drive {
         if whole {
             *self = Self::Witnessed(Box::new(Witness::new(self.clone(), byte_time)));
         }
+        whole
     }
 
     /// Its witness.

@@ -2,7 +2,7 @@
 
 use super::args::duration;
 use super::exit::Exit;
-use super::fuzz::{Use, on_ports, scope, tell};
+use super::fuzz::{Use, on_ports, scope, sizes, tell};
 use super::output::Output;
 use super::rig_failure::find_rig;
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
@@ -68,8 +68,7 @@ pub(super) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::i
     let Some(rig) = find_rig(name, output) else {
         return Ok(Exit::Usage);
     };
-    let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
-    if rig.is_simulated() || sizes != finding.case.sizes() {
+    if rig.is_simulated() || sizes(&rig) != finding.case.sizes() {
         let sizes: Vec<_> = finding.case.sizes().iter().map(u8::to_string).collect();
         output.complain(&format!(
             "the finding is of a rig with ports and {} drives in its rings, and {name} is another",

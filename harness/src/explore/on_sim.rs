@@ -41,17 +41,43 @@ impl OnSim {
         own.or_else(|| beside(case, link))
     }
 
+    /// The same, with rings of these sizes made at once: what cannot be is said before a run begins.
+    ///
+    /// # Errors
+    /// The lines of the setup have mistakes, or nobody can judge what they make.
+    pub fn ready(setup: Setup, sizes: &[u8]) -> Result<Self, ExploreError> {
+        let mut new = Self::new(setup);
+        new.fresh_of(sizes.to_vec())?;
+        Ok(new)
+    }
+
     /// The model: where nothing is planted it is under test itself, beside the reference model or with witnesses.
     fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, ExploreError> {
         let mut model = self.setup.model(sizes)?;
-        if self.setup.deviates.is_empty() {
-            model.witness();
+        if !self.setup.deviates.is_empty() || self.setup.is_plain() {
+            return Ok(model);
         }
-        Ok(model)
+        let remedy = "leave the line out, or plant a deviation (--deviates DRIVE=NAME)";
+        if let Some(line) = self.setup.sets_property() {
+            return Err(ExploreError::Usage(format!(
+                "there is nothing to hold these drives against: witnesses know no other property of the bus than the default, and the \
+                 rig says `{line}`; {remedy}"
+            )));
+        }
+        match model.witness() {
+            true => Ok(model),
+            false => Err(ExploreError::Usage(format!(
+                "there is nothing to hold these drives against: witnesses judge whole ND21s, and a `model` line of the rig makes some of \
+                 them plain; {remedy}"
+            ))),
+        }
     }
 
     fn fresh(&mut self, case: &Case) -> Result<&Fresh, ExploreError> {
-        let sizes = case.sizes();
+        self.fresh_of(case.sizes())
+    }
+
+    fn fresh_of(&mut self, sizes: Vec<u8>) -> Result<&Fresh, ExploreError> {
         let fresh = match self.fresh.take().filter(|fresh| fresh.sizes == sizes) {
             Some(fresh) => fresh,
             None => Fresh {

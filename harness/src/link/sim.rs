@@ -72,10 +72,13 @@ impl SimulatedLink {
         }
     }
 
-    /// Puts a [witness](harness_sim::witness) beside every whole ND21; nobody has spoken to the rings.
-    pub fn witness(&mut self) {
+    /// Puts a [witness](harness_sim::witness) beside every drive, to whom nobody has spoken; false where one is no whole ND21 and has none.
+    #[must_use]
+    pub fn witness(&mut self) -> bool {
         let byte_time = self.byte_time;
-        self.each_drive(|drive| drive.witness(byte_time));
+        let mut all = true;
+        self.each_drive(|drive| all &= drive.witness(byte_time));
+        all
     }
 
     /// The first thing that the witnesses of a ring saw: the drive, and what it was. Nothing more comes.

@@ -279,6 +279,19 @@ fn what_cannot_be() {
         2,
         "the rig says `drive 0 property time-out = 15ms`",
     );
+    let plain = folder.path().join("plain.toml");
+    let lines = lines.replace("property time-out = 15ms", "model plain");
+    std::fs::write(&plain, lines).expect("room");
+    ended(
+        &run(&[
+            "--rig",
+            name(&plain),
+            "--out",
+            name(&folder.path().join("mixed")),
+        ]),
+        2,
+        "makes some of them plain",
+    );
     ended(
         &run(&["--deviates", "2:1=writes-ignored", "--out", name(&out)]),
         2,

@@ -1,6 +1,6 @@
 //! `drivebench fuzz replay`: a minute on hardware.
 
-use super::rig::{Use, on_ports, rings, scope, simulated, tell};
+use super::rig::{Use, on_ports, rings, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
@@ -51,10 +51,7 @@ pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
         Err(error) => return Ok(tell(&error, output)),
     };
     if cases.is_empty() {
-        let sizes: Vec<_> = rig
-            .rings()
-            .map(|(_, ring)| ring.drives.to_string())
-            .collect();
+        let sizes: Vec<_> = sizes(&rig).iter().map(u8::to_string).collect();
         output.complain(&format!(
             "{} holds no case for a ring of {}",
             arguments.folder.display(),
@@ -64,7 +61,10 @@ pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
     }
     if rig.is_simulated() {
         let setup = Setup::of_rig(&rig, &[], false);
-        let mut target = OnSim::new(setup.clone());
+        let mut target = match OnSim::ready(setup.clone(), &sizes(&rig)) {
+            Ok(target) => target,
+            Err(error) => return Ok(tell(&error, output)),
+        };
         let scope = simulated(&rig, Limits::unlimited(), &setup);
         let campaign = campaign(arguments, &rig, setup, scope);
         return play(arguments, campaign, cases, &mut target, output);

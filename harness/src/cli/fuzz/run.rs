@@ -1,6 +1,6 @@
 //! `drivebench fuzz run`.
 
-use super::rig::{Use, on_ports, scope, simulated, tell};
+use super::rig::{Use, on_ports, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
@@ -186,13 +186,6 @@ fn on_simulated(
         Some(kept) => kept.about.setup.clone(),
         None => Setup::of_rig(rig, &arguments.deviates, arguments.whole),
     };
-    if let Some(line) = setup.sets_property().filter(|_| setup.deviates.is_empty()) {
-        output.complain(&format!(
-            "there is nothing to hold these drives against: the reference model knows no other property of the bus than the \
-             default, and the rig says `{line}`. Plant a deviation (--deviates DRIVE=NAME), or leave the line out"
-        ));
-        return Ok(Exit::Usage);
-    }
     let own = &rig.file.limits;
     let limits = Limits {
         motion: own.allow_motion,
@@ -202,7 +195,10 @@ fn on_simulated(
         ..Limits::default()
     };
     let scope = simulated(rig, limits, &setup);
-    let mut target = OnSim::new(setup.clone());
+    let mut target = match OnSim::ready(setup.clone(), &sizes(rig)) {
+        Ok(target) => target,
+        Err(error) => return Ok(tell(&error, output)),
+    };
     let bounds = Bounds {
         cases: arguments.cases.unwrap_or(match arguments.wire_time {
             Some(_) => u64::MAX,
