@@ -5,8 +5,11 @@ use crate::findings::empty_checkout;
 use crate::{Heard, about, bounds, scope_of};
 use harness::explore::shrink::{Subject, shrink};
 use harness::explore::{
-    About, Beside, Campaign, Case, Finding, OnSim, Planted, Setup, Target, by_novelty,
+    About, Beside, Campaign, Case, Finding, Line, OnSim, Planted, Setup, Target, beside,
+    by_novelty, play,
 };
+use harness::link::Line as _;
+use harness_proto::time::Span;
 use std::path::Path;
 
 fn planted(ring: usize, drive: u8, name: &str) -> Setup {
@@ -92,6 +95,21 @@ fn the_scenario_names_its_ring() {
     );
 }
 
+/// A byte on the ring that a case is not with is a finding of that ring (ND21 12.2).
+#[test]
+fn the_other_ring_stays_silent() {
+    let (_, campaign) = explore(&Setup::default(), 1, 60);
+    let case = campaign.pool().cases()[0].clone();
+    let mut link = Setup::default().model(&case.sizes()).expect("rings");
+    play(&mut link, &case);
+    assert_eq!(beside(&case, &link), None);
+    let other = 1 - case.ring();
+    link.send(other, &[0x80]);
+    link.run_until(link.now() + Span::from_millis(1));
+    let found = beside(&case, &link).expect("a byte");
+    assert_eq!((found.ring, &found.section[..]), (other, "12.2"));
+}
+
 /// What one ring has shown is no reason to leave it out of the other.
 #[test]
 fn each_ring_has_its_own_features() {
@@ -120,6 +138,14 @@ fn forms_of_cases() {
     let case = read(second).expect("a case");
     assert_eq!((case.ring(), case.sizes()), (1, vec![5, 3]));
     assert_eq!(serde_json::to_string(&case).expect("a form"), second);
+    let planted: Planted =
+        serde_json::from_str("{\"drive\":1,\"name\":\"and-is-or\"}").expect("a deviation");
+    assert_eq!((planted.ring, planted.drive), (0, 1));
+    let run = "{\"kind\":\"run\",\"schema\":1,\"rig\":\"sim:3\",\"drives\":3,\"ports\":false,\"seed\":1,\"confirm\":2,\"of\":3,\
+               \"setup\":{\"header\":[],\"deviates\":[]},\"spices\":[]}";
+    let line: Line = serde_json::from_str(run).expect("a line");
+    assert_eq!(line, Line::Run(about(&Setup::default(), 1)));
+    assert_eq!(serde_json::to_string(&line).expect("a form"), run);
     for drives in [0, 251] {
         let case = Case {
             beside: Some(Beside::Second(drives)),

@@ -110,3 +110,30 @@ fn broken(state: &State<'_>) -> Option<&'static str> {
     let (sentence, _) = INVARIANTS.iter().find(|(_, holds)| !holds(state))?;
     Some(sentence)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Who watches is told which one was broken first, in every build; nobody panics.
+    #[test]
+    fn a_broken_invariant_is_kept() {
+        let cells = Cells::with_eeprom([0; 256]);
+        let positioning = Positioning::default();
+        let state = |speed, position| State {
+            cells: &cells,
+            mode: Mode::Stop,
+            positioning: &positioning,
+            speed,
+            position,
+        };
+        let mut watch = Watch::default();
+        watch.begin();
+        watch.look(&state(0.0, 0.0));
+        assert_eq!(watch.broken(), None);
+        watch.look(&state(70_000.0, 0.0));
+        watch.look(&state(0.0, f64::NAN));
+        let first = "no motor turns faster than the model allows";
+        assert_eq!(watch.broken(), Some(first));
+    }
+}

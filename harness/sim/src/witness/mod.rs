@@ -3,8 +3,8 @@
 //! It hears what the drive hears and says for each byte what must go out for it, by the [reference model](crate::reference) of the bus
 //! (ND21 9, 10), which shares no code with the drive's own end of the bus. What the drive changes by itself the reference is taught
 //! before each byte, out of the drive's memory; nothing else may change between two bytes, and a byte changes exactly the cells
-//! that it means, as far as the tables let them be written ([`cells`], 14.2.1). Silence is watched by the clock of 9.9, the EEPROM
-//! controller by what stands in the EEPROM when it says that it is done ([`eeprom`]), and the [invariants](crate::nd21) of the drive after
+//! that it means, as far as the tables let them be written (14.2.1). Silence is watched by the clock of 9.9, the EEPROM
+//! controller by what stands in the EEPROM when it says that it is done, and the invariants of the drive after
 //! every cycle. What a motor does within these it does not judge.
 
 mod cells;
