@@ -245,6 +245,7 @@ fn the_page_of_a_finding() {
     let output = drivebench(&[&run[..], &ways[..]].concat());
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     browser.open(&file);
+    browser.value("document.querySelector('.ring').scrollIntoView()");
     browser.until("!!document.querySelector('.ring .tools button')");
     browser.value("document.querySelector('.ring .scroll').focus()");
     browser.press("ArrowRight");
