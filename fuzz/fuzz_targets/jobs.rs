@@ -1,2 +1,2 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| harness_sim::fuzz::jobs(data));
+drivebench_fuzz::noting!("jobs");

@@ -33,3 +33,6 @@ pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32, head: us
     }
     size
 }
+
+mod noting;
+pub use noting::{FEATURES, note};

@@ -472,6 +472,7 @@ fn fuzz_coverage() {
     let output = drivebench(&["fuzz", "coverage"]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     assert!(stdout(&output).contains("(100.0 %)"));
+    assert!(stdout(&output).contains("bus_end         49    15045  435 of 435\n"));
     let path = file("fuzz_coverage", "empty", "");
     let folder = path.parent().expect("a folder");
     let _none_before = std::fs::remove_dir_all(folder.join("detector"));
@@ -491,6 +492,9 @@ fn fuzz_coverage() {
     ];
     let json: serde_json::Value = serde_json::from_str(&stdout(&drivebench(&json))).expect("JSON");
     assert_eq!(json["reached_by_corpus"], 1);
+    let sum =
+        serde_json::json!({"target": "detector", "inputs": 1, "bytes": 2, "reached": 1, "of": 175});
+    assert_eq!(json["targets"], serde_json::json!([sum]));
     file("fuzz_coverage/detector", "two.hex", "0");
     let half = drivebench(&["fuzz", "coverage", "--corpus", text(folder)]);
     assert_eq!(code(&half), 2);
@@ -516,19 +520,45 @@ fn fuzz_distil() {
     let page = stdout(&output);
     assert_eq!(
         page,
-        format!("{name}\n1 inputs: 1 transitions more, 1 before\n")
+        format!("{name}\n1 inputs: 1 features more, 1 before\n")
     );
     let written = std::fs::read_to_string(kept.join(name)).expect("written");
-    // What stands in front of the PAUSE is the number of the damaged byte: any will do that is none of this wire.
-    assert!(written.ends_with("PAUSE\n80 81\n"), "{written}");
+    assert!(written.ends_with("PAUSE\n00 81\n"), "{written}");
     let again = distil("detector");
     assert_eq!(
         stdout(&again),
-        "0 inputs: 0 transitions more, 2 before\n",
+        "0 inputs: 0 features more, 2 before\n",
         "{}",
         stderr(&again)
     );
-    assert_eq!(code(&distil("codec")), 2);
+    // A target whose inputs are texts keeps texts.
+    let texts = file("fuzz_distil/texts", "a.scn", "title x\nwait\nring 3\n");
+    let texts = texts.parent().expect("a folder");
+    let to = texts.with_file_name("kept-texts");
+    let _none_before = std::fs::remove_dir_all(&to);
+    std::fs::create_dir(&to).expect("made");
+    let output = drivebench(&[
+        "fuzz",
+        "distil",
+        "scenario",
+        "--from",
+        text(texts),
+        "--to",
+        text(&to),
+    ]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let files = std::fs::read_dir(&to).expect("a folder");
+    let names: Vec<_> = files
+        .map(|file| file.expect("readable").file_name())
+        .collect();
+    assert!(
+        names
+            .iter()
+            .all(|name| name.to_string_lossy().ends_with(".scn")),
+        "{names:?}"
+    );
+    assert_eq!(names.len(), 1);
+    assert_eq!(code(&distil("nonesuch")), 2);
     let nothing = drivebench(&[
         "fuzz",
         "distil",

@@ -1,8 +1,9 @@
 //! The kept inputs of the fuzz targets, played with plain `cargo test`: none may break a rule.
 
 use harness::fuzz::coverage::Coverage;
+use harness::fuzz::distil::superfluous;
 use harness::fuzz::input::input;
-use harness::fuzz::targets;
+use harness::fuzz::{noting, targets};
 use harness_sim::transitions::{State, tour};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -149,6 +150,63 @@ fn the_corpus_reaches_every_reachable_transition() {
     assert!(coverage.missing().is_empty(), "{}", coverage.sums());
     let snapshot = Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots/fuzz/transitions.txt");
     kept(&snapshot, &coverage.page());
+}
+
+/// The inputs of a target with the names of their files.
+fn inputs(target: &str) -> Vec<(String, Vec<u8>)> {
+    let files = std::fs::read_dir(folder().join(target)).expect("a folder");
+    let read = |entry: std::io::Result<std::fs::DirEntry>| {
+        let path = entry.expect("readable").path();
+        let name = path.file_name().expect("a name").to_string_lossy();
+        let content = std::fs::read(&path).expect("readable");
+        let input = input(&name, &content).expect("an input");
+        (name.into_owned(), input)
+    };
+    let mut inputs: Vec<_> = files.map(read).collect();
+    inputs.sort();
+    inputs
+}
+
+/// Every target says what its inputs reach.
+#[test]
+fn every_target_is_summed_up() {
+    let noted: BTreeSet<_> = noting().map(|target| target.name).collect();
+    let known: BTreeSet<_> = targets().map(|(name, _)| name).collect();
+    assert_eq!(noted, known);
+    let coverage = Coverage::of_folder(&folder()).expect("a corpus");
+    let summed: BTreeSet<_> = coverage.targets.iter().map(|sum| sum.target).collect();
+    assert_eq!(summed, known);
+    for sum in &coverage.targets {
+        assert!(sum.reached > 0, "{sum:?}");
+        assert!(sum.of.is_none_or(|of| sum.reached <= of), "{sum:?}");
+    }
+}
+
+/// What was distilled stays distilled: without any one of these files something would not be reached.
+#[test]
+fn no_distilled_input_is_superfluous() {
+    for target in noting() {
+        let idle = superfluous(target.body, &inputs(target.name));
+        assert!(
+            idle.is_empty(),
+            "corpora/fuzz/{}: the others reach all that these do; remove one and look again: {idle:#?}",
+            target.name
+        );
+    }
+}
+
+/// The folders are small enough to be read, and to be played with every `cargo test`.
+#[test]
+fn the_folders_are_small() {
+    for target in noting() {
+        let inputs = inputs(target.name);
+        let bytes: usize = inputs.iter().map(|(_, input)| input.len()).sum();
+        let (files, name) = (inputs.len(), target.name);
+        assert!(
+            files <= 128 && bytes <= 60_000,
+            "{name}: {files} files, {bytes} bytes"
+        );
+    }
 }
 
 /// The inputs of `bus_end` that are named after a state are the tour.

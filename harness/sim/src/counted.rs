@@ -3,6 +3,7 @@
 use crate::cells::Cells;
 use crate::device::Device;
 use crate::plain::PlainDrive;
+use crate::transitions::{Event, Reached, Transition, classify, state};
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::command::Kind;
@@ -92,6 +93,8 @@ pub struct Counted {
     pub memory: CountedCells,
     /// How often the power came back.
     pub starts: u32,
+    /// The protocol transitions that it went through, where somebody watches.
+    reached: Option<Box<Reached>>,
 }
 
 impl Counted {
@@ -110,12 +113,27 @@ impl Counted {
                 refused: None,
             },
             starts: 0,
+            reached: None,
         }
+    }
+
+    /// From now on its protocol transitions are noted.
+    pub fn watch(&mut self) {
+        self.reached = Some(Box::default());
+    }
+
+    /// Those that it went through; `None` where nobody watches.
+    #[must_use]
+    pub fn reached(&self) -> Option<&Reached> {
+        self.reached.as_deref()
     }
 }
 
 impl Device for Counted {
     fn receive(&mut self, now: Instant, received: Received) -> Step {
+        if let Some(reached) = &mut self.reached {
+            reached.add(classify(&self.bus_end, &self.memory.cells, received));
+        }
         self.bus_end.receive(now, received, &mut self.memory)
     }
 
@@ -124,6 +142,12 @@ impl Device for Counted {
     }
 
     fn handle_deadline(&mut self, now: Instant) -> Step {
+        if let Some(reached) = &mut self.reached {
+            reached.add(Transition {
+                state: state(&self.bus_end, &self.memory.cells),
+                event: Event::Silence,
+            });
+        }
         self.bus_end.handle_deadline(now, &mut self.memory)
     }
 

@@ -70,6 +70,69 @@ pub fn record(input: &[u8]) {
     }
 }
 
+/// What a record reaches: its kinds of lines and what comes of judging it, or why it is none; as a place and a message.
+pub(crate) fn noted(input: &[u8], note: &mut dyn FnMut(&'static str, String)) {
+    if input.len() > LONGEST {
+        return;
+    }
+    let (lines, whole) = match read(input) {
+        Ok(read) => read,
+        Err(error) => return note("no record", error.message),
+    };
+    note(
+        "a record",
+        if whole {
+            "whole"
+        } else {
+            "half a line at its end"
+        }
+        .to_owned(),
+    );
+    for line in &lines {
+        note("a line", kind(line));
+    }
+    if lines.iter().any(|line| line.time() > SHORT) {
+        return note("a record", "longer than it is judged here".to_owned());
+    }
+    let scenario = |_: &str| Ok(SCENARIO.to_owned());
+    let beside = Beside {
+        rig: rig(),
+        scenario: &scenario,
+    };
+    match judge_record(input, &beside) {
+        Err(error) => note("not judged", error.to_string()),
+        Ok(verified) => {
+            for wrong in verified.files {
+                note("a file", wrong);
+            }
+            for attempt in verified.attempts {
+                let recorded = attempt.recorded.unwrap_or_else(|| "nothing".to_owned());
+                note(
+                    "an attempt",
+                    format!("recorded {recorded}, judged {}", attempt.judged),
+                );
+                if let Some(differs) = attempt.differs {
+                    note("an attempt that differs", differs);
+                }
+            }
+        }
+    }
+}
+
+/// What a line tells, with the words that stand in it for a kind.
+fn kind(line: &Line) -> String {
+    let value = serde_json::to_value(line).unwrap_or_default();
+    let word = |key: &str| value.get(key).and_then(serde_json::Value::as_str);
+    let words = ["kind", "cause", "error", "verdict"]
+        .into_iter()
+        .filter_map(word);
+    let mut words: Vec<_> = words.map(str::to_owned).collect();
+    if let Some(fault) = value.pointer("/what/0").and_then(serde_json::Value::as_str) {
+        words.push(fault.to_owned());
+    }
+    words.join(", ")
+}
+
 /// An error has its place in the input, or directly behind it.
 fn placed(error: &RecordError, input: &[u8]) {
     let lines = input.split(|byte| *byte == b'\n').count().max(1);

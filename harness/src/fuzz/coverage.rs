@@ -1,10 +1,13 @@
-//! Which transitions of a drive's end of the bus (ND21 9.1-9.9) the kept inputs reach, and which were reached on hardware.
+//! Which transitions of a drive's end of the bus (ND21 9.1-9.9) the kept inputs reach, and which were reached on hardware; and what
+//! the inputs of each target reach, summed up.
 
 use super::input::{InputError, input};
-use harness_sim::fuzz::WATCHING;
+use super::noting;
+use harness_sim::fuzz::{Feature, Noting, WATCHING, features, of_cell};
 use harness_sim::transitions::{CELLS, Event, RULES, Reached, State, Transition, why_unreachable};
 use include_dir::{Dir, include_dir};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -78,11 +81,28 @@ pub struct Played {
     pub reached: Reached,
 }
 
+/// What the inputs of a target reach.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Sum {
+    /// The target.
+    pub target: &'static str,
+    /// How many inputs it has.
+    pub inputs: usize,
+    /// How many bytes these have.
+    pub bytes: usize,
+    /// How many features they reach together; of a target that feeds drives raw bytes these are transitions of the matrix.
+    pub reached: usize,
+    /// How many there are, where that is known.
+    pub of: Option<usize>,
+}
+
 /// What is reached.
 #[derive(Clone, Debug)]
 pub struct Coverage {
-    /// Each input, in order of names.
+    /// Each input of the targets that feed drives raw bytes, in order of names.
     pub files: Vec<Played>,
+    /// Each target that has inputs, in order of names.
+    pub targets: Vec<Sum>,
     /// What the inputs reach together.
     pub corpus: Reached,
     /// What was reached on hardware.
@@ -112,8 +132,8 @@ impl Coverage {
     /// One of them is none, or breaks a rule.
     pub fn committed() -> Result<Self, CoverageError> {
         let mut files = Vec::new();
-        for (target, _) in WATCHING {
-            let folder = CORPUS.get_dir(target);
+        for target in noting() {
+            let folder = CORPUS.get_dir(target.name);
             for file in folder.iter().flat_map(|folder| folder.files()) {
                 files.push((file.path().display().to_string(), file.contents().to_vec()));
             }
@@ -128,11 +148,11 @@ impl Coverage {
     pub fn of_folder(folder: &Path) -> Result<Self, CoverageError> {
         let mut files = Vec::new();
         std::fs::read_dir(folder).map_err(unreadable(folder))?;
-        for (target, _) in WATCHING {
-            let inner = folder.join(target);
+        for Noting { name, .. } in noting() {
+            let inner = folder.join(name);
             if inner.is_dir() {
                 let inputs = read_folder(&inner)?.into_iter();
-                files.extend(inputs.map(|(file, content)| (format!("{target}/{file}"), content)));
+                files.extend(inputs.map(|(file, content)| (format!("{name}/{file}"), content)));
             }
         }
         Self::of(files)
@@ -143,27 +163,32 @@ impl Coverage {
         inputs.sort();
         let mut files = Vec::new();
         let mut corpus = Reached::default();
+        let mut tallies: Vec<_> = noting().map(Tally::new).collect();
+        tallies.sort_by_key(|tally| tally.target.name);
         for (name, content) in inputs {
             let target = name.split('/').next().unwrap_or_default();
-            let Some((_, body)) = WATCHING.iter().find(|(known, _)| *known == target) else {
-                continue;
-            };
+            let tally = tallies.iter_mut().find(|tally| tally.target.name == target);
+            let Some(tally) = tally else { continue };
             let data = input(&name, &content).map_err(|error| CoverageError::Input {
                 name: name.clone(),
                 error,
             })?;
-            let played = std::panic::catch_unwind(|| body(&data));
-            let Ok(reached) = played else {
+            let played = std::panic::catch_unwind(|| play(&tally.target, &data));
+            let Ok((reached, features)) = played else {
                 return Err(CoverageError::Rule { name });
             };
-            corpus.join(&reached);
-            files.push(Played { name, reached });
+            tally.add(data.len(), features);
+            if let Some(reached) = reached {
+                corpus.join(&reached);
+                files.push(Played { name, reached });
+            }
         }
         if files.is_empty() {
             return Err(CoverageError::Empty);
         }
         Ok(Self {
             files,
+            targets: tallies.iter().filter_map(Tally::sum).collect(),
             corpus,
             hardware: hardware(HARDWARE)?,
         })
@@ -207,6 +232,26 @@ impl Coverage {
         }
         text.push('\n');
         text.push_str(&self.sums());
+        text.push('\n');
+        text.push_str(&self.targets());
+        text
+    }
+
+    /// A row a target: its inputs, their bytes, and what they reach.
+    #[must_use]
+    pub fn targets(&self) -> String {
+        let mut text = String::from("target      inputs    bytes  reached\n");
+        for sum in &self.targets {
+            let of = sum.of.map(|of| format!(" of {of}")).unwrap_or_default();
+            let Sum {
+                target,
+                inputs,
+                bytes,
+                reached,
+                ..
+            } = sum;
+            let _infallible = writeln!(text, "{target:10}{inputs:8}{bytes:9}  {reached}{of}");
+        }
         text
     }
 
@@ -262,6 +307,53 @@ impl Coverage {
         }
         text
     }
+}
+
+/// What a target's inputs reach, as far as they have been played.
+struct Tally {
+    target: Noting,
+    inputs: usize,
+    bytes: usize,
+    reached: BTreeSet<Feature>,
+}
+
+impl Tally {
+    const fn new(target: Noting) -> Self {
+        Self {
+            target,
+            inputs: 0,
+            bytes: 0,
+            reached: BTreeSet::new(),
+        }
+    }
+
+    fn add(&mut self, bytes: usize, reached: BTreeSet<Feature>) {
+        self.inputs += 1;
+        self.bytes += bytes;
+        self.reached.extend(reached);
+    }
+
+    fn sum(&self) -> Option<Sum> {
+        (self.inputs > 0).then(|| Sum {
+            target: self.target.name,
+            inputs: self.inputs,
+            bytes: self.bytes,
+            reached: self.reached.len(),
+            of: self.target.of.map(|count| count()),
+        })
+    }
+}
+
+/// Plays an input once: the cells of the matrix, where its target feeds drives raw bytes, and what it reaches.
+fn play(target: &Noting, data: &[u8]) -> (Option<Reached>, BTreeSet<Feature>) {
+    let watching = WATCHING.iter().find(|(name, _)| *name == target.name);
+    let Some((_, body)) = watching else {
+        return (None, features(target.body, data));
+    };
+    let reached = body(data);
+    let cells = Transition::reachable().filter(|cell| reached.contains(*cell));
+    let features = cells.map(of_cell).collect();
+    (Some(reached), features)
 }
 
 /// The files of a folder with their names, in order of these; folders in it are left out.

@@ -2,16 +2,18 @@
 //!
 //! The bodies for bytes of the bus are in `harness_sim::fuzz`; here are those for texts ([`scenario`], [`rig`]);
 //! those for captures and records stand beside what reads them.
-//! [`coverage`] holds the kept inputs against the matrix of protocol transitions, [`distil`](mod@distil) chooses what is worth keeping.
+//! [`coverage`] holds the kept inputs against the matrix of protocol transitions and sums up what they reach, [`distil`](mod@distil) chooses
+//! what is worth keeping.
 
 pub mod coverage;
 pub mod distil;
 pub mod input;
+mod noted;
 mod text;
 
 pub use text::{rig, scenario};
 
-use harness_sim::fuzz::{TARGETS, Target};
+use harness_sim::fuzz::{NOTING, Noting, TARGETS, Target};
 
 /// The targets whose bodies need the whole bench.
 pub const BENCH_TARGETS: [Target; 4] = [
@@ -24,4 +26,33 @@ pub const BENCH_TARGETS: [Target; 4] = [
 /// Every target.
 pub fn targets() -> impl Iterator<Item = Target> {
     TARGETS.into_iter().chain(BENCH_TARGETS)
+}
+
+/// What the inputs of those reach.
+pub const BENCH_NOTING: [Noting; 4] = [
+    Noting {
+        name: "scenario",
+        body: noted::scenario,
+        of: None,
+    },
+    Noting {
+        name: "rig",
+        body: noted::rig,
+        of: None,
+    },
+    Noting {
+        name: "capture",
+        body: noted::capture,
+        of: None,
+    },
+    Noting {
+        name: "record",
+        body: noted::record,
+        of: None,
+    },
+];
+
+/// Every target with what its inputs reach.
+pub fn noting() -> impl Iterator<Item = Noting> {
+    NOTING.into_iter().chain(BENCH_NOTING)
 }

@@ -48,7 +48,8 @@ pub fn rig(data: &[u8]) {
         return;
     };
     let read = |source: &Source| match rig::parse(source) {
-        Ok(rig) => format!("{rig:?}"),
+        // Its text has the newline, and no more than that.
+        Ok(rig) => format!("{:?} {:?}", rig.file, rig.profile),
         Err(problems) => check(&problems, source),
     };
     let shown = read(&source);

@@ -2,6 +2,8 @@
 //! model, which shares no code with it.
 
 use super::LONGEST;
+use super::features::Notebook;
+use super::guard_words::{self as words, Heard};
 use crate::reference::{Cell, Drive};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::{Guard, Limits};
@@ -19,6 +21,14 @@ use harness_proto::time::{Instant, Span};
 /// # Panics
 /// A drive executes what the limits deny.
 pub fn guard(data: &[u8]) {
+    noted(data, &mut Notebook::none());
+}
+
+/// The same, and what the guard took the bytes for and made of them is noted.
+///
+/// # Panics
+/// As [`guard`].
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let &[what, damaged, silent, whose, start, ref rest @ ..] = data else {
         return;
     };
@@ -47,7 +57,14 @@ pub fn guard(data: &[u8]) {
             silence(&mut ring, usize::from(whose & 15), whose >> 4);
         }
         let bad = index + 1 == usize::from(damaged);
-        if guard.admit(now, byte, bad).is_err() {
+        let heard = Heard {
+            stage: guard.stage(),
+            byte,
+            bad,
+        };
+        let admitted = guard.admit(now, byte, bad);
+        words::note(notes, &heard, admitted, &guard);
+        if admitted.is_err() {
             guard.reset_after_denial();
             continue;
         }
@@ -61,7 +78,11 @@ pub fn guard(data: &[u8]) {
             },
         );
         for (place, drive) in ring.iter_mut().enumerate() {
+            if drive.in_error() {
+                words::note_error_mode(notes, &heard);
+            }
             for command in drive.take_executed() {
+                words::note_executed(notes, &command);
                 let why = denied(&command, &limits);
                 assert!(
                     why.is_none(),

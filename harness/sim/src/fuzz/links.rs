@@ -1,6 +1,7 @@
 //! In-band marks: what a stream with marks says does not depend on where it is cut.
 
 use super::LONGEST;
+use super::features::{Feature, Notebook};
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
 
@@ -33,6 +34,42 @@ pub fn links(data: &[u8]) {
     );
     again(&whole);
     as_line(stream);
+}
+
+/// How many features there are: three places in a mark, and there three bytes, a cut and the end.
+pub(super) fn count() -> usize {
+    3 * 5
+}
+
+/// Plays an input, and names what comes where in a mark.
+///
+/// # Panics
+/// As the target.
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
+    links(data);
+    let Some((&cut, stream)) = data.split_first() else {
+        return;
+    };
+    let stream = &stream[..stream.len().min(LONGEST)];
+    let mut mark = "between marks";
+    let mut note = |mark, what| notes.note(|| Feature::new("", mark, what));
+    for (index, byte) in stream.iter().enumerate() {
+        if index == usize::from(cut) {
+            note(mark, "the stream is cut");
+        }
+        let what = match byte {
+            0 => "00",
+            0xFF => "FF",
+            _ => "another byte",
+        };
+        note(mark, what);
+        mark = match (mark, byte) {
+            ("between marks", 0xFF) => "behind FF",
+            ("behind FF", 0) => "behind FF 00",
+            _ => "between marks",
+        };
+    }
+    note(mark, "the stream ends");
 }
 
 fn read<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> (Read, bool) {

@@ -5,15 +5,22 @@
 //! that are kept; plain `cargo test` plays all of them.
 
 mod bus_end;
+mod codec;
 mod drive;
+mod drive_words;
+mod features;
 mod guard;
+mod guard_words;
 mod hostile;
 pub mod jobs;
 mod links;
 mod repair;
+mod words;
 
 pub use bus_end::{bus_end, bus_end_watched};
+pub use codec::codec_stream;
 pub use drive::drive;
+pub use features::{Body, Feature, NOTING, Notebook, Noting, features, of_cell};
 pub use guard::guard;
 pub use hostile::master;
 pub use jobs::jobs;
@@ -50,7 +57,7 @@ pub const WATCHING: [Watching; 3] = [
 /// Every target whose body is here.
 pub const TARGETS: [Target; 9] = [
     ("bus_end", bus_end),
-    ("codec", codec),
+    ("codec", codec_stream),
     ("detector", detector),
     ("links", links),
     ("ring", ring),

@@ -102,6 +102,16 @@ struct Reach<'a> {
 }
 
 impl CycleControl {
+    /// The function that a PLC has ordered, and what has become of it, for who looks on.
+    pub(super) fn ordered(&self) -> Option<(Function, &'static str)> {
+        self.running.map(|(function, course)| match course {
+            Course::Working => (function, "working"),
+            Course::Done(true) => (function, "done, GPO1 high"),
+            Course::Done(false) => (function, "done, GPO1 low"),
+            Course::Refused => (function, "refused"),
+        })
+    }
+
     pub(super) fn start(&mut self) {
         *self = Self::default();
     }

@@ -6,6 +6,7 @@ use super::world::{Shown, Stimulus};
 use crate::cells::Cells;
 use crate::device::Device;
 use harness_proto::line::Received;
+use harness_proto::nd21::functions::Function;
 use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
@@ -58,6 +59,11 @@ impl Nd21Drive {
     #[must_use]
     pub fn s_ramp_status(&self) -> Status {
         self.program.s_ramp_status()
+    }
+
+    /// The PLC function that was ordered, and what has become of it (ND21 13.1.7).
+    pub(crate) fn ordered(&self) -> Option<(Function, &'static str)> {
+        self.program.cycle_control.ordered()
     }
 
     /// What it shows outside the bus.

@@ -61,7 +61,7 @@ pub struct Program {
     referencing: Referencing,
     s_ramp: SRampRun,
     scope: Scope,
-    cycle_control: CycleControl,
+    pub(super) cycle_control: CycleControl,
     eeprom_controller: EepromController,
     clock: Clock,
     /// Of the power-up: from there the encoder emulation counts.

@@ -1,9 +1,9 @@
-//! `drivebench fuzz coverage`: the matrix of protocol transitions, and what reaches it.
+//! `drivebench fuzz coverage`: the matrix of protocol transitions, what reaches it, and what the inputs of each target reach.
 
 use crate::cli::args::Format;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::fuzz::coverage::{Coverage, CoverageError};
+use crate::fuzz::coverage::{Coverage, CoverageError, Sum};
 use clap::Args;
 use harness_sim::transitions::{CELLS, Transition, why_unreachable};
 use serde::Serialize;
@@ -49,6 +49,7 @@ struct Table<'a> {
     reached_on_hardware: usize,
     percent: f64,
     inputs: Vec<Input<'a>>,
+    targets: &'a [Sum],
     transitions: Vec<Cell>,
 }
 
@@ -73,6 +74,7 @@ impl<'a> Table<'a> {
             reached_on_hardware: coverage.hardware.count(),
             percent: Coverage::percent(&coverage.corpus),
             inputs: coverage.files.iter().map(input).collect(),
+            targets: &coverage.targets,
             transitions: Transition::all().map(cell).collect(),
         }
     }

@@ -3,18 +3,19 @@
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::fuzz::coverage::{CoverageError, read_folder};
-use crate::fuzz::distil::distil as distilled;
+use crate::fuzz::distil::{Pieces, distil as distilled};
 use crate::fuzz::input::input;
+use crate::fuzz::noting;
 use clap::Args;
-use harness_sim::fuzz::WATCHING;
-use harness_sim::transitions::Reached;
+use harness_sim::fuzz::{Feature, features};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// For `fuzz distil`.
 #[derive(Clone, Debug, Args)]
 pub struct DistilArguments {
-    /// The target: bus_end, detector or ring.
-    #[arg(value_parser = WATCHING.map(|(name, _)| name))]
+    /// The target.
+    #[arg(value_parser = noting().map(|target| target.name).collect::<Vec<_>>())]
     pub target: String,
     /// The folder that the fuzzer has filled.
     #[arg(long, value_name = "FOLDER")]
@@ -43,10 +44,10 @@ pub(super) fn distil(arguments: &DistilArguments, output: &mut Output) -> std::i
 }
 
 fn chosen(arguments: &DistilArguments) -> Result<String, CoverageError> {
-    let target = WATCHING.iter().find(|(name, _)| *name == arguments.target);
-    let Some((_, body)) = target else {
+    let Some(target) = noting().find(|target| target.name == arguments.target) else {
         return Err(CoverageError::Empty);
     };
+    let (body, pieces) = (target.body, Pieces::of(target.name));
     let grown = inputs(&arguments.from)?;
     if grown.is_empty() {
         return Err(CoverageError::Empty);
@@ -56,32 +57,33 @@ fn chosen(arguments: &DistilArguments) -> Result<String, CoverageError> {
     };
     let kept = inputs(&arguments.to)?;
     let (before, new) = std::panic::catch_unwind(|| {
-        let mut before = Reached::default();
-        kept.iter().for_each(|input| before.join(&body(input)));
-        let new = distilled(*body, &grown, &before);
+        let reached = kept.iter().flat_map(|input| features(body, input));
+        let before: BTreeSet<Feature> = reached.collect();
+        let new = distilled(body, pieces, &grown, &before);
         (before, new)
     })
     .map_err(rule)?;
     let mut names = Vec::new();
     for one in &new {
-        let mut name = one.name() + ".hex";
+        let ending = one.ending(pieces);
+        let mut name = format!("{}.{ending}", one.name());
         let mut number = 2;
         while arguments.to.join(&name).exists() {
-            name = format!("{}-{number}.hex", one.name());
+            name = format!("{}-{number}.{ending}", one.name());
             number += 1;
         }
-        write(&arguments.to.join(&name), &one.text())?;
+        write(&arguments.to.join(&name), &one.content(pieces))?;
         names.push(name);
     }
     let more: usize = new.iter().map(|one| one.new.len()).sum();
     Ok(format!(
-        "{}{} inputs: {more} transitions more, {} before\n",
+        "{}{} inputs: {more} features more, {} before\n",
         names
             .iter()
             .map(|name| format!("{name}\n"))
             .collect::<String>(),
         names.len(),
-        before.count(),
+        before.len(),
     ))
 }
 
@@ -96,9 +98,9 @@ fn inputs(folder: &Path) -> Result<Vec<Vec<u8>>, CoverageError> {
 }
 
 /// Writes a file under another name first: it is there whole or not at all.
-fn write(path: &Path, text: &str) -> Result<(), CoverageError> {
+fn write(path: &Path, content: &[u8]) -> Result<(), CoverageError> {
     let part = path.with_extension("part");
-    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
+    let written = std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path));
     written.map_err(|error| {
         let _gone = std::fs::remove_file(&part);
         CoverageError::Unwritable {

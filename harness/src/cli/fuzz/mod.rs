@@ -23,7 +23,7 @@ pub enum FuzzCommand {
     Replay(replay::ReplayArguments),
     /// Show how many cases it takes to find each planned deviation of a drive.
     Power(power::PowerArguments),
-    /// Show which protocol transitions the kept inputs reach; exit code 1 where a reachable one is missing.
+    /// Show which protocol transitions the kept inputs reach, and what those of each target reach; exit code 1 where a reachable transition is missing.
     Coverage(coverage::CoverageArguments),
     /// Choose from a grown corpus the few small inputs that reach what the kept ones do not, and put them beside those.
     Distil(distil::DistilArguments),

@@ -3,6 +3,7 @@
 use super::denial::{Cause, Denial};
 use super::effect::Act;
 use super::limits::Limits;
+use super::stage::Stage;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::{SEQUENCE, ZEROS};
 use crate::novobus::checksum::Checksum;
@@ -140,6 +141,39 @@ impl Guard {
     #[must_use]
     pub fn at_rest(&self) -> bool {
         self.state == State::Sync && self.halves.iter().all(|half| half.length == 0)
+    }
+
+    /// What the drives take the next byte for, as far as the bytes that have passed tell.
+    #[must_use]
+    pub fn stage(&self) -> Stage {
+        match self.state {
+            State::Doubt(doubt) => match (doubt.cleared, doubt.matched > 0, doubt.zeros == ZEROS) {
+                (false, ..) => Stage::Doubt,
+                (true, false, false) => Stage::Cleared,
+                (true, false, true) => Stage::Zeros,
+                (true, true, true) => Stage::Sequence,
+                (true, true, false) => Stage::IdleSequence,
+            },
+            State::Sync => Stage::Sync,
+            State::Address(_) => Stage::Address,
+            State::Net {
+                process: Process::High,
+                ..
+            } => Stage::ProcessHigh,
+            State::Net {
+                process: Process::Low(_),
+                ..
+            } => Stage::ProcessLow,
+            State::Net { key, .. } if key < FIRST_ADDRESS => Stage::Nobody,
+            State::Net { key, .. } => {
+                let sent = self.halves[usize::from(key)].sent();
+                match sent.first().and_then(|code| length(*code)) {
+                    None => Stage::Command,
+                    Some(length) if sent.len() < length => Stage::Parameter,
+                    Some(_) => Stage::Check,
+                }
+            }
+        }
     }
 
     /// The address byte that a short address goes on from (9.2); `None` where no short address is valid.

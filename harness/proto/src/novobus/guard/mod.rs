@@ -36,6 +36,7 @@ mod denial;
 mod effect;
 mod gate;
 mod limits;
+mod stage;
 #[cfg(test)]
 mod tests;
 
@@ -43,3 +44,4 @@ pub use denial::{Cause, Denial};
 pub use effect::Act;
 pub use gate::Guard;
 pub use limits::{Limits, Need};
+pub use stage::Stage;

@@ -4,6 +4,7 @@
 //! judge looks into the drives.
 
 mod judge;
+mod noted;
 mod play;
 mod wire;
 mod work;
@@ -11,6 +12,7 @@ mod work;
 pub use judge::Lie;
 pub use work::{Fault, Order, Work};
 
+use super::features::Notebook;
 use crate::deviation::MasterDeviation;
 use harness_proto::novobus::command::Command;
 
@@ -19,8 +21,16 @@ use harness_proto::novobus::command::Command;
 /// # Panics
 /// The master tells something that is not so, or sends what the manual does not allow.
 pub fn jobs(data: &[u8]) {
+    noted(data, &mut Notebook::none());
+}
+
+/// The same, and what master and drives go through is noted.
+///
+/// # Panics
+/// As [`jobs`].
+pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     let work = Work::read(data);
-    if let Some(lie) = judged(&work, None) {
+    if let Err(lie) = play::play(&work, None, notes) {
         panic!("{lie}: {work:?}");
     }
 }
@@ -38,5 +48,5 @@ pub fn conduct(drives: u8, sent: &[u8], asked: Option<&[(u8, Command)]>) -> Resu
 /// The first thing in which a master is wrong; `None` where everything that it did and told is as it must be.
 #[must_use]
 pub fn judged(work: &Work, deviates: Option<&'static MasterDeviation>) -> Option<Lie> {
-    play::play(work, deviates).err()
+    play::play(work, deviates, &mut Notebook::none()).err()
 }

@@ -1,6 +1,8 @@
 //! A master at its work, in virtual time.
 
+use super::super::features::Notebook;
 use super::judge::{DATA_IN, DATA_OUT, Judge, Lie};
+use super::noted::Watch;
 use super::wire;
 use super::work::{BITS, CONSTANT_CELLS, CONSTANTS, Work, constant, nominal};
 use crate::counted::Counted;
@@ -19,18 +21,25 @@ const BOUND: u64 = 6_000;
 const AFTERWARDS: u64 = 500;
 
 /// Lets a master do the work, and judges it.
-pub(super) fn play(work: &Work, deviates: Option<&'static MasterDeviation>) -> Result<(), Lie> {
+pub(super) fn play(
+    work: &Work,
+    deviates: Option<&'static MasterDeviation>,
+    notes: &mut Notebook<'_>,
+) -> Result<(), Lie> {
     let size = RingSize::new(u64::from(work.drives))
         .map_err(|error| Lie::new("8.5", error.to_string()))?;
     let rate = Rate::Baud38400;
-    let mut ring = Ring::new(size, rate, |k| drive(work, k));
+    let watched = notes.wanted();
+    let mut ring = Ring::new(size, rate, |k| drive(work, k, watched));
     ring.stop_recording();
     for fault in &work.faults {
         ring.arm_link(fault.link, fault.byte, fault.what);
     }
     let mut master = AnyMaster::new(size, rate, work.options(), deviates);
     let mut judge = Judge::new(work);
-    let done = do_all(work, &mut master, &mut ring, &mut judge);
+    let mut watch = Watch::new(work, notes);
+    let done = do_all(work, &mut master, &mut ring, &mut judge, &mut watch);
+    watch.drives(&ring);
     // What it sent wrongly is why all the rest is wrong.
     wire::read(work.drives, &judge.sent)?;
     done?;
@@ -44,6 +53,7 @@ fn do_all(
     master: &mut AnyMaster,
     ring: &mut Ring<Counted>,
     judge: &mut Judge<'_>,
+    watch: &mut Watch<'_, '_>,
 ) -> Result<(), Lie> {
     if work.exchange {
         let all: Vec<u8> = (0..work.drives).collect();
@@ -59,10 +69,11 @@ fn do_all(
             wait = 0;
             if let Ok(id) = master.submit(order.job) {
                 judge.given(id, *order);
+                watch.given(id, order, master.phase());
             }
         }
         wait += 1;
-        step(master, ring, judge)?;
+        step(master, ring, judge, watch)?;
         if orders.peek().is_some() {
             continue;
         }
@@ -85,8 +96,11 @@ fn do_all(
 }
 
 /// A drive with what nobody writes, and with places for process data.
-fn drive(work: &Work, k: u8) -> Counted {
+fn drive(work: &Work, k: u8, watched: bool) -> Counted {
     let mut drive = Counted::new(work.monitoring);
+    if watched {
+        drive.watch();
+    }
     let [_, data_in] = DATA_IN.to_be_bytes();
     let [_, data_out] = DATA_OUT.to_be_bytes();
     let constants = (CONSTANTS..CONSTANTS + CONSTANT_CELLS).map(|cell| (cell, constant(k, cell)));
@@ -104,12 +118,16 @@ fn step(
     master: &mut AnyMaster,
     ring: &mut Ring<Counted>,
     judge: &mut Judge<'_>,
+    watch: &mut Watch<'_, '_>,
 ) -> Result<(), Lie> {
     let now = ring.now();
+    let before = master.phase();
     judge.steps += 1;
+    let mut last = None;
     while let Some(byte) = ring.receive() {
         if let Some(received) = byte.arrival() {
             judge.heard(received);
+            last = Some(received);
             master.handle_byte(byte.at, received);
         }
     }
@@ -117,9 +135,12 @@ fn step(
         master.handle_timeout(now);
     }
     while let Some(event) = master.poll_event() {
+        watch.told(&event);
         judge.hear(&event, ring)?;
     }
-    match master.poll_transmit(now) {
+    let transmitted = master.poll_transmit(now);
+    watch.step(before, last, master.phase());
+    match transmitted {
         Some(byte) => {
             judge.sent.push(byte);
             ring.send(now, &[byte]);
