@@ -2,7 +2,7 @@
 //! repairs commands.
 
 use harness_sim::fuzz::repair;
-use harness_sim::transitions::{REACHABLE, Reached};
+use harness_sim::transitions::{Notes, REACHABLE, Transition};
 use std::sync::atomic::{AtomicU8, Ordering};
 
 // libFuzzer takes the counters in steps of eight bytes.
@@ -16,11 +16,22 @@ const COUNTERS: usize = REACHABLE.next_multiple_of(8);
 #[unsafe(link_section = "__libfuzzer_extra_counters")]
 static TRANSITIONS: [AtomicU8; COUNTERS] = [const { AtomicU8::new(0) }; COUNTERS];
 
-/// Tells libFuzzer which transitions a case went through.
-pub fn count(reached: &Reached) {
-    for number in reached.reachable_numbers() {
-        TRANSITIONS[number].store(1, Ordering::Relaxed);
+/// Tells libFuzzer which transitions a case goes through, each when it happens.
+#[derive(Default)]
+pub struct Counters;
+
+impl Notes for Counters {
+    #[inline]
+    fn note(&mut self, cell: Transition) {
+        match cell.number() {
+            Some(number) => TRANSITIONS[number].store(1, Ordering::Relaxed),
+            None => cell.assert_possible(),
+        }
     }
+
+    fn join(&mut self, _other: &Self) {}
+
+    fn assert_possible(&self) {}
 }
 
 /// libFuzzer's mutation, and behind it, for three seeds of four, repaired commands; `head` bytes in front are no wire bytes.

@@ -92,21 +92,6 @@ pub struct ErrorMode {
     in_sequence: bool,
 }
 
-/// How far a drive in the error mode is, for those who look at a bus end from outside (ND21 9.7, 9.8).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stage {
-    /// Good zeros received in a row, the last of them just now.
-    pub zeros_received: u8,
-    /// Zeros sent; it stays at the largest number that fits.
-    pub zeros_sent: u8,
-    /// Whether "*" has been.
-    pub upstream: bool,
-    /// Whether the next byte is answered with received + 1 (rule 3).
-    pub increments: bool,
-    /// The bytes of the check sequence received, 0 to 4.
-    pub sequence: u8,
-}
-
 /// What the error mode makes of a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Response {
@@ -203,17 +188,32 @@ impl ErrorMode {
         }
     }
 
-    /// How far it is.
+    /// Good zeros received in a row, the last of them just now; it stays at the largest number that fits.
     #[must_use]
     #[inline]
-    pub const fn stage(&self) -> Stage {
-        Stage {
-            zeros_received: self.zeros_received,
-            zeros_sent: self.zeros_sent,
-            upstream: self.upstream,
-            increments: self.increments(),
-            sequence: self.watch.matched(),
-        }
+    pub const fn zeros_received(&self) -> u8 {
+        self.zeros_received
+    }
+
+    /// Zeros sent; it stays at the largest number that fits.
+    #[must_use]
+    #[inline]
+    pub const fn zeros_sent(&self) -> u8 {
+        self.zeros_sent
+    }
+
+    /// Whether "*" has been.
+    #[must_use]
+    #[inline]
+    pub const fn upstream(&self) -> bool {
+        self.upstream
+    }
+
+    /// The bytes of the check sequence received, 0 to 4.
+    #[must_use]
+    #[inline]
+    pub const fn sequence(&self) -> u8 {
+        self.watch.matched()
     }
 
     /// Notes that a 00 goes out, asked for or not.
@@ -242,9 +242,10 @@ impl ErrorMode {
         Marks::NONE
     }
 
-    /// Rule 3.
+    /// Whether the next byte is answered with received + 1 (rule 3).
+    #[must_use]
     #[inline]
-    const fn increments(&self) -> bool {
+    pub const fn increments(&self) -> bool {
         self.upstream && (self.after_time_out || self.zeros_sent >= self.rules.sent_zeros)
     }
 }

@@ -26,7 +26,7 @@ use crate::link::LineByte;
 use crate::plain::PlainDrive;
 use crate::reference;
 use crate::ring::Ring;
-use crate::transitions::{Reached, Watched};
+use crate::transitions::{Notes, Reached, Watched};
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
@@ -92,7 +92,7 @@ pub fn codec(data: &[u8]) {
 /// # Panics
 /// The two models answer otherwise, or disagree on the error mode or the memory.
 pub fn detector(data: &[u8]) {
-    let _transitions = detector_watched(data);
+    let _transitions: Reached = detector_watched(data);
 }
 
 /// The same, with the transitions that the drive went through.
@@ -100,10 +100,10 @@ pub fn detector(data: &[u8]) {
 /// # Panics
 /// As [`detector`], or a transition is called unreachable.
 #[must_use]
-pub fn detector_watched(data: &[u8]) -> Reached {
-    let mut ours = Watched::default();
+pub fn detector_watched<N: Notes>(data: &[u8]) -> N {
+    let mut ours = Watched::<N>::default();
     let Some((&damaged, wire)) = data.split_first() else {
-        return Reached::default();
+        return N::default();
     };
     let mut theirs = reference::Drive::new();
     let mut now = Instant::START;
@@ -136,7 +136,7 @@ pub fn detector_watched(data: &[u8]) -> Reached {
 /// # Panics
 /// A byte on any link is otherwise than in the reference model, or a drive's memory or error mode.
 pub fn ring(data: &[u8]) {
-    let _transitions = ring_watched(data);
+    let _transitions: Reached = ring_watched(data);
 }
 
 /// The same, with the transitions that the three drives went through.
@@ -144,8 +144,8 @@ pub fn ring(data: &[u8]) {
 /// # Panics
 /// As [`ring`], or a transition is called unreachable.
 #[must_use]
-pub fn ring_watched(data: &[u8]) -> Reached {
-    let mut reached = Reached::default();
+pub fn ring_watched<N: Notes>(data: &[u8]) -> N {
+    let mut reached = N::default();
     let [what, place, wire @ ..] = data else {
         return reached;
     };
@@ -156,7 +156,7 @@ pub fn ring_watched(data: &[u8]) -> Reached {
         return reached;
     }
     let wire = &wire[..wire.len().min(256)];
-    let mut ours = Ring::new(size, Rate::Baud38400, |_| Watched::default());
+    let mut ours = Ring::new(size, Rate::Baud38400, |_| Watched::<N>::default());
     // Marks are of no use here.
     ours.stop_recording();
     (0..4).for_each(|link| ours.record_link(link));

@@ -14,6 +14,7 @@ mod classify;
 mod event;
 mod matrix;
 mod named;
+mod notes;
 mod reached;
 mod state;
 pub mod tour;
@@ -22,6 +23,7 @@ mod watched;
 pub use classify::{classify, state};
 pub use event::Event;
 pub use matrix::{RULES, Rule, why_unreachable};
+pub use notes::Notes;
 pub use reached::Reached;
 pub use state::State;
 pub use watched::Watched;
@@ -63,6 +65,24 @@ impl Transition {
     #[must_use]
     pub const fn index(self) -> usize {
         self.state.index() * Event::ALL.len() + self.event.index()
+    }
+
+    /// Its number among those that can be reached, from 0 to [`REACHABLE`] less 1; `None` for one that cannot be.
+    #[must_use]
+    #[inline]
+    pub fn number(self) -> Option<usize> {
+        let number = matrix::NUMBERS[self.index()];
+        (number != matrix::UNREACHABLE).then_some(usize::from(number))
+    }
+
+    /// Nothing.
+    ///
+    /// # Panics
+    /// The matrix calls it unreachable.
+    pub fn assert_possible(self) {
+        if let Some(rule) = why_unreachable(self) {
+            panic!("reached, and called unreachable: {self} ({})", rule.reason);
+        }
     }
 }
 

@@ -146,11 +146,11 @@ fn a_drive_knows_its_inbound_link_only() {
         .chain(harness_proto::novobus::check_sequence::CHECK_SEQUENCE)
         .chain([0x88, 0xFD, 0xC0, 0x13, 0xFE, 0xD1])
         .collect();
-    let mut ring = Ring::new(size, Rate::Baud38400, |_| Watched::default());
+    let mut ring = Ring::new(size, Rate::Baud38400, |_| Watched::<Reached>::default());
     ring.send(Instant::START, &sent);
     ring.run_until(Instant::START + Span::from_millis(2_000));
     for (index, k) in (0..3).rev().enumerate() {
-        let mut alone = Watched::default();
+        let mut alone = Watched::<Reached>::default();
         for byte in &ring.trace().links[index].bytes {
             let received = byte.arrival().expect("nothing is lost");
             alone.receive(Instant::START, received);
