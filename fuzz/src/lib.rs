@@ -23,8 +23,8 @@ pub struct Counters;
 impl Notes for Counters {
     #[inline]
     fn note(&mut self, cell: Transition) {
-        match cell.number() {
-            Some(number) => TRANSITIONS[number].store(1, Ordering::Relaxed),
+        match cell.number().and_then(|number| TRANSITIONS.get(number)) {
+            Some(counter) => counter.store(1, Ordering::Relaxed),
             None => cell.assert_possible(),
         }
     }

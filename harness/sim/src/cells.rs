@@ -146,10 +146,9 @@ impl Cells {
     pub(crate) fn start(&mut self) {
         let ram = RAM.len();
         self.ram[..ram].fill(0);
-        for i in 0..nd21::PARAMETER_COUNT {
-            let byte = self.eeprom[usize::from(u16::from(nd21::EE_PARAMETERS) + i)];
-            self.write(nd21::PARAMETERS + i, byte);
-        }
+        let count = usize::from(nd21::PARAMETER_COUNT);
+        let kept = &self.eeprom[usize::from(nd21::EE_PARAMETERS)..][..count];
+        self.ram[usize::from(nd21::PARAMETERS - RAM_START)..][..count].copy_from_slice(kept);
         let monitoring =
             self.eeprom[usize::from(nd21::ee::SELFTEST)] & nd21::bits::selftest::MONITORING != 0;
         if monitoring {

@@ -21,13 +21,14 @@ impl PlainDrive {
     /// A drive with an EEPROM as given, after power-up.
     #[must_use]
     pub fn new(properties: Properties, eeprom: [u8; 256]) -> Self {
-        let mut memory = Cells::with_eeprom(eeprom);
-        memory.start();
-        Self {
+        // Started where it stands: a memory that is moved is copied.
+        let mut drive = Self {
             bus_end: BusEnd::new(properties),
-            memory,
+            memory: Cells::with_eeprom(eeprom),
             properties,
-        }
+        };
+        drive.memory.start();
+        drive
     }
 
     /// Its memory.

@@ -3,7 +3,6 @@
 //! of bytes on its inbound link into that on its outbound link, one after another, so time-outs
 //! (ND21 9.9) are out of its reach. Where the manual contradicts its byte tables, the tables win.
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Deref;
 
@@ -97,15 +96,15 @@ impl fmt::Debug for Bytes {
 #[derive(Clone, Debug)]
 struct Memory {
     ram: [u8; RAM_AND_REGISTERS.1],
-    /// Cells elsewhere that were set.
-    elsewhere: BTreeMap<u16, u8>,
+    /// Cells elsewhere that were set, each once.
+    elsewhere: Vec<(u16, u8)>,
 }
 
 impl Default for Memory {
     fn default() -> Self {
         Self {
             ram: [0; RAM_AND_REGISTERS.1],
-            elsewhere: BTreeMap::new(),
+            elsewhere: Vec::new(),
         }
     }
 }
@@ -154,7 +153,8 @@ impl Drive {
         match address.checked_sub(RAM_AND_REGISTERS.0) {
             Some(place) => self.memory.ram[usize::from(place)] = byte,
             None => {
-                self.memory.elsewhere.insert(address, byte);
+                self.memory.elsewhere.retain(|cell| cell.0 != address);
+                self.memory.elsewhere.push((address, byte));
             }
         }
     }
@@ -164,7 +164,10 @@ impl Drive {
     pub fn peek(&self, address: u16) -> u8 {
         match address.checked_sub(RAM_AND_REGISTERS.0) {
             Some(place) => self.memory.ram[usize::from(place)],
-            None => self.memory.elsewhere.get(&address).map_or(0, |byte| *byte),
+            None => {
+                let mut set = self.memory.elsewhere.iter();
+                set.find(|cell| cell.0 == address).map_or(0, |cell| cell.1)
+            }
         }
     }
 
@@ -217,7 +220,7 @@ impl Drive {
     /// Takes one byte off the line, gives the byte sent for it; only PAUSE gets none (ND21 9, 9.2).
     pub fn receive(&mut self, cell: Cell) -> Option<u8> {
         let reply = match (self.state, cell.byte) {
-            (State::Error, _) => Ok(self.error_mode(cell)),
+            (State::Error, _) => return Some(self.error_mode(cell)),
             // ND21 9.7: parity and framing are checked by every drive, addressed or not.
             _ if cell.error => Err(0x0502),
             (State::Sync, 0x80) => Ok(0x80),    // SYNCO
@@ -391,20 +394,27 @@ impl Drive {
     fn error_mode(&mut self, cell: Cell) -> u8 {
         let good = |byte| !cell.error && cell.byte == byte;
         // "*": eight good zeros in a row show the preceding drive in error mode; remembered.
-        self.zeros_received = u8::from(good(0)) * self.zeros_received.saturating_add(1);
+        self.zeros_received = match good(0) {
+            true => self.zeros_received.saturating_add(1),
+            false => 0,
+        };
         self.preceding |= self.zeros_received >= 8;
-        // "@": the check sequence passes; a byte that breaks it off may begin it anew.
-        self.matched *= usize::from(good(CHECK_SEQUENCE[self.matched]));
-        if self.preceding && good(CHECK_SEQUENCE[self.matched]) {
-            self.matched += 1;
-            if self.matched == CHECK_SEQUENCE.len() {
-                self.restart();
+        if self.preceding {
+            // "@": the check sequence passes; a byte that breaks it off may begin it anew.
+            if !good(CHECK_SEQUENCE[self.matched]) {
+                self.matched = 0;
             }
-            return cell.byte;
-        }
-        // "#": the 17th zero is the last.
-        if self.preceding && self.zeros_sent >= 17 {
-            return cell.byte.wrapping_add(1);
+            if good(CHECK_SEQUENCE[self.matched]) {
+                self.matched += 1;
+                if self.matched == CHECK_SEQUENCE.len() {
+                    self.restart();
+                }
+                return cell.byte;
+            }
+            // "#": the 17th zero is the last.
+            if self.zeros_sent >= 17 {
+                return cell.byte.wrapping_add(1);
+            }
         }
         self.zeros_sent = self.zeros_sent.saturating_add(1);
         0

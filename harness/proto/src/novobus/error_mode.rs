@@ -230,12 +230,13 @@ impl ErrorMode {
     /// Rule 2.
     #[inline]
     fn count(&mut self, good_zero: bool) -> Marks {
-        if !good_zero {
-            self.zeros_received = 0;
-            return Marks::NONE;
-        }
-        self.zeros_received = self.zeros_received.saturating_add(1);
-        if self.zeros_received == self.rules.upstream_zeros && !self.upstream {
+        self.zeros_received = if good_zero {
+            self.zeros_received.saturating_add(1)
+        } else {
+            0
+        };
+        let eighth = good_zero && self.zeros_received == self.rules.upstream_zeros;
+        if eighth && !self.upstream {
             self.upstream = true;
             return Marks::UPSTREAM;
         }

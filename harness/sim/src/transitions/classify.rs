@@ -148,23 +148,23 @@ fn error_mode(mode: &ErrorMode, silent: Silent) -> State {
 /// The error mode of a drive that knows of no other one in it.
 #[inline]
 fn alone(mode: &ErrorMode) -> State {
+    let long = mode.zeros_sent() >= ZEROS;
     let seven = mode.zeros_received() == UPSTREAM_ZEROS - 1;
-    match (mode.zeros_sent() >= ZEROS, seven) {
-        (false, false) => State::ErrorZeros,
-        (false, true) => State::ErrorSeven,
-        (true, false) => State::ErrorLong,
-        (true, true) => State::ErrorLongSeven,
-    }
+    [
+        [State::ErrorZeros, State::ErrorSeven],
+        [State::ErrorLong, State::ErrorLongSeven],
+    ][usize::from(long)][usize::from(seven)]
 }
 
 /// What a good byte is that is no 00, in the error mode.
 #[inline]
 fn good_in_error_mode(mode: &ErrorMode, byte: u8) -> Event {
     let due = usize::from(mode.sequence());
+    if due > 0 && byte == SEQUENCE[due] {
+        return Event::SequenceNext;
+    }
     if byte == SEQUENCE[0] {
         Event::SequenceStart
-    } else if due > 0 && byte == SEQUENCE[due] {
-        Event::SequenceNext
     } else {
         Event::OtherByte
     }
