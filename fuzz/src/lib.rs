@@ -1,8 +1,9 @@
 //! What the targets share: libFuzzer's extra counters, fed with the protocol transitions of a case, and the mutator that
 //! repairs commands.
 
-use harness_sim::fuzz::repair;
+use harness_sim::fuzz::{ThreeDrives, repair};
 use harness_sim::transitions::{Notes, REACHABLE, Transition};
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 // libFuzzer takes the counters in steps of eight bytes.
@@ -17,7 +18,7 @@ const COUNTERS: usize = REACHABLE.next_multiple_of(8);
 static TRANSITIONS: [AtomicU8; COUNTERS] = [const { AtomicU8::new(0) }; COUNTERS];
 
 /// Tells libFuzzer which transitions a case goes through, each when it happens.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Counters;
 
 impl Notes for Counters {
@@ -32,6 +33,15 @@ impl Notes for Counters {
     fn join(&mut self, _other: &Self) {}
 
     fn assert_possible(&self) {}
+}
+
+thread_local! {
+    static THREE_DRIVES: RefCell<ThreeDrives<Counters>> = RefCell::default();
+}
+
+/// The body of the target `ring`, each case on the two models of the one before.
+pub fn ring(data: &[u8]) -> Counters {
+    THREE_DRIVES.with_borrow_mut(|drives| drives.watched(data))
 }
 
 /// libFuzzer's mutation, and behind it, for three seeds of four, repaired commands; `head` bytes in front are no wire bytes.

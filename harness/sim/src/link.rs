@@ -169,6 +169,22 @@ impl Link {
         }
     }
 
+    /// Is as new again, but keeps room and whether it records: a run of many short cases does not ask for memory in each.
+    pub(crate) fn restart(&mut self) {
+        let mut under_way = std::mem::take(&mut self.under_way);
+        under_way.clear();
+        let mut plan = std::mem::take(&mut self.plan);
+        plan.clear();
+        let mut log = self.log.take();
+        log.iter_mut().for_each(Vec::clear);
+        *self = Self {
+            under_way,
+            plan,
+            log,
+            ..Self::new(self.byte_time)
+        };
+    }
+
     /// Everything that this link has carried, in order; empty where nothing is recorded.
     #[must_use]
     pub fn log(&self) -> &[LineByte] {

@@ -27,6 +27,11 @@ impl<N: Notes> Watched<N> {
         }
     }
 
+    /// Is as new again: a plain drive with an empty EEPROM, and nothing noted.
+    pub fn restart(&mut self) {
+        *self = Self::default();
+    }
+
     /// The drive.
     #[must_use]
     pub const fn drive(&self) -> &PlainDrive {
