@@ -28,3 +28,4 @@ pub mod ring;
 pub mod trace;
 pub mod transitions;
 mod uart;
+mod under_way;
