@@ -155,12 +155,13 @@ fn error_mode(mode: &ErrorMode, silent: Silent) -> State {
 /// The error mode of a drive that knows of no other one in it.
 #[inline]
 fn alone(mode: &ErrorMode) -> State {
-    let long = mode.zeros_sent() >= ZEROS;
     let seven = mode.zeros_received() == UPSTREAM_ZEROS - 1;
-    [
-        [State::ErrorZeros, State::ErrorSeven],
-        [State::ErrorLong, State::ErrorLongSeven],
-    ][usize::from(long)][usize::from(seven)]
+    match (mode.zeros_sent() >= ZEROS, seven) {
+        (false, false) => State::ErrorZeros,
+        (false, true) => State::ErrorSeven,
+        (true, false) => State::ErrorLong,
+        (true, true) => State::ErrorLongSeven,
+    }
 }
 
 /// What a good byte is that is no 00, in the error mode.
