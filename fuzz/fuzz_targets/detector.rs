@@ -1,3 +1,4 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| { let drivebench_fuzz::Counters = harness_sim::fuzz::detector_watched(data); });
+drivebench_fuzz::counters!(harness_sim::transitions::WITHOUT_TIME_OUT);
+libfuzzer_sys::fuzz_target!(|data: &[u8]| { let Counters = harness_sim::fuzz::detector_watched(data); });
 libfuzzer_sys::fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| { drivebench_fuzz::mutate(data, size, max_size, seed, 1) });

@@ -1,47 +1,51 @@
 //! What the targets share: libFuzzer's extra counters, fed with the protocol transitions of a case, and the mutator that
 //! repairs commands.
 
-use harness_sim::fuzz::{ThreeDrives, repair};
-use harness_sim::transitions::{Notes, REACHABLE, Transition};
-use std::cell::RefCell;
-use std::sync::atomic::{AtomicU8, Ordering};
+use harness_sim::fuzz::repair;
+use harness_sim::transitions::Transition;
 
-// libFuzzer takes the counters in steps of eight bytes.
-const COUNTERS: usize = REACHABLE.next_multiple_of(8);
+/// How many counters stand for so many cells: libFuzzer takes them in steps of eight bytes.
+pub const fn counters(cells: usize) -> usize {
+    cells.next_multiple_of(8)
+}
 
-/// One counter a cell of the matrix of protocol transitions that can be reached. libFuzzer finds them by the name of the section, sets them
-/// to 0 before each case, reads all of them behind it and keeps an input that makes one of them rise for the first time. `used` keeps the
-/// linker from leaving them out.
-// Unsafe, since a section of a wrong form would harm the program; this one is an array of bytes, as libFuzzer documents it.
-#[used]
-#[unsafe(link_section = "__libfuzzer_extra_counters")]
-static TRANSITIONS: [AtomicU8; COUNTERS] = [const { AtomicU8::new(0) }; COUNTERS];
+/// Makes `Counters`, which tells libFuzzer of each transition when it happens: one counter for each of the first so many cells of the
+/// matrix of protocol transitions. No more than the target can reach: libFuzzer finds the counters by the name of the section, sets all of
+/// them to 0 before each case, reads all of them behind it and keeps an input that makes one of them rise for the first time.
+#[macro_export]
+macro_rules! counters {
+    ($cells:expr) => {
+        // `used` keeps the linker from leaving them out. Unsafe, since a section of a wrong form would harm the program; this one is an
+        // array of bytes, as libFuzzer documents it.
+        #[used]
+        #[unsafe(link_section = "__libfuzzer_extra_counters")]
+        static TRANSITIONS: [std::sync::atomic::AtomicU8; $crate::counters($cells)] =
+            [const { std::sync::atomic::AtomicU8::new(0) }; $crate::counters($cells)];
 
-/// Tells libFuzzer which transitions a case goes through, each when it happens.
-#[derive(Debug, Default)]
-pub struct Counters;
+        #[derive(Debug, Default)]
+        struct Counters;
 
-impl Notes for Counters {
-    #[inline]
-    fn note(&mut self, cell: Transition) {
-        match cell.number().and_then(|number| TRANSITIONS.get(number)) {
-            Some(counter) => counter.store(1, Ordering::Relaxed),
-            None => cell.assert_possible(),
+        impl harness_sim::transitions::Notes for Counters {
+            #[inline]
+            fn note(&mut self, cell: harness_sim::transitions::Transition) {
+                match cell.number().and_then(|number| TRANSITIONS.get(number)) {
+                    Some(counter) => counter.store(1, std::sync::atomic::Ordering::Relaxed),
+                    None => $crate::not_counted(cell),
+                }
+            }
+
+            fn join(&mut self, _other: &Self) {}
+
+            fn assert_possible(&self) {}
         }
-    }
-
-    fn join(&mut self, _other: &Self) {}
-
-    fn assert_possible(&self) {}
+    };
 }
 
-thread_local! {
-    static THREE_DRIVES: RefCell<ThreeDrives<Counters>> = RefCell::default();
-}
-
-/// The body of the target `ring`, each case on the two models of the one before.
-pub fn ring(data: &[u8]) -> Counters {
-    THREE_DRIVES.with_borrow_mut(|drives| drives.watched(data))
+/// Ends the case of a target that reaches a cell that it cannot reach.
+#[cold]
+pub fn not_counted(cell: Transition) {
+    cell.assert_possible();
+    panic!("{cell}: this target has no counter for it");
 }
 
 /// libFuzzer's mutation, and behind it, for three seeds of four, repaired commands; `head` bytes in front are no wire bytes.

@@ -121,20 +121,29 @@ const IN_SEQUENCE: &[State] = SEQUENCES.as_flattened();
 /// In [`NUMBERS`]: a cell that cannot be reached.
 pub(super) const UNREACHABLE: u16 = u16::MAX;
 
-/// By [`Transition::index`]: the number that a cell has among those that can be reached. A table, since it is asked for with every byte.
+/// By [`Transition::index`]: the number that a cell has among those that can be reached, those [without time-outs](without_time_out)
+/// first. A table, since it is asked for with every byte.
 pub(super) static NUMBERS: [u16; CELLS] = {
     let mut numbers = [UNREACHABLE; CELLS];
-    let (mut index, mut number) = (0, 0);
-    while index < CELLS {
-        let (state, event) = (index / Event::ALL.len(), index % Event::ALL.len());
-        if rule_against(State::ALL[state], Event::ALL[event]).is_none() {
+    let (mut place, mut number) = (0, 0);
+    while place < 2 * CELLS {
+        let index = place % CELLS;
+        let state = State::ALL[index / Event::ALL.len()];
+        let event = Event::ALL[index % Event::ALL.len()];
+        let first = place < CELLS;
+        if without_time_out(state, event) == first && rule_against(state, event).is_none() {
             numbers[index] = number;
             number += 1;
         }
-        index += 1;
+        place += 1;
     }
     numbers
 };
+
+/// Whether a drive can reach a cell on which no time-out is monitored and that reads no line error but that of the parity.
+pub(super) const fn without_time_out(state: State, event: Event) -> bool {
+    state.index() < State::Waiting.index() && event.index() <= Event::Parity.index()
+}
 
 /// The rule by which nothing can reach a cell; `None` for one that can be reached.
 #[must_use]

@@ -43,6 +43,9 @@ pub const CELLS: usize = State::ALL.len() * Event::ALL.len();
 /// How many cells of the matrix can be reached.
 pub const REACHABLE: usize = 435;
 
+/// How many of these a drive can reach on which no time-out is monitored (ND21 9.9) and that reads no line error but that of the parity.
+pub const WITHOUT_TIME_OUT: usize = 175;
+
 impl Transition {
     /// All of them, state by state.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -67,7 +70,8 @@ impl Transition {
         self.state.index() * Event::ALL.len() + self.event.index()
     }
 
-    /// Its number among those that can be reached, from 0 to [`REACHABLE`] less 1; `None` for one that cannot be.
+    /// Its number among those that can be reached, from 0 to [`REACHABLE`] less 1; those [`WITHOUT_TIME_OUT`] have
+    /// the first numbers. `None` for one that cannot be.
     #[must_use]
     #[inline]
     pub fn number(self) -> Option<usize> {

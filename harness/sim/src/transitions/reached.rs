@@ -1,6 +1,5 @@
 //! The cells of the matrix that a run has reached.
 
-use super::matrix::{NUMBERS, UNREACHABLE};
 use super::{CELLS, Transition};
 use std::sync::OnceLock;
 
@@ -63,14 +62,6 @@ impl Reached {
                 left &= left.wrapping_sub(1);
                 (bit < 64).then_some(place * 64 + bit)
             })
-        })
-    }
-
-    /// The numbers that those have among the cells that can be reached, from 0 to [`REACHABLE`](super::REACHABLE) less 1; in order.
-    pub fn reachable_numbers(&self) -> impl Iterator<Item = usize> + '_ {
-        self.indices().filter_map(|index| {
-            let number = NUMBERS[index];
-            (number != UNREACHABLE).then_some(usize::from(number))
         })
     }
 
