@@ -50,6 +50,7 @@ pub enum Fault {
 
 /// Where a drive stands in the byte stream (ND21 9.1).
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(u8)]
 enum State {
     #[default]
     Sync,
@@ -404,10 +405,7 @@ impl Drive {
     fn error_mode(&mut self, cell: Cell) -> u8 {
         let good = |byte| !cell.error && cell.byte == byte;
         // "*": eight good zeros in a row show the preceding drive in error mode; remembered.
-        self.zeros_received = match good(0) {
-            true => self.zeros_received.saturating_add(1),
-            false => 0,
-        };
+        self.zeros_received = u8::from(good(0)) * self.zeros_received.saturating_add(1);
         self.preceding |= self.zeros_received >= 8;
         if self.preceding {
             // "@": the check sequence passes; a byte that breaks it off may begin it anew.

@@ -25,7 +25,7 @@ pub const UPSTREAM_ZEROS: u8 = 8;
 /// drive, for tests of what must find one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rules {
-    /// Good zeros in a row that show that the drive before is in the error mode (ND21 9.7).
+    /// Good zeros in a row that show that the drive before is in the error mode (ND21 9.7); 1 or more.
     pub upstream_zeros: u8,
     /// Zeros that a drive has sent when it begins to increment (ND21 9.7).
     pub sent_zeros: u8,
@@ -230,13 +230,9 @@ impl ErrorMode {
     /// Rule 2.
     #[inline]
     fn count(&mut self, good_zero: bool) -> Marks {
-        self.zeros_received = if good_zero {
-            self.zeros_received.saturating_add(1)
-        } else {
-            0
-        };
-        let eighth = good_zero && self.zeros_received == self.rules.upstream_zeros;
-        if eighth && !self.upstream {
+        // Without a branch on the byte: any byte is as likely as another.
+        self.zeros_received = u8::from(good_zero) * self.zeros_received.saturating_add(1);
+        if self.zeros_received == self.rules.upstream_zeros && !self.upstream {
             self.upstream = true;
             return Marks::UPSTREAM;
         }

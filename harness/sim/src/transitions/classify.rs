@@ -16,23 +16,31 @@ use harness_proto::novobus::sync::{Addressing, SyncByte};
 
 /// The cell that a byte is for a bus end on this memory, before it is received.
 #[must_use]
-#[inline]
+#[inline(always)]
 pub fn classify(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transition {
-    let event = match received.error {
-        Some(error) => Some(line_error(error)),
-        None => (received.byte == 0).then_some(Event::Zero),
-    };
     // Nearly every byte that a fuzzer sends comes to a drive in the error mode.
     if let Some((mode, silent)) = bus_end.error_mode() {
         return Transition {
             state: error_mode(mode, silent),
-            event: event.unwrap_or_else(|| good_in_error_mode(mode, received.byte)),
+            event: match received.error {
+                Some(error) => line_error(error),
+                None => good_in_error_mode(mode, received.byte),
+            },
         };
     }
+    in_normal_mode(bus_end, memory, received)
+}
+
+#[inline(never)]
+fn in_normal_mode(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transition {
     let place = bus_end.place();
     Transition {
         state: state_at(place, bus_end, memory),
-        event: event.unwrap_or_else(|| good(place, bus_end, memory, received.byte)),
+        event: match received.error {
+            Some(error) => line_error(error),
+            None if received.byte == 0 => Event::Zero,
+            None => good(place, bus_end, memory, received.byte),
+        },
     }
 }
 
@@ -164,18 +172,21 @@ fn alone(mode: &ErrorMode) -> State {
     }
 }
 
-/// What a good byte is that is no 00, in the error mode.
+/// What a good byte is in the error mode.
 #[inline]
 fn good_in_error_mode(mode: &ErrorMode, byte: u8) -> Event {
+    // A table, since any byte is as likely as another: what is asked by branches costs most.
+    static ALONE: [Event; 256] = {
+        let mut events = [Event::OtherByte; 256];
+        events[0] = Event::Zero;
+        events[SEQUENCE[0] as usize] = Event::SequenceStart;
+        events
+    };
     let due = usize::from(mode.sequence());
     if due > 0 && byte == SEQUENCE[due] {
         return Event::SequenceNext;
     }
-    if byte == SEQUENCE[0] {
-        Event::SequenceStart
-    } else {
-        Event::OtherByte
-    }
+    ALONE[usize::from(byte)]
 }
 
 /// What a good byte is that is no 00.

@@ -64,7 +64,7 @@ impl<N: Notes> Watched<N> {
 }
 
 impl<N: Notes> Device for Watched<N> {
-    #[inline]
+    #[inline(always)]
     fn receive(&mut self, now: Instant, received: Received) -> Step {
         self.reached.note(self.transition(received));
         self.drive.receive(now, received)
