@@ -20,20 +20,22 @@ pub struct Cells {
 }
 
 impl Cells {
-    fn new() -> Self {
+    /// A memory with an EEPROM as given, and nothing in RAM.
+    #[inline]
+    pub(crate) fn with_eeprom(eeprom: [u8; 256]) -> Self {
         Self {
             ram: [0; RAM_AND_REGISTERS],
             rom: [0; ROM_SIZE],
-            eeprom: [0; 256],
+            eeprom,
         }
     }
 
-    /// A memory with an EEPROM as given, and nothing in RAM.
-    pub(crate) fn with_eeprom(eeprom: [u8; 256]) -> Self {
-        Self {
-            eeprom,
-            ..Self::new()
-        }
+    /// Starts with nothing in ROM, EEPROM and registers, and does so where they are: a memory that is made anew and moved is copied.
+    pub(crate) fn restart_empty(&mut self) {
+        self.ram[RAM.len()..].fill(0);
+        self.rom.fill(0);
+        self.eeprom.fill(0);
+        self.start();
     }
 
     fn cell(&mut self, address: u16) -> Option<&mut u8> {

@@ -21,14 +21,19 @@ impl PlainDrive {
     /// A drive with an EEPROM as given, after power-up.
     #[must_use]
     pub fn new(properties: Properties, eeprom: [u8; 256]) -> Self {
-        // Started where it stands: a memory that is moved is copied.
-        let mut drive = Self {
+        let mut memory = Cells::with_eeprom(eeprom);
+        memory.start();
+        Self {
             bus_end: BusEnd::new(properties),
-            memory: Cells::with_eeprom(eeprom),
+            memory,
             properties,
-        };
-        drive.memory.start();
-        drive
+        }
+    }
+
+    /// Is as new again, with an empty EEPROM.
+    pub(crate) fn restart(&mut self) {
+        self.memory.restart_empty();
+        self.bus_end = BusEnd::new(self.properties);
     }
 
     /// Its memory.

@@ -144,12 +144,11 @@ impl Drive {
 
     /// The same as [`Self::new`], on the room that it has.
     pub fn restart_all(&mut self) {
-        let mut executed = self.take_executed();
-        executed.clear();
-        *self = Self {
-            executed,
-            ..Self::new()
-        };
+        self.memory.ram.fill(0);
+        self.memory.elsewhere.clear();
+        self.restart();
+        self.executed.clear();
+        self.monitored = false;
     }
 
     /// The cells FD80 to FFFF (ND21 10.1).
@@ -229,9 +228,18 @@ impl Drive {
     }
 
     /// Takes one byte off the line, gives the byte sent for it; only PAUSE gets none (ND21 9, 9.2).
+    #[inline]
     pub fn receive(&mut self, cell: Cell) -> Option<u8> {
+        match self.state {
+            State::Error => Some(self.error_mode(cell)),
+            _ => self.normal_mode(cell),
+        }
+    }
+
+    #[inline(never)]
+    fn normal_mode(&mut self, cell: Cell) -> Option<u8> {
         let reply = match (self.state, cell.byte) {
-            (State::Error, _) => return Some(self.error_mode(cell)),
+            (State::Error, _) => Ok(self.error_mode(cell)),
             // ND21 9.7: parity and framing are checked by every drive, addressed or not.
             _ if cell.error => Err(0x0502),
             (State::Sync, 0x80) => Ok(0x80),    // SYNCO
@@ -402,6 +410,7 @@ impl Drive {
     }
 
     /// ND21 9.7, 9.8: from the offending byte on, zeros, then increments, until the check sequence.
+    #[inline]
     fn error_mode(&mut self, cell: Cell) -> u8 {
         let good = |byte| !cell.error && cell.byte == byte;
         // "*": eight good zeros in a row show the preceding drive in error mode; remembered.

@@ -27,9 +27,11 @@ impl<N: Notes> Watched<N> {
         }
     }
 
-    /// Is as new again: a plain drive with an empty EEPROM, and nothing noted.
+    /// Is as new again, with an empty EEPROM and nothing noted.
     pub fn restart(&mut self) {
-        *self = Self::default();
+        self.drive.restart();
+        self.reached = N::default();
+        self.timed_out = false;
     }
 
     /// The drive.
@@ -42,6 +44,12 @@ impl<N: Notes> Watched<N> {
     #[must_use]
     pub const fn reached(&self) -> &N {
         &self.reached
+    }
+
+    /// What it has gone through; from now on it notes anew.
+    #[must_use]
+    pub fn take_reached(&mut self) -> N {
+        std::mem::take(&mut self.reached)
     }
 
     /// Whether there has been a time-out (ND21 9.9).
