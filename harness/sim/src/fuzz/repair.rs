@@ -13,12 +13,15 @@ pub fn repair(wire: &mut [u8]) {
     let mut left = wire;
     loop {
         let read = Reader::default().read(left);
-        let behind = &mut left[read..];
-        let mut places = behind.windows(SEQUENCE.len());
-        let Some(place) = places.position(|bytes| bytes == SEQUENCE) else {
-            return;
-        };
-        left = &mut behind[place + SEQUENCE.len()..];
+        left = &mut left[read..];
+        while !left.starts_with(&SEQUENCE) {
+            // On to the next byte that may begin one.
+            let Some(place) = left.iter().skip(1).position(|byte| *byte == SEQUENCE[0]) else {
+                return;
+            };
+            left = &mut left[1 + place..];
+        }
+        left = &mut left[SEQUENCE.len()..];
     }
 }
 
