@@ -139,6 +139,95 @@ fn eeprom_of_12_5() {
     assert_eq!(bus.read_word(axis(2), ram::N_MAX), Ok(0x1000));
 }
 
+/// A ring whose answer to the command that reads a byte of the EEPROM is damaged every other time, so and so often.
+struct DamagesReads {
+    link: SimulatedLink,
+    left: u8,
+    damages: bool,
+    heard: [u8; 4],
+}
+
+impl Line for DamagesReads {
+    fn byte_time(&self) -> Span {
+        self.link.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.link.now()
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        self.link.send(ring, bytes)
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        let (at, mut received) = self.link.receive(ring)?;
+        // Its check byte follows.
+        if self.heard == [0x82, 0x81, 0x8A, 0xFD] && self.left > 0 {
+            self.damages = !self.damages;
+            if self.damages {
+                self.left -= 1;
+                received.byte ^= 1;
+            }
+        }
+        self.heard.rotate_left(1);
+        self.heard[3] = received.byte;
+        Some((at, received))
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.link.wait(until)
+    }
+}
+
+/// ND21 14.10.5.1: the byte that was read stands where its address stood, so that a read that is repeated reads another byte.
+#[test]
+fn a_disturbed_read_of_the_eeprom() {
+    let bus_of = |left| {
+        let line = DamagesReads {
+            link: SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default()))),
+            left,
+            damages: false,
+            heard: [0; 4],
+        };
+        Bus::open(Box::new(line), &[size(3)], Options::default()).expect("an open bus")
+    };
+    // 02 stands there, and 00 at 02.
+    let place = ee::SERIENNUMMER + 2;
+    for left in 0..8 {
+        let bus = bus_of(left);
+        assert_eq!(bus.read_eeprom(axis(2), place), Ok(2), "{left} times");
+        assert_eq!(bus.corrected_errors(), u64::from(left));
+        assert_eq!(bus.read_eeprom(axis(2), 2), Ok(0));
+    }
+    let bus = bus_of(8);
+    let disturbed = bus.read_eeprom(axis(2), place).expect_err("8 times");
+    assert_eq!(
+        disturbed.to_string(),
+        "reading the EEPROM at 03 (ND21 14.10.5.2) was disturbed 8 times"
+    );
+    assert_eq!(bus.read_eeprom(axis(2), place), Ok(2));
+}
+
+/// Wherever a byte is lost or damaged, the EEPROM is read as it is.
+#[test]
+fn the_eeprom_on_a_disturbed_ring() {
+    for byte in 1..=100 {
+        for (place, fault) in [
+            (0, LinkFault::Drop),
+            (2, LinkFault::Drop),
+            (3, LinkFault::Drop),
+            (3, LinkFault::Replace(0x41)),
+        ] {
+            let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
+            link.inject(0, PlacedFault::Link(place, fault), Moment::Byte(byte));
+            let bus = Bus::open(Box::new(link), &[size(3)], Options::default()).expect("open");
+            let read = bus.read_eeprom(axis(2), ee::SERIENNUMMER + 2);
+            assert_eq!(read, Ok(2), "{fault:?} at byte {byte} of link {place}");
+        }
+    }
+}
+
 /// ND21 11.8, 12.6-12.8.
 #[test]
 fn start_stop_error_and_outputs() {

@@ -169,7 +169,9 @@ fn near_misses_get_a_suggestion() {
     );
     refused(&steps("> 0x88"), "0x88", "hexadecimal", Some("without 0x"));
     refused(&steps("> 8O"), "8O", "hexadecimal", Some("`80`"));
-    refused(&steps("> 888"), "888", "odd number", Some("`0888`"));
+    refused(&steps("> 888"), "888", "odd number", Some("`0888`?"));
+    let speed = &steps("drive 1 memory nsoll = 100");
+    refused(speed, "100", "odd number", Some("`0100` or `100rpm`?"));
     refused(
         &steps("! 2->0: drop"),
         "2->0",

@@ -129,6 +129,14 @@ impl<D: Device> Ring<D> {
         (next < Instant::NEVER).then_some(next)
     }
 
+    /// When the byte on the last link reaches the master; `None` where there is none. One that is not yet there needs a byte time at
+    /// least.
+    #[must_use]
+    pub fn next_home(&self) -> Option<Instant> {
+        let next = self.links.last()?.next_arrival();
+        (next < Instant::NEVER).then_some(next)
+    }
+
     /// Begins another conversation: bytes are counted anew, what was recorded and the faults whose byte has not come
     /// are forgotten, and so is what was received and not fetched. Time and drives go on.
     pub fn begin(&mut self) {

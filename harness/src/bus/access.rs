@@ -1,8 +1,8 @@
 //! Reading and writing cells (ND21 12.2-12.4).
 
-use super::{Axis, Bus, Error, Order};
+use super::{Axis, Bus, Error, Order, value_of};
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{Job, Refused};
+use harness_proto::novobus::master::{Job, Outcome, Refused};
 use harness_proto::time::Span;
 use std::collections::VecDeque;
 
@@ -98,8 +98,17 @@ impl Bus<'_> {
         &self,
         commands: impl IntoIterator<Item = (Axis, Command)>,
     ) -> Result<Vec<Option<u32>>, Error> {
+        let outcomes = self.run_outcomes(commands)?;
+        outcomes.into_iter().map(value_of).collect()
+    }
+
+    /// The same, and how each of them ended.
+    pub(super) fn run_outcomes(
+        &self,
+        commands: impl IntoIterator<Item = (Axis, Command)>,
+    ) -> Result<Vec<Outcome>, Error> {
         let mut orders = VecDeque::new();
-        let mut read = Vec::new();
+        let mut ended = Vec::new();
         let end = commands
             .into_iter()
             .try_for_each(|(axis, command)| {
@@ -111,7 +120,7 @@ impl Bus<'_> {
                         }
                         // The master holds no more: the oldest comes home first.
                         Err(full @ Error::Refused(Refused::Full { .. })) => {
-                            read.push(self.result(orders.pop_front().ok_or(full)?)?);
+                            ended.push(self.outcome(orders.pop_front().ok_or(full)?)?);
                         }
                         Err(error) => return Err(error),
                     }
@@ -119,14 +128,14 @@ impl Bus<'_> {
             })
             .and_then(|()| {
                 while let Some(order) = orders.pop_front() {
-                    read.push(self.result(order)?);
+                    ended.push(self.outcome(order)?);
                 }
                 Ok(())
             });
         for Order { ring, id } in orders {
             self.lock().forget(ring, id);
         }
-        end.map(|()| read)
+        end.map(|()| ended)
     }
 
     /// Writes a byte of RAM (12.2).

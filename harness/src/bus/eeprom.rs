@@ -1,9 +1,10 @@
 //! Reading and writing the EEPROM (ND21 12.5), by the steps of 14.10.5.
 
 use super::access::narrow;
-use super::{Axis, Bus, Error};
+use super::{Axis, Bus, Error, value_of};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::Outcome;
 
 /// The commands of 14.10.5.1.
 const READ_BYTE: u8 = 0x81;
@@ -14,6 +15,9 @@ const READ_DONE: u8 = 0x10;
 /// Bit 5 of `EEPROMcontrol`: a byte has been read; bit 4: writing is completed.
 const READ: u8 = 1 << 5;
 const WRITTEN: u8 = 1 << 4;
+
+/// How often a byte is read on a line that disturbs.
+const ATTEMPTS: u8 = 8;
 
 impl Bus<'_> {
     /// Reads a byte of the EEPROM.
@@ -31,24 +35,40 @@ impl Bus<'_> {
     /// # Errors
     /// See [`Error`]; the first one where several drives fail.
     pub fn read_eeprom_of(&self, axes: &[Axis], address: u8) -> Result<Vec<u8>, Error> {
-        let all = |command| self.run_commands(axes.iter().map(|axis| (*axis, command)));
+        for _ in 0..ATTEMPTS {
+            if let Some(bytes) = self.read_eeprom_once(axes, address)? {
+                return Ok(bytes);
+            }
+        }
+        Err(Error::Disturbed {
+            what: format!("reading the EEPROM at {address:02X} (ND21 14.10.5.2)"),
+            attempts: ATTEMPTS,
+        })
+    }
+
+    /// The steps of 14.10.5.2. `None` where the command may have run twice: the byte that was read stands where the address stood
+    /// (14.10.5.1), so that the second time another byte is read.
+    fn read_eeprom_once(&self, axes: &[Axis], address: u8) -> Result<Option<Vec<u8>>, Error> {
+        let all = |command| axes.iter().map(move |axis| (*axis, command));
         let write = |address, data| all(Command::WriteByte { address, data });
-        write(ram::EEPROM_BUFFER, address)?;
-        write(ram::EEPROM_CONTROL, READ_BYTE)?;
+        let read = |address| self.run_commands(all(Command::ReadByte { address }));
+        self.run_commands(write(ram::EEPROM_BUFFER, address))?;
+        let mut twice = false;
+        for outcome in self.run_outcomes(write(ram::EEPROM_CONTROL, READ_BYTE))? {
+            let perhaps_twice = true;
+            twice |= outcome == Outcome::Done { perhaps_twice };
+            value_of(outcome)?;
+        }
         // Most have it by now, as many telegrams have passed; those that do not are asked again.
-        let control = all(Command::ReadByte {
-            address: ram::EEPROM_CONTROL,
-        })?;
-        for (axis, control) in axes.iter().zip(control) {
+        for (axis, control) in axes.iter().zip(read(ram::EEPROM_CONTROL)?) {
             if narrow::<u8>(control)? & READ == 0 {
                 self.wait_for_eeprom(*axis, READ)?;
             }
         }
-        let bytes = all(Command::ReadByte {
-            address: ram::EEPROM_BUFFER,
-        })?;
-        write(ram::EEPROM_CONTROL, READ_DONE)?;
-        bytes.into_iter().map(narrow).collect()
+        let bytes = read(ram::EEPROM_BUFFER)?;
+        self.run_commands(write(ram::EEPROM_CONTROL, READ_DONE))?;
+        let bytes: Vec<u8> = bytes.into_iter().map(narrow).collect::<Result<_, _>>()?;
+        Ok((!twice).then_some(bytes))
     }
 
     /// Reads bytes of the EEPROM from `address` on; those beyond FF are left out.

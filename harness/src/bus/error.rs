@@ -69,6 +69,14 @@ pub enum Error {
         /// How often it was tried.
         attempts: u8,
     },
+    /// It cannot be told whether a step was done once or twice, every time anew.
+    #[error("{what} was disturbed {attempts} times")]
+    Disturbed {
+        /// What.
+        what: String,
+        /// How often it was tried.
+        attempts: u8,
+    },
     /// The manual does not say how it is done.
     #[error("{0}")]
     Open(&'static str),

@@ -255,12 +255,7 @@ impl<'l> Bus<'l> {
     /// result has been fetched.
     #[doc(alias = "NB_Result")]
     pub fn result(&self, order: Order) -> Result<Option<u32>, Error> {
-        match self.outcome(order)? {
-            Outcome::Read(data) => Ok(data.value()),
-            Outcome::Done { .. } => Ok(None),
-            Outcome::Unknown(fault) => Err(Error::Unknown(fault)),
-            Outcome::Failed(stop) => Err(Error::Stopped(stop)),
-        }
+        value_of(self.outcome(order)?)
     }
 
     /// Waits for the end of a job and fetches how it ended, whatever that is; a second time there is nothing to fetch.
@@ -296,5 +291,15 @@ impl<'l> Bus<'l> {
     fn run_job(&self, axis: Axis, job: impl FnOnce(u8) -> Job) -> Result<Option<u32>, Error> {
         let order = self.start(axis, job)?;
         self.result(order)
+    }
+}
+
+/// What a job read, or why nobody knows whether it ran.
+fn value_of(outcome: Outcome) -> Result<Option<u32>, Error> {
+    match outcome {
+        Outcome::Read(data) => Ok(data.value()),
+        Outcome::Done { .. } => Ok(None),
+        Outcome::Unknown(fault) => Err(Error::Unknown(fault)),
+        Outcome::Failed(stop) => Err(Error::Stopped(stop)),
     }
 }

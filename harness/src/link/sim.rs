@@ -119,6 +119,13 @@ impl SimulatedLink {
         Some(self.since_origin(next))
     }
 
+    /// When the byte on the last link of a ring reaches the master; one that is not yet there needs a byte time at least.
+    #[must_use]
+    pub fn next_home(&self, ring: usize) -> Option<Instant> {
+        let next = self.ring(ring)?.next_home()?;
+        Some(self.since_origin(next))
+    }
+
     /// A time on the bench's clock as one of the conversation.
     fn since_origin(&self, at: Instant) -> Instant {
         Instant::START + at.since(self.origin)

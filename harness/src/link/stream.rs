@@ -8,7 +8,7 @@ use super::inner::InnerLink;
 use super::stamp::stamped;
 use super::tamper::Tamper;
 use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name};
-use crate::port::{LastWords, Outgoing, Wire};
+use crate::port::{LastWords, Outgoing, Wire, wake_on_time};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
@@ -103,6 +103,7 @@ impl StreamLink {
         rate: Rate,
         interrupt: Arc<AtomicBool>,
     ) -> Self {
+        wake_on_time();
         let mut capabilities = vec![
             Capability::Memory,
             Capability::Motion,

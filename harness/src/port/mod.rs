@@ -22,3 +22,13 @@ mod wire;
 pub use last_words::{LastWords, Unsaid};
 pub use open::{Endpoint, OpenError, PortSettings, open};
 pub use wire::{Abilities, Outgoing, Wire};
+
+use rustix::thread::set_current_timer_slack;
+use std::num::NonZeroU64;
+
+/// Lets the sleeps of this thread and of those that it starts end when they are due. By itself the system lets them take up to 50 us
+/// longer, a sixth of a byte at 38400 bit/s, to wake up less often.
+pub fn wake_on_time() {
+    // A system that cannot do it wakes as it always has.
+    let _unsupported = set_current_timer_slack(NonZeroU64::new(1));
+}

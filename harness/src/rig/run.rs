@@ -24,6 +24,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// How often a scenario is played whose bytes are right and come at other times than the model says.
 const MOST_UNTIMELY: usize = 3;
 
+/// How often drives are made ready before a scenario is skipped.
+const MOST_UNREADY: usize = 2;
+
 /// One attempt at a scenario.
 #[derive(Clone, Debug)]
 pub struct Attempt {
@@ -180,7 +183,9 @@ impl<'s> Run<'s> {
             let verdict = attempt.outcome.verdict;
             attempts.push(attempt);
             let again = match verdict {
-                Verdict::Passed | Verdict::Skipped | Verdict::RigError => false,
+                Verdict::Passed | Verdict::RigError => false,
+                // Drives that could not be made ready: what disturbed them may have been the computer.
+                Verdict::Skipped => attempts.len() < MOST_UNREADY,
                 // A busy computer is late now and then, a drive at the same byte each time.
                 Verdict::Marginal => attempts.len() < MOST_UNTIMELY,
                 _ => attempts.len() < most,
@@ -399,9 +404,14 @@ impl Played {
                 .collect();
             let remark = format!("{} attempts: {}", attempts.len(), verdicts.join(", "));
             outcome.remarks.push(remark);
-            let late = |attempt: &Attempt| attempt.outcome.verdict == Verdict::Marginal;
+            let verdict = |attempt: &Attempt| attempt.outcome.verdict;
+            let no_fault =
+                |attempt| matches!(verdict(attempt), Verdict::Marginal | Verdict::Skipped);
             let before = &attempts[..attempts.len() - 1];
-            if outcome.verdict == Verdict::Passed && !before.iter().all(late) {
+            if let Some(unready) = before.iter().find(|a| verdict(a) == Verdict::Skipped) {
+                outcome.remarks.extend(unready.outcome.remarks.clone());
+            }
+            if outcome.verdict == Verdict::Passed && !before.iter().all(no_fault) {
                 outcome.verdict = Verdict::Flaky;
             }
         }
@@ -551,5 +561,7 @@ mod tests {
         assert_eq!(of(&[Failed, Skipped]), Failed);
         assert_eq!(of(&[Marginal, Skipped]), Marginal);
         assert_eq!(of(&[Skipped]), Skipped);
+        assert_eq!(of(&[Skipped, Passed]), Passed);
+        assert_eq!(of(&[Skipped, Failed]), Failed);
     }
 }

@@ -74,6 +74,16 @@ impl Problem {
         self
     }
 
+    /// The same with another thing that may have been meant, where its help asks what was.
+    #[must_use]
+    pub fn or(mut self, other: &str) -> Self {
+        if let Some(asked) = self.help.as_mut().filter(|help| help.ends_with('?')) {
+            asked.truncate(asked.len() - 1);
+            asked.push_str(&format!(" or {other}?"));
+        }
+        self
+    }
+
     /// The same with the nearest of `known` suggested, if one is near.
     #[must_use]
     pub fn did_you_mean(self, found: &str, known: &[&str]) -> Self {

@@ -107,6 +107,12 @@ impl Dimension {
         })
     }
 
+    /// The name of its first unit.
+    pub(super) fn unit(self) -> &'static str {
+        let own = |unit: &&Unit| unit.dimension == self;
+        UNITS.iter().find(own).map_or("", |unit| unit.name)
+    }
+
     /// The names of its units, for a message: "rpm/s or rad/s2". Other spellings are not named.
     fn names(self) -> String {
         let spelling = |unit: &Unit| unit.name == "turn" || !unit.name.is_ascii();

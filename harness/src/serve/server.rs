@@ -15,7 +15,7 @@ const SETTLED: Span = Span::from_millis(1);
 /// How much of a client's bytes waits for the line at most: the rest stays with the client.
 const WAITING: Span = Span::from_millis(500);
 
-/// While something happens on a ring: how long what reaches the master waits for company.
+/// While a client sends: how long what reaches the master waits for company. The last byte of an answer does not wait.
 const BATCH: Span = Span::from_millis(1);
 
 /// While nothing does: how often drives are let go on, so that it does not all come at once in front of the next byte.
@@ -342,16 +342,30 @@ impl Server {
             return self.clock;
         }
         let (from, to) = self.base;
+        let on_clock = |at: Instant| from + at.since(to);
         let idle = self.clock + IDLE;
-        let inner = self.seats.iter().filter_map(|seat| match seat.at {
-            At::Inner(inner) if inner.role.hears() => self.link.next_fetch(inner.ring, inner.link),
-            _ => None,
-        });
-        let next = inner.chain(self.link.next_event()).min();
-        next.map_or(idle, |next| {
-            let next = from + next.since(to);
-            next.clamp(self.clock + BATCH, idle)
-        })
+        let now = self.link.now();
+        let mut batch = BATCH;
+        let mut next = self.link.next_event();
+        let mut exact = idle;
+        for seat in &self.seats {
+            match seat.at {
+                // Somebody waits for what comes home now, and a byte that is not yet on the last link is there in a byte time.
+                At::Master(ring) if seat.taken && seat.sent_by <= now => {
+                    batch = batch.min(self.link.byte_time());
+                    let home = self.link.next_home(ring);
+                    exact = home.map_or(exact, |home| exact.min(on_clock(home)));
+                }
+                At::Master(_) if seat.taken => exact = exact.min(on_clock(seat.sent_by)),
+                At::Inner(inner) if inner.role.hears() => {
+                    let fetch = self.link.next_fetch(inner.ring, inner.link);
+                    next = next.into_iter().chain(fetch).min();
+                }
+                At::Master(_) | At::Inner(_) => {}
+            }
+        }
+        let next = next.map_or(idle, |next| on_clock(next).clamp(self.clock + batch, idle));
+        next.min(exact).max(self.clock)
     }
 }
 

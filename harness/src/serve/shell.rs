@@ -6,6 +6,7 @@ use super::place::{ControlPlace, Place};
 use super::pty::{Change, Pty};
 use super::server::Server;
 use super::tcp::{Tcp, Visitor};
+use crate::port::wake_on_time;
 use harness_proto::time::{Instant, Span};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -256,6 +257,7 @@ impl Shell<'_> {
     }
 
     fn run(&mut self, job: &Job) -> Result<End, ServeError> {
+        wake_on_time();
         let started = std::time::Instant::now();
         let end = job.length.map(|length| Instant::START + length);
         loop {

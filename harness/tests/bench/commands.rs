@@ -1,7 +1,14 @@
 //! The commands on drives, on a ring that another process serves: one process a command, as a person types them.
 
+#![expect(clippy::print_stderr, reason = "a test that is left out says so")]
+
 use super::ring::Served;
 use super::{Desk, ended, finish, playing, said, signal};
+use harness::port::Endpoint;
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const SAFE: &str = "2 drives are stopped, standing and blocked";
 
@@ -325,4 +332,48 @@ fn a_program_that_hangs_is_watched() {
         "nist 0 rpm  Flags",
     );
     shows(&desk, "read 0 Flags", "stop");
+}
+
+/// Whoever may not open the port is told so. Root may open everything, and becomes somebody else for it.
+#[test]
+fn a_port_without_rights() {
+    let root = rustix::process::geteuid().is_root();
+    if root && Command::new("setpriv").arg("--version").output().is_err() {
+        eprintln!(
+            "skipped: root cannot become somebody else without setpriv (apt-get install util-linux)"
+        );
+        return;
+    }
+    let served = Served::start("plain", &[2], "pty", false, &[]);
+    let Endpoint::Pty(port) = &served.endpoints[0] else {
+        panic!("a pseudo terminal");
+    };
+    let desk = Desk::new(2, "pty", &port.display().to_string());
+    let mode = |path: &Path, mode| {
+        let set = std::fs::set_permissions(path, Permissions::from_mode(mode));
+        set.expect("the owner's right");
+    };
+    mode(port, 0o000);
+    // All of what else is needed, the folder of the port too, is everybody's.
+    mode(port.parent().expect("a folder"), 0o755);
+    let state = desk.path("state");
+    std::fs::create_dir(&state).expect("room");
+    mode(&state, 0o777);
+    let program = desk.path("drivebench");
+    std::fs::copy(env!("CARGO_BIN_EXE_drivebench"), &program).expect("room");
+    mode(desk.folder.path(), 0o755);
+    let mut command = Command::new(if root { Path::new("setpriv") } else { &program });
+    if root {
+        command.args(["--reuid", "65534", "--regid", "65534", "--clear-groups"]);
+        command.arg(&program);
+    }
+    command.args(["rig", "check"]).arg(desk.path("desk.toml"));
+    command.env("DRIVEBENCH_STATE", &state);
+    let output = command.output().expect("the program");
+    ended(&output, 3, "no right to open ");
+    let held = std::fs::read_dir(&state).expect("a folder");
+    let held: Vec<_> = held.map(|entry| entry.expect("a file").path()).collect();
+    let free =
+        |path: &PathBuf| std::fs::read_to_string(path).is_ok_and(|text| !text.contains("pid"));
+    assert!(held.iter().all(free), "a lock is left: {held:?}");
 }

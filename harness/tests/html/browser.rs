@@ -1,6 +1,7 @@
 //! What a browser makes of pages: pictures, hover, keys, times, colours, print, and no page needs a script.
 
 use super::devtools::Browser;
+use super::program::{drivebench, path};
 use super::{FAILS, folder, page, text};
 use serde_json::json;
 
@@ -188,4 +189,70 @@ fn light_dark_print_and_without_scripts() {
           document.querySelector('table.bytes').innerText.includes('C1')]",
     );
     assert_eq!(bare, json!([2, 0, true, true]));
+}
+
+/// The map of a campaign: its cells have a size, a colour for each outcome, and say to the pointer what happened.
+#[test]
+fn the_map_of_a_campaign() {
+    let own = folder("map");
+    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+        return;
+    };
+    let file = own.join("page.html");
+    let output = drivebench(&["campaign", "9.9-silence", "--html", path(&file)]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    browser.open(&file);
+    let cells = "[...document.querySelectorAll('table.heat td')]";
+    let seen = browser.value(&format!(
+        "(() => {{ const all = {cells}; const box = all[0].getBoundingClientRect();
+           return [all.length > 20, box.width > 3 && box.height > 3, all.filter(cell => cell.title).every(cell => cell.className !== '' && /^[0-9]+ [a-z]/.test(cell.title) && cell.textContent !== ''),
+             new Set(all.map(cell => getComputedStyle(cell).backgroundColor)).size > 1]; }})()"
+    ));
+    assert_eq!(seen, json!([true, true, true, true]));
+    let titles = browser.value(&format!(
+        "{cells}.map(cell => cell.title).filter(Boolean).length"
+    ));
+    assert!(titles.as_u64() > Some(20), "{titles}");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+/// What fuzzing has found: the picture is there, and its fault is told to keys.
+#[test]
+fn the_page_of_a_finding() {
+    let own = folder("finding");
+    let Some(mut browser) = Browser::start(&own.join("profile")) else {
+        return;
+    };
+    let (out, file) = (own.join("run"), own.join("page.html"));
+    let run = [
+        "fuzz",
+        "run",
+        "--seed",
+        "7",
+        "--cases",
+        "2000",
+        "--findings",
+        "1",
+    ];
+    let ways = [
+        "--deviates",
+        "1=writes-ignored",
+        "--out",
+        path(&out),
+        "--html",
+        path(&file),
+    ];
+    let output = drivebench(&[&run[..], &ways[..]].concat());
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    browser.open(&file);
+    browser.value("document.querySelector('.ring').scrollIntoView()");
+    browser.until("!!document.querySelector('.ring .tools button')");
+    browser.value("document.querySelector('.ring .scroll').focus()");
+    browser.press("ArrowRight");
+    let said = browser.text(SAID);
+    assert!(said.contains("byte 1, "), "{said}");
+    let (x, y) = middle(&mut browser, 0, 0);
+    browser.point(x, y);
+    browser.until(&format!("({TIP}) !== ''"));
+    assert_eq!(browser.complaints(), Vec::<String>::new());
 }

@@ -5,7 +5,7 @@ use super::parser::{parse, sound};
 use std::path::Path;
 use std::process::{Command, Output};
 
-fn drivebench(arguments: &[&str]) -> Output {
+pub(super) fn drivebench(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
     command.args(arguments).env("NO_COLOR", "1");
     command.output().expect("the program")
@@ -15,7 +15,7 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-fn path(path: &Path) -> &str {
+pub(super) fn path(path: &Path) -> &str {
     path.to_str().expect("a plain path")
 }
 

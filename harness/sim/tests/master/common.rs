@@ -83,6 +83,20 @@ impl<D: Device> Couple<D> {
         (0..count).for_each(|_| self.step());
     }
 
+    /// Lets everything that is under way come back; the master is not asked for more.
+    pub(crate) fn come_home(&mut self) {
+        let most = usize::from(self.ring.size().drives()) + 4;
+        for _ in 0..most {
+            let now = self.ring.now();
+            while let Some(byte) = self.ring.receive() {
+                if let Some(received) = byte.arrival() {
+                    self.master.handle_byte(byte.at, received);
+                }
+            }
+            self.ring.run_until(now + self.ring.byte_time());
+        }
+    }
+
     /// Runs until the drives are counted.
     pub(crate) fn ready(mut self) -> Self {
         self.steps(usize::from(self.ring.size().drives()) + 6);

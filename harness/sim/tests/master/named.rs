@@ -315,6 +315,34 @@ fn damage_on_the_last_link_is_named_by_the_master() {
     assert!(matches!(couple.outcome(id), Some(Outcome::Read(_))));
 }
 
+/// A master that comes late, or has sent nothing for a while, has missed nothing: the first byte that it sends is damaged, not its link
+/// broken.
+#[test]
+fn damage_behind_a_pause_is_damage() {
+    for drives in [5, 100] {
+        for pause in [0, 40, 4_000] {
+            let mut ring = Ring::new(size(drives), Rate::Baud38400, |_| Counted::new(false));
+            ring.run_until(ring.now() + ring.byte_time() * pause);
+            ring.arm_link(2, 1, PARITY);
+            let master = Master::new(size(drives), Rate::Baud38400, few());
+            let mut couple = Couple::with(master, ring);
+            couple.steps(900);
+            let damaged = Fault::Damaged(link(drives - 2, drives - 3));
+            assert_eq!(faults(&couple), [damaged], "{drives} drives, {pause}");
+
+            // Everything comes home, and then nobody asks the master for bytes.
+            couple.come_home();
+            let rest = couple.ring.now() + couple.ring.byte_time() * pause;
+            couple.ring.run_until(rest);
+            let sent = couple.master.counters().sent;
+            couple.ring.arm_link(2, sent + 1, PARITY);
+            couple.steps(900);
+            assert_eq!(faults(&couple), [damaged; 2], "{drives} drives, {pause}");
+            assert_eq!(couple.master.phase(), Phase::Running);
+        }
+    }
+}
+
 /// A link that damages every so many bytes: the work is done all the same, and the counter of 11.5 says
 /// how good the transmission is.
 #[test]

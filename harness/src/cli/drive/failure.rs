@@ -71,6 +71,7 @@ fn exit(error: &bus::Error) -> Exit {
         bus::Error::Link(Trouble::Denied(_)) => Exit::Usage,
         bus::Error::Link(_)
         | bus::Error::Unknown(_)
+        | bus::Error::Disturbed { .. }
         | bus::Error::Stopped(_)
         | bus::Error::NoSuchOrder => Exit::RigError,
     }

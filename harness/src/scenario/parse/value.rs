@@ -184,7 +184,14 @@ pub(in crate::scenario) fn value(
         return Err(problem.help(help));
     }
     if !quantity::ahead(scanner) {
-        return Ok(Written::Bytes(bytes(scanner)?));
+        let digits = scanner.clone().chunk().value;
+        let or_number = |problem: Problem| match dimension {
+            Some(dimension) if !digits.is_empty() && digits.bytes().all(|d| d.is_ascii_digit()) => {
+                problem.or(&format!("`{digits}{}`", dimension.unit()))
+            }
+            _ => problem,
+        };
+        return bytes(scanner).map(Written::Bytes).map_err(or_number);
     }
     let quantity = quantity::quantity(scanner, dimension)?;
     match dimension {

@@ -358,7 +358,8 @@ impl Master {
         }
         self.counters.received += 1;
         self.counters.line_errors += u64::from(received.error.is_some());
-        let silent = now.since(core::mem::replace(&mut self.last_heard, now)) >= TIME_OUT;
+        let silent = self.silent_until(now) >= TIME_OUT;
+        self.last_heard = now;
         self.episode.heard_after(silent);
         match &mut self.state {
             State::Running | State::Counting { .. } => self.take(received, now),
@@ -371,6 +372,15 @@ impl Master {
             State::Resetting { .. } | State::Verifying { .. } => self.verify(received),
             State::Draining { .. } | State::Stopped(_) => {}
         }
+    }
+
+    /// For how long bytes have been missed. A master that has sent nothing for a while, or never, has missed none.
+    fn silent_until(&self, now: Instant) -> Span {
+        // One byte time before the oldest byte under way is to come back.
+        let early = self.options.slack + self.byte_time;
+        let from = |due: Instant| Instant::START + due.since_start().saturating_sub(early);
+        let from = self.in_flight.due().map(from);
+        now.since(from.map_or(self.last_heard, |from| from.max(self.last_heard)))
     }
 
     /// When [`Self::handle_timeout`] is to be called, if no byte comes before.
