@@ -48,16 +48,16 @@ pub fn not_counted(cell: Transition) {
     panic!("{cell}: this target has no counter for it");
 }
 
-/// The longest telegram: sync byte, address byte, seven net bytes (ND21 9.1).
-const LONGEST_TELEGRAM: usize = 9;
+/// The longest command (ND21 10).
+const LONGEST_COMMAND: usize = 6;
 
-/// libFuzzer's mutation, and behind it, for three seeds of four, repaired commands; `head` bytes in front are no wire bytes. For most seeds
-/// an input grows by a telegram at most: of a long input nearly every byte comes to a drive that is in the error mode already.
+/// libFuzzer's mutation, and behind it, for three seeds of four, repaired commands; `head` bytes in front are no wire bytes. For all but a
+/// few seeds an input grows by a command at most: of a long input nearly every byte comes to a drive that is in the error mode already.
 pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32, head: usize) -> usize {
-    let most = if seed.is_multiple_of(16) {
+    let most = if seed.is_multiple_of(32) {
         max_size
     } else {
-        max_size.min(size + LONGEST_TELEGRAM)
+        max_size.min(size + LONGEST_COMMAND)
     };
     let size = libfuzzer_sys::fuzzer_mutate(data, size, most);
     if !seed.is_multiple_of(4)

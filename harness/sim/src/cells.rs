@@ -30,11 +30,10 @@ impl Cells {
         }
     }
 
-    /// Starts with nothing in ROM, EEPROM and registers, and does so where they are: a memory that is made anew and moved is copied.
-    pub(crate) fn restart_empty(&mut self) {
+    /// Starts with nothing in the registers; ROM and EEPROM stay, which nothing on the bus can change. All where it stands: a memory that is
+    /// made anew and moved is copied.
+    pub(crate) fn restart(&mut self) {
         self.ram[RAM.len()..].fill(0);
-        self.rom.fill(0);
-        self.eeprom.fill(0);
         self.start();
     }
 

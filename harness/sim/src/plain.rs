@@ -30,9 +30,9 @@ impl PlainDrive {
         }
     }
 
-    /// Is as new again, with an empty EEPROM.
+    /// Is as new again, with the EEPROM that it has.
     pub(crate) fn restart(&mut self) {
-        self.memory.restart_empty();
+        self.memory.restart();
         self.bus_end = BusEnd::new(self.properties);
     }
 

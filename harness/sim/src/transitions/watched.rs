@@ -27,7 +27,7 @@ impl<N: Notes> Watched<N> {
         }
     }
 
-    /// Is as new again, with an empty EEPROM and nothing noted.
+    /// Is as new again, with the EEPROM that it has and nothing noted.
     pub fn restart(&mut self) {
         self.drive.restart();
         self.reached = N::default();
