@@ -5,6 +5,7 @@ use crate::deviation::Deviant;
 use crate::device::Device;
 use crate::nd21::{Nd21Drive, Shown, Stimulus, factory};
 use crate::plain::PlainDrive;
+use crate::witness::Witness;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
 use harness_proto::novobus::error::BusError;
@@ -48,6 +49,8 @@ pub enum Drive {
     Nd21(Nd21Drive),
     /// A drive of either model that deviates from the manual.
     Deviant(Box<Deviant>),
+    /// A drive with a witness.
+    Witnessed(Box<Witness>),
 }
 
 /// The same call for whichever model it is.
@@ -57,6 +60,7 @@ macro_rules! each {
             Drive::Plain($drive) => $call,
             Drive::Nd21($drive) => $call,
             Drive::Deviant($drive) => $call,
+            Drive::Witnessed($drive) => $call,
         }
     };
 }
@@ -69,6 +73,7 @@ impl Drive {
             Self::Plain(drive) => drive.memory(),
             Self::Nd21(drive) => drive.program().cells(),
             Self::Deviant(drive) => drive.drive().cells(),
+            Self::Witnessed(drive) => drive.drive().cells(),
         }
     }
 
@@ -78,6 +83,7 @@ impl Drive {
             Self::Plain(drive) => drive.memory_mut(),
             Self::Nd21(drive) => drive.program_mut().cells_mut(),
             Self::Deviant(drive) => drive.drive_mut().cells_mut(),
+            Self::Witnessed(drive) => drive.drive_mut().cells_mut(),
         }
     }
 
@@ -86,6 +92,7 @@ impl Drive {
     pub fn peek(&self, address: u16) -> u8 {
         match self {
             Self::Deviant(drive) => drive.peek(address),
+            Self::Witnessed(drive) => drive.drive().peek(address),
             _ => self.cells().peek(address),
         }
     }
@@ -102,6 +109,7 @@ impl Drive {
             Self::Plain(drive) => drive.inside(),
             Self::Nd21(drive) => drive.inside(),
             Self::Deviant(drive) => drive.drive().inside(),
+            Self::Witnessed(drive) => drive.drive().inside(),
         }
     }
 
@@ -111,6 +119,7 @@ impl Drive {
             Self::Plain(drive) => drive.parts(),
             Self::Nd21(drive) => drive.parts(),
             Self::Deviant(drive) => drive.drive_mut().parts(),
+            Self::Witnessed(drive) => drive.drive_mut().parts(),
         }
     }
 
@@ -132,6 +141,7 @@ impl Drive {
                 true
             }
             Self::Deviant(drive) => drive.drive_mut().stimulate(stimulus),
+            Self::Witnessed(drive) => drive.drive_mut().stimulate(stimulus),
         }
     }
 
@@ -142,6 +152,52 @@ impl Drive {
             Self::Plain(_) => None,
             Self::Nd21(drive) => Some(drive.shown()),
             Self::Deviant(drive) => drive.drive().shown(),
+            Self::Witnessed(drive) => drive.drive().shown(),
+        }
+    }
+}
+
+impl Drive {
+    /// Keeps from now on which of its invariants is broken first, in place of a debug assertion.
+    pub(crate) fn watch_invariants(&mut self) {
+        match self {
+            Self::Plain(_) => {}
+            Self::Nd21(drive) => drive.program_mut().invariants.begin(),
+            Self::Deviant(drive) => drive.drive_mut().watch_invariants(),
+            Self::Witnessed(drive) => drive.drive_mut().watch_invariants(),
+        }
+    }
+
+    /// The first of its invariants that was broken since it is watched.
+    pub(crate) fn broken_invariant(&self) -> Option<&'static str> {
+        match self {
+            Self::Plain(_) => None,
+            Self::Nd21(drive) => drive.program().invariants.broken(),
+            Self::Deviant(drive) => drive.drive().broken_invariant(),
+            Self::Witnessed(drive) => drive.drive().broken_invariant(),
+        }
+    }
+
+    /// Puts a [witness](Witness) beside a drive to which nobody has spoken, on a line with this time for a byte; false where it is no
+    /// whole ND21 and has none.
+    #[must_use]
+    pub fn witness(&mut self, byte_time: Span) -> bool {
+        let whole = match &*self {
+            Self::Plain(_) | Self::Witnessed(_) => false,
+            Self::Nd21(_) => true,
+            Self::Deviant(drive) => matches!(drive.drive(), Self::Nd21(_)),
+        };
+        if whole {
+            *self = Self::Witnessed(Box::new(Witness::new(self.clone(), byte_time)));
+        }
+        whole
+    }
+
+    /// Its witness.
+    pub fn its_witness(&mut self) -> Option<&mut Witness> {
+        match self {
+            Self::Witnessed(witness) => Some(witness),
+            _ => None,
         }
     }
 }

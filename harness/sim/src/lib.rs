@@ -7,7 +7,7 @@
 //! happen on a [`link`](mod@link) or in a drive's [`node`], never inside the code under test, and a drive that
 //! breaks the manual has its [`deviation`](mod@deviation)s around it.
 //! [`reference`](mod@reference) is a second, deliberately simple model of the same rules, written apart from the first
-//! and sharing nothing with it: the two are held against each other in tests.
+//! and sharing nothing with it: the two are held against each other in tests. A [`witness`](mod@witness) holds a whole drive against it.
 #![forbid(unsafe_code)]
 
 pub mod bench;
@@ -29,3 +29,4 @@ pub mod trace;
 pub mod transitions;
 mod uart;
 mod under_way;
+pub mod witness;

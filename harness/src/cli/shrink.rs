@@ -2,11 +2,13 @@
 
 use super::args::duration;
 use super::exit::Exit;
-use super::fuzz::{Use, on_ports, scope, tell};
+use super::fuzz::{Use, on_ports, scope, sizes, tell};
 use super::output::Output;
 use super::rig_failure::find_rig;
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
-use crate::explore::{Difference, ExploreError, Finding, OnRig, OnSim, Planted, Setup, Target};
+use crate::explore::{
+    Case, Difference, ExploreError, Finding, OnRig, OnSim, Planted, Setup, Target,
+};
 use crate::rig::Run;
 use clap::Args;
 use harness_sim::deviation::deviations;
@@ -66,10 +68,11 @@ pub(super) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::i
     let Some(rig) = find_rig(name, output) else {
         return Ok(Exit::Usage);
     };
-    if rig.is_simulated() || rig.file.ring.first.drives != finding.case.drives {
+    if rig.is_simulated() || sizes(&rig) != finding.case.sizes() {
+        let sizes: Vec<_> = finding.case.sizes().iter().map(u8::to_string).collect();
         output.complain(&format!(
-            "the finding is of a ring of {} drives with ports, and {name} is another",
-            finding.case.drives
+            "the finding is of a rig with ports and {} drives in its rings, and {name} is another",
+            sizes.join(", ")
         ));
         return Ok(Exit::Usage);
     }
@@ -91,6 +94,11 @@ fn subject(finding: &Finding) -> Subject {
         case: finding.case.clone(),
         setup: finding.setup.clone(),
     }
+}
+
+fn is_on_same_rings(subject: &Subject, finding: &Finding) -> bool {
+    let rings = |case: &Case| (case.drives, case.beside);
+    rings(&subject.case) == rings(&finding.case)
 }
 
 /// Asks a simulated ring.
@@ -117,6 +125,7 @@ fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
         for drive in &suspects {
             let name = deviation.name.to_owned();
             let planted = Planted {
+                ring: finding.case.ring(),
                 drive: *drive,
                 name,
             };
@@ -131,9 +140,8 @@ fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
             let Some(difference) = found.filter(|found| found.kind() == kind) else {
                 continue;
             };
-            // The rig's ring has the size that it has.
-            let size = finding.case.drives;
-            let mut ask = |subject: &Subject| match subject.case.drives == size {
+            // The rig's rings have the sizes that they have.
+            let mut ask = |subject: &Subject| match is_on_same_rings(subject, finding) {
                 true => on_simulated(subject),
                 false => Ok(None),
             };
@@ -161,7 +169,7 @@ fn on_rig(
     let limits = scope(run).limits;
     let mut target = OnRig::new(run, limits)?;
     let mut ask = |subject: &Subject| {
-        if subject.case.drives != finding.case.drives {
+        if !is_on_same_rings(subject, finding) {
             return Ok(None);
         }
         let rehearsal = target.rehearse(&subject.case)?;

@@ -150,12 +150,14 @@ impl Campaign {
     /// The case of a number: it depends on the seed, the number and what was kept before.
     fn case(&self, number: u64, swarm: &Swarm) -> Case {
         let mut dice = Dice::of_part(self.about.seed, number);
-        let maker = Generator::new(&self.scope, swarm, &mut dice);
+        let ring = usize::from(self.scope.second.is_some() && dice.percent(50));
+        let own = self.scope.ring(ring);
+        let maker = Generator::new(&self.scope, own, swarm, &mut dice);
         let old = dice
             .percent(60)
-            .then(|| self.pool.pick(&mut dice))
+            .then(|| self.pool.pick(ring, &mut dice))
             .flatten();
-        let other = self.pool.pick(&mut dice);
+        let other = self.pool.pick(ring, &mut dice);
         match old {
             Some(old) => mutate(old, other, &maker, &mut dice),
             None => maker.case(&mut dice),

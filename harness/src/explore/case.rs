@@ -5,6 +5,7 @@
 
 use super::order::{Command, Order};
 use crate::link::LinkFault;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
 use harness_proto::novobus::sync::{PAUSE, SYNCO};
 use harness_proto::time::Span;
@@ -26,8 +27,21 @@ pub const MOST_NET: u8 = 7;
 pub struct Case {
     /// How many drives the ring has.
     pub drives: u8,
+    /// The other ring of the bench, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beside: Option<Beside>,
     /// What happens, in order.
     pub acts: Vec<Act>,
+}
+
+/// The ring of a bench that a conversation is not with, and its number of drives (ND21 12.2). No byte goes from one ring to the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Beside {
+    /// It is ring 1: the conversation is with ring 2.
+    First(u8),
+    /// It is ring 2: the conversation is with ring 1.
+    Second(u8),
 }
 
 /// Something that the master does, with the faults that meet its bytes.
@@ -244,6 +258,25 @@ impl Act {
 }
 
 impl Case {
+    /// Which ring of the bench it is with, counted from 0.
+    #[must_use]
+    pub const fn ring(&self) -> usize {
+        match self.beside {
+            Some(Beside::First(_)) => 1,
+            Some(Beside::Second(_)) | None => 0,
+        }
+    }
+
+    /// How many drives the rings of the bench have, in order.
+    #[must_use]
+    pub fn sizes(&self) -> Vec<u8> {
+        match self.beside {
+            None => vec![self.drives],
+            Some(Beside::First(other)) => vec![other, self.drives],
+            Some(Beside::Second(other)) => vec![self.drives, other],
+        }
+    }
+
     /// All bytes that are sent.
     #[must_use]
     pub fn bytes(&self) -> Vec<u8> {
@@ -277,10 +310,13 @@ impl Case {
         })
     }
 
-    /// Whether it stays within the bounds of a case.
+    /// Whether it stays within the bounds of a case, and its rings within theirs (ND21 8.4).
     #[must_use]
     pub fn is_bounded(&self) -> bool {
-        self.acts.len() <= MOST_ACTS && self.bytes().len() <= MOST_BYTES
+        let is_ring = |drives: &u8| RingSize::new(u64::from(*drives)).is_ok();
+        self.acts.len() <= MOST_ACTS
+            && self.bytes().len() <= MOST_BYTES
+            && self.sizes().iter().all(is_ring)
     }
 
     /// What stands in it, for shrinking: every step makes this smaller. In order of weight: bytes on the wire, faults, acts,
@@ -297,7 +333,7 @@ impl Case {
             self.bytes().len() as u64,
             damages.map(|damage| damage.harm.weight()).sum(),
             self.acts.len() as u64,
-            u64::from(self.drives),
+            self.sizes().into_iter().map(u64::from).sum(),
             waits.sum(),
             values,
         ]
@@ -413,6 +449,7 @@ mod tests {
         let read = What::Talk(Talk::one(To::Drive(0), Command::ReadByte { cell: 0xFE13 }));
         let mut case = Case {
             drives: 2,
+            beside: None,
             acts: vec![Act {
                 what: read,
                 damages: vec![damage],

@@ -70,9 +70,7 @@ impl Finding {
         let finding: Self = serde_json::from_str(&json).map_err(|error| {
             ExploreError::Usage(format!("{} is no finding: {error}", file.display()))
         })?;
-        let sound = finding.schema == SCHEMA
-            && RingSize::new(u64::from(finding.case.drives)).is_ok()
-            && finding.case.is_bounded();
+        let sound = finding.schema == SCHEMA && finding.case.is_bounded();
         if !sound {
             return Err(ExploreError::Usage(format!(
                 "{} is no finding of schema {SCHEMA} within the bounds of a case",
@@ -112,10 +110,7 @@ impl Finding {
         let timed = self.difference.byte.filter(|_| self.difference.time);
         let mut remarks = vec![self.difference.about.clone()];
         for planted in &self.setup.deviates {
-            remarks.push(format!(
-                "found on drive {} deviates {}",
-                planted.drive, planted.name
-            ));
+            remarks.push(format!("found on {}", planted.line()));
         }
         let page = Page {
             title,

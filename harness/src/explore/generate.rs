@@ -1,6 +1,6 @@
 //! New cases from numbers: telegrams mostly as they should be, now and then not, and a look at what came of them.
 
-use super::case::{Act, Case, Damage, Harm, MOST_NET, Talk, To, What};
+use super::case::{Act, Beside, Case, Damage, Harm, MOST_NET, Talk, To, What};
 use super::dice::Dice;
 use super::idiom::Idiom;
 use super::order::{Command, Order, Spoil};
@@ -13,16 +13,67 @@ use harness_proto::novobus::guard::{Limits, Need};
 /// What cases may have on a rig.
 #[derive(Clone, Debug)]
 pub struct Scope {
-    /// How many drives the ring has.
-    pub drives: u8,
+    /// Its ring.
+    pub first: RingScope,
+    /// Its second ring, where it has two: a case is with one of them.
+    pub second: Option<RingScope>,
     /// What the rig can be asked.
     pub spices: Vec<Spice>,
-    /// The links on which faults can be put.
-    pub links: Vec<u8>,
     /// What may be sent.
     pub limits: Limits,
     /// Whether the EEPROM is spared, whatever may be sent: what is written there stays (ND21 14.10.5).
     pub spare_eeprom: bool,
+}
+
+impl Scope {
+    /// A ring of it, counted from 0.
+    #[must_use]
+    pub fn ring(&self, ring: usize) -> &RingScope {
+        let second = self.second.as_ref().filter(|_| ring > 0);
+        second.unwrap_or(&self.first)
+    }
+}
+
+/// A ring that cases may be with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RingScope {
+    /// How many drives it has.
+    pub drives: u8,
+    /// The other ring of the bench, where there is one.
+    pub beside: Option<Beside>,
+    /// The links on which faults can be put.
+    pub links: Vec<u8>,
+}
+
+impl RingScope {
+    /// The rings of a bench of these sizes, with the links that `reaches` says of a ring and a link, both counted from 0. What is
+    /// damaged behind the last drive no drive hears: that link is left out.
+    #[must_use]
+    pub fn both(
+        first: u8,
+        second: Option<u8>,
+        reaches: impl Fn(usize, u8) -> bool,
+    ) -> (Self, Option<Self>) {
+        let ring = |ring, drives, beside| Self {
+            drives,
+            beside,
+            links: (0..drives).filter(|link| reaches(ring, *link)).collect(),
+        };
+        (
+            ring(0, first, second.map(Beside::Second)),
+            second.map(|second| ring(1, second, Some(Beside::First(first)))),
+        )
+    }
+
+    /// A case with this ring.
+    #[must_use]
+    pub const fn case(&self, acts: Vec<Act>) -> Case {
+        Case {
+            drives: self.drives,
+            beside: self.beside,
+            acts,
+        }
+    }
 }
 
 /// The most acts that a new case has in front of its end.
@@ -57,20 +108,22 @@ const BYTES: [u8; 12] = [
 #[derive(Debug)]
 pub struct Generator<'s> {
     scope: &'s Scope,
+    ring: &'s RingScope,
     swarm: &'s Swarm,
     /// The cells of this case: what is written is read again.
     cells: Vec<u16>,
 }
 
 impl<'s> Generator<'s> {
-    /// A generator with a few cells of its own.
-    pub fn new(scope: &'s Scope, swarm: &'s Swarm, dice: &mut Dice) -> Self {
+    /// A generator for one of the scope's rings, with a few cells of its own.
+    pub fn new(scope: &'s Scope, ring: &'s RingScope, swarm: &'s Swarm, dice: &mut Dice) -> Self {
         let mut cells = Vec::new();
         for _ in 0..1 + dice.below(3) {
             cells.push(any_cell(dice));
         }
         Self {
             scope,
+            ring,
             swarm,
             cells,
         }
@@ -84,10 +137,7 @@ impl<'s> Generator<'s> {
         }
         self.damage(&mut acts, dice);
         self.end(&mut acts, dice);
-        let mut case = Case {
-            drives: self.scope.drives,
-            acts,
-        };
+        let mut case = self.ring.case(acts);
         self.keep_in_step(&mut case);
         // Growing beyond the bounds loses the end.
         while !case.is_bounded() && case.acts.pop().is_some() {}
@@ -108,18 +158,18 @@ impl<'s> Generator<'s> {
 
     /// A drive of the ring.
     pub(super) fn drive(&self, dice: &mut Dice) -> u8 {
-        dice.below(usize::from(self.scope.drives)) as u8
+        dice.below(usize::from(self.ring.drives)) as u8
     }
 
     /// All of them.
     pub(super) fn drives(&self) -> std::ops::Range<u8> {
-        0..self.scope.drives
+        0..self.ring.drives
     }
 
     /// The link in front of a drive, where faults can be put on it.
     pub(super) fn link_before(&self, drive: u8) -> Option<u8> {
-        let link = self.scope.drives.checked_sub(drive + 1)?;
-        self.scope.links.contains(&link).then_some(link)
+        let link = self.ring.drives.checked_sub(drive + 1)?;
+        self.ring.links.contains(&link).then_some(link)
     }
 
     /// Whether the rig allows a command.
@@ -174,7 +224,7 @@ impl<'s> Generator<'s> {
                 },
             )),
             34..36 if has(Spice::Power) => What::Power {
-                drive: dice.below(usize::from(self.scope.drives)) as u8,
+                drive: dice.below(usize::from(self.ring.drives)) as u8,
                 on: dice.percent(60),
             },
             _ => What::Talk(self.talk(dice)),
@@ -215,7 +265,7 @@ impl<'s> Generator<'s> {
 
     /// Whom a telegram is for.
     pub fn to(&self, dice: &mut Dice) -> To {
-        let drive = dice.below(usize::from(self.scope.drives)) as u8;
+        let drive = dice.below(usize::from(self.ring.drives)) as u8;
         match dice.below(100) {
             0..20 if self.swarm.has(Spice::Same) => To::Same,
             20..40 if self.swarm.has(Spice::Next) => To::Next,
@@ -226,7 +276,7 @@ impl<'s> Generator<'s> {
 
     /// An address byte, often one that is counted up through 80 or beyond 00 (ND21 9.3).
     fn nobody(&self, dice: &mut Dice) -> u8 {
-        let on_the_way = dice.below(usize::from(self.scope.drives)) as u8;
+        let on_the_way = dice.below(usize::from(self.ring.drives)) as u8;
         match dice.below(4) {
             0 => 0x7F - on_the_way.min(0x7F),
             1 => on_the_way,
@@ -326,7 +376,7 @@ impl<'s> Generator<'s> {
             };
             let at = dice.below(acts.len());
             if let Some(act) = acts.get_mut(at) {
-                let length = act.length(self.scope.drives);
+                let length = act.length(self.ring.drives);
                 let damage = Damage {
                     at: dice.below(length) as u16,
                     ..damage
@@ -341,7 +391,7 @@ impl<'s> Generator<'s> {
     }
 
     fn one_damage(&self, own: &[Spice], dice: &mut Dice) -> Option<Damage> {
-        let link = *dice.pick(&self.scope.links)?;
+        let link = *dice.pick(&self.ring.links)?;
         let flip = |data, parity, stop| Harm::Flip { data, parity, stop };
         let harm = match (dice.pick(own)?, dice.below(4)) {
             (Spice::Flip, 0) => flip(0, true, false),
@@ -368,7 +418,7 @@ impl<'s> Generator<'s> {
         }
         // A ring in the error mode spells out its address (ND21 9.7).
         if kind < 4 {
-            let synco = 24 + usize::from(self.scope.drives) + dice.below(8);
+            let synco = 24 + usize::from(self.ring.drives) + dice.below(8);
             acts.push(Act::sound(What::Synco(synco.min(60) as u8)));
         }
         if !(2..4).contains(&kind) {
@@ -379,7 +429,7 @@ impl<'s> Generator<'s> {
             let mut cells = self.cells.clone();
             cells.truncate(2);
             for cell in cells {
-                let drive = dice.below(usize::from(self.scope.drives)) as u8;
+                let drive = dice.below(usize::from(self.ring.drives)) as u8;
                 let read = Command::ReadByte { cell };
                 acts.push(Act::sound(What::Talk(Talk::one(To::Drive(drive), read))));
             }

@@ -51,7 +51,14 @@ pub fn features(case: &Case, seen: &Seen, trace: &Trace) -> BTreeSet<u32> {
     }
     let surplus = seen.received.len().saturating_sub(bytes.len());
     found.insert(hash(&[4, surplus.min(3) as u32]));
-    found
+    match case.ring() {
+        0 => found,
+        // What one ring has shown says nothing of the other one.
+        ring => found
+            .into_iter()
+            .map(|own| hash(&[own, ring as u32]))
+            .collect(),
+    }
 }
 
 fn sign(bit: u32) -> harness_proto::novobus::error_mode::Marks {
@@ -102,6 +109,8 @@ fn hash(words: &[u32]) -> u32 {
 #[derive(Clone, Debug, Default)]
 pub struct Pool {
     cases: Vec<Case>,
+    /// Which of them are with ring 1, and which with ring 2.
+    of_ring: [Vec<usize>; 2],
     shown: BTreeSet<u32>,
 }
 
@@ -113,6 +122,7 @@ impl Pool {
             return 0;
         }
         self.shown.extend(features);
+        self.of_ring[case.ring()].push(self.cases.len());
         self.cases.push(case.clone());
         new
     }
@@ -129,11 +139,16 @@ impl Pool {
         self.shown.len()
     }
 
-    /// One of them; the younger ones more often.
-    pub fn pick(&self, dice: &mut Dice) -> Option<&Case> {
-        let count = self.cases.len();
-        let from = if dice.percent(50) { count * 3 / 4 } else { 0 };
-        self.cases.get(from + dice.below(count - from))
+    /// One of them with this ring, counted from 0; the younger ones more often.
+    pub fn pick(&self, ring: usize, dice: &mut Dice) -> Option<&Case> {
+        let own = self.of_ring.get(ring)?;
+        let from = if dice.percent(50) {
+            own.len() * 3 / 4
+        } else {
+            0
+        };
+        let at = own.get(from + dice.below(own.len() - from))?;
+        self.cases.get(*at)
     }
 }
 

@@ -57,7 +57,7 @@ impl<'r, 's> OnRig<'r, 's> {
             name: "a case".to_owned(),
             text: text(case, &page).into(),
         };
-        Ok(Entry::new(source, Some(case.drives))?)
+        Ok(Entry::new(source, None)?)
     }
 }
 
@@ -72,7 +72,7 @@ impl Target for OnRig<'_, '_> {
         let mut guarded = Guarded::new(self.model.clone(), self.limits);
         let mut recording = Recording::new(&mut guarded, &mut events);
         let played = play_one(&mut recording, &plan, &way);
-        let trace = recording.trace(0);
+        let trace = recording.trace(case.ring());
         rehearsal.denied = match (&played, guarded.trouble()) {
             (_, Some(trouble)) => Some(trouble.to_string()),
             (Ok(outcome), _) if outcome.verdict == Verdict::Skipped => {
@@ -86,7 +86,7 @@ impl Target for OnRig<'_, '_> {
             .rposition(|event| matches!(event, Event::Begin(_)));
         let own = &events[from.unwrap_or(0)..];
         let received = own.iter().filter_map(|event| match event {
-            Event::Received(0, at, byte) => Some((*at, *byte)),
+            Event::Received(ring, at, byte) if *ring == case.ring() => Some((*at, *byte)),
             _ => None,
         });
         rehearsal.seen = Seen {
@@ -99,10 +99,17 @@ impl Target for OnRig<'_, '_> {
         });
         rehearsal.took = before.fold(rehearsal.seen.took, |sum, span| sum + span);
         rehearsal.features = features(case, &rehearsal.seen, &trace);
-        let monitors =
-            |drive| guarded.peek(0, drive, ram::FLAGS2).unwrap_or(0) & flags2::MONITORING;
-        let unasked = rehearsal.seen.received.len() > case.bytes().len();
-        if rehearsal.denied.is_none() && (unasked || (0..case.drives).any(|k| monitors(k) != 0)) {
+        // A ring that nobody speaks to falls silent too.
+        let monitors = |(ring, drive): (usize, u8)| {
+            guarded.peek(ring, drive, ram::FLAGS2).unwrap_or(0) & flags2::MONITORING != 0
+        };
+        let rings = case.sizes().into_iter().enumerate();
+        let mut drives = rings.flat_map(|(ring, drives)| (0..drives).map(move |k| (ring, k)));
+        let received = own
+            .iter()
+            .filter(|event| matches!(event, Event::Received(..)));
+        let unasked = received.count() > case.bytes().len();
+        if rehearsal.denied.is_none() && (unasked || drives.any(monitors)) {
             // In real time it is a race how a ring comes out of that.
             let why = "drives would miss bytes and send unasked (ND21 9.9)";
             rehearsal.denied = Some(why.to_owned());

@@ -3,23 +3,24 @@
 use super::case::Case;
 use super::error::ExploreError;
 use super::novelty::features;
-use super::oracle::{against_model, against_reference};
+use super::oracle::{Difference, against_model, against_reference, against_witnesses, beside};
 use super::play::play;
 use super::setup::Setup;
 use super::target::{Rehearsal, Target, Tried};
 use crate::link::{Link, SimulatedLink};
+use harness_sim::trace::Trace;
 
 /// A simulated ring beside its model, and beside the reference model where its drives are plain and sound.
 #[derive(Debug)]
 pub struct OnSim {
     setup: Setup,
-    /// Fresh rings of the size of the last case.
+    /// Fresh rings of the sizes of the last case.
     fresh: Option<Fresh>,
 }
 
 #[derive(Debug)]
 struct Fresh {
-    drives: u8,
+    sizes: Vec<u8>,
     model: SimulatedLink,
     under_test: Option<SimulatedLink>,
 }
@@ -31,16 +32,61 @@ impl OnSim {
         Self { setup, fresh: None }
     }
 
-    fn fresh(&mut self, drives: u8) -> Result<&Fresh, ExploreError> {
-        let fresh = match self.fresh.take().filter(|fresh| fresh.drives == drives) {
+    /// How the model itself is otherwise than it must be.
+    fn judge(&self, case: &Case, link: &mut SimulatedLink, trace: &Trace) -> Option<Difference> {
+        let own = match self.setup.is_plain() {
+            true => against_reference(case, link, trace),
+            false => against_witnesses(case, link, trace),
+        };
+        own.or_else(|| beside(case, link))
+    }
+
+    /// The same, with rings of these sizes made at once: what cannot be is said before a run begins.
+    ///
+    /// # Errors
+    /// The lines of the setup have mistakes, or nobody can judge what they make.
+    pub fn ready(setup: Setup, sizes: &[u8]) -> Result<Self, ExploreError> {
+        let mut new = Self::new(setup);
+        new.fresh_of(sizes.to_vec())?;
+        Ok(new)
+    }
+
+    /// The model: where nothing is planted it is under test itself, beside the reference model or with witnesses.
+    fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, ExploreError> {
+        let mut model = self.setup.model(sizes)?;
+        if !self.setup.deviates.is_empty() || self.setup.is_plain() {
+            return Ok(model);
+        }
+        let remedy = "leave the line out, or plant a deviation (--deviates DRIVE=NAME)";
+        if let Some(line) = self.setup.sets_property() {
+            return Err(ExploreError::Usage(format!(
+                "there is nothing to hold these drives against: witnesses know no other property of the bus than the default, and the \
+                 rig says `{line}`; {remedy}"
+            )));
+        }
+        match model.witness() {
+            true => Ok(model),
+            false => Err(ExploreError::Usage(format!(
+                "there is nothing to hold these drives against: witnesses judge whole ND21s, and a `model` line of the rig makes some of \
+                 them plain; {remedy}"
+            ))),
+        }
+    }
+
+    fn fresh(&mut self, case: &Case) -> Result<&Fresh, ExploreError> {
+        self.fresh_of(case.sizes())
+    }
+
+    fn fresh_of(&mut self, sizes: Vec<u8>) -> Result<&Fresh, ExploreError> {
+        let fresh = match self.fresh.take().filter(|fresh| fresh.sizes == sizes) {
             Some(fresh) => fresh,
             None => Fresh {
-                drives,
-                model: self.setup.model(drives)?,
+                model: self.model(&sizes)?,
                 under_test: match self.setup.deviates.is_empty() {
                     true => None,
-                    false => Some(self.setup.under_test(drives)?),
+                    false => Some(self.setup.under_test(&sizes)?),
                 },
+                sizes,
             },
         };
         Ok(self.fresh.insert(fresh))
@@ -49,12 +95,11 @@ impl OnSim {
 
 impl Target for OnSim {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
-        let with_reference = self.setup.is_plain() && self.setup.deviates.is_empty();
-        let mut link = self.fresh(case.drives)?.model.clone();
+        let mut link = self.fresh(case)?.model.clone();
         let seen = play(&mut link, case);
-        let trace = link.trace(0);
-        let of_model = match with_reference {
-            true => against_reference(case, &link, &trace),
+        let trace = link.trace(case.ring());
+        let of_model = match self.setup.deviates.is_empty() {
+            true => self.judge(case, &mut link, &trace),
             false => None,
         };
         Ok(Rehearsal {
@@ -67,7 +112,7 @@ impl Target for OnSim {
     }
 
     fn attempt(&mut self, case: &Case, rehearsal: &Rehearsal) -> Result<Tried, ExploreError> {
-        let Some(mut link) = self.fresh(case.drives)?.under_test.clone() else {
+        let Some(mut link) = self.fresh(case)?.under_test.clone() else {
             return Ok(Tried {
                 took: rehearsal.took,
                 difference: rehearsal.of_model.clone(),
@@ -77,7 +122,7 @@ impl Target for OnSim {
         let seen = play(&mut link, case);
         Ok(Tried {
             took: seen.took,
-            difference: against_model(case, &rehearsal.seen, &seen),
+            difference: against_model(case, &rehearsal.seen, &seen).or_else(|| beside(case, &link)),
             not_played: None,
         })
     }

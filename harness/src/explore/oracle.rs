@@ -1,19 +1,21 @@
 //! What a ring must answer: the model of the manual, byte for byte and to the nanosecond, and the reference model, on every link and
 //! in every cell.
 
-use super::case::{Case, Harm, What};
+use super::case::{Beside, Case, Harm, What};
 use super::order::Order;
 use super::play::Seen;
-use crate::link::{Link, SimulatedLink};
+use super::setup::{drive_name, is_first};
+use crate::link::{Line as _, Link, SimulatedLink, link_name};
 use crate::twin;
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 use harness_sim::reference;
-use harness_sim::trace::Trace;
+use harness_sim::trace::{LinkTrace, Trace};
+use harness_sim::witness::Complaint;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -28,6 +30,9 @@ pub struct Difference {
     pub section: String,
     /// The rule in a few words.
     pub rule: String,
+    /// In which ring, counted from 0.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub ring: usize,
     /// The drive that is meant, where one is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<u8>,
@@ -51,9 +56,11 @@ impl Difference {
     /// The same of the same drive.
     #[must_use]
     pub fn signature(&self) -> String {
-        match self.drive {
-            Some(drive) => format!("drive {drive}: {}", self.kind()),
-            None => self.kind(),
+        let kind = self.kind();
+        match (self.drive, self.ring) {
+            (Some(drive), ring) => format!("drive {}: {kind}", drive_name(ring, drive)),
+            (None, 0) => kind,
+            (None, _) => format!("ring 2: {kind}"),
         }
     }
 }
@@ -65,6 +72,7 @@ impl From<&twin::Divergence> for Difference {
             what: found.what.words().to_owned(),
             section: section.to_owned(),
             rule: rule.to_owned(),
+            ring: found.ring,
             drive: found.drive,
             byte: Some(found.byte),
             time: found.what == twin::What::Time,
@@ -97,7 +105,7 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
     let role = answered(&roles(size, &sent), &sent).nth(index);
     let role = role.unwrap_or(Role::Foreign);
     let divergence = twin::Divergence {
-        ring: 0,
+        ring: case.ring(),
         byte: index + 1,
         what,
         expected: expected.get(index).copied(),
@@ -139,7 +147,8 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
         return None;
     }
     let faults = reference_faults(case)?;
-    let monitors = |drive| link.peek(0, drive, ram::FLAGS2).unwrap_or(0) & 0x04 != 0;
+    let ring = case.ring();
+    let monitors = |drive| link.peek(ring, drive, ram::FLAGS2).unwrap_or(0) & 0x04 != 0;
     if (0..case.drives).any(monitors) {
         return None;
     }
@@ -168,17 +177,101 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
         }
     }
     drives.iter().rev().zip(0..).find_map(|(other, drive)| {
-        let in_error = link.error_of(0, drive).flatten().is_some();
+        let in_error = link.error_of(ring, drive).flatten().is_some();
         if in_error != other.in_error() {
-            return Some(beside_bus(drive, "error mode", "9.7", String::new()));
+            return Some(beside_bus(ring, drive, "error mode", "9.7", ""));
         }
         // The reference model knows one code for every bad byte.
         let cells = (0xFD80..=0xFFFF).filter(|cell| ![0xFD82, 0xFD83].contains(cell));
         let mut differing =
-            cells.filter(|cell| link.peek(0, drive, *cell) != Some(other.peek(*cell)));
-        differing
-            .next()
-            .map(|cell| beside_bus(drive, "contents of a cell", "10.2", format!(" {cell:04X}")))
+            cells.filter(|cell| link.peek(ring, drive, *cell) != Some(other.peek(*cell)));
+        differing.next().map(|cell| {
+            let detail = format!(" {cell:04X}");
+            beside_bus(ring, drive, "contents of a cell", "10.2", &detail)
+        })
+    })
+}
+
+/// What the witnesses of whole ND21s have seen of a case, or an answer that did not go out a byte time behind what came.
+#[must_use]
+pub fn against_witnesses(
+    case: &Case,
+    link: &mut SimulatedLink,
+    trace: &Trace,
+) -> Option<Difference> {
+    let ring = case.ring();
+    let Some((drive, found)) = link.complaint(ring) else {
+        return untimely(case, link.byte_time(), trace);
+    };
+    let name = drive_name(ring, drive);
+    let Complaint {
+        heard, at, about, ..
+    } = found;
+    let at = at.since_start();
+    Some(Difference {
+        what: "another drive than that of the manual".to_owned(),
+        section: found.section.to_owned(),
+        rule: found.rule.to_owned(),
+        ring,
+        drive: Some(drive),
+        byte: None,
+        time: false,
+        about: format!("drive {name}, byte {heard} on the link to it, at {at}: {about}"),
+    })
+}
+
+/// A byte that did not go out as the one that it answers was in (ND21 8.2). Behind faults and silence others may stand in its way.
+fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
+    let waits = |act: &super::case::Act| matches!(act.what, What::Wait(_));
+    if !case.faults().is_empty() || case.acts.iter().any(waits) {
+        return None;
+    }
+    trace.links.windows(2).find_map(|pair| {
+        let mut heard = pair[0].bytes.iter().map(|byte| byte.at + byte_time);
+        // What is not answered is passed over: PAUSE, and all that a drive without power hears.
+        let early = |at: Instant| !heard.any(|due| due == at);
+        let place = pair[1].bytes.iter().map(|byte| byte.at).position(early)?;
+        let drive = pair[1].from?;
+        let (number, at) = (place + 1, pair[1].bytes[place].at.since_start());
+        let name = drive_name(case.ring(), drive);
+        Some(Difference {
+            what: "another time".to_owned(),
+            section: "8.2".to_owned(),
+            rule: "answer".to_owned(),
+            ring: case.ring(),
+            drive: Some(drive),
+            byte: None,
+            time: true,
+            about: format!(
+                "byte {number} that drive {name} sent came at {at}, no byte time behind one that it heard"
+            ),
+        })
+    })
+}
+
+/// A byte on the ring that a case is not with: nobody has spoken to its drives (ND21 12.2).
+#[must_use]
+pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
+    let other = match case.beside? {
+        Beside::First(_) => 0,
+        Beside::Second(_) => 1,
+    };
+    let trace = link.trace(other);
+    let spoke = |own: &LinkTrace| !own.bytes.is_empty();
+    let place = trace.links.iter().position(spoke)?;
+    let name = link_name(other, trace.drives, place);
+    Some(Difference {
+        what: "a byte on the other ring".to_owned(),
+        section: "12.2".to_owned(),
+        rule: "two rings".to_owned(),
+        ring: other,
+        drive: None,
+        byte: None,
+        time: false,
+        about: format!(
+            "{name} carried a byte, and the master had sent nothing to ring {}",
+            other + 1
+        ),
     })
 }
 
@@ -212,11 +305,12 @@ fn on_link(
         Some((byte, false)) => format!("{byte:02X}"),
         Some((byte, true)) => format!("{byte:02X} (bad)"),
     };
-    let name = crate::link::link_name(0, case.drives, place);
+    let name = link_name(case.ring(), case.drives, place);
     Difference {
         what: "another byte on a link than in the reference model".to_owned(),
         section: "9.1".to_owned(),
         rule: "ring".to_owned(),
+        ring: case.ring(),
         drive: None,
         byte: (place == usize::from(case.drives)).then_some(at + 1),
         time: false,
@@ -229,15 +323,17 @@ fn on_link(
     }
 }
 
-fn beside_bus(drive: u8, rule: &str, section: &str, detail: String) -> Difference {
+fn beside_bus(ring: usize, drive: u8, rule: &str, section: &str, detail: &str) -> Difference {
+    let name = drive_name(ring, drive);
     Difference {
         what: "another state than in the reference model".to_owned(),
         section: section.to_owned(),
         rule: rule.to_owned(),
+        ring,
         drive: Some(drive),
         byte: None,
         time: false,
-        about: format!("drive {drive}: {rule}{detail} is otherwise than in the reference model"),
+        about: format!("drive {name}: {rule}{detail} is otherwise than in the reference model"),
     }
 }
 

@@ -69,9 +69,14 @@ fn reach(kept: &Kept, case: &Case, reached: &mut Reached) -> Result<(), ExploreE
             "a kept case in the record is larger than a case may be".to_owned(),
         ));
     }
-    let mut link = kept.about.setup.model(case.drives)?;
+    let mut link = kept.about.setup.model(&case.sizes())?;
     play(&mut link, case);
-    for own in link.trace(0).links.iter().filter(|own| own.to.is_some()) {
+    for own in link
+        .trace(case.ring())
+        .links
+        .iter()
+        .filter(|own| own.to.is_some())
+    {
         reached.join(&heard(own));
     }
     Ok(())
@@ -130,7 +135,7 @@ fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Sh
         name: file,
         title: &finding.difference.signature(),
         sources: &sources,
-        drives: &finding.case.drives.to_string(),
+        drives: &drives(&finding.case.sizes()),
         text: &text,
         outcome: &outcome,
         traces: &traces,
@@ -140,14 +145,18 @@ fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Sh
     Ok(section(number, &played))
 }
 
+/// Numbers of drives as a header line has them.
+fn drives(sizes: &[u8]) -> String {
+    let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
+    sizes.join(", ")
+}
+
 /// Plays the scenario of a finding, with what is planted.
 fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>), ExploreError> {
     // The header ends with the first empty line.
     let (head, steps) = text.split_once("\n\n").unwrap_or((text, ""));
     let planted = finding.setup.deviates.iter();
-    let planted: String = planted
-        .map(|own| format!("\ndrive {} deviates {}", own.drive, own.name))
-        .collect();
+    let planted: String = planted.map(|own| format!("\n{}", own.line())).collect();
     let text = format!("{head}{planted}\n\n{steps}");
     let source = Source {
         name: "the ring under test".to_owned(),

@@ -19,9 +19,10 @@ pub struct Seen {
 
 /// Plays a case on a ring that nobody has spoken to, in the steps in which a scenario is played.
 pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
+    let ring = case.ring();
     for (place, byte, harm) in case.faults() {
         let fault = PlacedFault::Link(usize::from(place), harm.fault());
-        link.inject(0, fault, Moment::Byte(byte));
+        link.inject(ring, fault, Moment::Byte(byte));
     }
     // When the line before was done.
     let mut line_before = link.now();
@@ -33,7 +34,7 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
             }
             What::Power { drive, on } => {
                 let fault = if on { DriveFault::On } else { DriveFault::Off };
-                link.inject(0, PlacedFault::Drive(drive, fault), Moment::Now);
+                link.inject(ring, PlacedFault::Drive(drive, fault), Moment::Now);
             }
             _ => {
                 for part in act
@@ -41,7 +42,7 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
                     .iter()
                     .filter(|part| !part.is_empty())
                 {
-                    line_before = link.send(0, part);
+                    line_before = link.send(ring, part);
                 }
             }
         }
@@ -49,7 +50,7 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
     let end = link.now() + MOST_ROUND;
     while link.busy() && link.now() < end && link.wait(end) {}
     Seen {
-        received: std::iter::from_fn(|| link.receive(0)).collect(),
+        received: std::iter::from_fn(|| link.receive(ring)).collect(),
         took: link.now().since_start(),
     }
 }

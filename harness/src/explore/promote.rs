@@ -132,9 +132,10 @@ fn snapshot(name: &str, text: &str) -> Result<String, ExploreError> {
             why.unwrap_or_default()
         )));
     }
+    let traces: Vec<_> = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
     Ok(format!(
         "---\nsource: harness/tests/scenarios.rs\n---\n{}\n",
-        page(&entry, &outcome, &[link.trace(0)]).trim_end_matches('\n')
+        page(&entry, &outcome, &traces).trim_end_matches('\n')
     ))
 }
 
@@ -160,9 +161,7 @@ fn deviating_fails(finding: &Finding, text: &str) -> Result<Option<bool>, Explor
     // The header ends with the first empty line.
     let (head, steps) = text.split_once("\n\n").unwrap_or((text, ""));
     let planted = finding.setup.deviates.iter();
-    let planted: String = planted
-        .map(|own| format!("\ndrive {} deviates {}", own.drive, own.name))
-        .collect();
+    let planted: String = planted.map(|own| format!("\n{}", own.line())).collect();
     let entry = Entry::new(
         Source {
             name: "the ring under test".to_owned(),

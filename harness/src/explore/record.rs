@@ -26,6 +26,9 @@ pub struct About {
     pub rig: String,
     /// How many drives its ring has.
     pub drives: u8,
+    /// How many drives its second ring has, where it has two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second: Option<u8>,
     /// Whether it has ports.
     pub ports: bool,
     /// The seed.

@@ -2,27 +2,48 @@
 
 use super::case::Case;
 use super::play::{Seen, play};
-use super::text::{Page, text};
+use super::text::{Page, head};
 use crate::library::Entry;
 use crate::link::SimulatedLink;
 use crate::rig::Rig;
 use crate::scenario::problem::Problems;
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
+use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::deviation;
 use serde::{Deserialize, Serialize};
 
-/// The line that makes every drive a whole ND21.
-const ALL_ND21: &str = "drive 0..last model nd21";
+/// The lines that make every drive of a ring a whole ND21.
+const ALL_ND21: [&str; 2] = ["drive 0..last model nd21", "drive 2:0..last model nd21"];
 
 /// A deviation that is planted in a drive.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Planted {
+    /// In which ring, counted from 0.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub ring: usize,
     /// Which drive.
     pub drive: u8,
     /// The name of the deviation.
     pub name: String,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+pub(super) const fn is_first(ring: &usize) -> bool {
+    *ring == 0
+}
+
+impl Planted {
+    /// The line of a header.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let drive = drive_name(self.ring, self.drive);
+        format!("drive {drive} deviates {}", self.name)
+    }
 }
 
 /// What simulated rings are made of.
@@ -59,18 +80,45 @@ impl Setup {
             if nothing_said && !whole && !deviates.iter().any(behind) {
                 header.clear();
             } else {
-                header.insert(0, ALL_ND21.to_owned());
+                header.splice(0..0, all_nd21(rig.rings().count()));
             }
         }
         Self { header, deviates }
     }
 
-    /// The model of a rig with ports.
+    /// The same with a drive that deviates where nobody knows of it: in the model too.
     #[must_use]
-    pub fn of_ports() -> Self {
+    pub fn hides(mut self, planted: &Planted) -> Self {
+        self.header.push(planted.line());
+        self
+    }
+
+    /// The model of a rig with ports, with so many rings.
+    #[must_use]
+    pub fn of_ports(rings: usize) -> Self {
         Self {
-            header: vec![ALL_ND21.to_owned()],
+            header: all_nd21(rings),
             deviates: Vec::new(),
+        }
+    }
+
+    /// What is said of the drives of one ring, as of a bench that has no other; the ring is counted from 0.
+    #[must_use]
+    pub fn of_ring(&self, ring: usize) -> Self {
+        let own = |line: &String| match (line.strip_prefix("drive 2:"), ring) {
+            (None, 0) => Some(line.clone()),
+            (Some(rest), 1) => Some(format!("drive {}", rest.trim_start())),
+            _ => None,
+        };
+        let planted = self.deviates.iter().filter(|own| own.ring == ring);
+        Self {
+            header: self.header.iter().filter_map(own).collect(),
+            deviates: planted
+                .map(|own| Planted {
+                    ring: 0,
+                    ..own.clone()
+                })
+                .collect(),
         }
     }
 
@@ -80,28 +128,40 @@ impl Setup {
         self.header.is_empty()
     }
 
+    /// The first line that sets what the manual leaves open of the bus: the reference model, which judges where nothing is planted, knows
+    /// the defaults only.
+    #[must_use]
+    pub fn sets_property(&self) -> Option<&str> {
+        let sets = |line: &&String| {
+            let (_, setting) = line.split_once(" property ")?;
+            let name = setting.split(['=', ' ']).find(|word| !word.is_empty())?;
+            PROPERTIES.iter().find(|known| known.name == name)
+        };
+        let line = self.header.iter().find(|line| sets(line).is_some());
+        line.map(String::as_str)
+    }
+
     /// The lines with the deviations.
     #[must_use]
     pub fn lines_with_deviations(&self) -> Vec<String> {
-        let planted = self.deviates.iter();
-        let planted = planted.map(|p| format!("drive {} deviates {}", p.drive, p.name));
+        let planted = self.deviates.iter().map(Planted::line);
         self.header.iter().cloned().chain(planted).collect()
     }
 
-    /// The model: a ring of `drives` without deviations.
+    /// The model: rings of these sizes without deviations.
     ///
     /// # Errors
-    /// The lines have mistakes, or speak of drives that this ring has not.
-    pub fn model(&self, drives: u8) -> Result<SimulatedLink, Box<Problems>> {
-        ring(drives, &self.header)
+    /// The lines have mistakes, or speak of drives that these rings have not.
+    pub fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
+        rings(sizes, &self.header)
     }
 
-    /// The ring under test.
+    /// The rings under test.
     ///
     /// # Errors
     /// The same.
-    pub fn under_test(&self, drives: u8) -> Result<SimulatedLink, Box<Problems>> {
-        ring(drives, &self.lines_with_deviations())
+    pub fn under_test(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
+        rings(sizes, &self.lines_with_deviations())
     }
 
     /// What the model answers.
@@ -109,20 +169,38 @@ impl Setup {
     /// # Errors
     /// The same.
     pub fn model_answers(&self, case: &Case) -> Result<Seen, Box<Problems>> {
-        Ok(play(&mut self.model(case.drives)?, case))
+        Ok(play(&mut self.model(&case.sizes())?, case))
     }
+}
+
+/// A drive as a scenario writes it: `3`, or `2:3` in ring 2; the ring is counted from 0.
+pub(super) fn drive_name(ring: usize, drive: u8) -> String {
+    let prefix = if ring == 0 { "" } else { "2:" };
+    format!("{prefix}{drive}")
+}
+
+fn all_nd21(rings: usize) -> Vec<String> {
+    let lines = ALL_ND21.iter().take(rings);
+    lines.map(|line| (*line).to_owned()).collect()
 }
 
 /// The deviations of a header line, drive by drive.
 fn planted_by(line: &str, rig: &Rig) -> Vec<Planted> {
-    let drives = rig.file.ring.first.drives;
     let Some((whom, name)) = line.split_once(" deviates ") else {
         return Vec::new();
     };
     let whom = whom.trim().trim_start_matches("drive").trim();
+    let (ring, whom) = match whom.strip_prefix("2:") {
+        Some(whom) => (1, whom),
+        None => (0, whom),
+    };
+    let Some((_, own)) = rig.rings().nth(ring) else {
+        return Vec::new();
+    };
+    let last = own.drives.saturating_sub(1);
     let (from, to) = whom.split_once("..").unwrap_or((whom, whom));
     let number = |text: &str| match text.trim() {
-        "last" | "N-1" => Some(drives.saturating_sub(1)),
+        "last" | "N-1" => Some(last),
         other => other.parse::<u8>().ok(),
     };
     let (Some(from), Some(to)) = (number(from), number(to)) else {
@@ -130,21 +208,16 @@ fn planted_by(line: &str, rig: &Rig) -> Vec<Planted> {
     };
     let name = name.split('#').next().unwrap_or_default().trim();
     let planted = |drive| Planted {
+        ring,
         drive,
         name: name.to_owned(),
     };
-    (from..=to.min(drives.saturating_sub(1)))
-        .map(planted)
-        .collect()
+    (from..=to.min(last)).map(planted).collect()
 }
 
-fn ring(drives: u8, header: &[String]) -> Result<SimulatedLink, Box<Problems>> {
-    let case = Case {
-        drives,
-        acts: Vec::new(),
-    };
+fn rings(sizes: &[u8], header: &[String]) -> Result<SimulatedLink, Box<Problems>> {
     let page = Page {
-        title: "a ring",
+        title: "rings",
         header,
         ..Page::default()
     };
@@ -152,7 +225,7 @@ fn ring(drives: u8, header: &[String]) -> Result<SimulatedLink, Box<Problems>> {
         Source {
             name: "the rig".to_owned(),
             // A scenario has a step.
-            text: (text(&case, &page) + "> 80\n").into(),
+            text: (head(sizes, false, &page) + "\n> 80\n").into(),
         },
         None,
     )?;

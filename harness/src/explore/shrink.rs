@@ -4,7 +4,7 @@
 //! steps is fixed, so it is the same each time. On hardware a run is what it costs, so the steps that take most away come first:
 //! behind the byte that is otherwise nothing is needed, then acts, parts of acts, faults, drives, silence and values.
 
-use super::case::{Act, Case, Harm, MOST_NET, Talk, To, What};
+use super::case::{Act, Beside, Case, Harm, MOST_NET, Talk, To, What};
 use super::error::ExploreError;
 use super::oracle::Difference;
 use super::order::{Command, Order};
@@ -148,6 +148,7 @@ impl Shrinker<'_, '_> {
     fn pass(&mut self) -> Result<(), ExploreError> {
         self.cut_behind()?;
         self.drop_acts()?;
+        self.one_ring()?;
         self.smaller_ring()?;
         self.lower_cells()?;
         let mut at = 0;
@@ -207,6 +208,23 @@ impl Shrinker<'_, '_> {
                 }
             }
             length = (length / 2).min(self.best.case.acts.len());
+        }
+        Ok(())
+    }
+
+    /// Without the other ring of the bench, or with the smallest there is.
+    fn one_ring(&mut self) -> Result<(), ExploreError> {
+        let ring = self.best.case.ring();
+        let smallest = match self.best.case.beside {
+            None => return Ok(()),
+            Some(Beside::First(_)) => Beside::First(1),
+            Some(Beside::Second(_)) => Beside::Second(1),
+        };
+        let mut alone = self.best.clone();
+        alone.case.beside = None;
+        alone.setup = alone.setup.of_ring(ring);
+        if !self.offer(alone)? {
+            self.change(|case| case.beside = Some(smallest))?;
         }
         Ok(())
     }
@@ -470,6 +488,7 @@ fn lower(command: Command) -> Vec<Command> {
 /// The same conversation on a smaller ring: the drives that it has not are its highest one.
 fn on_ring(subject: &Subject, drives: u8) -> Subject {
     let old = subject.case.drives;
+    let ring = subject.case.ring();
     let map = |drive: u8| drive.min(drives - 1);
     let mut new = subject.clone();
     new.case.drives = drives;
@@ -491,7 +510,8 @@ fn on_ring(subject: &Subject, drives: u8) -> Subject {
             };
         }
     }
-    for planted in &mut new.setup.deviates {
+    let own = new.setup.deviates.iter_mut();
+    for planted in own.filter(|planted| planted.ring == ring) {
         planted.drive = map(planted.drive);
     }
     new

@@ -3,11 +3,10 @@
 use super::case::{Act, Case, Harm, Talk, To, What};
 use super::oracle::{answered, sent};
 use super::play::Seen;
+use super::setup::drive_name;
 use crate::link::link_name;
-use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::roles;
-use harness_proto::time::Instant;
 use std::fmt::Write as _;
 
 /// Bytes on a line at most.
@@ -48,38 +47,45 @@ pub struct Expected<'a> {
     pub timed: Option<usize>,
 }
 
-/// The text of a scenario.
-#[must_use]
-pub fn text(case: &Case, page: &Page<'_>) -> String {
+/// The lines in front of the first empty one, for rings of these sizes.
+pub(super) fn head(sizes: &[u8], strict: bool, page: &Page<'_>) -> String {
     let mut text = format!("title   {}\n", page.title);
     // Writing to a String cannot fail.
     for source in page.sources {
         let _infallible = writeln!(text, "source  {source}");
     }
-    let _infallible = writeln!(text, "ring    {}", case.drives);
-    if page
-        .expected
-        .is_some_and(|expected| is_strict(case, expected))
-    {
+    let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
+    let _infallible = writeln!(text, "ring    {}", sizes.join(", "));
+    if strict {
         text.push_str("strict\n");
     }
     for line in page.header {
         let _infallible = writeln!(text, "{line}");
     }
+    text
+}
+
+/// The text of a scenario.
+#[must_use]
+pub fn text(case: &Case, page: &Page<'_>) -> String {
+    let strict = page
+        .expected
+        .is_some_and(|expected| is_strict(case, expected));
+    let mut text = head(&case.sizes(), strict, page);
     text.push('\n');
     for line in page.remarks.iter().flat_map(|remark| wrapped(remark)) {
         let _infallible = writeln!(text, "# {line}");
     }
     let mut faults = case.faults().into_iter();
     for act in &case.acts {
-        steps(&mut text, act, case.drives);
+        steps(&mut text, act, case);
         let own = if act.length(case.drives) > 0 {
             act.damages.len()
         } else {
             0
         };
         for (link, byte, harm) in faults.by_ref().take(own) {
-            let place = link_name(0, case.drives, usize::from(link));
+            let place = link_name(case.ring(), case.drives, usize::from(link));
             let _infallible = writeln!(text, "! {place} byte {byte}: {}", fault(harm));
         }
     }
@@ -111,23 +117,29 @@ fn is_strict(case: &Case, expected: Expected<'_>) -> bool {
     expected.seen.received.len() <= case.bytes().len()
 }
 
-fn steps(text: &mut String, act: &Act, drives: u8) {
+/// What stands in front of `>` and `<`: a case with ring 2 says so.
+fn side(case: &Case) -> &'static str {
+    ["", "2"][case.ring()]
+}
+
+fn steps(text: &mut String, act: &Act, case: &Case) {
     match act.what {
         What::Wait(ms) => line(text, &format!("wait {ms}ms"), ""),
         What::Power { drive, on } => {
             let state = if on { "on" } else { "off" };
+            let drive = drive_name(case.ring(), drive);
             line(text, &format!("! drive {drive}: {state}"), "");
         }
         _ => {
             let words = words(&act.what);
-            let parts = act.parts(drives);
+            let parts = act.parts(case.drives);
             for (index, part) in parts.iter().enumerate() {
                 let comment = if index == 0 { &words[..] } else { "its rest" };
                 let mut comment = Some(comment);
                 for bytes in packed(part) {
                     line(
                         text,
-                        &format!("> {bytes}"),
+                        &format!("{}> {bytes}", side(case)),
                         comment.take().unwrap_or_default(),
                     );
                 }
@@ -235,7 +247,7 @@ fn answers(text: &mut String, case: &Case, expected: Expected<'_>) {
         for part in case.acts.iter().flat_map(|act| act.parts(case.drives)) {
             let (own, later) = (rest.0.split_at(part.len()), rest.1.split_at(part.len()));
             let count = answered(own.0, later.0).count();
-            answer(text, received, from..from + count, expected);
+            answer(text, case, from..from + count, expected);
             from += count;
             rest = (own.1, later.1);
         }
@@ -243,17 +255,14 @@ fn answers(text: &mut String, case: &Case, expected: Expected<'_>) {
     let step = 4 * BYTES_A_LINE;
     while from < received.len() {
         let to = (from + step).min(received.len());
-        answer(text, received, from..to, expected);
+        answer(text, case, from..to, expected);
         from = to;
     }
 }
 
-fn answer(
-    text: &mut String,
-    received: &[(Instant, Received)],
-    range: std::ops::Range<usize>,
-    expected: Expected<'_>,
-) {
+fn answer(text: &mut String, case: &Case, range: std::ops::Range<usize>, expected: Expected<'_>) {
+    let received = &expected.seen.received;
+    let side = side(case);
     let word = |index: usize| match expected.any.contains(&index) {
         true => "xx".to_owned(),
         false => format!("{:02X}", received[index].1.byte),
@@ -265,11 +274,15 @@ fn answer(
         let words: Vec<_> = part.map(word).collect();
         for (index, bytes) in pack(&words).into_iter().enumerate() {
             match at.filter(|_| index == 0) {
-                None => line(text, &format!("< {bytes}"), ""),
+                None => line(text, &format!("{side}< {bytes}"), ""),
                 Some(at) => {
                     let time = received[at].0.since_start().as_nanos();
                     let (us, tenth) = (time / 1_000, time / 100 % 10);
-                    line(text, &format!("@{us}.{tenth}us < {bytes}"), "at this time");
+                    line(
+                        text,
+                        &format!("@{us}.{tenth}us {side}< {bytes}"),
+                        "at this time",
+                    );
                 }
             }
         }

@@ -11,6 +11,7 @@ use harness_sim::drive::Drive;
 use harness_sim::link::LineByte;
 use harness_sim::ring::Ring;
 use harness_sim::trace::Trace;
+use harness_sim::witness::Complaint;
 use std::collections::VecDeque;
 
 /// One or two simulated rings.
@@ -67,6 +68,53 @@ impl SimulatedLink {
         for ring in 0..self.bench.rings().len() {
             if let Some(ring) = self.bench.ring_mut(ring) {
                 ring.stop_recording();
+            }
+        }
+    }
+
+    /// Puts a [witness](harness_sim::witness) beside every drive, to whom nobody has spoken; false where one is no whole ND21 and has none.
+    #[must_use]
+    pub fn witness(&mut self) -> bool {
+        let byte_time = self.byte_time;
+        let mut all = true;
+        self.each_drive(|drive| all &= drive.witness(byte_time));
+        all
+    }
+
+    /// The first thing that the witnesses of a ring saw: the drive, and what it was. Nothing more comes.
+    pub fn complaint(&mut self, ring: usize) -> Option<(u8, Complaint)> {
+        let now = self.bench.now();
+        let ring = self.bench.ring_mut(ring)?;
+        let drives = 0..ring.size().drives();
+        let mut found: Option<(u8, Complaint)> = None;
+        for drive in drives.rev() {
+            let powered = ring.powered(drive);
+            let Some(witness) = ring.drive_mut(drive).and_then(Drive::its_witness) else {
+                continue;
+            };
+            // Without power it does nothing more.
+            if powered {
+                witness.end(now);
+            }
+            let own = witness.complaint();
+            let first =
+                |own: &&Complaint| found.as_ref().is_none_or(|(_, other)| own.at < other.at);
+            if let Some(own) = own.filter(first) {
+                found = Some((drive, own.clone()));
+            }
+        }
+        found
+    }
+
+    fn each_drive(&mut self, mut work: impl FnMut(&mut Drive)) {
+        for ring in 0..self.bench.rings().len() {
+            let drives = 0..self.drives(ring);
+            for drive in drives {
+                let own = self
+                    .bench
+                    .ring_mut(ring)
+                    .and_then(|own| own.drive_mut(drive));
+                own.into_iter().for_each(&mut work);
             }
         }
     }

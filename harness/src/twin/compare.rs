@@ -3,8 +3,7 @@
 use super::follow::Conversation;
 use crate::locate::locate;
 use harness_proto::line::Received;
-use harness_proto::nd21::cells::{Access, cell_at};
-use harness_proto::nd21::ram;
+use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::{Role, roles};
@@ -12,7 +11,6 @@ use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::ops::RangeInclusive;
 
 /// The longest run of one byte in which each counts: more than the 25 zeros of 9.7.
 const LONGEST_RUN: usize = 32;
@@ -307,7 +305,7 @@ impl Comparer<'_> {
                 if let Some(look) = looks_at(drive, address) {
                     return (value ^ wanted) & look.mask == 0;
                 }
-                if measured(address) || !self.exactness.knows_cells && moves(address) {
+                if measured(address) || !self.exactness.knows_cells && changes_by_itself(address) {
                     self.comparison.measured += 1;
                     return true;
                 }
@@ -455,31 +453,12 @@ fn collapsed(bytes: &[(Instant, Received)]) -> Vec<(Instant, Received)> {
 
 /// Whether no model knows what a cell of a real drive holds from one moment to the next.
 pub(crate) fn unknowable(address: u16) -> bool {
-    measured(address) || moves(address)
+    measured(address) || changes_by_itself(address)
 }
 
 /// Whether the drive itself writes a cell (14.2: read only), so that no model knows what it holds.
 fn measured(address: u16) -> bool {
     cell_at(address).is_some_and(|cell| cell.access != Access::Write)
-}
-
-/// Whether a cell changes by itself as time goes on, so that a bench that is late by a moment reads something else: states
-/// (14.4), the positioning controller (13.3), the EEPROM controller (14.10.5), the oscilloscope (14.10.6), positions (14.5.5), and the
-/// counters and buffers of the drive's program (14.2.1).
-fn moves(address: u16) -> bool {
-    const SECTIONS: [&str; 5] = ["14.4", "13.3", "14.10.5", "14.10.6", "14.5.5"];
-    const OWN: [RangeInclusive<u16>; 5] = [
-        ram::I2..=ram::I2 + 3,
-        ram::STACK..=ram::STACK + 95,
-        ram::N_INTEGRATOR..=ram::LAGE0 + 1,
-        ram::ICRA..=ram::ICRA0 + 1,
-        ram::CNT2..=ram::CNT_REVERS,
-    ];
-    OWN.iter().any(|own| own.contains(&address))
-        || cell_at(address).is_some_and(|cell| {
-            let own = |section: &&str| cell.section.starts_with(*section);
-            SECTIONS.iter().any(own)
-        })
 }
 
 /// Whether a byte is another one, or one too many or too few.
@@ -520,6 +499,7 @@ mod tests {
     use crate::link::{Line, Link};
     use crate::scenario::simulate::bench;
     use crate::scenario::source::Source;
+    use harness_proto::nd21::ram;
 
     /// ND21 14.2.1: what a drive changes by itself, while it stands and while it turns, is compared with nobody's.
     #[test]
@@ -557,7 +537,7 @@ mod tests {
         );
         let compared: Vec<_> = changed
             .iter()
-            .filter(|cell| !measured(**cell) && !moves(**cell))
+            .filter(|cell| !measured(**cell) && !changes_by_itself(**cell))
             .collect();
         assert!(compared.is_empty(), "{compared:04X?}");
     }

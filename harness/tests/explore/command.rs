@@ -41,8 +41,16 @@ pub(crate) fn findings(folder: &Path) -> Vec<PathBuf> {
     all
 }
 
+/// The names of their files.
+pub(crate) fn names(folder: &Path) -> Vec<std::ffi::OsString> {
+    findings(folder)
+        .iter()
+        .filter_map(|path| path.file_name().map(ToOwned::to_owned))
+        .collect()
+}
+
 /// What a record holds but for how often the progress was written.
-fn settled(folder: &Path) -> Vec<Line> {
+pub(crate) fn settled(folder: &Path) -> Vec<Line> {
     let text = std::fs::read_to_string(folder.join(RECORD)).expect("a record");
     let lines = text
         .lines()
@@ -168,7 +176,7 @@ fn a_sound_ring_passes() {
 }
 
 /// Begins a run and kills it (SIGKILL) when some of it is done.
-fn begin_and_kill(arguments: &[&str], folder: &Path) {
+pub(crate) fn begin_and_kill(arguments: &[&str], folder: &Path) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
         .args(arguments)
         .stdin(Stdio::null())
@@ -223,12 +231,6 @@ fn a_killed_run_goes_on() {
     ]);
     ended(&resumed, 1, "4000 cases");
     assert_eq!(settled(&killed), settled(&whole));
-    let names = |folder: &Path| -> Vec<_> {
-        findings(folder)
-            .iter()
-            .filter_map(|path| path.file_name().map(ToOwned::to_owned))
-            .collect()
-    };
     assert_eq!(names(&killed), names(&whole));
     assert!(!names(&killed).is_empty());
     for (one, other) in findings(&killed).iter().zip(findings(&whole)) {
@@ -245,6 +247,10 @@ fn what_cannot_be() {
     std::fs::write(&file, "x").expect("room");
     let under = file.join("run");
     let out = folder.path().join("run");
+    let rig = folder.path().join("rig.toml");
+    let lines = "schema = 1\n[rig]\nid = \"rig\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\n\
+                 setup = [\"drive 0 property time-out = 15ms\"]\n";
+    std::fs::write(&rig, lines).expect("room");
     let run = |more: &[&str]| drivebench(&[&["fuzz", "run", "--cases", "60"][..], more].concat());
     ended(
         &run(&["--out", name(&under)]),
@@ -265,18 +271,36 @@ fn what_cannot_be() {
     ended(
         &run(&["--deviates", "7=writes-ignored", "--out", name(&out)]),
         2,
-        "no drive 7",
+        "ring 1 has the drives 0 to 2, and no drive 7",
     );
     ended(&run(&["--confirm", "4/3"]), 2, "such as 2/3");
     ended(
-        &run(&["--whole", "--out", name(&out)]),
+        &run(&["--rig", name(&rig), "--out", name(&out)]),
         2,
-        "nothing to hold whole ND21s against",
+        "the rig says `drive 0 property time-out = 15ms`",
+    );
+    let plain = folder.path().join("plain.toml");
+    let lines = lines.replace("property time-out = 15ms", "model plain");
+    std::fs::write(&plain, lines).expect("room");
+    ended(
+        &run(&[
+            "--rig",
+            name(&plain),
+            "--out",
+            name(&folder.path().join("mixed")),
+        ]),
+        2,
+        "makes some of them plain",
     );
     ended(
-        &run(&["--rig", "sim:2,2", "--out", name(&out)]),
+        &run(&["--deviates", "2:1=writes-ignored", "--out", name(&out)]),
         2,
-        "has two",
+        "no ring 2",
+    );
+    ended(
+        &run(&["--deviates", "3:1=writes-ignored"]),
+        2,
+        "in ring 2 as 2:1=",
     );
     ended(&run(&["--out", name(&out)]), 0, "60 cases");
 }

@@ -4,12 +4,14 @@ mod command;
 mod findings;
 mod masters;
 mod rig;
+mod rings;
 mod runs;
 mod texts;
+mod witness;
 
 use harness::explore::{
     About, Bounds, Campaign, Difference, End, ExploreError, Finding, OnSim, Planted, Pool,
-    Progress, Rehearsal, Scope, Setup, Spice, Swarm, Target, Tried, Watcher,
+    Progress, Rehearsal, RingScope, Scope, Setup, Spice, Swarm, Target, Tried, Watcher,
 };
 use harness_proto::novobus::guard::Limits;
 
@@ -28,12 +30,18 @@ fn repeat(test: &str) -> String {
 
 /// Everything on a simulated ring of plain drives.
 fn scope(drives: u8) -> Scope {
+    scope_of(drives, None)
+}
+
+/// The same with a second ring.
+fn scope_of(drives: u8, second: Option<u8>) -> Scope {
+    let (first, second) = RingScope::both(drives, second, |_, _| true);
     let behind = [Spice::Motion, Spice::Eeprom];
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
     Scope {
-        drives,
+        first,
+        second,
         spices: all.filter(|spice| !behind.contains(spice)).collect(),
-        links: (0..drives).collect(),
         limits: Limits::unlimited(),
         spare_eeprom: false,
     }
@@ -43,6 +51,7 @@ fn planted(drive: u8, name: &str) -> Setup {
     Setup {
         header: Vec::new(),
         deviates: vec![Planted {
+            ring: 0,
             drive,
             name: name.to_owned(),
         }],
@@ -54,6 +63,7 @@ fn about(setup: &Setup, seed: u64) -> About {
         schema: About::SCHEMA,
         rig: "sim:3".to_owned(),
         drives: 3,
+        second: None,
         ports: false,
         seed,
         confirm: 2,

@@ -1,6 +1,7 @@
 //! Rings behind sockets: a deviating drive is found, confirmed and made small there, and what the rig does not allow never leaves.
 
 use crate::command::{ended, findings, name, said};
+use harness::explore::{Finding, RECORD};
 use harness::port::Endpoint;
 use harness_proto::nd21::ram;
 use harness_sim::reference;
@@ -29,6 +30,26 @@ impl Desk {
             "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = {drives}\ntransport = \"tcp\"\nport = \"{port}\"\n\
              marks = \"in-band\"\ntime_tolerance = \"40ms\"\n[limits]\n{limits}"
         );
+        std::fs::write(folder.path().join("desk.toml"), text).expect("room");
+        Self { folder }
+    }
+
+    /// The same for the rings of a server, whichever they are.
+    fn of(served: &Served, limits: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut text = "schema = 1\n[rig]\nid = \"desk\"\n".to_owned();
+        for ((number, drives), endpoint) in (1..).zip(&served.sizes).zip(&served.endpoints) {
+            let (transport, port) = match endpoint {
+                Endpoint::Tcp(place) => ("tcp", place.clone()),
+                Endpoint::Pty(path) => ("pty", path.display().to_string()),
+                other => panic!("{other}"),
+            };
+            text.push_str(&format!(
+                "[ring.{number}]\ndrives = {drives}\ntransport = \"{transport}\"\nport = \"{port}\"\n\
+                 marks = \"in-band\"\ntime_tolerance = \"40ms\"\n"
+            ));
+        }
+        text.push_str(&format!("[limits]\n{limits}"));
         std::fs::write(folder.path().join("desk.toml"), text).expect("room");
         Self { folder }
     }
@@ -89,6 +110,72 @@ fn a_deviating_drive_behind_a_socket() {
     let output = desk.run(&["shrink", name(&found[0]), "--allow-motion"]);
     ended(&output, 0, "made small there first");
     ended(&output, 0, "(ND21 9.7, error mode)");
+}
+
+/// Two rings behind ports, and a drive of the second one deviates: it is found there, confirmed, made small, and its scenario runs on
+/// the rig. The run is killed on the way (SIGKILL), the next one brings the rings back and goes on.
+fn two_rings(transport: &str) {
+    let more = ["drive 2:1 deviates counts-9-zeros"];
+    let served = Served::start_with("nd21", &[1, 2], transport, true, &[], &more);
+    let desk = Desk::of(&served, EVERYTHING);
+    let out = desk.path("run");
+    let run = ["fuzz", "run", "--allow-motion", "--findings", "1"];
+    let begun = ["--seed", "3", "--wire-time", "60s", "--out"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args([&run[..], &begun[..], &[name(&out)]].concat())
+        .arg("--rig")
+        .arg(desk.path("desk.toml"))
+        .env("DRIVEBENCH_STATE", desk.path("state"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program");
+    let record = out.join(RECORD);
+    let begun = || std::fs::read_to_string(&record).is_ok_and(|text| text.contains("\"cases\":2,"));
+    while !begun() && child.try_wait().expect("a process").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().expect("SIGKILL");
+    let _gone = child.wait().expect("an end");
+    let resume = ["--wire-time", "60s", "--resume", name(&out)];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    command
+        .args([&run[..], &resume[..]].concat())
+        .env("DRIVEBENCH_STATE", desk.path("state"))
+        .stdin(Stdio::null());
+    let output = command.output().expect("the program");
+    ended(&output, 1, "seen again 2 of");
+    ended(&output, 1, "3 drives are stopped, standing and blocked");
+    let (finding, path) = findings(&out)
+        .iter()
+        .map(|path| Finding::read(path).expect("a finding"))
+        .find(|(finding, _)| finding.confirmed)
+        .expect("one that was seen again");
+    assert_eq!((finding.case.ring(), finding.case.sizes()), (1, vec![1, 2]));
+    assert_eq!(finding.difference.ring, 1);
+    let scenario = path.with_extension("scn");
+    let output = desk.run(&["run", name(&scenario), "--allow-motion"]);
+    // A finding of a moment is one that is late again, or not.
+    let code = output.status.code();
+    assert!(matches!(code, Some(1 | 5)), "{}", said(&output));
+    let output = desk.run(&["shrink", name(&path), "--allow-motion", "--runs", "12"]);
+    ended(&output, 0, "ring    1, 2");
+    let output = desk.run(&["fuzz", "replay", name(&out), "--wire-time", "2s"]);
+    let code = output.status.code();
+    assert!(matches!(code, Some(0 | 1 | 5)), "{}", said(&output));
+}
+
+/// Over sockets.
+#[test]
+fn two_rings_behind_sockets() {
+    two_rings("tcp");
+}
+
+/// Over pseudo-terminals.
+#[test]
+fn two_rings_behind_ptys() {
+    two_rings("pty");
 }
 
 /// Passes bytes on between a client and a ring, and keeps what the clients send.

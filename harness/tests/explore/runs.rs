@@ -72,6 +72,7 @@ impl Target for LateOnce {
             what: "another time".to_owned(),
             section: "9.2".to_owned(),
             rule: "sync byte".to_owned(),
+            ring: 0,
             drive: None,
             byte: Some(1),
             time: true,

@@ -1,8 +1,8 @@
 //! A case and its scenario are one.
 
-use crate::{repeat, scope, seed};
+use crate::{repeat, scope, scope_of, seed};
 use harness::explore::text::{Expected, Page, text};
-use harness::explore::{Case, Dice, Generator, Seen, Setup, Swarm, mutate, play};
+use harness::explore::{Case, Dice, Generator, Scope, Seen, Setup, Swarm, mutate, play};
 use harness::library::Entry;
 use harness::link::Link;
 use harness::scenario::run::run;
@@ -12,12 +12,16 @@ use harness::scenario::verdict::Verdict;
 
 /// Cases of many swarms, new ones and ones made of others.
 pub(crate) fn cases(count: u64, drives: u8) -> Vec<Case> {
-    let scope = scope(drives);
+    cases_with(&scope(drives), 0, count)
+}
+
+/// The same with one of a bench's rings.
+fn cases_with(scope: &Scope, ring: usize, count: u64) -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
     for number in 0..count {
         let mut dice = Dice::of_part(seed(), number);
-        let swarm = Swarm::of_round(seed(), number, &scope);
-        let maker = Generator::new(&scope, &swarm, &mut dice);
+        let swarm = Swarm::of_round(seed(), number, scope);
+        let maker = Generator::new(scope, scope.ring(ring), &swarm, &mut dice);
         let new = match cases.last().filter(|_| number % 2 == 1) {
             Some(old) => mutate(old, cases.first(), &maker, &mut dice),
             None => maker.case(&mut dice),
@@ -45,19 +49,17 @@ fn scenario(case: &Case, setup: &Setup, seen: &Seen) -> String {
 /// Played by its text a case leaves the same bytes at the same times on every link, and its scenario passes.
 #[test]
 fn a_case_is_its_scenario() {
-    let whole = Setup {
-        header: vec!["drive 0..last model nd21".to_owned()],
-        deviates: Vec::new(),
-    };
-    for (number, case) in cases(300, 3).iter().enumerate() {
-        let setup = if number % 4 == 0 {
-            whole.clone()
-        } else {
-            Setup::default()
+    let two = scope_of(2, Some(3));
+    let second = cases_with(&two, 1, 100);
+    let all = cases(300, 3).into_iter().chain(cases_with(&two, 0, 20));
+    for (number, case) in all.chain(second).enumerate() {
+        let setup = match number % 4 {
+            0 => Setup::of_ports(case.sizes().len()),
+            _ => Setup::default(),
         };
-        let mut link = setup.model(case.drives).expect("a ring");
-        let seen = play(&mut link, case);
-        let page = scenario(case, &setup, &seen);
+        let mut link = setup.model(&case.sizes()).expect("rings");
+        let seen = play(&mut link, &case);
+        let page = scenario(&case, &setup, &seen);
         let source = Source {
             name: "a case".to_owned(),
             text: page.clone().into(),
@@ -73,7 +75,12 @@ fn a_case_is_its_scenario() {
             outcome.finding,
             repeat("a_case_is_its_scenario")
         );
-        assert!(link.trace(0) == other.trace(0), "case {number}\n{page}");
+        for ring in 0..case.sizes().len() {
+            assert!(
+                link.trace(ring) == other.trace(ring),
+                "case {number}\n{page}"
+            );
+        }
     }
 }
 

@@ -254,6 +254,27 @@ pub fn cell_at(address: u16) -> Option<&'static Cell> {
     at(RAM, address)
 }
 
+/// Whether the drive changes a cell by itself as time goes on, be it read only or not: states (14.4), the positioning controller (13.3),
+/// the EEPROM controller (14.10.5), the oscilloscope (14.10.6), positions (14.5.5), the markers of the cycle control (13.1.9.1), and
+/// the counters and buffers of the drive's program (14.2.1).
+#[must_use]
+pub fn changes_by_itself(address: u16) -> bool {
+    const SECTIONS: [&str; 5] = ["14.4", "13.3", "14.10.5", "14.10.6", "14.5.5"];
+    const OWN: [core::ops::RangeInclusive<u16>; 6] = [
+        ram::PZ..=ram::AS_COMMAND,
+        ram::I2..=ram::I2 + 3,
+        ram::STACK..=ram::STACK + 95,
+        ram::N_INTEGRATOR..=ram::LAGE0 + 1,
+        ram::ICRA..=ram::ICRA0 + 1,
+        ram::CNT2..=ram::CNT_REVERS,
+    ];
+    OWN.iter().any(|own| own.contains(&address))
+        || cell_at(address).is_some_and(|cell| {
+            let own = |section: &&str| cell.section.starts_with(*section);
+            SECTIONS.iter().any(own)
+        })
+}
+
 /// The cell of this name, but for the name "reserviert" and none.
 pub(super) fn named(table: &'static [Cell], name: &str) -> Option<&'static Cell> {
     if name.is_empty() || name == "reserviert" {

@@ -1,5 +1,6 @@
 //! What always holds after a cycle, whatever the bus writes and the world does. A drive that breaks one is
-//! in an impossible state: a mistake in this model. Builds with debug assertions check every cycle.
+//! in an impossible state: a mistake in this model. Builds with debug assertions check every cycle, and so does whoever
+//! watches.
 
 use super::positioning::Positioning;
 use super::world::Mode;
@@ -76,8 +77,63 @@ fn released(mode: Mode) -> bool {
     matches!(mode, Mode::Stop | Mode::Go)
 }
 
+/// What is known of the invariants of a drive.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Watch {
+    watching: bool,
+    broken: Option<&'static str>,
+}
+
+impl Watch {
+    /// Keeps from now on which one is broken first.
+    pub(crate) fn begin(&mut self) {
+        self.watching = true;
+    }
+
+    /// The first one that was broken since somebody watches.
+    pub(crate) fn broken(self) -> Option<&'static str> {
+        self.broken
+    }
+
+    /// Looks behind a cycle.
+    pub(super) fn look(&mut self, state: &State<'_>) {
+        if self.watching {
+            self.broken = self.broken.or_else(|| broken(state));
+        } else {
+            debug_assert_eq!(broken(state), None);
+        }
+    }
+}
+
 /// The first invariant that does not hold.
-pub(super) fn broken(state: &State<'_>) -> Option<&'static str> {
+fn broken(state: &State<'_>) -> Option<&'static str> {
     let (sentence, _) = INVARIANTS.iter().find(|(_, holds)| !holds(state))?;
     Some(sentence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Who watches is told which one was broken first, in every build; nobody panics.
+    #[test]
+    fn a_broken_invariant_is_kept() {
+        let cells = Cells::with_eeprom([0; 256]);
+        let positioning = Positioning::default();
+        let state = |speed, position| State {
+            cells: &cells,
+            mode: Mode::Stop,
+            positioning: &positioning,
+            speed,
+            position,
+        };
+        let mut watch = Watch::default();
+        watch.begin();
+        watch.look(&state(0.0, 0.0));
+        assert_eq!(watch.broken(), None);
+        watch.look(&state(70_000.0, 0.0));
+        watch.look(&state(0.0, f64::NAN));
+        let first = "no motor turns faster than the model allows";
+        assert_eq!(watch.broken(), Some(first));
+    }
 }

@@ -6,7 +6,7 @@
 use super::cycle_control::{CycleControl, Orders};
 use super::eeprom_controller::{EepromController, parity_is_right};
 use super::error_state;
-use super::invariants::{self, State};
+use super::invariants::{State, Watch};
 use super::monitor::{self, EndSwitches};
 use super::motion::{Demand, Motion, Outside};
 use super::outputs;
@@ -84,6 +84,7 @@ pub struct Program {
     quiet: bool,
     /// Something has come from outside since the last cycle: what is watched is to be looked at.
     stirred: bool,
+    pub(crate) invariants: Watch,
     /// What the ports of the inputs were last made to show.
     shown_inputs: Option<(Inputs, Option<ErrorCode>)>,
 }
@@ -119,6 +120,7 @@ impl Program {
             mode: Mode::Reset,
             quiet: false,
             stirred: true,
+            invariants: Watch::default(),
             shown_inputs: None,
         };
         program.start();
@@ -381,18 +383,13 @@ impl Program {
             && self.s_ramp.status() != Status::Doing
             && self.cycle_control.at_rest(&self.cells)
             && self.still_demands_nothing();
-        debug_assert_eq!(self.broken_invariant(), None);
-    }
-
-    /// The first of the [`invariants`] that does not hold.
-    fn broken_invariant(&self) -> Option<&'static str> {
-        invariants::broken(&State {
+        self.invariants.look(&State {
             cells: &self.cells,
             mode: self.mode,
             positioning: &self.positioning,
             speed: self.plant.speed,
             position: self.plant.position,
-        })
+        });
     }
 
     /// The nominal value is 0 and stays so.

@@ -12,7 +12,7 @@ use super::exit::Exit;
 use super::output::Output;
 use clap::Subcommand;
 
-pub(super) use rig::{Use, on_ports, scope, tell};
+pub(super) use rig::{Use, on_ports, scope, sizes, tell};
 
 /// The commands of `fuzz`.
 #[derive(Debug, Subcommand)]

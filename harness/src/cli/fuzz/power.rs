@@ -30,6 +30,9 @@ pub struct PowerArguments {
     /// How many seeds each is looked for with.
     #[arg(long, value_name = "NUMBER", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
+    /// Let witnesses judge whole ND21s, as `fuzz run --whole` does: nothing they have knows of the deviation. Drives only.
+    #[arg(long)]
+    pub whole: bool,
     /// After how many cases it counts as not found.
     #[arg(long, value_name = "NUMBER", default_value_t = 10_000)]
     pub cases: u64,
@@ -129,7 +132,7 @@ pub(super) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io:
         .filter(|own| own.name.contains(filter))
         .collect();
     let masters: Vec<_> = master_deviations()
-        .filter(|own| own.name.contains(filter))
+        .filter(|own| own.name.contains(filter) && !arguments.whole)
         .collect();
     if wanted.is_empty() && masters.is_empty() {
         output
@@ -189,16 +192,21 @@ fn counts(
     let mut counts = Vec::new();
     for seed in 1..=arguments.seeds {
         let planted = Planted {
+            ring: 0,
             drive: u8::try_from(seed % u64::from(DRIVES)).unwrap_or(0),
             name: deviation.name.to_owned(),
         };
-        let setup = Setup::of_rig(&rig, &[planted], false);
+        let setup = match arguments.whole {
+            true => Setup::of_rig(&rig, &[], true).hides(&planted),
+            false => Setup::of_rig(&rig, &[planted], false),
+        };
         let mut target = OnSim::new(setup.clone());
-        let scope = simulated(DRIVES, Limits::unlimited(), &setup);
+        let scope = simulated(&rig, Limits::unlimited(), &setup);
         let about = About {
             schema: About::SCHEMA,
             rig: format!("sim:{DRIVES}"),
             drives: DRIVES,
+            second: None,
             ports: false,
             seed,
             confirm: 1,

@@ -1,14 +1,14 @@
 //! `drivebench fuzz replay`: a minute on hardware.
 
-use super::rig::{Use, on_ports, scope, simulated, tell};
+use super::rig::{Use, on_ports, rings, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::find_rig;
 use crate::explore::{
-    About, Act, Bounds, Campaign, Case, ExploreError, Line, OnRig, OnSim, Setup, Target, What,
-    by_novelty, read,
+    About, Act, Bounds, Campaign, Case, ExploreError, Line, MOST_BYTES, OnRig, OnSim, Setup,
+    Target, What, by_novelty, read,
 };
 use crate::rig::Rig;
 use clap::Args;
@@ -46,22 +46,26 @@ pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
     let Some(rig) = find_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };
-    let drives = rig.file.ring.first.drives;
-    let cases = match cases(&arguments.folder, drives) {
+    let cases = match cases(&arguments.folder, &rig) {
         Ok(cases) => cases,
         Err(error) => return Ok(tell(&error, output)),
     };
     if cases.is_empty() {
+        let sizes: Vec<_> = sizes(&rig).iter().map(u8::to_string).collect();
         output.complain(&format!(
-            "{} holds no case for a ring of {drives}",
-            arguments.folder.display()
+            "{} holds no case for a ring of {}",
+            arguments.folder.display(),
+            sizes.join(" or of ")
         ));
         return Ok(Exit::NothingSelected);
     }
     if rig.is_simulated() {
         let setup = Setup::of_rig(&rig, &[], false);
-        let mut target = OnSim::new(setup.clone());
-        let scope = simulated(drives, Limits::unlimited(), &setup);
+        let mut target = match OnSim::ready(setup.clone(), &sizes(&rig)) {
+            Ok(target) => target,
+            Err(error) => return Ok(tell(&error, output)),
+        };
+        let scope = simulated(&rig, Limits::unlimited(), &setup);
         let campaign = campaign(arguments, &rig, setup, scope);
         return play(arguments, campaign, cases, &mut target, output);
     }
@@ -73,7 +77,7 @@ pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
     on_ports(&rig, &how, output, |run, output| {
         let scope = scope(run);
         let limits = scope.limits;
-        let campaign = campaign(arguments, &rig, Setup::of_ports(), scope);
+        let campaign = campaign(arguments, &rig, Setup::of_ports(rig.rings().count()), scope);
         match OnRig::new(run, limits) {
             Ok(mut target) => play(arguments, campaign, cases, &mut target, output),
             Err(error) => Ok(tell(&error, output)),
@@ -90,7 +94,8 @@ fn campaign(
     let about = About {
         schema: About::SCHEMA,
         rig: arguments.rig.clone(),
-        drives: scope.drives,
+        drives: scope.first.drives,
+        second: scope.second.as_ref().map(|ring| ring.drives),
         ports: !rig.is_simulated(),
         seed: 0,
         confirm: 2,
@@ -154,15 +159,21 @@ fn play(
     })
 }
 
-/// The cases of a folder that fit a ring.
-fn cases(folder: &Path, drives: u8) -> Result<Vec<Case>, ExploreError> {
+/// The cases of a folder, each on every ring of the rig that has as many drives.
+fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
+    let (first, second) = rings(rig, |_, _| true);
+    let places: Vec<_> = std::iter::once(first).chain(second).collect();
     if folder.join(crate::explore::RECORD).exists() {
         let (kept, _) = read(folder)?;
-        let own = kept.lines.into_iter().filter_map(|line| match line {
-            Line::Kept { case, .. } if case.drives == drives => Some(case),
+        let kept = kept.lines.into_iter().filter_map(|line| match line {
+            Line::Kept { case, .. } => Some(case),
             _ => None,
         });
-        return Ok(own.take(MOST_CASES).collect());
+        let placed = kept.flat_map(|case| {
+            let fit = places.iter().filter(move |own| own.drives == case.drives);
+            fit.map(move |own| own.case(case.acts.clone()))
+        });
+        return Ok(placed.take(MOST_CASES).collect());
     }
     let unreadable = |error: std::io::Error| {
         ExploreError::File(format!("failed to read {}: {error}", folder.display()))
@@ -178,13 +189,17 @@ fn cases(folder: &Path, drives: u8) -> Result<Vec<Case>, ExploreError> {
         }
     }
     files.sort();
-    let cases = files.iter().map(|path| of_hex(path, drives));
-    cases.collect()
+    let mut cases = Vec::new();
+    for path in &files {
+        let acts = of_hex(path)?;
+        cases.extend(places.iter().map(|own| own.case(acts.clone())));
+    }
+    Ok(cases)
 }
 
 /// A file of corpora/fuzz/ring: two bytes that say what is damaged, and the bytes of the wire. The bytes alone are a case: what they
 /// damage lies on links that a rig does not reach.
-fn of_hex(path: &Path, drives: u8) -> Result<Case, ExploreError> {
+fn of_hex(path: &Path) -> Result<Vec<Act>, ExploreError> {
     let wrong = |why: &str| ExploreError::File(format!("{}: {why}", path.display()));
     let size = std::fs::metadata(path)
         .map_err(|error| wrong(&error.to_string()))?
@@ -203,12 +218,8 @@ fn of_hex(path: &Path, drives: u8) -> Result<Case, ExploreError> {
         .collect::<Result<Vec<_>, _>>()
         .map_err(|_| wrong("bytes are two hexadecimal digits each"))?;
     let wire = bytes.get(2..).unwrap_or_default().to_vec();
-    let case = Case {
-        drives,
-        acts: vec![Act::sound(What::Bytes(wire))],
-    };
-    match case.is_bounded() {
-        true => Ok(case),
+    match wire.len() <= MOST_BYTES {
+        true => Ok(vec![Act::sound(What::Bytes(wire))]),
         false => Err(wrong("more bytes than a case has")),
     }
 }

@@ -3,7 +3,7 @@
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, give_back, interrupt_flag};
-use crate::explore::{ExploreError, Scope, Setup, Spice};
+use crate::explore::{ExploreError, RingScope, Scope, Setup, Spice};
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::{Options, Rig, Run, Session};
@@ -38,12 +38,6 @@ pub(crate) fn on_ports(
     output: &mut Output,
     work: impl FnOnce(&mut Run<'_>, &mut Output) -> std::io::Result<Exit>,
 ) -> std::io::Result<Exit> {
-    if rig.rings().count() > 1 {
-        output.complain(
-            "a case is a conversation with one ring, and this rig has two: name a rig with the one that is meant",
-        );
-        return Ok(Exit::Usage);
-    }
     let options = Options {
         purpose: how.purpose.to_owned(),
         wait: how.wait,
@@ -93,17 +87,32 @@ fn leave_clean(session: &mut Session, output: &mut Output) {
     }
 }
 
+/// How many drives the rings of a rig have.
+pub(crate) fn sizes(rig: &Rig) -> Vec<u8> {
+    rig.rings().map(|(_, ring)| ring.drives).collect()
+}
+
+/// The rings of a rig, and where faults can be put on them.
+pub(crate) fn rings(
+    rig: &Rig,
+    reaches: impl Fn(usize, u8) -> bool,
+) -> (RingScope, Option<RingScope>) {
+    let file = &rig.file.ring;
+    let second = file.second.as_ref().map(|ring| ring.drives);
+    RingScope::both(file.first.drives, second, reaches)
+}
+
 /// What cases may have on simulated rings; plain drives have nothing behind their bus.
-pub(crate) fn simulated(drives: u8, limits: Limits, setup: &Setup) -> Scope {
+pub(crate) fn simulated(rig: &Rig, limits: Limits, setup: &Setup) -> Scope {
     let behind = [Spice::Motion, Spice::Eeprom];
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
+    let (first, second) = rings(rig, |_, _| true);
     Scope {
-        drives,
+        first,
+        second,
         spices: all
             .filter(|spice| !setup.is_plain() || !behind.contains(spice))
             .collect(),
-        // What is damaged behind the last drive no drive hears.
-        links: (0..drives).collect(),
         limits,
         spare_eeprom: false,
     }
@@ -123,18 +132,18 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
             ..Limits::default()
         },
     };
-    let drives = session.rig().file.ring.first.drives;
+    let rig = session.rig().clone();
     let has = |capability| capabilities.contains(&capability);
     let link = session.link();
-    let links: Vec<u8> = (0..drives)
-        .filter(|place| link.reaches(0, usize::from(*place)))
-        .collect();
+    let (first, second) = rings(&rig, |ring, place| link.reaches(ring, usize::from(place)));
+    let own = |ring: &RingScope| !ring.links.is_empty();
+    let reached = own(&first) || second.as_ref().is_some_and(own);
     let possible = |spice: &Spice| match spice {
         Spice::Power => false,
-        Spice::Flip | Spice::Framing => has(Capability::LineErrors) && !links.is_empty(),
+        Spice::Flip | Spice::Framing => has(Capability::LineErrors) && reached,
         // What drives take lost bytes for nobody can judge.
-        Spice::Slip => limits.allow_everything() && !links.is_empty(),
-        Spice::Late => limits.allow_everything() && !links.is_empty(),
+        Spice::Slip => limits.allow_everything() && reached,
+        Spice::Late => limits.allow_everything() && reached,
         Spice::Reset => limits.reset && limits.motion,
         Spice::ProcessData => limits.motion,
         Spice::WriteIo => limits.outputs,
@@ -144,9 +153,9 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
     };
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
     Scope {
-        drives,
+        first,
+        second,
         spices: all.filter(possible).collect(),
-        links,
         limits,
         spare_eeprom: true,
     }

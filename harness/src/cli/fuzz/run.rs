@@ -1,6 +1,6 @@
 //! `drivebench fuzz run`.
 
-use super::rig::{Use, on_ports, scope, simulated, tell};
+use super::rig::{Use, on_ports, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
@@ -42,10 +42,11 @@ pub struct FuzzRunArguments {
     pub cases: Option<u64>,
     #[arg(long, value_name = "TIME", value_parser = duration, help = WIRE_TIME_HELP)]
     pub wire_time: Option<Duration>,
-    /// Plant a deviation in a drive of a simulated ring, as DRIVE=NAME; `drivebench deviations` shows the names. May repeat.
+    /// Plant a deviation in a drive of a simulated ring, as DRIVE=NAME, or 2:DRIVE=NAME in ring 2; `drivebench deviations` shows the names. May repeat.
     #[arg(long, value_name = "DRIVE=NAME", value_parser = planted)]
     pub deviates: Vec<Planted>,
-    /// Let the drives of sim:N be whole ND21s; without it they are plain, as the reference model is.
+    /// Let the drives of sim:N be whole ND21s; without it they are plain, as the reference model is. Where no deviation is planted, a
+    /// witness judges each whole drive by what the manual says of the bus, the cells and the invariants of a drive.
     #[arg(long)]
     pub whole: bool,
     /// A finding counts when it is seen again K of N times, as K/N.
@@ -71,16 +72,25 @@ pub struct FuzzRunArguments {
     pub wait: Option<Duration>,
 }
 
-/// `1=sends-16-zeros`.
+/// `1=sends-16-zeros`, `2:1=sends-16-zeros`.
 fn planted(text: &str) -> Result<Planted, String> {
-    let form = "a deviation is planted as DRIVE=NAME, such as 1=sends-16-zeros";
+    let form = "a deviation is planted as DRIVE=NAME, such as 1=sends-16-zeros; in ring 2 as 2:1=sends-16-zeros";
     let (drive, name) = text.split_once('=').ok_or(form)?;
+    let (ring, drive) = match drive.split_once(':') {
+        None => (0, drive),
+        Some((ring, drive)) => match ring.trim() {
+            "1" => (0, drive),
+            "2" => (1, drive),
+            _ => return Err(form.to_owned()),
+        },
+    };
     let drive = drive.trim().parse().map_err(|_| form)?;
     let known = deviation::deviation(name.trim());
     let known = known.ok_or_else(|| {
         format!("there is no deviation `{name}`; `drivebench deviations` shows what there is")
     })?;
     Ok(Planted {
+        ring,
         drive,
         name: known.name.to_owned(),
     })
@@ -134,7 +144,12 @@ pub(super) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
             Ok(target) => target,
             Err(error) => return Ok(tell(&error, output)),
         };
-        let about = about(arguments, &rig, Setup::of_ports(), &scope);
+        let about = about(
+            arguments,
+            &rig,
+            Setup::of_ports(rig.rings().count()),
+            &scope,
+        );
         let bounds = Bounds {
             cases: arguments.cases.unwrap_or(u64::MAX),
             wire: Some(span(arguments.wire_time.unwrap_or(WIRE))),
@@ -151,30 +166,26 @@ fn on_simulated(
     rig: &Rig,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let drives = rig.file.ring.first.drives;
-    if rig.rings().count() > 1 {
-        output.complain("a case is a conversation with one ring, and this rig has two: name sim:N");
-        return Ok(Exit::Usage);
-    }
-    if let Some(planted) = arguments.deviates.iter().find(|own| own.drive >= drives) {
-        output.complain(&format!(
-            "the ring has the drives 0 to {}, and no drive {}",
-            drives - 1,
-            planted.drive
-        ));
-        return Ok(Exit::Usage);
+    for planted in &arguments.deviates {
+        let own = rig.rings().nth(planted.ring);
+        let drives = own.map_or(0, |(_, ring)| ring.drives);
+        if planted.drive >= drives {
+            output.complain(&match drives {
+                0 => "the rig has one ring, and no ring 2".to_owned(),
+                _ => format!(
+                    "ring {} has the drives 0 to {}, and no drive {}",
+                    planted.ring + 1,
+                    drives - 1,
+                    planted.drive
+                ),
+            });
+            return Ok(Exit::Usage);
+        }
     }
     let setup = match before {
         Some(kept) => kept.about.setup.clone(),
         None => Setup::of_rig(rig, &arguments.deviates, arguments.whole),
     };
-    if !setup.is_plain() && setup.deviates.is_empty() {
-        output.complain(
-            "there is nothing to hold whole ND21s against: the reference model knows plain drives only. Plant a deviation \
-             (--deviates DRIVE=NAME), or use sim:N without --whole",
-        );
-        return Ok(Exit::Usage);
-    }
     let own = &rig.file.limits;
     let limits = Limits {
         motion: own.allow_motion,
@@ -183,8 +194,11 @@ fn on_simulated(
         outputs: own.allow_outputs,
         ..Limits::default()
     };
-    let scope = simulated(drives, limits, &setup);
-    let mut target = OnSim::new(setup.clone());
+    let scope = simulated(rig, limits, &setup);
+    let mut target = match OnSim::ready(setup.clone(), &sizes(rig)) {
+        Ok(target) => target,
+        Err(error) => return Ok(tell(&error, output)),
+    };
     let bounds = Bounds {
         cases: arguments.cases.unwrap_or(match arguments.wire_time {
             Some(_) => u64::MAX,
@@ -203,7 +217,8 @@ fn about(arguments: &FuzzRunArguments, rig: &Rig, setup: Setup, scope: &Scope) -
     About {
         schema: About::SCHEMA,
         rig: arguments.rig.clone(),
-        drives: scope.drives,
+        drives: scope.first.drives,
+        second: scope.second.as_ref().map(|ring| ring.drives),
         ports: !rig.is_simulated(),
         seed: arguments.seed,
         confirm: arguments.confirm.0,
@@ -284,7 +299,8 @@ fn resume(
     target: &mut dyn Target,
 ) -> Result<(Record, Campaign), ExploreError> {
     let (record, kept) = Record::resume(folder)?;
-    if (kept.about.drives, &kept.about.spices) != (about.drives, &about.spices) {
+    let is = |about: &About| (about.drives, about.second, about.spices.clone());
+    if is(&kept.about) != is(about) {
         return Err(ExploreError::Usage(format!(
             "the rig {} is another one than when the run in {} began: other drives, or other leave; begin another run",
             kept.about.rig,

@@ -75,12 +75,12 @@ fn facts(html: &mut Html, run: &Explored<'_>) {
         };
         fact("Rig", &about.rig);
         fact("Drives", &about.drives);
+        if let Some(second) = about.second {
+            fact("Drives of ring 2", &second);
+        }
         fact("Seed", &about.seed);
         for planted in &about.setup.deviates {
-            fact(
-                "Planted",
-                &format_args!("drive {} deviates {}", planted.drive, planted.name),
-            );
+            fact("Planted", &planted.line());
         }
         fact(
             "Confirmed",
