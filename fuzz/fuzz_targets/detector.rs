@@ -1,3 +1,9 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| drivebench_fuzz::count(&harness_sim::fuzz::detector_watched(data)));
-libfuzzer_sys::fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| { drivebench_fuzz::mutate(data, size, max_size, seed, 1) });
+drivebench_fuzz::counters!(harness_sim::transitions::WITHOUT_TIME_OUT);
+std::thread_local!(static DETECTOR: std::cell::RefCell<harness_sim::fuzz::Detector<Counters>> = std::cell::RefCell::default());
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    let Counters = DETECTOR.with_borrow_mut(|detector| detector.watched(data));
+});
+libfuzzer_sys::fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+    drivebench_fuzz::mutate(data, size, max_size, seed, 1)
+});

@@ -2,31 +2,65 @@
 //! repairs commands.
 
 use harness_sim::fuzz::repair;
-use harness_sim::transitions::{REACHABLE, Reached};
-use std::sync::atomic::{AtomicU8, Ordering};
+use harness_sim::transitions::Transition;
 
-// libFuzzer takes the counters in steps of eight bytes.
-const COUNTERS: usize = REACHABLE.next_multiple_of(8);
-
-/// One counter a cell of the matrix of protocol transitions that can be reached. libFuzzer finds them by the name of the section, sets them
-/// to 0 before each case, reads all of them behind it and keeps an input that makes one of them rise for the first time. `used` keeps the
-/// linker from leaving them out.
-// Unsafe, since a section of a wrong form would harm the program; this one is an array of bytes, as libFuzzer documents it.
-#[used]
-#[unsafe(link_section = "__libfuzzer_extra_counters")]
-static TRANSITIONS: [AtomicU8; COUNTERS] = [const { AtomicU8::new(0) }; COUNTERS];
-
-/// Tells libFuzzer which transitions a case went through.
-pub fn count(reached: &Reached) {
-    for number in reached.reachable_numbers() {
-        TRANSITIONS[number].store(1, Ordering::Relaxed);
-    }
+/// How many counters stand for so many cells: libFuzzer takes them in steps of eight bytes.
+pub const fn counters(cells: usize) -> usize {
+    cells.next_multiple_of(8)
 }
 
-/// libFuzzer's mutation, and behind it, for three seeds of four, repaired commands; `head` bytes in front are no wire bytes.
+/// Makes `Counters`, which tells libFuzzer of each transition when it happens: one counter for each of the first so many cells of the
+/// matrix of protocol transitions. No more than the target can reach: libFuzzer finds the counters by the name of the section, sets all of
+/// them to 0 before each case, reads all of them behind it and keeps an input that makes one of them rise for the first time.
+#[macro_export]
+macro_rules! counters {
+    ($cells:expr) => {
+        // `used` keeps the linker from leaving them out. Unsafe, since a section of a wrong form would harm the program; this one is an
+        // array of bytes, as libFuzzer documents it.
+        #[used]
+        #[unsafe(link_section = "__libfuzzer_extra_counters")]
+        static TRANSITIONS: [std::sync::atomic::AtomicU8; $crate::counters($cells)] =
+            [const { std::sync::atomic::AtomicU8::new(0) }; $crate::counters($cells)];
+
+        #[derive(Debug, Default)]
+        struct Counters;
+
+        impl harness_sim::transitions::Notes for Counters {
+            #[inline]
+            fn note(&mut self, cell: harness_sim::transitions::Transition) {
+                match cell.number().and_then(|number| TRANSITIONS.get(number)) {
+                    Some(counter) => counter.store(1, std::sync::atomic::Ordering::Relaxed),
+                    None => $crate::not_counted(cell),
+                }
+            }
+
+            fn join(&mut self, _other: &Self) {}
+
+            fn assert_possible(&self) {}
+        }
+    };
+}
+
+/// Ends the case of a target that reaches a cell that it cannot reach.
+#[cold]
+pub fn not_counted(cell: Transition) {
+    cell.assert_possible();
+    panic!("{cell}: this target has no counter for it");
+}
+
+/// The longest command (ND21 10).
+const LONGEST_COMMAND: usize = 6;
+
+/// libFuzzer's mutation, and behind it, for every second seed, repaired commands; `head` bytes in front are no wire bytes. For all but a
+/// few seeds an input grows by a command at most: of a long input nearly every byte comes to a drive that is in the error mode already.
 pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32, head: usize) -> usize {
-    let size = libfuzzer_sys::fuzzer_mutate(data, size, max_size);
-    if !seed.is_multiple_of(4)
+    let most = if seed % 32 == 1 {
+        max_size
+    } else {
+        max_size.min(size + LONGEST_COMMAND)
+    };
+    let size = libfuzzer_sys::fuzzer_mutate(data, size, most);
+    if seed.is_multiple_of(2)
         && let Some(wire) = data[..size].get_mut(head..)
     {
         repair(wire);

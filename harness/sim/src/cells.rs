@@ -20,20 +20,21 @@ pub struct Cells {
 }
 
 impl Cells {
-    fn new() -> Self {
+    /// A memory with an EEPROM as given, and nothing in RAM.
+    #[inline]
+    pub(crate) fn with_eeprom(eeprom: [u8; 256]) -> Self {
         Self {
             ram: [0; RAM_AND_REGISTERS],
             rom: [0; ROM_SIZE],
-            eeprom: [0; 256],
+            eeprom,
         }
     }
 
-    /// A memory with an EEPROM as given, and nothing in RAM.
-    pub(crate) fn with_eeprom(eeprom: [u8; 256]) -> Self {
-        Self {
-            eeprom,
-            ..Self::new()
-        }
+    /// Starts with nothing in the registers; ROM and EEPROM stay, which nothing on the bus can change. All where it stands: a memory that is
+    /// made anew and moved is copied.
+    pub(crate) fn restart(&mut self) {
+        self.ram[RAM.len()..].fill(0);
+        self.start();
     }
 
     fn cell(&mut self, address: u16) -> Option<&mut u8> {
@@ -146,10 +147,9 @@ impl Cells {
     pub(crate) fn start(&mut self) {
         let ram = RAM.len();
         self.ram[..ram].fill(0);
-        for i in 0..nd21::PARAMETER_COUNT {
-            let byte = self.eeprom[usize::from(u16::from(nd21::EE_PARAMETERS) + i)];
-            self.write(nd21::PARAMETERS + i, byte);
-        }
+        let count = usize::from(nd21::PARAMETER_COUNT);
+        let kept = &self.eeprom[usize::from(nd21::EE_PARAMETERS)..][..count];
+        self.ram[usize::from(nd21::PARAMETERS - RAM_START)..][..count].copy_from_slice(kept);
         let monitoring =
             self.eeprom[usize::from(nd21::ee::SELFTEST)] & nd21::bits::selftest::MONITORING != 0;
         if monitoring {

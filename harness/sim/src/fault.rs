@@ -149,6 +149,11 @@ impl<F: Copy> Plan<F> {
         self.waiting.insert(place, (byte, fault));
     }
 
+    /// Forgets all of them.
+    pub(crate) fn clear(&mut self) {
+        self.waiting.clear();
+    }
+
     /// The next fault at or before byte `byte`.
     #[inline]
     pub(crate) fn take(&mut self, byte: u64) -> Option<F> {

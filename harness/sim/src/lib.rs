@@ -28,4 +28,5 @@ pub mod ring;
 pub mod trace;
 pub mod transitions;
 mod uart;
+mod under_way;
 pub mod witness;

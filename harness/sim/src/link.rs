@@ -2,9 +2,9 @@
 
 use crate::fault::{Flips, LinkFault, Plan};
 use crate::uart::{self, Uart};
+use crate::under_way::{Bytes, UnderWay};
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
-use std::collections::VecDeque;
 
 /// A byte on a wire, at both of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,84 +48,11 @@ impl LineByte {
     }
 }
 
-/// A [`LineByte`] in two words: composed of single bytes, a line byte is stored in pieces and loaded
-/// whole, which costs more than all the rest of passing a byte on.
-#[derive(Clone, Copy, Debug)]
-struct UnderWay {
-    at: Instant,
-    word: u32,
-}
-
-impl UnderWay {
-    const SENT: u32 = 1 << 16;
-    const RECEIVED: u32 = 1 << 17;
-    const SOLICITED: u32 = 1 << 18;
-    const ERROR_SHIFT: u32 = 24;
-
-    /// A byte that arrives as it was sent.
-    #[inline]
-    fn whole(at: Instant, byte: u8, solicited: bool) -> Self {
-        let word = (u32::from(byte) * 0x0101) | Self::SENT | Self::RECEIVED;
-        let solicited = if solicited { Self::SOLICITED } else { 0 };
-        Self {
-            at,
-            word: word | solicited,
-        }
-    }
-
-    fn pack(byte: LineByte) -> Self {
-        let sent = byte.sent.map_or(0, |b| Self::SENT | u32::from(b));
-        let received = byte
-            .received
-            .map_or(0, |b| Self::RECEIVED | u32::from(b) << 8);
-        let solicited = if byte.solicited { Self::SOLICITED } else { 0 };
-        let error = match byte.error {
-            None => 0,
-            Some(LineError::Parity) => 1,
-            Some(LineError::Framing) => 2,
-            Some(LineError::Break) => 3,
-            Some(LineError::Overrun) => 4,
-        };
-        Self {
-            at: byte.at,
-            word: sent | received | solicited | error << Self::ERROR_SHIFT,
-        }
-    }
-
-    #[inline]
-    fn unpack(self) -> LineByte {
-        let [sent, received, _, error] = self.word.to_le_bytes();
-        LineByte {
-            at: self.at,
-            sent: (self.word & Self::SENT != 0).then_some(sent),
-            received: (self.word & Self::RECEIVED != 0).then_some(received),
-            error: match error {
-                0 => None,
-                1 => Some(LineError::Parity),
-                2 => Some(LineError::Framing),
-                3 => Some(LineError::Break),
-                _ => Some(LineError::Overrun),
-            },
-            solicited: self.solicited(),
-        }
-    }
-
-    #[inline]
-    fn solicited(self) -> bool {
-        self.word & Self::SOLICITED != 0
-    }
-
-    /// Lets the byte be lost on the wire.
-    fn lose(&mut self) {
-        self.word &= Self::SENT | Self::SOLICITED | 0xFF;
-    }
-}
-
 /// A link cut open: what the transmitter sends goes to somebody else, and what the receiver hears comes from them.
 #[derive(Clone, Debug, Default)]
 struct Opening {
     /// What has been sent and not been fetched.
-    sent: VecDeque<UnderWay>,
+    sent: Bytes,
     /// When the last byte sent arrives there.
     last_arrival: Instant,
 }
@@ -138,7 +65,7 @@ pub struct Link {
     line_free: Instant,
     /// When the last byte arrived: bytes arrive one after another.
     last_arrival: Instant,
-    under_way: VecDeque<UnderWay>,
+    bytes: Bytes,
     transmitted: u64,
     plan: Plan<LinkFault>,
     cut: bool,
@@ -147,7 +74,6 @@ pub struct Link {
     out_of_step: Option<Uart>,
     /// Until when the line is held at 0.
     held_until: Instant,
-    log: Option<Vec<LineByte>>,
     arrived: u64,
 }
 
@@ -157,44 +83,55 @@ impl Link {
             byte_time,
             line_free: Instant::START,
             last_arrival: Instant::START,
-            under_way: VecDeque::new(),
+            bytes: Bytes::recorded(),
             transmitted: 0,
             plan: Plan::default(),
             cut: false,
             opening: None,
             out_of_step: None,
             held_until: Instant::START,
-            log: Some(Vec::new()),
             arrived: 0,
         }
     }
 
+    /// Is as new again, but keeps room and whether it records: a run of many short cases does not ask for memory in each.
+    pub(crate) fn restart(&mut self) {
+        let mut bytes = std::mem::take(&mut self.bytes);
+        bytes.clear();
+        let mut plan = std::mem::take(&mut self.plan);
+        plan.clear();
+        *self = Self {
+            bytes,
+            plan,
+            ..Self::new(self.byte_time)
+        };
+    }
+
     /// Everything that this link has carried, in order; empty where nothing is recorded.
     #[must_use]
-    pub fn log(&self) -> &[LineByte] {
-        self.log.as_deref().unwrap_or_default()
+    pub fn log(&self) -> impl ExactSizeIterator<Item = LineByte> + Clone + '_ {
+        self.bytes.log()
     }
 
     /// Makes room for so many bytes.
     pub(crate) fn reserve(&mut self, bytes: usize) {
-        self.under_way.reserve(bytes);
-        if let Some(log) = &mut self.log {
-            log.reserve(bytes);
-        }
+        self.bytes.reserve(bytes);
     }
 
     pub(crate) fn stop_recording(&mut self) {
-        self.log = None;
+        self.bytes.record(false);
     }
 
     /// Records what it carries from now on.
     pub(crate) fn record_anew(&mut self) {
-        self.log = Some(Vec::new());
+        self.bytes.record(true);
     }
 
     /// What has been recorded since the last call.
     pub(crate) fn take_log(&mut self) -> Vec<LineByte> {
-        self.log.as_mut().map(std::mem::take).unwrap_or_default()
+        let log = self.bytes.log().collect();
+        self.bytes.forget_arrived();
+        log
     }
 
     /// Cuts the link open: from now on the receiver hears only what is fed, and what the transmitter sends has to be
@@ -218,26 +155,25 @@ impl Link {
     /// When the next byte of an open link's transmitter has been sent.
     pub(crate) fn next_sent(&self) -> Instant {
         let opening = self.opening.as_ref();
-        let next = opening.and_then(|opening| opening.sent.front());
-        next.map_or(Instant::NEVER, |byte| byte.at)
+        opening.map_or(Instant::NEVER, |opening| opening.sent.next_arrival())
     }
 
     /// The next byte that an open link's transmitter has sent by `now`.
     pub(crate) fn fetch(&mut self, now: Instant) -> Option<LineByte> {
         let sent = &mut self.opening.as_mut()?.sent;
-        sent.front().filter(|byte| byte.at <= now)?;
-        sent.pop_front().map(UnderWay::unpack)
+        if sent.next_arrival() > now {
+            return None;
+        }
+        sent.take().map(UnderWay::unpack)
     }
 
     /// Forgets what it has carried and the faults whose byte has not come; what is under way counts as the first
     /// bytes.
     pub(crate) fn begin(&mut self) {
         self.plan = Plan::default();
-        self.transmitted = self.under_way.len() as u64;
+        self.bytes.forget_arrived();
+        self.transmitted = self.bytes.under_way().len() as u64;
         self.arrived = 0;
-        if let Some(log) = &mut self.log {
-            log.clear();
-        }
     }
 
     /// When the transmitter can start its next byte.
@@ -257,7 +193,7 @@ impl Link {
 
     /// Whether a byte is under way that goes back to the master's.
     pub(crate) fn carries_solicited(&self) -> bool {
-        self.under_way.iter().any(|byte| byte.solicited())
+        self.bytes.under_way().iter().any(|byte| byte.solicited())
     }
 
     /// Faults whose byte has not come yet.
@@ -285,8 +221,8 @@ impl Link {
     pub(crate) fn hold(&mut self, now: Instant, span: Span) {
         self.lose_after(now);
         self.held_until = self.held_until.max(now + span);
-        let (under_way, last_arrival) = match &mut self.opening {
-            None => (&mut self.under_way, &mut self.last_arrival),
+        let (bytes, last_arrival) = match &mut self.opening {
+            None => (&mut self.bytes, &mut self.last_arrival),
             Some(opening) => (&mut opening.sent, &mut opening.last_arrival),
         };
         let at = (*last_arrival).max(now) + self.byte_time;
@@ -298,8 +234,7 @@ impl Link {
             error: Some(LineError::Break),
             solicited: true,
         };
-        let place = under_way.partition_point(|other| other.at <= at);
-        under_way.insert(place, UnderWay::pack(byte));
+        bytes.insert(UnderWay::pack(byte));
     }
 
     /// The transmitter loses its power: what it has not finished is never sent.
@@ -311,10 +246,10 @@ impl Link {
     fn lose_after(&mut self, now: Instant) {
         // On an open link what is under way is not the transmitter's.
         let own = match &mut self.opening {
-            None => &mut self.under_way,
+            None => &mut self.bytes,
             Some(opening) => &mut opening.sent,
         };
-        for byte in own {
+        for byte in own.under_way_mut() {
             if byte.at > now {
                 byte.lose();
             }
@@ -449,7 +384,7 @@ impl Link {
             Some(opening) => {
                 byte.at = byte.at.max(opening.last_arrival + self.byte_time);
                 opening.last_arrival = byte.at;
-                opening.sent.push_back(byte);
+                opening.sent.push(byte);
             }
         }
     }
@@ -459,30 +394,20 @@ impl Link {
     fn line_up(&mut self, mut byte: UnderWay) {
         byte.at = byte.at.max(self.last_arrival + self.byte_time);
         self.last_arrival = byte.at;
-        self.under_way.push_back(byte);
+        self.bytes.push(byte);
     }
 
     /// When the next byte arrives.
     #[inline]
     pub(crate) fn next_arrival(&self) -> Instant {
-        self.under_way
-            .front()
-            .map_or(Instant::NEVER, |byte| byte.at)
+        self.bytes.next_arrival()
     }
 
     /// Takes the next byte from the wire.
     #[inline]
     pub(crate) fn take(&mut self) -> Option<LineByte> {
-        let byte = self.under_way.pop_front()?.unpack();
-        self.record(byte);
-        Some(byte)
-    }
-
-    #[inline]
-    fn record(&mut self, byte: LineByte) {
+        let byte = self.bytes.take()?;
         self.arrived += 1;
-        if let Some(log) = &mut self.log {
-            log.push(byte);
-        }
+        Some(byte.unpack())
     }
 }

@@ -55,9 +55,17 @@ impl<D: Device> Node<D> {
         self.recording = false;
     }
 
+    /// Is as new again around a device that is, but keeps whether it records.
+    pub(crate) fn restart(&mut self) {
+        self.head_start = self.device.head_start();
+        self.powered = true;
+        self.stuck = None;
+        self.begin();
+    }
+
     /// Forgets its marks, and the faults whose byte has not come.
     pub(crate) fn begin(&mut self) {
-        self.plan = Plan::default();
+        self.plan.clear();
         self.marks.clear();
     }
 

@@ -30,6 +30,12 @@ impl PlainDrive {
         }
     }
 
+    /// Is as new again, with the EEPROM that it has.
+    pub(crate) fn restart(&mut self) {
+        self.memory.restart();
+        self.bus_end = BusEnd::new(self.properties);
+    }
+
     /// Its memory.
     #[must_use]
     pub fn memory(&self) -> &Cells {

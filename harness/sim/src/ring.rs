@@ -50,6 +50,20 @@ impl<D: Device> Ring<D> {
         }
     }
 
+    /// Is as new again once `restart` has made each device so, but keeps room, and what is recorded and what is not: a run of many short
+    /// cases does not ask for memory in each.
+    pub fn restart(&mut self, mut restart: impl FnMut(&mut D)) {
+        self.links.iter_mut().for_each(Link::restart);
+        for node in &mut self.nodes {
+            restart(node.device_mut());
+            node.restart();
+        }
+        self.outbox.clear();
+        self.inbox.clear();
+        self.now = Instant::START;
+        self.sent_by = Instant::START;
+    }
+
     /// Makes room for so many bytes on every link at once: a short run then does not ask for memory again and again.
     pub fn reserve(&mut self, bytes: usize) {
         self.links.iter_mut().for_each(|link| link.reserve(bytes));
@@ -58,9 +72,13 @@ impl<D: Device> Ring<D> {
     }
 
     /// What link `link` has carried so far, as far as it was recorded; what was taken by [`Self::take_record`] is gone.
+    /// `None` where the ring has no such link.
     #[must_use]
-    pub fn carried_by(&self, link: usize) -> &[LineByte] {
-        self.links.get(link).map_or(&[], Link::log)
+    pub fn carried_by(
+        &self,
+        link: usize,
+    ) -> Option<impl ExactSizeIterator<Item = LineByte> + Clone + '_> {
+        self.links.get(link).map(Link::log)
     }
 
     /// Keeps no record of bytes and marks from now on: for runs that are too long for one.
@@ -318,7 +336,7 @@ impl<D: Device> Ring<D> {
         let links = self.links.iter().enumerate().map(|(i, link)| LinkTrace {
             from: end(i).filter(|&k| k < drives),
             to: end(i + 1),
-            bytes: link.log().to_vec(),
+            bytes: link.log().collect(),
         });
         let mut marks: Vec<_> = self.nodes.iter().flat_map(|n| n.marks().to_vec()).collect();
         marks.sort_by_key(|mark| mark.at);

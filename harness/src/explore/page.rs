@@ -83,7 +83,7 @@ fn reach(kept: &Kept, case: &Case, reached: &mut Reached) -> Result<(), ExploreE
 }
 
 fn heard(link: &LinkTrace) -> Reached {
-    let mut drive = Watched::default();
+    let mut drive = Watched::<Reached>::default();
     for byte in &link.bytes {
         if let Some(value) = byte.received {
             let received = Received {

@@ -292,6 +292,7 @@ impl BusEnd {
     }
 
     /// A byte in normal mode, without a line error.
+    #[inline(never)]
     fn normal<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Step, BusError> {
         match &mut self.state {
             State::Sync => self.sync_byte(byte, memory),

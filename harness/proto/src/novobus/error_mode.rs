@@ -25,7 +25,7 @@ pub const UPSTREAM_ZEROS: u8 = 8;
 /// drive, for tests of what must find one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rules {
-    /// Good zeros in a row that show that the drive before is in the error mode (ND21 9.7).
+    /// Good zeros in a row that show that the drive before is in the error mode (ND21 9.7); 1 or more.
     pub upstream_zeros: u8,
     /// Zeros that a drive has sent when it begins to increment (ND21 9.7).
     pub sent_zeros: u8,
@@ -90,21 +90,6 @@ pub struct ErrorMode {
     after_time_out: bool,
     watch: Watch,
     in_sequence: bool,
-}
-
-/// How far a drive in the error mode is, for those who look at a bus end from outside (ND21 9.7, 9.8).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stage {
-    /// Good zeros received in a row, the last of them just now.
-    pub zeros_received: u8,
-    /// Zeros sent; it stays at the largest number that fits.
-    pub zeros_sent: u8,
-    /// Whether "*" has been.
-    pub upstream: bool,
-    /// Whether the next byte is answered with received + 1 (rule 3).
-    pub increments: bool,
-    /// The bytes of the check sequence received, 0 to 4.
-    pub sequence: u8,
 }
 
 /// What the error mode makes of a byte.
@@ -203,17 +188,32 @@ impl ErrorMode {
         }
     }
 
-    /// How far it is.
+    /// Good zeros received in a row, the last of them just now; it stays at the largest number that fits.
     #[must_use]
     #[inline]
-    pub const fn stage(&self) -> Stage {
-        Stage {
-            zeros_received: self.zeros_received,
-            zeros_sent: self.zeros_sent,
-            upstream: self.upstream,
-            increments: self.increments(),
-            sequence: self.watch.matched(),
-        }
+    pub const fn zeros_received(&self) -> u8 {
+        self.zeros_received
+    }
+
+    /// Zeros sent; it stays at the largest number that fits.
+    #[must_use]
+    #[inline]
+    pub const fn zeros_sent(&self) -> u8 {
+        self.zeros_sent
+    }
+
+    /// Whether "*" has been.
+    #[must_use]
+    #[inline]
+    pub const fn upstream(&self) -> bool {
+        self.upstream
+    }
+
+    /// The bytes of the check sequence received, 0 to 4.
+    #[must_use]
+    #[inline]
+    pub const fn sequence(&self) -> u8 {
+        self.watch.matched()
     }
 
     /// Notebook that a 00 goes out, asked for or not.
@@ -230,11 +230,8 @@ impl ErrorMode {
     /// Rule 2.
     #[inline]
     fn count(&mut self, good_zero: bool) -> Marks {
-        if !good_zero {
-            self.zeros_received = 0;
-            return Marks::NONE;
-        }
-        self.zeros_received = self.zeros_received.saturating_add(1);
+        // Without a branch on the byte: any byte is as likely as another.
+        self.zeros_received = u8::from(good_zero) * self.zeros_received.saturating_add(1);
         if self.zeros_received == self.rules.upstream_zeros && !self.upstream {
             self.upstream = true;
             return Marks::UPSTREAM;
@@ -242,9 +239,10 @@ impl ErrorMode {
         Marks::NONE
     }
 
-    /// Rule 3.
+    /// Whether the next byte is answered with received + 1 (rule 3).
+    #[must_use]
     #[inline]
-    const fn increments(&self) -> bool {
+    pub const fn increments(&self) -> bool {
         self.upstream && (self.after_time_out || self.zeros_sent >= self.rules.sent_zeros)
     }
 }

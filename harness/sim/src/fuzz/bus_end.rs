@@ -5,7 +5,7 @@ use crate::device::Device as _;
 use crate::plain::PlainDrive;
 use crate::reference;
 use crate::transitions::tour::Stimulus;
-use crate::transitions::{Event, Reached, State, Watched};
+use crate::transitions::{Event, Notes, Reached, State, Watched};
 use harness_proto::line::Received;
 use harness_proto::nd21;
 use harness_proto::novobus::bus_end::{Deadline, Step};
@@ -19,7 +19,7 @@ use harness_proto::time::{Instant, Span};
 /// # Panics
 /// A rule of ND21 9.1 to 9.9 is broken; or the reference model, where no time-out is monitored, answers otherwise.
 pub fn bus_end(data: &[u8]) {
-    let _transitions = bus_end_watched(data);
+    let _transitions: Reached = bus_end_watched(data);
 }
 
 /// The same, with the transitions that the drive went through.
@@ -27,15 +27,15 @@ pub fn bus_end(data: &[u8]) {
 /// # Panics
 /// As [`bus_end`], or a transition is called unreachable.
 #[must_use]
-pub fn bus_end_watched(data: &[u8]) -> Reached {
+pub fn bus_end_watched<N: Notes>(data: &[u8]) -> N {
     let Some((&options, wire)) = data.split_first() else {
-        return Reached::default();
+        return N::default();
     };
     let mut eeprom = [0; 256];
     if options & 1 != 0 {
         eeprom[usize::from(nd21::ee::SELFTEST)] = nd21::bits::selftest::MONITORING;
     }
-    let mut drive = Watched::new(PlainDrive::new(Properties::default(), eeprom));
+    let mut drive = Watched::<N>::new(PlainDrive::new(Properties::default(), eeprom));
     // Time-outs are no part of the reference model.
     let mut model = (options & 1 == 0).then(reference::Drive::new);
     let mut now = Instant::START;
@@ -50,11 +50,11 @@ pub fn bus_end_watched(data: &[u8]) -> Reached {
         model = model.filter(|_| drive.deadline().is_none());
     }
     drive.reached().assert_possible();
-    drive.reached().clone()
+    drive.into_reached()
 }
 
 /// ND21 9.9: nothing goes out until the silence has lasted twice as long; then zeros, one a byte time.
-fn silence(drive: &mut Watched, now: &mut Instant) {
+fn silence<N: Notes>(drive: &mut Watched<N>, now: &mut Instant) {
     let Some(deadline) = drive.deadline() else {
         return;
     };
@@ -66,8 +66,8 @@ fn silence(drive: &mut Watched, now: &mut Instant) {
     assert!(drive.in_error(), "a time-out is an error");
 }
 
-fn byte(
-    drive: &mut Watched,
+fn byte<N: Notes>(
+    drive: &mut Watched<N>,
     now: Instant,
     received: Received,
     model: &mut Option<reference::Drive>,

@@ -6,6 +6,7 @@
 
 mod bus_end;
 mod codec;
+mod detector;
 mod drive;
 mod drive_words;
 mod features;
@@ -15,10 +16,12 @@ mod hostile;
 pub mod jobs;
 mod links;
 mod repair;
+mod ring;
 mod words;
 
 pub use bus_end::{bus_end, bus_end_watched};
 pub use codec::codec_stream;
+pub use detector::{Detector, detector, detector_watched};
 pub use drive::drive;
 pub use features::{Body, Feature, NOTING, Notebook, Noting, features, of_cell};
 pub use guard::guard;
@@ -26,20 +29,14 @@ pub use hostile::master;
 pub use jobs::jobs;
 pub use links::links;
 pub use repair::repair;
+pub use ring::{ThreeDrives, ring, ring_watched};
 
-use crate::device::Device as _;
-use crate::fault::{Flips, LinkFault};
-use crate::link::LineByte;
 use crate::plain::PlainDrive;
 use crate::reference;
-use crate::ring::Ring;
-use crate::transitions::{Reached, Watched};
-use harness_proto::line::{LineError, Rate, Received};
-use harness_proto::novobus::address::RingSize;
+use crate::transitions::Reached;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::decode::Decoded;
 use harness_proto::novobus::telegram::Telegram;
-use harness_proto::time::{Instant, Span};
 
 /// A target: its name, which is that of its folder in `corpora/fuzz`, and its body.
 pub type Target = (&'static str, fn(&[u8]));
@@ -92,123 +89,6 @@ pub fn codec(data: &[u8]) {
     }
 }
 
-/// One drive's end of the bus against the reference model, byte by byte (ND21 9.1-9.8). The first byte of
-/// the input is the number of the byte that arrives with wrong parity, 0 for none; the rest goes over the
-/// wire.
-///
-/// # Panics
-/// The two models answer otherwise, or disagree on the error mode or the memory.
-pub fn detector(data: &[u8]) {
-    let _transitions = detector_watched(data);
-}
-
-/// The same, with the transitions that the drive went through.
-///
-/// # Panics
-/// As [`detector`], or a transition is called unreachable.
-#[must_use]
-pub fn detector_watched(data: &[u8]) -> Reached {
-    let mut ours = Watched::default();
-    let Some((&damaged, wire)) = data.split_first() else {
-        return Reached::default();
-    };
-    let mut theirs = reference::Drive::new();
-    let mut now = Instant::START;
-    for (index, &byte) in wire.iter().take(LONGEST).enumerate() {
-        now += Span::from_micros(287);
-        let bad = index + 1 == usize::from(damaged);
-        let received = if bad {
-            Received::bad(byte, LineError::Parity)
-        } else {
-            Received::good(byte)
-        };
-        let step = ours.receive(now, received);
-        let expected = theirs.receive(reference::Cell { byte, error: bad });
-        assert_eq!(step.byte, expected, "byte {} of {wire:02X?}", index + 1);
-        assert_eq!(ours.in_error(), theirs.in_error(), "byte {}", index + 1);
-        // Time-outs are no part of the reference model: a case that switches them on ends here.
-        if ours.drive().memory().peek(0xFF57) & 4 != 0 {
-            ours.reached().assert_possible();
-            return ours.into_reached();
-        }
-    }
-    same_memory(ours.drive(), &theirs);
-    ours.reached().assert_possible();
-    ours.into_reached()
-}
-
-/// A ring of three against the reference model. The first byte of the input is the link that is damaged (0
-/// to 3) and how (its high half), the second the number of the damaged byte, 0 for none.
-///
-/// # Panics
-/// A byte on any link is otherwise than in the reference model, or a drive's memory or error mode.
-pub fn ring(data: &[u8]) {
-    let _transitions = ring_watched(data);
-}
-
-/// The same, with the transitions that the three drives went through.
-///
-/// # Panics
-/// As [`ring`], or a transition is called unreachable.
-#[must_use]
-pub fn ring_watched(data: &[u8]) -> Reached {
-    let mut reached = Reached::default();
-    let [what, place, wire @ ..] = data else {
-        return reached;
-    };
-    let Ok(size) = RingSize::new(3) else {
-        return reached;
-    };
-    if wire.is_empty() {
-        return reached;
-    }
-    let wire = &wire[..wire.len().min(256)];
-    let mut ours = Ring::new(size, Rate::Baud38400, |_| Watched::default());
-    // Marks are of no use here.
-    ours.stop_recording();
-    (0..4).for_each(|link| ours.record_link(link));
-    // A byte is inserted or doubled at most.
-    ours.reserve(wire.len() + 1);
-    let mut theirs = [(); 3].map(|()| reference::Drive::new());
-    let (link, fault, other) = ring_fault(*what);
-    let fault_of_theirs = [(link, usize::from(*place), other)];
-    let mut faults = &fault_of_theirs[..0];
-    if *place > 0 && usize::from(*place) <= wire.len() {
-        ours.arm_link(link, u64::from(*place), fault);
-        faults = &fault_of_theirs;
-    }
-    ours.send(Instant::START, wire);
-    // The way round the ring takes a byte time a link.
-    let conversation = ours.byte_time() * (wire.len() as u64 + 8);
-    ours.run_until(Instant::START + conversation);
-    let drives = || (0..3).rev().filter_map(|k| ours.drive(k));
-    drives().for_each(|drive| reached.join(drive.reached()));
-    reached.assert_possible();
-    // Time-outs are no part of the reference model, be they switched off again since by a reset.
-    if drives().any(|drive| drive.timed_out() || drive.drive().memory().peek(0xFF57) & 4 != 0) {
-        return reached;
-    }
-    assert!(!ours.busy(), "a byte is still under way, sent {wire:02X?}");
-    let expected = reference::run(&mut theirs, wire, faults);
-    assert_eq!(expected.len(), 4, "a link behind the master and each drive");
-    for (index, expected) in expected.iter().enumerate() {
-        let arrived = ours.carried_by(index).iter().filter_map(LineByte::arrival);
-        let received = arrived.map(|byte| reference::Cell {
-            byte: byte.byte,
-            error: byte.error.is_some(),
-        });
-        if !received.clone().eq(expected.iter().copied()) {
-            let received: Vec<_> = received.collect();
-            assert_eq!(received, *expected, "link {index}, sent {wire:02X?}");
-        }
-    }
-    for (ours, theirs) in drives().zip(&theirs) {
-        assert_eq!(ours.in_error(), theirs.in_error(), "sent {wire:02X?}");
-        same_memory(ours.drive(), theirs);
-    }
-    reached
-}
-
 /// The memories are the same but for the error code (FD82, FD83), of which the reference model knows one only.
 fn same_memory(ours: &PlainDrive, theirs: &reference::Drive) {
     let ours = ours.memory().ram_and_registers();
@@ -219,28 +99,6 @@ fn same_memory(ours: &PlainDrive, theirs: &reference::Drive) {
     for (address, (ours, theirs)) in (0xFD80_u16..).zip(ours.iter().zip(theirs)) {
         if ![0xFD82, 0xFD83].contains(&address) {
             assert_eq!(ours, theirs, "cell {address:04X}");
-        }
-    }
-}
-
-/// The damaged link of [`ring`], and what happens on it, in the words of both models.
-fn ring_fault(what: u8) -> (usize, LinkFault, reference::Fault) {
-    let link = usize::from(what & 3);
-    match what >> 4 {
-        kind @ 0..8 => {
-            let data = 1 << kind;
-            let flips = Flips {
-                data,
-                ..Flips::default()
-            };
-            let other = reference::Fault::Flip(data, false, false);
-            (link, LinkFault::Flip(flips), other)
-        }
-        8 => (link, LinkFault::Drop, reference::Fault::Drop),
-        9 => (link, LinkFault::Duplicate, reference::Fault::Duplicate),
-        kind => {
-            let other = reference::Fault::Insert(kind);
-            (link, LinkFault::Insert(kind), other)
         }
     }
 }

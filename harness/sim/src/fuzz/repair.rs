@@ -1,7 +1,7 @@
 //! Repairs commands in raw bytes, so that a mutated input gets past the checking byte (ND21 9.5, 9.6).
 
 use harness_proto::novobus::address::passed_on;
-use harness_proto::novobus::check_sequence::{Progress, Watch};
+use harness_proto::novobus::check_sequence::SEQUENCE;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Field, Layout, layout};
 use harness_proto::novobus::properties::ReadLongAnswer;
@@ -10,15 +10,18 @@ use harness_proto::novobus::sync::{Addressing, SyncByte};
 /// Sets the fixed bytes and the checking byte of every command in `wire`, for every drive; lengths, addresses and data stay as
 /// they are. Behind a byte that is no sync byte or no command everything stays, up to the next check sequence (9.8).
 pub fn repair(wire: &mut [u8]) {
-    let mut reader = Reader::default();
-    let mut watch = Watch::default();
-    for byte in wire {
-        if !reader.lost {
-            reader.take(byte);
+    let mut left = wire;
+    loop {
+        let read = Reader::default().read(left);
+        left = &mut left[read..];
+        while !left.starts_with(&SEQUENCE) {
+            // On to the next byte that may begin one.
+            let Some(place) = left.iter().skip(1).position(|byte| *byte == SEQUENCE[0]) else {
+                return;
+            };
+            left = &mut left[1 + place..];
         }
-        if watch.see(*byte, true) == Progress::Complete && reader.lost {
-            reader = Reader::default();
-        }
+        left = &mut left[SEQUENCE.len()..];
     }
 }
 
@@ -44,6 +47,17 @@ struct Begun {
 }
 
 impl Reader {
+    /// Reads up to a byte that no drive accepts, or all; says how many bytes stand in front of that one.
+    fn read(mut self, wire: &mut [u8]) -> usize {
+        for (place, byte) in wire.iter_mut().enumerate() {
+            self.take(byte);
+            if self.lost {
+                return place;
+            }
+        }
+        wire.len()
+    }
+
     fn take(&mut self, byte: &mut u8) {
         if self.address_next {
             self.address_next = false;

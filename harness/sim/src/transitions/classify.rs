@@ -8,7 +8,7 @@ use harness_proto::novobus::address::{ADDRESSED, passed_on};
 use harness_proto::novobus::bus_end::{BusEnd, Parameter, Place, Silent};
 use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
 use harness_proto::novobus::command::{Field, Kind, PAGE, layout};
-use harness_proto::novobus::error_mode::{Stage, UPSTREAM_ZEROS};
+use harness_proto::novobus::error_mode::{ErrorMode, UPSTREAM_ZEROS};
 use harness_proto::novobus::memory::Memory as _;
 use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::properties::ReadLongAnswer;
@@ -16,20 +16,42 @@ use harness_proto::novobus::sync::{Addressing, SyncByte};
 
 /// The cell that a byte is for a bus end on this memory, before it is received.
 #[must_use]
-#[inline]
+#[inline(always)]
 pub fn classify(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transition {
+    // Nearly every byte that a fuzzer sends comes to a drive in the error mode.
+    if let Some((mode, silent)) = bus_end.error_mode() {
+        return Transition {
+            state: error_mode(mode, silent),
+            event: match received.error {
+                Some(error) => line_error(error),
+                None => good_in_error_mode(mode, received.byte),
+            },
+        };
+    }
+    in_normal_mode(bus_end, memory, received)
+}
+
+#[inline(never)]
+fn in_normal_mode(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transition {
     let place = bus_end.place();
-    let event = match received.error {
-        Some(LineError::Parity) => Event::Parity,
-        Some(LineError::Framing) => Event::Framing,
-        Some(LineError::Break) => Event::Break,
-        Some(LineError::Overrun) => Event::Overrun,
-        None if received.byte == 0 => Event::Zero,
-        None => good(place, bus_end, memory, received.byte),
-    };
     Transition {
         state: state_at(place, bus_end, memory),
-        event,
+        event: match received.error {
+            Some(error) => line_error(error),
+            None if received.byte == 0 => Event::Zero,
+            None => good(place, bus_end, memory, received.byte),
+        },
+    }
+}
+
+// Apart, so that a good byte costs one comparison.
+#[cold]
+fn line_error(error: LineError) -> Event {
+    match error {
+        LineError::Parity => Event::Parity,
+        LineError::Framing => Event::Framing,
+        LineError::Break => Event::Break,
+        LineError::Overrun => Event::Overrun,
     }
 }
 
@@ -62,10 +84,8 @@ fn state_at(place: Place, bus_end: &BusEnd, memory: &Cells) -> State {
             Field::Check => State::Check,
         },
         Place::ErrorMode => bus_end
-            .error_stage()
-            .map_or(State::ErrorZeros, |(stage, silent)| {
-                error_mode(stage, silent)
-            }),
+            .error_mode()
+            .map_or(State::ErrorZeros, |(mode, silent)| error_mode(mode, silent)),
     }
 }
 
@@ -112,26 +132,24 @@ pub(super) const SEQUENCES: [[State; 4]; 4] = [
 ];
 
 #[inline]
-fn error_mode(stage: Stage, silent: Silent) -> State {
+fn error_mode(mode: &ErrorMode, silent: Silent) -> State {
+    if silent == Silent::No && !mode.upstream() {
+        return alone(mode);
+    }
     let form = match silent {
-        Silent::No => usize::from(stage.increments),
+        Silent::No => usize::from(mode.increments()),
         Silent::Waiting => 2,
         Silent::Sending => 3,
     };
-    if let Some(place) = stage.sequence.checked_sub(1) {
+    if let Some(place) = mode.sequence().checked_sub(1) {
         return SEQUENCES[form][usize::from(place)];
     }
-    let seven = stage.zeros_received == UPSTREAM_ZEROS - 1;
-    let long = stage.zeros_sent >= ZEROS;
-    match (silent, stage.upstream) {
-        (Silent::No, false) => match (long, seven) {
-            (false, false) => State::ErrorZeros,
-            (false, true) => State::ErrorSeven,
-            (true, false) => State::ErrorLong,
-            (true, true) => State::ErrorLongSeven,
-        },
+    let seven = mode.zeros_received() == UPSTREAM_ZEROS - 1;
+    let long = mode.zeros_sent() >= ZEROS;
+    match (silent, mode.upstream()) {
+        (Silent::No, false) => alone(mode),
         (Silent::No, true) if long => State::Increments,
-        (Silent::No, true) if stage.zeros_sent == ZEROS - 1 => State::UpstreamSixteen,
+        (Silent::No, true) if mode.zeros_sent() == ZEROS - 1 => State::UpstreamSixteen,
         (Silent::No, true) => State::Upstream,
         (Silent::Waiting, true) => State::WaitingIncrements,
         (Silent::Waiting, false) if seven => State::WaitingSeven,
@@ -140,6 +158,35 @@ fn error_mode(stage: Stage, silent: Silent) -> State {
         (Silent::Sending, false) if seven => State::SendingSeven,
         (Silent::Sending, false) => State::Sending,
     }
+}
+
+/// The error mode of a drive that knows of no other one in it.
+#[inline]
+fn alone(mode: &ErrorMode) -> State {
+    let seven = mode.zeros_received() == UPSTREAM_ZEROS - 1;
+    match (mode.zeros_sent() >= ZEROS, seven) {
+        (false, false) => State::ErrorZeros,
+        (false, true) => State::ErrorSeven,
+        (true, false) => State::ErrorLong,
+        (true, true) => State::ErrorLongSeven,
+    }
+}
+
+/// What a good byte is in the error mode.
+#[inline]
+fn good_in_error_mode(mode: &ErrorMode, byte: u8) -> Event {
+    // A table, since any byte is as likely as another: what is asked by branches costs most.
+    static ALONE: [Event; 256] = {
+        let mut events = [Event::OtherByte; 256];
+        events[0] = Event::Zero;
+        events[SEQUENCE[0] as usize] = Event::SequenceStart;
+        events
+    };
+    let due = usize::from(mode.sequence());
+    if due > 0 && byte == SEQUENCE[due] {
+        return Event::SequenceNext;
+    }
+    ALONE[usize::from(byte)]
 }
 
 /// What a good byte is that is no 00.
@@ -163,17 +210,9 @@ fn good(place: Place, bus_end: &BusEnd, memory: &Cells, byte: u8) -> Event {
         Place::ProcessHigh | Place::ProcessLow => Event::ProcessData,
         Place::Command => command(byte),
         Place::Parameter(parameter) => parameter_byte(&parameter, memory, byte),
-        Place::ErrorMode => {
-            let stage = bus_end.error_stage();
-            let due = stage.map_or(0, |(stage, _)| usize::from(stage.sequence));
-            if byte == SEQUENCE[0] {
-                Event::SequenceStart
-            } else if due > 0 && byte == SEQUENCE[due] {
-                Event::SequenceNext
-            } else {
-                Event::OtherByte
-            }
-        }
+        Place::ErrorMode => bus_end
+            .error_mode()
+            .map_or(Event::OtherByte, |(mode, _)| good_in_error_mode(mode, byte)),
     }
 }
 

@@ -14,6 +14,7 @@ mod classify;
 mod event;
 mod matrix;
 mod named;
+mod notes;
 mod reached;
 mod state;
 pub mod tour;
@@ -22,6 +23,7 @@ mod watched;
 pub use classify::{classify, state};
 pub use event::Event;
 pub use matrix::{RULES, Rule, why_unreachable};
+pub use notes::Notes;
 pub use reached::Reached;
 pub use state::State;
 pub use watched::Watched;
@@ -40,6 +42,9 @@ pub const CELLS: usize = State::ALL.len() * Event::ALL.len();
 
 /// How many cells of the matrix can be reached.
 pub const REACHABLE: usize = 435;
+
+/// How many of these a drive can reach on which no time-out is monitored (ND21 9.9) and that reads no line error but that of the parity.
+pub const WITHOUT_TIME_OUT: usize = 175;
 
 impl Transition {
     /// All of them, state by state.
@@ -63,6 +68,25 @@ impl Transition {
     #[must_use]
     pub const fn index(self) -> usize {
         self.state.index() * Event::ALL.len() + self.event.index()
+    }
+
+    /// Its number among those that can be reached, from 0 to [`REACHABLE`] less 1; those [`WITHOUT_TIME_OUT`] have
+    /// the first numbers. `None` for one that cannot be.
+    #[must_use]
+    #[inline]
+    pub fn number(self) -> Option<usize> {
+        let number = matrix::NUMBERS[self.index()];
+        (number != matrix::UNREACHABLE).then_some(usize::from(number))
+    }
+
+    /// Nothing.
+    ///
+    /// # Panics
+    /// The matrix calls it unreachable.
+    pub fn assert_possible(self) {
+        if let Some(rule) = why_unreachable(self) {
+            panic!("reached, and called unreachable: {self} ({})", rule.reason);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The cells of the matrix that a run has reached.
 
-use super::{CELLS, Transition, why_unreachable};
+use super::{CELLS, Transition};
 use std::sync::OnceLock;
 
 const WORDS: usize = CELLS.div_ceil(64);
@@ -65,20 +65,6 @@ impl Reached {
         })
     }
 
-    /// The numbers that those have among the cells that can be reached, from 0 to [`REACHABLE`](super::REACHABLE) less 1; in order.
-    pub fn reachable_numbers(&self) -> impl Iterator<Item = usize> + '_ {
-        static NUMBERS: OnceLock<[Option<u16>; CELLS]> = OnceLock::new();
-        let numbers = NUMBERS.get_or_init(|| {
-            let mut numbers = [None; CELLS];
-            for (number, cell) in (0..).zip(Transition::reachable()) {
-                numbers[cell.index()] = Some(number);
-            }
-            numbers
-        });
-        self.indices()
-            .filter_map(|index| numbers[index].map(usize::from))
-    }
-
     /// A cell among them that the matrix calls unreachable; there is none unless the matrix or the drive is wrong.
     #[must_use]
     pub fn impossible(&self) -> Option<Transition> {
@@ -86,7 +72,7 @@ impl Reached {
         let unreachable = UNREACHABLE.get_or_init(|| {
             let mut cells = Self::default();
             Transition::all()
-                .filter(|cell| why_unreachable(*cell).is_some())
+                .filter(|cell| cell.number().is_none())
                 .for_each(|cell| cells.add(cell));
             cells
         });
@@ -104,8 +90,7 @@ impl Reached {
     /// A cell is among them that the matrix calls unreachable.
     pub fn assert_possible(&self) {
         if let Some(cell) = self.impossible() {
-            let reason = why_unreachable(cell).map_or("", |rule| rule.reason);
-            panic!("reached, and called unreachable: {cell} ({reason})");
+            cell.assert_possible();
         }
     }
 }

@@ -79,8 +79,31 @@ fn the_tour_reaches_every_reachable_cell() {
     }
     assert_eq!(all.count(), Transition::reachable().count());
     assert_eq!(all.indices().count(), all.count());
-    // Each has a number of its own, and none is left out.
-    assert!(all.reachable_numbers().eq(0..REACHABLE));
+}
+
+/// Each cell has a number of its own, and none is left out; those without time-outs come first.
+#[test]
+fn the_numbers_of_the_cells() {
+    let numbers: BTreeSet<_> = Transition::reachable()
+        .filter_map(Transition::number)
+        .collect();
+    assert!(numbers.into_iter().eq(0..REACHABLE));
+    for cell in Transition::reachable() {
+        let first = cell
+            .number()
+            .is_some_and(|number| number < WITHOUT_TIME_OUT);
+        assert_eq!(
+            first,
+            matrix::without_time_out(cell.state, cell.event),
+            "{cell}"
+        );
+    }
+    let unreachable = Transition::all().filter(|cell| why_unreachable(*cell).is_some());
+    assert!(
+        unreachable
+            .map(Transition::number)
+            .all(|number| number.is_none())
+    );
 }
 
 /// A cell that the matrix calls unreachable fails whoever reaches it.
@@ -146,11 +169,11 @@ fn a_drive_knows_its_inbound_link_only() {
         .chain(harness_proto::novobus::check_sequence::CHECK_SEQUENCE)
         .chain([0x88, 0xFD, 0xC0, 0x13, 0xFE, 0xD1])
         .collect();
-    let mut ring = Ring::new(size, Rate::Baud38400, |_| Watched::default());
+    let mut ring = Ring::new(size, Rate::Baud38400, |_| Watched::<Reached>::default());
     ring.send(Instant::START, &sent);
     ring.run_until(Instant::START + Span::from_millis(2_000));
     for (index, k) in (0..3).rev().enumerate() {
-        let mut alone = Watched::default();
+        let mut alone = Watched::<Reached>::default();
         for byte in &ring.trace().links[index].bytes {
             let received = byte.arrival().expect("nothing is lost");
             alone.receive(Instant::START, received);

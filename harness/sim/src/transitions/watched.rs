@@ -1,6 +1,6 @@
 //! A plain drive with an observer around it that notes its transitions.
 
-use super::{Event, Reached, Transition, classify, state};
+use super::{Event, Notes, Reached, Transition, classify, state};
 use crate::device::Device;
 use crate::plain::PlainDrive;
 use harness_proto::line::Received;
@@ -10,21 +10,28 @@ use harness_proto::time::Instant;
 
 /// A plain drive whose transitions are noted. It does what the drive does.
 #[derive(Clone, Debug, Default)]
-pub struct Watched {
+pub struct Watched<N = Reached> {
     drive: PlainDrive,
-    reached: Reached,
+    reached: N,
     timed_out: bool,
 }
 
-impl Watched {
+impl<N: Notes> Watched<N> {
     /// A drive with nothing noted.
     #[must_use]
     pub fn new(drive: PlainDrive) -> Self {
         Self {
             drive,
-            reached: Reached::default(),
+            reached: N::default(),
             timed_out: false,
         }
+    }
+
+    /// Is as new again, with the EEPROM that it has and nothing noted.
+    pub fn restart(&mut self) {
+        self.drive.restart();
+        self.reached = N::default();
+        self.timed_out = false;
     }
 
     /// The drive.
@@ -35,8 +42,14 @@ impl Watched {
 
     /// What it has gone through.
     #[must_use]
-    pub const fn reached(&self) -> &Reached {
+    pub const fn reached(&self) -> &N {
         &self.reached
+    }
+
+    /// What it has gone through; from now on it notes anew.
+    #[must_use]
+    pub fn take_reached(&mut self) -> N {
+        std::mem::take(&mut self.reached)
     }
 
     /// Whether there has been a time-out (ND21 9.9).
@@ -47,7 +60,7 @@ impl Watched {
 
     /// What it has gone through; the drive is done with.
     #[must_use]
-    pub fn into_reached(self) -> Reached {
+    pub fn into_reached(self) -> N {
         self.reached
     }
 
@@ -58,10 +71,10 @@ impl Watched {
     }
 }
 
-impl Device for Watched {
-    #[inline]
+impl<N: Notes> Device for Watched<N> {
+    #[inline(always)]
     fn receive(&mut self, now: Instant, received: Received) -> Step {
-        self.reached.add(self.transition(received));
+        self.reached.note(self.transition(received));
         self.drive.receive(now, received)
     }
 
@@ -71,7 +84,7 @@ impl Device for Watched {
     }
 
     fn handle_deadline(&mut self, now: Instant) -> Step {
-        self.reached.add(Transition {
+        self.reached.note(Transition {
             state: state(self.drive.bus_end(), self.drive.memory()),
             event: Event::Silence,
         });

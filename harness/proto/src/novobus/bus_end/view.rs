@@ -1,7 +1,7 @@
 //! A bus end as those see it who look on from outside and change nothing (ND21 9.1-9.9).
 
 use super::{BusEnd, Net, Silence, State};
-use crate::novobus::error_mode::Stage;
+use crate::novobus::error_mode::ErrorMode;
 
 /// How long the line has been silent for a drive in the error mode (ND21 9.9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,10 +54,10 @@ impl BusEnd {
         })
     }
 
-    /// How far the error mode is, and how long the line has been silent; `None` in normal mode (ND21 9.7, 9.9).
+    /// The error mode, and how long the line has been silent; `None` in normal mode (ND21 9.7, 9.9).
     #[must_use]
     #[inline]
-    pub const fn error_stage(&self) -> Option<(Stage, Silent)> {
+    pub const fn error_mode(&self) -> Option<(&ErrorMode, Silent)> {
         let State::Error(mode, silence) = &self.state else {
             return None;
         };
@@ -66,6 +66,6 @@ impl BusEnd {
             Silence::Waiting { .. } => Silent::Waiting,
             Silence::Sending { .. } => Silent::Sending,
         };
-        Some((mode.stage(), silent))
+        Some((mode, silent))
     }
 }
