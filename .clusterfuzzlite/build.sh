@@ -23,4 +23,7 @@ for target in $(scripts/fuzz-targets); do
     (cd "$seeds" && zip -q -r "$OUT/${target}_seed_corpus.zip" .)
     rm -rf "$seeds"
     if [[ " ${with_dictionary[*]} " == *" $target "* ]]; then cp fuzz/novobus.dict "$OUT/$target.dict"; fi
+    # The other options, one a line, as a file of the fuzzing service's.
+    scripts/fuzz-options "$target" | sed -n '/^-dict=/!s/^-\(.*\)=/\1 = /p' | sed '1i [libfuzzer]' >"$OUT/$target.options"
+    [[ -s $OUT/$target.options ]] || rm "$OUT/$target.options"
 done

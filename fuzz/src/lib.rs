@@ -51,7 +51,7 @@ pub fn not_counted(cell: Transition) {
 /// The longest command (ND21 10).
 const LONGEST_COMMAND: usize = 6;
 
-/// libFuzzer's mutation, and behind it, for every second seed, repaired commands; `head` bytes in front are no wire bytes. For all but a
+/// libFuzzer's mutation, and behind it, for every fourth seed, repaired commands; `head` bytes in front are no wire bytes. For all but a
 /// few seeds an input grows by a command at most: of a long input nearly every byte comes to a drive that is in the error mode already.
 pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32, head: usize) -> usize {
     let most = if seed % 32 == 1 {
@@ -60,7 +60,7 @@ pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32, head: us
         max_size.min(size + LONGEST_COMMAND)
     };
     let size = libfuzzer_sys::fuzzer_mutate(data, size, most);
-    if seed.is_multiple_of(2)
+    if seed.is_multiple_of(4)
         && let Some(wire) = data[..size].get_mut(head..)
     {
         repair(wire);

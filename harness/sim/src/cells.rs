@@ -33,8 +33,8 @@ impl Cells {
     /// Starts with nothing in the registers; ROM and EEPROM stay, which nothing on the bus can change. All where it stands: a memory that is
     /// made anew and moved is copied.
     pub(crate) fn restart(&mut self) {
-        self.ram[RAM.len()..].fill(0);
-        self.start();
+        self.ram = [0; RAM_AND_REGISTERS];
+        self.load();
     }
 
     fn cell(&mut self, address: u16) -> Option<&mut u8> {
@@ -147,6 +147,11 @@ impl Cells {
     pub(crate) fn start(&mut self) {
         let ram = RAM.len();
         self.ram[..ram].fill(0);
+        self.load();
+    }
+
+    /// Loads the parameters, and switches the monitoring on where the EEPROM says so.
+    fn load(&mut self) {
         let count = usize::from(nd21::PARAMETER_COUNT);
         let kept = &self.eeprom[usize::from(nd21::EE_PARAMETERS)..][..count];
         self.ram[usize::from(nd21::PARAMETERS - RAM_START)..][..count].copy_from_slice(kept);

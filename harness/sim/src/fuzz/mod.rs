@@ -93,7 +93,10 @@ pub fn codec(data: &[u8]) {
 fn same_memory(ours: &PlainDrive, theirs: &reference::Drive) {
     let ours = ours.memory().ram_and_registers();
     let theirs = theirs.ram_and_registers();
-    if ours[..2] == theirs[..2] && ours[4..] == theirs[4..] {
+    // Not by a comparison of slices: libFuzzer listens in on those, and what two equal memories hold is no hint to it.
+    let differing =
+        |from: &[u8], to: &[u8]| from.iter().zip(to).fold(0, |all, (a, b)| all | (a ^ b));
+    if differing(&ours[..2], &theirs[..2]) | differing(&ours[4..], &theirs[4..]) == 0 {
         return;
     }
     for (address, (ours, theirs)) in (0xFD80_u16..).zip(ours.iter().zip(theirs)) {

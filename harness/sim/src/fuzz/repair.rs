@@ -25,6 +25,9 @@ pub fn repair(wire: &mut [u8]) {
     }
 }
 
+/// Drives whose commands are repaired at the same time; behind a further one everything stays as behind a byte that is no command.
+const MOST_BEGUN: usize = 4;
+
 #[derive(Default)]
 struct Reader {
     /// Net bytes still to come, and how many of them are process data.
@@ -33,8 +36,8 @@ struct Reader {
     address_next: bool,
     /// The last address byte, counted on by "next drive".
     address: u8,
-    /// Commands half received: there are few, so they are looked for one after another.
-    begun: Vec<Begun>,
+    /// Commands half received: there are few, so they are looked for one after another, in a place that costs no memory.
+    begun: [Option<Begun>; MOST_BEGUN],
     lost: bool,
 }
 
@@ -92,19 +95,26 @@ impl Reader {
 
     fn parameter(&mut self, byte: &mut u8) {
         let address = self.address;
-        let Some(place) = self.begun.iter().position(|one| one.address == address) else {
-            match layout(*byte, ReadLongAnswer::default()) {
-                None => self.lost = true,
-                Some(layout) => self.begun.push(Begun {
-                    address,
-                    layout,
-                    received: 1,
-                    sum: Checksum::EMPTY.with(*byte),
-                }),
+        let own =
+            |place: &&mut Option<Begun>| place.as_ref().is_some_and(|one| one.address == address);
+        let Some(place) = self.begun.iter_mut().find(own) else {
+            let free = self.begun.iter_mut().find(|place| place.is_none());
+            match (layout(*byte, ReadLongAnswer::default()), free) {
+                (Some(layout), Some(free)) => {
+                    *free = Some(Begun {
+                        address,
+                        layout,
+                        received: 1,
+                        sum: Checksum::EMPTY.with(*byte),
+                    });
+                }
+                _ => self.lost = true,
             }
             return;
         };
-        let begun = &mut self.begun[place];
+        let Some(begun) = place else {
+            return;
+        };
         match begun.layout.command[begun.received - 1] {
             Field::Fixed(fixed) => *byte = fixed,
             Field::Check => *byte = begun.sum.plus(),
@@ -113,7 +123,7 @@ impl Reader {
         begun.received += 1;
         begun.sum = begun.sum.with(*byte);
         if begun.received == begun.layout.length() {
-            self.begun.swap_remove(place);
+            *place = None;
         }
     }
 }

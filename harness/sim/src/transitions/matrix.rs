@@ -122,26 +122,26 @@ const IN_SEQUENCE: &[State] = SEQUENCES.as_flattened();
 pub(super) const UNREACHABLE: u16 = u16::MAX;
 
 /// By [`Transition::index`]: the number that a cell has among those that can be reached. Those [without time-outs](without_time_out) come
-/// first, and of these the error mode, through which most cases of a fuzzer go: it reads eight counters at a time. A table, since it is
-/// asked for with every byte.
+/// first, and of these the error mode, through which most cases of a fuzzer go, event by event: the same event takes a case through one
+/// state after another, and a fuzzer reads eight counters at a time. A table, since it is asked for with every byte.
 pub(super) static NUMBERS: [u16; CELLS] = {
     let mut numbers = [UNREACHABLE; CELLS];
     let (mut group, mut number) = (0, 0);
     while group < 3 {
-        let mut index = 0;
-        while index < CELLS {
-            let state = State::ALL[index / Event::ALL.len()];
-            let event = Event::ALL[index % Event::ALL.len()];
+        let mut turn = 0;
+        while turn < CELLS {
+            let state = State::ALL[turn % State::ALL.len()];
+            let event = Event::ALL[turn / State::ALL.len()];
             let own = match without_time_out(state, event) {
                 true if state.index() >= State::ErrorZeros.index() => 0,
                 true => 1,
                 false => 2,
             };
             if own == group && rule_against(state, event).is_none() {
-                numbers[index] = number;
+                numbers[state.index() * Event::ALL.len() + event.index()] = number;
                 number += 1;
             }
-            index += 1;
+            turn += 1;
         }
         group += 1;
     }
