@@ -72,6 +72,8 @@ pub struct Run<'s> {
     byte_time: Span,
     /// The sign of life of whoever only computes; see the session's watchdog.
     beats: Option<Arc<AtomicU64>>,
+    /// Drives that cannot be made ready are made ready once more: until that, too, has not helped.
+    once_more: bool,
     /// Drives are not reset before a scenario, whatever is allowed.
     as_they_are: bool,
     /// What the rig's limits do not let be played to its end is not begun.
@@ -105,6 +107,7 @@ impl<'s> Run<'s> {
             session,
             twin,
             byte_time,
+            once_more: true,
             as_they_are: false,
             rehearses: false,
         })
@@ -185,11 +188,13 @@ impl<'s> Run<'s> {
             let again = match verdict {
                 Verdict::Passed | Verdict::RigError => false,
                 // Drives that could not be made ready: what disturbed them may have been the computer.
-                Verdict::Skipped => attempts.len() < MOST_UNREADY,
+                Verdict::Skipped => self.once_more && attempts.len() < MOST_UNREADY,
                 // A busy computer is late now and then, a drive at the same byte each time.
                 Verdict::Marginal => attempts.len() < MOST_UNTIMELY,
                 _ => attempts.len() < most,
             };
+            // It is the drives, then, and not the computer.
+            self.once_more &= verdict != Verdict::Skipped || again;
             if !again || self.session.link().trouble().is_some() {
                 return Ok(Played::of(attempts));
             }
