@@ -1,9 +1,10 @@
 //! What a browser makes of pages: pictures, hover, keys, times, colours, print, and no page needs a script.
 
 use super::devtools::Browser;
-use super::program::{drivebench, path};
+use super::program::{drivebench, finding, path};
 use super::{FAILS, folder, page, text};
 use serde_json::json;
+use std::path::Path;
 
 /// Where the middle of a byte of the first picture stands in the window: `link` and `row` counted from 0.
 fn middle(browser: &mut Browser, link: usize, row: usize) -> (f64, f64) {
@@ -30,10 +31,15 @@ fn opened(name: &str) -> Option<Browser> {
         page(&[("9.7-parity-error", text("9.7-parity-error"))]),
     )
     .expect("a file");
-    browser.open(&file);
-    browser.value("document.querySelector('.ring').scrollIntoView()");
-    browser.until("!!document.querySelector('.tools button')");
+    ready(&mut browser, &file);
     Some(browser)
+}
+
+/// Opens a page and waits until its first diagram is ready.
+fn ready(browser: &mut Browser, file: &Path) {
+    browser.open(file);
+    browser.value("document.querySelector('.ring').scrollIntoView()");
+    browser.until("!!document.querySelector('.ring .tools button')");
 }
 
 #[test]
@@ -223,30 +229,8 @@ fn the_page_of_a_finding() {
     let Some(mut browser) = Browser::start(&own.join("profile")) else {
         return;
     };
-    let (out, file) = (own.join("run"), own.join("page.html"));
-    let run = [
-        "fuzz",
-        "run",
-        "--seed",
-        "7",
-        "--cases",
-        "2000",
-        "--findings",
-        "1",
-    ];
-    let ways = [
-        "--deviates",
-        "1=writes-ignored",
-        "--out",
-        path(&out),
-        "--html",
-        path(&file),
-    ];
-    let output = drivebench(&[&run[..], &ways[..]].concat());
-    assert_eq!(output.status.code(), Some(1), "{output:?}");
-    browser.open(&file);
-    browser.value("document.querySelector('.ring').scrollIntoView()");
-    browser.until("!!document.querySelector('.ring .tools button')");
+    let (_run, file) = finding(&own);
+    ready(&mut browser, &file);
     browser.value("document.querySelector('.ring .scroll').focus()");
     browser.press("ArrowRight");
     let said = browser.text(SAID);

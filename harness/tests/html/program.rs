@@ -2,7 +2,7 @@
 
 use super::folder;
 use super::parser::{parse, sound};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 pub(super) fn drivebench(arguments: &[&str]) -> Output {
@@ -183,32 +183,23 @@ fn a_folder_that_is_cut_off_gives_what_there_is() {
     }
 }
 
+/// Fuzzes a ring with a drive that ignores writes until that is found; the folder of the run, and its page.
+pub(super) fn finding(folder: &Path) -> (PathBuf, PathBuf) {
+    let (out, html) = (folder.join("run"), folder.join("page.html"));
+    let run = "fuzz run --seed 7 --cases 2000 --deviates 1=writes-ignored --findings 1";
+    let files = ["--out", path(&out), "--html", path(&html)];
+    let arguments: Vec<_> = run.split(' ').chain(files).collect();
+    let output = drivebench(&arguments);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    (out, html)
+}
+
 /// The page of a run of fuzzing: what was found with its picture, made again from the folder.
 #[test]
 fn fuzzing_writes_a_page() {
     let own = folder("fuzz");
-    let (out, html, again) = (
-        own.join("run"),
-        own.join("page.html"),
-        own.join("again.html"),
-    );
-    let output = drivebench(&[
-        "fuzz",
-        "run",
-        "--seed",
-        "7",
-        "--cases",
-        "2000",
-        "--deviates",
-        "1=writes-ignored",
-        "--findings",
-        "1",
-        "--out",
-        path(&out),
-        "--html",
-        path(&html),
-    ]);
-    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let again = own.join("again.html");
+    let (out, html) = finding(&own);
     let text = read(&html);
     let parsed = parse(&text);
     sound(&parsed);

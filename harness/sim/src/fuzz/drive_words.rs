@@ -83,8 +83,8 @@ impl Watch {
         outside(notes, &before, &now);
         for (place, (cell, name, section)) in BITS.into_iter().enumerate() {
             let (was, is) = (before.bits[place], now.bits[place]);
-            bits(notes, (cell, name, section), was, is);
-            bits_gone(notes, (cell, name, section), was, is);
+            bits(notes, (cell, name, section), (was, is), "set");
+            bits(notes, (cell, name, section), (is, was), "cleared");
         }
         steps(notes, &before, &now);
     }
@@ -130,27 +130,16 @@ fn outside(notes: &mut Notebook<'_>, before: &Seen, now: &Seen) {
     output("5.3.5", "GPO2", before.gpo2, now.gpo2, ["falls", "rises"]);
 }
 
+/// The bits of a cell that are in `to` and were not in `from`, with what that means.
 fn bits(
     notes: &mut Notebook<'_>,
     (cell, name, section): (u16, &'static str, &'static str),
-    was: u8,
-    is: u8,
+    (from, to): (u8, u8),
+    means: &'static str,
 ) {
-    let new = set_in(cell, is).filter(|bit| set_in(cell, was).all(|old| old != *bit));
+    let new = set_in(cell, to).filter(|bit| set_in(cell, from).all(|other| other != *bit));
     for bit in new {
-        notes.note(|| Feature::new(section, name, format!("{bit} set")));
-    }
-}
-
-fn bits_gone(
-    notes: &mut Notebook<'_>,
-    (cell, name, section): (u16, &'static str, &'static str),
-    was: u8,
-    is: u8,
-) {
-    let gone = set_in(cell, was).filter(|bit| set_in(cell, is).all(|new| new != *bit));
-    for bit in gone {
-        notes.note(|| Feature::new(section, name, format!("{bit} cleared")));
+        notes.note(|| Feature::new(section, name, format!("{bit} {means}")));
     }
 }
 
