@@ -49,7 +49,7 @@ impl Sound {
         }
     }
 
-    /// Notebook what drives hold now.
+    /// Notes what drives hold now.
     pub fn note(&mut self, now: &SimulatedLink) {
         for drive in drives(now) {
             let (Some(before), Some(cells)) = (cells(&self.end, drive), cells(now, drive)) else {

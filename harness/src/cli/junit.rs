@@ -26,7 +26,7 @@ impl Cases {
         }
     }
 
-    /// Notebook what came of a scenario.
+    /// Notes what came of a scenario.
     pub(super) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
         let found = outcome.finding.iter().map(|found| found.message.clone());
         let message: Vec<_> = found.chain(outcome.remarks.clone()).collect();

@@ -54,7 +54,7 @@ impl Findings {
         }
     }
 
-    /// Notebook what came of a scenario.
+    /// Notes what came of a scenario.
     pub(super) fn note(&mut self, played: &Played) {
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());

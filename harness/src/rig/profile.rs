@@ -68,7 +68,7 @@ impl Profile {
         }
     }
 
-    /// Notebook what was found of a property, of one drive after another.
+    /// Notes what was found of a property, of one drive after another.
     pub fn settle(&mut self, property: &str, section: &str, value: &str, lines: Vec<String>) {
         let settled = self.property.entry(property.to_owned());
         let settled = settled.or_insert_with(|| Settled {
@@ -80,7 +80,7 @@ impl Profile {
         settled.setup.extend(lines);
     }
 
-    /// Notebook why a property is not known, of one drive after another.
+    /// Notes why a property is not known, of one drive after another.
     pub fn leave_open(&mut self, property: &str, why: &str) {
         add(self.open.entry(property.to_owned()).or_default(), why);
     }

@@ -101,7 +101,7 @@ impl RingReading {
 }
 
 impl Reading {
-    /// Notebook a disturbance.
+    /// Notes a disturbance.
     pub fn disturbed(&mut self, ring: usize, what: String) {
         let last = self.at;
         let known = self.disturbances.iter_mut();

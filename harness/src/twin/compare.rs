@@ -361,7 +361,7 @@ impl Comparer<'_> {
         }
     }
 
-    /// Notebook how far two times are apart; never ends the comparison.
+    /// Notes how far two times are apart; never ends the comparison.
     fn time(
         &mut self,
         (ring, index): (usize, usize),

@@ -216,7 +216,7 @@ impl ErrorMode {
         self.watch.matched()
     }
 
-    /// Notebook that a 00 goes out, asked for or not.
+    /// Notes that a 00 goes out, asked for or not.
     #[inline]
     pub fn send_zero(&mut self) -> Marks {
         self.zeros_sent = self.zeros_sent.saturating_add(1);

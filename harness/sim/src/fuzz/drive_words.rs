@@ -73,7 +73,7 @@ impl Watch {
         self.last = Seen::of(drive);
     }
 
-    /// Notebook what the drive has done since it was looked at last.
+    /// Notes what the drive has done since it was looked at last.
     pub(super) fn look(&mut self, notes: &mut Notebook<'_>, drive: &Nd21Drive) {
         let now = Seen::of(drive);
         if now == self.last {

@@ -102,7 +102,7 @@ impl<'n> Notebook<'n> {
         self.0.is_some()
     }
 
-    /// Notebook a feature, which is made for whoever notes only.
+    /// Notes a feature, which is made for whoever notes only.
     #[inline]
     pub fn note(&mut self, feature: impl FnOnce() -> Feature) {
         if let Some(there) = &mut self.0 {
@@ -110,7 +110,7 @@ impl<'n> Notebook<'n> {
         }
     }
 
-    /// Notebook the cells of the matrix.
+    /// Notes the cells of the matrix.
     pub(super) fn reached(&mut self, reached: &Reached) {
         if self.wanted() {
             for cell in Transition::reachable().filter(|cell| reached.contains(*cell)) {

@@ -138,7 +138,7 @@ impl Runner<'_> {
         }
     }
 
-    /// Notebook what the driver is asked for; calls of several steps ask for more than is known here.
+    /// Notes what the driver is asked for; calls of several steps ask for more than is known here.
     fn ask(&mut self, ring: usize, calls: &[(u8, PlannedCall)]) {
         let Some(own) = self.asked.get_mut(ring) else {
             return;

@@ -155,7 +155,7 @@ impl Runner<'_> {
         self.note();
     }
 
-    /// Notebook what the cells hold whose time has come.
+    /// Notes what the cells hold whose time has come.
     pub(super) fn note(&mut self) {
         let now = self.link.now();
         if self.recorder.next() > now {

@@ -1,6 +1,6 @@
 //! A master that deviates.
 
-use super::how::{Heard, How, MasterDeviation, Notebook, Sending};
+use super::how::{Heard, How, MasterDeviation, Notes, Sending};
 use super::speech::{Speech, Spoken, What};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
@@ -33,7 +33,7 @@ pub struct DeviantMaster {
     flown: VecDeque<(Spoken, bool)>,
     /// The sums of the answers begun.
     answers: BTreeMap<u8, Checksum>,
-    notes: Notebook,
+    notes: Notes,
 }
 
 impl DeviantMaster {
@@ -57,7 +57,7 @@ impl DeviantMaster {
             speech: Speech::new(ring.drives(), options.read_long),
             flown: VecDeque::new(),
             answers: BTreeMap::new(),
-            notes: Notebook {
+            notes: Notes {
                 ring,
                 open: Vec::new(),
                 told: Vec::new(),

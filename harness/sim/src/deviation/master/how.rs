@@ -79,7 +79,7 @@ impl Heard {
 
 /// What a wrong master keeps in mind.
 #[derive(Clone, Debug)]
-pub(super) struct Notebook {
+pub(super) struct Notes {
     /// Its ring.
     pub(super) ring: RingSize,
     /// Jobs that have not ended.
@@ -112,9 +112,9 @@ pub(super) enum How {
     /// It does what it is given twice, where this says so.
     Doubles(fn(&Job) -> bool),
     /// It tells something as soon as it has taken a job.
-    Takes(fn(&mut Notebook, JobId, &Job)),
+    Takes(fn(&mut Notes, JobId, &Job)),
     /// It tells something else.
-    Tells(fn(&mut Notebook, Event) -> Option<Event>),
+    Tells(fn(&mut Notes, Event) -> Option<Event>),
     /// It gives the drives other nominal values.
     Nominal(fn(u16) -> u16),
     /// It gives the actual value of another drive.

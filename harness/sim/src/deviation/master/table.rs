@@ -1,6 +1,6 @@
 //! The table of wrong masters (ND21 8, 9, 10, 11).
 
-use super::how::{Due, How, MasterDeviation, Notebook, Sending};
+use super::how::{Due, How, MasterDeviation, Notes, Sending};
 use super::speech::{Spoken, What};
 use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
@@ -443,7 +443,7 @@ fn renamed(event: Event, link: impl Fn(u8) -> RingLink) -> Event {
     Event::Disturbed { fault, attempt }
 }
 
-fn failed_as_read(_: &mut Notebook, event: Event) -> Option<Event> {
+fn failed_as_read(_: &mut Notes, event: Event) -> Option<Event> {
     // A write that failed is told as if it had read nothing: an order of either kind has a result then.
     let Event::Ended {
         id,
@@ -456,7 +456,7 @@ fn failed_as_read(_: &mut Notebook, event: Event) -> Option<Event> {
     Some(Event::Ended { id, outcome })
 }
 
-fn exchange_results(notes: &mut Notebook, event: Event) -> Option<Event> {
+fn exchange_results(notes: &mut Notes, event: Event) -> Option<Event> {
     let Event::Ended {
         id,
         outcome: Outcome::Read(data),
