@@ -3,11 +3,17 @@
 
 use harness_sim::fuzz::repair;
 use harness_sim::transitions::Transition;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU8, AtomicU16};
 
 /// How many counters stand for so many cells: libFuzzer takes them in steps of eight bytes.
 pub const fn counters(cells: usize) -> usize {
     cells.next_multiple_of(8)
 }
+
+/// In how many cases libFuzzer is told of a transition. It keeps an input for what is new; what nearly every case goes through it would read
+/// and compare behind each of them for nothing.
+pub const NEWS: u16 = 4_096;
 
 /// Makes `Counters`, which tells libFuzzer of each transition when it happens: one counter for each of the first so many cells of the
 /// matrix of protocol transitions. No more than the target can reach: libFuzzer finds the counters by the name of the section, sets all of
@@ -22,16 +28,17 @@ macro_rules! counters {
         static TRANSITIONS: [std::sync::atomic::AtomicU8; $crate::counters($cells)] =
             [const { std::sync::atomic::AtomicU8::new(0) }; $crate::counters($cells)];
 
+        // In how many more cases each of them is told.
+        static LEFT: [std::sync::atomic::AtomicU16; $crate::counters($cells)] =
+            [const { std::sync::atomic::AtomicU16::new($crate::NEWS) }; $crate::counters($cells)];
+
         #[derive(Debug, Default)]
         struct Counters;
 
         impl harness_sim::transitions::Notes for Counters {
             #[inline]
             fn note(&mut self, cell: harness_sim::transitions::Transition) {
-                match cell.number().and_then(|number| TRANSITIONS.get(number)) {
-                    Some(counter) => counter.store(1, std::sync::atomic::Ordering::Relaxed),
-                    None => $crate::not_counted(cell),
-                }
+                $crate::tell(&TRANSITIONS, &LEFT, cell);
             }
 
             fn join(&mut self, _other: &Self) {}
@@ -41,9 +48,26 @@ macro_rules! counters {
     };
 }
 
+/// Raises the counter of a transition, once a case and in so many more cases as are left.
+///
+/// # Panics
+/// There is no counter for it.
+#[inline]
+pub fn tell<const N: usize>(counters: &[AtomicU8; N], left: &[AtomicU16; N], cell: Transition) {
+    let of = |number| Some((counters.get(number)?, left.get(number)?));
+    let Some((counter, left)) = cell.number().and_then(of) else {
+        return not_counted(cell);
+    };
+    let cases = left.load(Relaxed);
+    if cases > 0 && counter.load(Relaxed) == 0 {
+        counter.store(1, Relaxed);
+        left.store(cases - 1, Relaxed);
+    }
+}
+
 /// Ends the case of a target that reaches a cell that it cannot reach.
 #[cold]
-pub fn not_counted(cell: Transition) {
+fn not_counted(cell: Transition) {
     cell.assert_possible();
     panic!("{cell}: this target has no counter for it");
 }

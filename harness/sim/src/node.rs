@@ -191,7 +191,7 @@ impl<D: Device> Node<D> {
         if let Some(byte) = step.byte {
             outbound.transmit(now - self.head_start, self.stuck.unwrap_or(byte), solicited);
         }
-        if !step.marks.is_empty() && self.recording {
+        if self.recording && !step.marks.is_empty() {
             self.marks.push(Mark {
                 drive: self.drive,
                 byte: received,

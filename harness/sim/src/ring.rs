@@ -303,8 +303,10 @@ impl<D: Device> Ring<D> {
             }
         }
         if let Some(last) = self.links.last_mut() {
-            while last.next_arrival() <= until {
-                self.inbox.extend(last.take());
+            while last.next_arrival() <= until
+                && let Some(byte) = last.take()
+            {
+                self.inbox.push_back(byte);
             }
         }
         self.now = self.now.max(until);

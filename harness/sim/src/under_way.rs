@@ -18,6 +18,17 @@ impl UnderWay {
     const RECEIVED: u32 = 1 << 17;
     const SOLICITED: u32 = 1 << 18;
     const ERROR_SHIFT: u32 = 24;
+    /// By the number that stands for each, so that a byte is read without a branch.
+    const ERRORS: [Option<LineError>; 8] = [
+        None,
+        Some(LineError::Parity),
+        Some(LineError::Framing),
+        Some(LineError::Break),
+        Some(LineError::Overrun),
+        None,
+        None,
+        None,
+    ];
 
     /// A byte that arrives as it was sent.
     #[inline]
@@ -56,13 +67,7 @@ impl UnderWay {
             at: self.at,
             sent: (self.word & Self::SENT != 0).then_some(sent),
             received: (self.word & Self::RECEIVED != 0).then_some(received),
-            error: match error {
-                0 => None,
-                1 => Some(LineError::Parity),
-                2 => Some(LineError::Framing),
-                3 => Some(LineError::Break),
-                _ => Some(LineError::Overrun),
-            },
+            error: Self::ERRORS[usize::from(error) % Self::ERRORS.len()],
             solicited: self.solicited(),
         }
     }

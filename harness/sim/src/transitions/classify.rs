@@ -33,15 +33,13 @@ pub fn classify(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transit
 
 #[inline(never)]
 fn in_normal_mode(bus_end: &BusEnd, memory: &Cells, received: Received) -> Transition {
-    let place = bus_end.place();
-    Transition {
-        state: state_at(place, bus_end, memory),
-        event: match received.error {
-            Some(error) => line_error(error),
-            None if received.byte == 0 => Event::Zero,
-            None => good(place, bus_end, memory, received.byte),
-        },
-    }
+    let (state, good) = state_and_good(bus_end, memory, received.byte);
+    let event = match received.error {
+        Some(error) => line_error(error),
+        None if received.byte == 0 => Event::Zero,
+        None => good,
+    };
+    Transition { state, event }
 }
 
 // Apart, so that a good byte costs one comparison.
@@ -58,34 +56,60 @@ fn line_error(error: LineError) -> Event {
 /// The state of a bus end on this memory.
 #[must_use]
 pub fn state(bus_end: &BusEnd, memory: &Cells) -> State {
-    state_at(bus_end.place(), bus_end, memory)
+    // It is the same whatever byte comes.
+    state_and_good(bus_end, memory, 0).0
 }
 
-#[inline]
-fn state_at(place: Place, bus_end: &BusEnd, memory: &Cells) -> State {
-    let remaining = bus_end.remaining();
-    match place {
-        Place::Sync => between_telegrams(bus_end, memory),
-        Place::Address if remaining.is_some_and(|left| left.process_data) => State::AddressProcess,
-        Place::Address => State::Address,
-        Place::Passing if remaining.is_some_and(|left| left.net_bytes == 1) => State::PassingLast,
-        Place::Passing => State::Passing,
-        Place::ProcessHigh => State::ProcessHigh,
-        Place::ProcessLow => State::ProcessLow,
-        Place::Command => State::Command,
-        Place::Parameter(parameter) => match parameter.field {
-            Field::AddrL => State::AddrL,
-            Field::AddrH => State::AddrH,
-            Field::AddrInPage => State::AddrInPage,
-            Field::Data(_) => State::Data,
-            Field::Code => State::Code,
-            Field::Fixed(_) => State::Fixed,
-            Field::Check if parameter.kind == Kind::ResetH8 => State::CheckReset,
-            Field::Check => State::Check,
-        },
+/// The state of a bus end on this memory, and what this byte is there if it is good and no 00. Both at once: the processor cannot foretell
+/// where the bytes of a fuzzer lead, and so each question after the place costs much.
+#[inline(always)]
+fn state_and_good(bus_end: &BusEnd, memory: &Cells, byte: u8) -> (State, Event) {
+    match bus_end.place() {
+        Place::Sync => (between_telegrams(bus_end, memory), sync_byte(byte)),
+        Place::Address => {
+            let process_data = bus_end.remaining().is_some_and(|left| left.process_data);
+            let state = if process_data {
+                State::AddressProcess
+            } else {
+                State::Address
+            };
+            let own = passed_on(byte) == ADDRESSED;
+            let event = if own {
+                Event::OwnAddress
+            } else {
+                Event::OtherAddress
+            };
+            (state, event)
+        }
+        Place::Passing if bus_end.remaining().is_some_and(|left| left.net_bytes == 1) => {
+            (State::PassingLast, Event::NetByte)
+        }
+        Place::Passing => (State::Passing, Event::NetByte),
+        Place::ProcessHigh => (State::ProcessHigh, Event::ProcessData),
+        Place::ProcessLow => (State::ProcessLow, Event::ProcessData),
+        Place::Command => (State::Command, command(byte)),
+        Place::Parameter(parameter) => (
+            parameter_state(&parameter),
+            parameter_byte(&parameter, memory, byte),
+        ),
         Place::ErrorMode => bus_end
             .error_mode()
-            .map_or(State::ErrorZeros, |(mode, silent)| error_mode(mode, silent)),
+            .map_or((State::ErrorZeros, Event::OtherByte), |(mode, silent)| {
+                (error_mode(mode, silent), good_in_error_mode(mode, byte))
+            }),
+    }
+}
+
+fn parameter_state(parameter: &Parameter) -> State {
+    match parameter.field {
+        Field::AddrL => State::AddrL,
+        Field::AddrH => State::AddrH,
+        Field::AddrInPage => State::AddrInPage,
+        Field::Data(_) => State::Data,
+        Field::Code => State::Code,
+        Field::Fixed(_) => State::Fixed,
+        Field::Check if parameter.kind == Kind::ResetH8 => State::CheckReset,
+        Field::Check => State::Check,
     }
 }
 
@@ -189,30 +213,18 @@ fn good_in_error_mode(mode: &ErrorMode, byte: u8) -> Event {
     ALONE[usize::from(byte)]
 }
 
-/// What a good byte is that is no 00.
-#[inline]
-fn good(place: Place, bus_end: &BusEnd, memory: &Cells, byte: u8) -> Event {
-    match place {
-        Place::Sync => match SyncByte::decode(byte) {
-            Err(_) => Event::NoSyncByte,
-            Ok(SyncByte::Synco) => Event::Synco,
-            Ok(SyncByte::Pause) => Event::Pause,
-            Ok(SyncByte::Telegram(header)) => match header.addressing() {
-                Addressing::AddressFollows => Event::AddressFollows,
-                _ if header.net_length() == 0 => Event::EmptyShort,
-                Addressing::SameDrive => Event::SameDrive,
-                Addressing::NextDrive => Event::NextDrive,
-            },
+/// What a byte is between two telegrams (ND21 9.2).
+fn sync_byte(byte: u8) -> Event {
+    match SyncByte::decode(byte) {
+        Err(_) => Event::NoSyncByte,
+        Ok(SyncByte::Synco) => Event::Synco,
+        Ok(SyncByte::Pause) => Event::Pause,
+        Ok(SyncByte::Telegram(header)) => match header.addressing() {
+            Addressing::AddressFollows => Event::AddressFollows,
+            _ if header.net_length() == 0 => Event::EmptyShort,
+            Addressing::SameDrive => Event::SameDrive,
+            Addressing::NextDrive => Event::NextDrive,
         },
-        Place::Address if passed_on(byte) == ADDRESSED => Event::OwnAddress,
-        Place::Address => Event::OtherAddress,
-        Place::Passing => Event::NetByte,
-        Place::ProcessHigh | Place::ProcessLow => Event::ProcessData,
-        Place::Command => command(byte),
-        Place::Parameter(parameter) => parameter_byte(&parameter, memory, byte),
-        Place::ErrorMode => bus_end
-            .error_mode()
-            .map_or(Event::OtherByte, |(mode, _)| good_in_error_mode(mode, byte)),
     }
 }
 
