@@ -6,6 +6,7 @@
 mod inner;
 mod record;
 mod replay;
+mod ring;
 mod sim;
 mod stamp;
 mod stream;

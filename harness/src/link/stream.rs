@@ -5,14 +5,13 @@
 //! a little ahead of the line, so that a busy computer leaves no gaps in a telegram.
 
 use super::inner::InnerLink;
-use super::stamp::stamped;
+use super::ring::{MOST_RECORDED, Ring};
 use super::tamper::Tamper;
 use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name};
-use crate::port::{LastWords, Outgoing, Wire, wake_on_time};
+use crate::port::{LastWords, Wire, wake_on_time};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
-use harness_sim::link::LineByte;
 use harness_sim::trace::{LinkTrace, Trace};
 use rustix::event::{Timespec, poll};
 use rustix::io::Errno;
@@ -22,10 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time;
 
-/// How far ahead of the line bytes are given to the operating system.
-const AHEAD: Span = Span::from_millis(100);
-
-/// How far ahead they are at least, while there are any.
+/// How far ahead of the line bytes are with the operating system at least, while there are any.
 const AT_LEAST_AHEAD: Span = Span::from_millis(50);
 
 /// How far ahead of the line a driver may hand over its bytes: more than a busy computer is late, less than a person
@@ -47,9 +43,6 @@ const CALM: Span = Span::from_millis(4);
 /// The sleep then: some bytes.
 const DOZE: Span = Span::from_millis(2);
 
-/// Bytes of a conversation that are recorded on each link; more are counted only.
-const MOST_RECORDED: usize = 4_000_000;
-
 /// One or two rings over streams.
 #[derive(Debug)]
 pub struct StreamLink {
@@ -69,28 +62,6 @@ pub struct StreamLink {
     trouble: Option<Trouble>,
     recording: bool,
     tolerance: Span,
-}
-
-/// One ring's two ends at the master.
-#[derive(Debug)]
-struct Ring {
-    wire: Wire,
-    drives: u8,
-    /// What has not been given to the operating system, with the time at which its start bit is due, and whether
-    /// it must not be sooner.
-    queue: VecDeque<(Instant, bool, Outgoing)>,
-    /// When the line is free for the next byte.
-    free: Instant,
-    received: VecDeque<(Instant, Received)>,
-    last_arrival: Instant,
-    /// Bytes sent and received since the ring was last at rest.
-    sent: u64,
-    came: u64,
-    outgoing: Tamper,
-    incoming: Tamper,
-    log: [Vec<LineByte>; 2],
-    carried: u64,
-    unplaced: u64,
 }
 
 impl StreamLink {
@@ -296,110 +267,6 @@ impl StreamLink {
                 self.trouble.get_or_insert(Trouble::Lost(text));
             }
         }
-    }
-}
-
-impl Ring {
-    fn new(wire: Wire, drives: u8) -> Self {
-        Self {
-            wire,
-            drives,
-            queue: VecDeque::new(),
-            free: Instant::START,
-            received: VecDeque::new(),
-            last_arrival: Instant::START,
-            sent: 0,
-            came: 0,
-            outgoing: Tamper::default(),
-            incoming: Tamper::default(),
-            log: [Vec::new(), Vec::new()],
-            carried: 0,
-            unplaced: 0,
-        }
-    }
-
-    fn begin(&mut self) {
-        self.queue.clear();
-        self.free = Instant::START;
-        self.received.clear();
-        self.last_arrival = Instant::START;
-        (self.sent, self.came, self.carried) = (0, 0, 0);
-        self.outgoing = Tamper::default();
-        self.incoming = Tamper::default();
-        self.log = [Vec::new(), Vec::new()];
-    }
-
-    /// Queues a byte of the master's.
-    fn send(&mut self, now: Instant, byte: u8, byte_time: Span, recording: bool) {
-        let start = self.free.max(now);
-        let passed = self.outgoing.pass(Received::good(byte), start);
-        let begun = start + passed.delay;
-        let mut exact = passed.delay > Span::ZERO;
-        let mut free = begun;
-        let mut queue = |outgoing, length: Span| {
-            self.queue
-                .push_back((free, std::mem::take(&mut exact), outgoing));
-            free += length;
-            self.sent += 1;
-        };
-        for received in &passed.bytes {
-            let outgoing = match received.error {
-                None => Outgoing::Byte(received.byte),
-                Some(_) => Outgoing::WrongParity(received.byte),
-            };
-            queue(outgoing, byte_time);
-        }
-        if let Some(span) = passed.hold {
-            queue(Outgoing::Break(span), span.max(byte_time));
-        }
-        // A byte that is lost takes its time all the same.
-        self.free = free.max(begun + byte_time);
-        self.carried += 1;
-        if recording && self.log[0].len() < MOST_RECORDED {
-            self.log[0].extend(passed.seen(byte, begun + byte_time, byte_time));
-        }
-    }
-
-    /// Gives the operating system what is due.
-    fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {
-        while let Some(&(start, exact, outgoing)) = self.queue.front() {
-            let lead = if exact { Span::ZERO } else { AHEAD };
-            if start > now + lead {
-                break;
-            }
-            self.queue.pop_front();
-            self.wire.send(outgoing)?;
-        }
-        self.wire.flush()
-    }
-
-    /// Takes what has come.
-    fn collect(
-        &mut self,
-        (told, now): (Instant, Instant),
-        byte_time: Span,
-        recording: bool,
-    ) -> Result<(), Trouble> {
-        let mut bytes = Vec::new();
-        let result = self.wire.receive(&mut bytes);
-        if !bytes.is_empty() {
-            self.last_arrival = self.last_arrival.max(told);
-        }
-        self.unplaced += self.wire.take_unplaced();
-        for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
-            self.came += 1;
-            self.carried += 1;
-            let passed = self.incoming.pass(byte, at);
-            let seen = passed.seen(byte.byte, at + passed.delay, byte_time);
-            for byte in &seen {
-                let arrival = byte.arrival().map(|received| (byte.at, received));
-                self.received.extend(arrival);
-            }
-            if recording && self.log[1].len() < MOST_RECORDED {
-                self.log[1].extend(seen);
-            }
-        }
-        result
     }
 }
 
