@@ -53,6 +53,8 @@ pub struct StreamLink {
     start: time::Instant,
     /// The last time that somebody was told: what had not come then has come later, whatever is computed of it.
     told: Cell<Instant>,
+    /// Somebody has been told of bytes that have come, and has fetched none since: only more of them are news.
+    lying: bool,
     capabilities: Vec<Capability>,
     /// Faults that wait for their time, in order of it.
     scheduled: VecDeque<(Instant, usize, usize, LinkFault)>,
@@ -100,6 +102,7 @@ impl StreamLink {
             rate,
             start: time::Instant::now(),
             told: Cell::new(Instant::START),
+            lying: false,
             capabilities,
             scheduled: VecDeque::new(),
             interrupt,
@@ -230,6 +233,13 @@ impl StreamLink {
         }
     }
 
+    /// Whether there is a byte to be fetched.
+    fn has_come(&self) -> bool {
+        let now = self.now();
+        let mut fronts = self.rings.iter().filter_map(|ring| ring.received.front());
+        fronts.any(|(at, _)| *at <= now)
+    }
+
     /// When something has to be done although nothing comes.
     fn due(&self) -> Option<Instant> {
         let queues = self.rings.iter().filter_map(|ring| {
@@ -240,10 +250,15 @@ impl StreamLink {
         });
         let faults = self.scheduled.front().map(|(at, ..)| *at);
         // What is delayed on the last link.
+        let now = self.now();
         let fronts = self.rings.iter().filter_map(|ring| ring.received.front());
-        let queues = queues.chain(fronts.map(|(at, _)| *at));
+        let queues = queues.chain(fronts.map(|(at, _)| *at).filter(|at| *at > now));
         let relays = self.inner.iter().filter_map(InnerLink::due);
-        queues.chain(faults).chain(relays).min()
+        // From when on a byte that has not come home counts as lost.
+        let expecting = self.rings.iter().filter(|ring| ring.sent > ring.came);
+        let lost = expecting.map(|ring| ring.free + self.round(ring));
+        let lost = lost.filter(|at| *at > now);
+        queues.chain(faults).chain(relays).chain(lost).min()
     }
 
     fn sleep(&mut self, span: Span) {
@@ -311,15 +326,13 @@ impl Line for StreamLink {
         if *at > now {
             return None;
         }
+        self.lying = false;
         ring.received.pop_front()
     }
 
     fn wait(&mut self, until: Instant) -> bool {
         self.pump();
-        let now = self.now();
-        let mut fronts = self.rings.iter().filter_map(|ring| ring.received.front());
-        let ready = fronts.any(|(at, _)| *at <= now);
-        if !ready && self.trouble.is_none() {
+        if (self.lying || !self.has_come()) && self.trouble.is_none() {
             let until = self.due().map_or(until, |due| due.min(until));
             let left = until.since(self.now());
             if left > Span::ZERO {
@@ -327,6 +340,7 @@ impl Line for StreamLink {
             }
             self.pump();
         }
+        self.lying = self.has_come();
         self.trouble.is_none()
     }
 
@@ -376,6 +390,7 @@ impl Link for StreamLink {
         self.pump();
         self.start = time::Instant::now();
         self.told.set(Instant::START);
+        self.lying = false;
         self.scheduled.clear();
         self.rings.iter_mut().for_each(Ring::begin);
         self.inner.iter_mut().for_each(InnerLink::begin);

@@ -4,32 +4,37 @@
 mod ring;
 
 use harness::library::{Entry, sources};
-use harness::link::StreamLink;
-use harness::port::{PortSettings, open};
+use harness::link::{Line, StreamLink};
+use harness::port::{Endpoint, PortSettings, Wire, open};
 use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_anew};
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
+use harness_proto::time::Span;
 use harness_sim::drive::Model;
 use ring::Served;
 use std::collections::BTreeMap;
+use std::io::Write;
+use std::net::TcpListener;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 fn link(served: &Served, marks: bool) -> StreamLink {
     let wires = served
         .endpoints
         .iter()
         .zip(&served.sizes)
-        .map(|(endpoint, size)| {
-            let settings = PortSettings {
-                endpoint: endpoint.clone(),
-                rate: Rate::default(),
-                marks,
-                low_latency: false,
-            };
-            let wire = open(&settings).unwrap_or_else(|error| panic!("{endpoint}: {error}"));
-            (wire, *size)
-        });
+        .map(|(endpoint, size)| (wire(endpoint, marks), *size));
     StreamLink::new(wires.collect(), Vec::new(), Rate::default(), Arc::default())
+}
+
+fn wire(endpoint: &Endpoint, marks: bool) -> Wire {
+    let settings = PortSettings {
+        endpoint: endpoint.clone(),
+        rate: Rate::default(),
+        marks,
+        low_latency: false,
+    };
+    open(&settings).unwrap_or_else(|error| panic!("{endpoint}: {error}"))
 }
 
 fn play_on(link: &mut StreamLink, entry: &Entry) -> Outcome {
@@ -116,4 +121,28 @@ fn over_a_pty_with_marks() {
 fn over_a_pty() {
     let passed = all_that_fit("pty", false, 6);
     assert!(passed >= 18, "{passed}");
+}
+
+/// Whoever waits for a time and fetches nothing sleeps meanwhile: bytes that lie there wake nobody twice, and are still told of at once
+/// to whoever has fetched the one before.
+#[test]
+fn bytes_that_lie_there_are_no_news() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let wires = vec![(wire(&Endpoint::Tcp(address), false), 1)];
+    let (mut far, _) = listener.accept().expect("a client");
+    let mut link = StreamLink::new(wires, Vec::new(), Rate::default(), Arc::default());
+    far.write_all(&[0x80; 8]).expect("room");
+    let until = link.now() + Span::from_millis(300);
+    while link.now() < until && link.wait(until) {}
+    let looks = link.beats().load(Ordering::Relaxed);
+    assert!(looks < 50, "{looks} looks at the port in 300 ms");
+    for left in (0..8).rev() {
+        assert!(link.receive(0).is_some(), "{left} bytes behind it");
+        if left > 0 {
+            let before = link.beats().load(Ordering::Relaxed);
+            link.wait(link.now() + Span::from_millis(10_000));
+            assert_eq!(link.beats().load(Ordering::Relaxed), before + 1);
+        }
+    }
 }
