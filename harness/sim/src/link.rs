@@ -74,6 +74,8 @@ pub struct Link {
     out_of_step: Option<Uart>,
     /// Until when the line is held at 0.
     held_until: Instant,
+    /// Nothing of all that stands between a byte and its receiver.
+    sound: bool,
     arrived: u64,
 }
 
@@ -90,6 +92,7 @@ impl Link {
             opening: None,
             out_of_step: None,
             held_until: Instant::START,
+            sound: true,
             arrived: 0,
         }
     }
@@ -138,6 +141,7 @@ impl Link {
     /// fetched.
     pub(crate) fn open(&mut self) {
         self.opening.get_or_insert_default();
+        self.sound = false;
     }
 
     /// Feeds the receiver of an open link a byte that starts at `now` at the earliest; says when it arrives.
@@ -204,11 +208,13 @@ impl Link {
     /// Arms a fault for the `byte`-th byte transmitted on this link, counted from 1.
     pub(crate) fn arm(&mut self, byte: u64, fault: LinkFault) {
         self.plan.add(byte, fault);
+        self.sound = false;
     }
 
     /// From now on nothing arrives; a byte on the wire is lost.
     pub(crate) fn cut(&mut self, now: Instant) {
         self.cut = true;
+        self.sound = false;
         self.lose_after(now);
     }
 
@@ -221,6 +227,7 @@ impl Link {
     pub(crate) fn hold(&mut self, now: Instant, span: Span) {
         self.lose_after(now);
         self.held_until = self.held_until.max(now + span);
+        self.sound = false;
         let (bytes, last_arrival) = match &mut self.opening {
             None => (&mut self.bytes, &mut self.last_arrival),
             Some(opening) => (&mut opening.sent, &mut opening.last_arrival),
@@ -264,19 +271,25 @@ impl Link {
         self.line_free = start + self.byte_time;
         self.transmitted += 1;
         let on_wire = UnderWay::whole(self.line_free, byte, solicited);
-        match self.plan.take(self.transmitted) {
-            None if !self.cut
-                && start >= self.held_until
-                && self.opening.is_none()
-                && self.out_of_step.is_none() =>
-            {
-                self.line_up(on_wire);
-            }
-            first => self.transmit_damaged(first, gap, on_wire.unpack()),
+        if self.sound {
+            self.line_up(on_wire);
+        } else {
+            self.transmit_with_care(gap, on_wire);
         }
     }
 
+    /// The same on a link on which something may happen to the byte.
     #[cold]
+    fn transmit_with_care(&mut self, gap: Span, on_wire: UnderWay) {
+        let fault = self.plan.take(self.transmitted);
+        self.transmit_damaged(fault, gap, on_wire.unpack());
+        self.sound = self.plan.waiting().next().is_none()
+            && !self.cut
+            && self.line_free >= self.held_until
+            && self.opening.is_none()
+            && self.out_of_step.is_none();
+    }
+
     fn transmit_damaged(&mut self, first: Option<LinkFault>, gap: Span, mut byte: LineByte) {
         let start = self.line_free - self.byte_time;
         // Several faults at one byte act one after the other, in the order of their lines.
