@@ -13,6 +13,7 @@ case "${FUZZ_PROFILE:-release}" in
     *) profile=--release folder=release ;;
 esac
 host=$(rustc -vV | sed -n 's/^host: //p')
+# All of them instrumented, unlike scripts/fuzz-build: a fuzzing service turns away what is not.
 cargo fuzz build --sanitizer "$sanitizer" "$profile" --debug-assertions
 mapfile -t with_dictionary < <(scripts/fuzz-targets --dictionary)
 for target in $(scripts/fuzz-targets); do
