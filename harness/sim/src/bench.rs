@@ -1,33 +1,27 @@
 //! One or two rings on one clock (ND21 8.2: drives can be distributed to several loops; 11.4: the
 //! driver works with one or two).
 
-use crate::device::Device;
+use crate::drive::Drive;
 use crate::ring::Ring;
 use harness_proto::time::Instant;
 
-/// One or two rings.
-#[derive(Clone, Debug)]
-pub struct Bench<D> {
-    rings: Vec<Ring<D>>,
+/// One or two rings. Of drives of any model, and not of any kind of device: so what lets time pass in them is compiled, and optimised, with
+/// this crate and not with whoever uses it.
+#[derive(Clone, Debug, Default)]
+pub struct Bench {
+    rings: Vec<Ring<Drive>>,
 }
 
-impl<D> Default for Bench<D> {
-    /// A bench without a ring.
-    fn default() -> Self {
-        Self { rings: Vec::new() }
-    }
-}
-
-impl<D: Device> Bench<D> {
+impl Bench {
     /// A bench with one ring.
     #[must_use]
-    pub fn one(ring: Ring<D>) -> Self {
+    pub fn one(ring: Ring<Drive>) -> Self {
         Self { rings: vec![ring] }
     }
 
     /// A bench with two rings.
     #[must_use]
-    pub fn two(first: Ring<D>, second: Ring<D>) -> Self {
+    pub fn two(first: Ring<Drive>, second: Ring<Drive>) -> Self {
         Self {
             rings: vec![first, second],
         }
@@ -35,12 +29,12 @@ impl<D: Device> Bench<D> {
 
     /// The rings, one or two.
     #[must_use]
-    pub fn rings(&self) -> &[Ring<D>] {
+    pub fn rings(&self) -> &[Ring<Drive>] {
         &self.rings
     }
 
     /// Ring `index`, counted from 0.
-    pub fn ring_mut(&mut self, index: usize) -> Option<&mut Ring<D>> {
+    pub fn ring_mut(&mut self, index: usize) -> Option<&mut Ring<Drive>> {
         self.rings.get_mut(index)
     }
 

@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 /// One or two simulated rings.
 #[derive(Clone, Debug)]
 pub struct SimulatedLink {
-    bench: Bench<Drive>,
+    bench: Bench,
     byte_time: Span,
     /// When the conversation began, on the bench's clock.
     origin: Instant,
@@ -52,7 +52,7 @@ const DARK: Shown = Shown {
 impl SimulatedLink {
     /// A link to the rings of a bench.
     #[must_use]
-    pub fn new(bench: Bench<Drive>) -> Self {
+    pub fn new(bench: Bench) -> Self {
         let byte_time = bench.rings().first().map_or(Span::ZERO, Ring::byte_time);
         Self {
             bench,
