@@ -47,13 +47,9 @@ impl UnderWay {
             .received
             .map_or(0, |b| Self::RECEIVED | u32::from(b) << 8);
         let solicited = if byte.solicited { Self::SOLICITED } else { 0 };
-        let error = match byte.error {
-            None => 0,
-            Some(LineError::Parity) => 1,
-            Some(LineError::Framing) => 2,
-            Some(LineError::Break) => 3,
-            Some(LineError::Overrun) => 4,
-        };
+        let known = (0..).zip(Self::ERRORS);
+        let mut same = known.filter(|(_, known)| *known == byte.error);
+        let error = same.next().map_or(0, |(number, _)| number);
         Self {
             at: byte.at,
             word: sent | received | solicited | error << Self::ERROR_SHIFT,
