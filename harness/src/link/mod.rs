@@ -158,7 +158,8 @@ pub trait Line: Send {
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)>;
 
     /// Lets time pass until something happens, at most until `until`. False where nothing ever will
-    /// unless the master sends. With [trouble](Self::trouble) time may stand still: who waits in a loop looks at it.
+    /// unless the master sends. What the last call has told of, and nobody has fetched a byte of since, need not be
+    /// told again. With [trouble](Self::trouble) time may stand still: who waits in a loop looks at it.
     fn wait(&mut self, until: Instant) -> bool;
 
     /// Why nothing more is carried; `None` while all is well. A simulated link has no trouble.
