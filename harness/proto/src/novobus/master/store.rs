@@ -157,7 +157,10 @@ struct List {
 /// The jobs.
 #[derive(Clone, Debug)]
 pub(super) struct Store {
+    /// As many as were ever held at once, of `capacity`: most masters hold few.
     entries: Vec<Option<Entry>>,
+    capacity: u16,
+    /// Which of them are empty.
     free: Vec<Slot>,
     next_id: u64,
     all: List,
@@ -167,8 +170,9 @@ pub(super) struct Store {
 impl Store {
     pub(super) fn new(ring: RingSize, capacity: u16) -> Self {
         Self {
-            entries: vec![None; usize::from(capacity)],
-            free: (0..capacity).rev().collect(),
+            entries: Vec::new(),
+            capacity,
+            free: Vec::new(),
             next_id: 0,
             all: List::default(),
             drives: vec![List::default(); usize::from(ring.drives())],
@@ -182,10 +186,21 @@ impl Store {
 
     /// Adds a job behind the others; `None` where there is no room.
     pub(super) fn add(&mut self, job: &Job, read_long: ReadLongAnswer) -> Option<JobId> {
-        let slot = self.free.pop()?;
         let id = JobId(self.next_id);
+        let entry = Some(Entry::new(id, job, read_long));
+        let slot = match self.free.pop() {
+            Some(slot) => {
+                self.entries[usize::from(slot)] = entry;
+                slot
+            }
+            None => {
+                let slot = Slot::try_from(self.entries.len()).ok();
+                let slot = slot.filter(|slot| *slot < self.capacity)?;
+                self.entries.push(entry);
+                slot
+            }
+        };
         self.next_id += 1;
-        self.entries[usize::from(slot)] = Some(Entry::new(id, job, read_long));
         self.link(slot);
         Some(id)
     }
