@@ -2,8 +2,9 @@
 //! the line, 38400 bit/s (ND21 8.1).
 //!
 //! Each conversation is played three times: in virtual time, which is the wire's own; by a program that only writes to the socket and
-//! reads from it, the baseline in the same run; and by the bench, with guard, record, and everything else that a rig has. What both add is
-//! the system's: two processes that are woken up, once for each question and each answer. What the bench adds to that is its own.
+//! reads from it, the baseline in the same run; and by the bench, with guard, record, and everything else that a rig has. The program
+//! writes what was sent in virtual time, and what was sent behind an answer when as much has come back. What both add is the system's:
+//! two processes that are woken up, once for each question and each answer. What the bench adds to that is its own.
 
 #![expect(clippy::print_stdout, reason = "figures are what it is for")]
 
@@ -11,13 +12,15 @@
 mod ring;
 
 use harness::library::Entry;
-use harness::link::Line;
+use harness::link::{Line, Link};
 use harness::port::Endpoint;
 use harness::rig::{Options, Run, Session, parse};
 use harness::scenario::run::{AtFinding, play};
 use harness::scenario::simulate;
 use harness::scenario::source::Source;
 use harness_proto::time::Span;
+use harness_sim::link::LineByte;
+use harness_sim::trace::Trace;
 use ring::Served;
 use rustix::time::{ClockId, clock_gettime};
 use std::io::{Read, Write};
@@ -33,32 +36,62 @@ const TURN: Duration = Duration::from_millis(500);
 /// Bytes of a conversation: a second on the wire.
 const BYTES: usize = 3_491;
 
-/// A conversation and the bytes that go out in it.
+/// A conversation.
 struct Case {
     name: &'static str,
     text: String,
-    sent: Vec<u8>,
+}
+
+/// Bytes that go out together, once so many have come back.
+struct Chunk {
+    back: usize,
+    bytes: Vec<u8>,
 }
 
 fn cases(drives: u8) -> Vec<Case> {
     let header = |name: &str| format!("title {name}\nsource nd21 8.1\nring {drives}\n");
     let idle = "SYNCO without a gap";
-    let mut cases = vec![Case {
-        name: idle,
-        text: format!("{}> 80*{BYTES}\n< 80*{BYTES}\n", header(idle)),
-        sent: vec![0x80; BYTES],
-    }];
-    // An answer takes a whole round: on a long ring there is time for few.
-    let questions = 2_000 / (usize::from(drives) + 8);
     let reads = "reads, each behind the answer to the one before";
-    // ReadByte FE13 of drive 0 (10.1): 88, its address byte, C0 13 FE, and the checking byte.
-    let telegram = [0x88, 0_u8.wrapping_sub(drives), 0xC0, 0x13, 0xFE, 0xD1];
-    cases.push(Case {
-        name: reads,
-        text: header(reads) + &"read-byte 0 FE13\n".repeat(questions),
-        sent: telegram.repeat(questions),
-    });
-    cases
+    let jobs = "jobs of the driver, each behind the end of the one before";
+    // An answer takes a whole round, and a job with the count of the drives in front of it some more: on a long ring there is time for few.
+    let questions = 2_000 / (usize::from(drives) + 8);
+    vec![
+        Case {
+            name: idle,
+            text: format!("{}> 80*{BYTES}\n< 80*{BYTES}\n", header(idle)),
+        },
+        Case {
+            name: reads,
+            text: header(reads) + &"read-byte 0 FE13\n".repeat(questions),
+        },
+        Case {
+            name: jobs,
+            text: header(jobs) + &"master read-byte 0 FE13 = xx\n".repeat(questions / 3 + 1),
+        },
+    ]
+}
+
+/// What the master sends in a conversation: behind a pause, or behind SYNCO with something to say, it has waited for what came until then.
+fn chunks(trace: &Trace, byte_time: Span) -> Vec<Chunk> {
+    let (Some(first), Some(last)) = (trace.links.first(), trace.links.last()) else {
+        return Vec::new();
+    };
+    let mut chunks: Vec<Chunk> = Vec::new();
+    let mut before = (harness_proto::time::Instant::START, 0x80);
+    for byte in &first.bytes {
+        let sent = byte.sent.expect("no fault");
+        let says = sent != 0x80 && before.1 == 0x80;
+        if chunks.is_empty() || says || before.0 + byte_time < byte.at {
+            let home = |other: &&LineByte| other.at + byte_time <= byte.at;
+            chunks.push(Chunk {
+                back: last.bytes.iter().filter(home).count(),
+                bytes: Vec::new(),
+            });
+        }
+        chunks.last_mut().expect("one").bytes.push(sent);
+        before = (byte.at, sent);
+    }
+    chunks
 }
 
 /// What this process has had of a processor.
@@ -83,21 +116,22 @@ fn timed(act: impl FnOnce()) -> (f64, f64) {
     (took.as_secs_f64(), (processor() - before).as_secs_f64())
 }
 
-/// The baseline: everything is written, and read until as much has come back.
-fn bare(stream: &mut TcpStream, case: &Case) -> (f64, f64) {
+/// The baseline: each chunk is written when what it is an answer to has come back.
+fn bare(stream: &mut TcpStream, chunks: &[Chunk]) -> (f64, f64) {
     timed(|| {
         let mut buffer = [0; 4_096];
-        let chunks = match case.name.starts_with("SYNCO") {
-            true => case.sent.len(),
-            false => 6,
-        };
-        for chunk in case.sent.chunks(chunks) {
-            stream.write_all(chunk).expect("room");
-            let mut left = chunk.len();
-            while left > 0 {
-                left -= stream.read(&mut buffer).expect("bytes").min(left);
+        let (mut sent, mut came) = (0, 0);
+        let mut read_until = |stream: &mut TcpStream, back| {
+            while came < back {
+                came += stream.read(&mut buffer).expect("bytes");
             }
+        };
+        for chunk in chunks {
+            read_until(stream, chunk.back);
+            stream.write_all(&chunk.bytes).expect("room");
+            sent += chunk.bytes.len();
         }
+        read_until(stream, sent);
     })
 }
 
@@ -107,11 +141,11 @@ fn main() {
         return;
     }
     println!(
-        "{:>6}  {:48} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7}",
+        "{:>6}  {:57} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7}",
         "drives", "conversation", "wire", "bare", "added", "bench", "added", "own", "bare", "bench"
     );
     println!(
-        "{:>6}  {:48} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7}",
+        "{:>6}  {:57} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7}",
         "", "", "ms", "ms", "", "ms", "", "", "CPU", "CPU"
     );
     for drives in [1, 3, 100, 250] {
@@ -130,9 +164,10 @@ fn main() {
             let virtual_time = play(plan, &mut link, AtFinding::Stop);
             assert!(virtual_time.finding.is_none(), "{:?}", virtual_time.finding);
             let wire = virtual_time.took.as_millis_f64() / 1e3;
+            let chunks = chunks(&link.trace(0), link.byte_time());
             let mut stream = TcpStream::connect(address).expect("a server");
             stream.set_nodelay(true).expect("no delay");
-            let bare = (0..TIMES).map(|_| bare(&mut stream, &case)).collect();
+            let bare = (0..TIMES).map(|_| bare(&mut stream, &chunks)).collect();
             let bare = middle(bare);
             drop(stream);
             // A second client is turned away while the first one has not been seen to go.
@@ -142,7 +177,7 @@ fn main() {
             let added = |(took, _): (f64, f64)| 100.0 * (took / wire - 1.0);
             let of_a_core = |(took, cpu): (f64, f64)| 100.0 * cpu / took;
             println!(
-                "{drives:>6}  {:48} {:9.2} {:9.2} {:7.2}% {:9.2} {:7.2}% {:7.2}% {:6.2}% {:6.2}%",
+                "{drives:>6}  {:57} {:9.2} {:9.2} {:7.2}% {:9.2} {:7.2}% {:7.2}% {:6.2}% {:6.2}%",
                 case.name,
                 wire * 1e3,
                 bare.0 * 1e3,

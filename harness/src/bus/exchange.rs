@@ -31,6 +31,7 @@ impl Bus<'_> {
         let set = master.set_exchange(&own, Pace::OnRequest);
         set.map_err(refused)?;
         master.start_round();
+        pump.speak(ring);
         loop {
             if let Some(halt) = pump.halt() {
                 return Err(halt);

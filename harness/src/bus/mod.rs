@@ -191,8 +191,14 @@ impl<'l> Bus<'l> {
         while pump.now() < end && pump.halt().is_none() {
             pump.pause();
             let due = pump.pause_due().unwrap_or(end);
-            pump.step(due.min(end));
+            pump.pass(due.min(end));
         }
+    }
+
+    /// Keeps the line for some milliseconds without the caller: before he does something else that takes its time, such as drawing.
+    /// Drives that watch for silence take 10 ms of it for an error (ND21 9.9).
+    pub fn keep(&self) {
+        self.lock().keep();
     }
 
     /// What happened on the way that no call reports: faults and recoveries, oldest first, in words.

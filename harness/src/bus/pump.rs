@@ -1,7 +1,7 @@
 //! Masters and their link, coupled: bytes out when the line is free, bytes in as they come.
 
 use super::{Error, Options};
-use crate::link::{Line, Trouble};
+use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{
@@ -24,6 +24,10 @@ struct Ring {
     master: AnyMaster,
     /// When the line is free for the next byte.
     free: Instant,
+    /// When the last byte that says something comes home.
+    home: Instant,
+    /// Behind that byte SYNCO has been sent, and nobody has asked for anything since.
+    idle: bool,
     results: BTreeMap<JobId, Option<Outcome>>,
     stopped: Option<Stop>,
 }
@@ -42,7 +46,7 @@ impl<'l> Pump<'l> {
         // A byte that is only late must not count as lost: the recovery stops every drive.
         let own = master::Options {
             slack: match link.lead() {
-                Span::ZERO => options.master.slack,
+                Lead::NONE => options.master.slack,
                 _ => options.master.slack.max(BUSY_HOST),
             },
             ..options.master
@@ -54,6 +58,8 @@ impl<'l> Pump<'l> {
         let rings = sizes.iter().map(|&size| Ring {
             master: AnyMaster::new(size, rate, own, options.deviates),
             free: now,
+            home: now,
+            idle: false,
             results: BTreeMap::new(),
             stopped: None,
         });
@@ -99,6 +105,7 @@ impl<'l> Pump<'l> {
     pub(super) fn submit(&mut self, ring: usize, job: Job) -> Option<Result<JobId, Refused>> {
         let ring = self.rings.get_mut(ring)?;
         let id = ring.master.submit(job);
+        ring.idle = false;
         if let Ok(id) = id {
             ring.results.insert(id, None);
         }
@@ -108,6 +115,13 @@ impl<'l> Pump<'l> {
     /// The master of a ring; `None` where there is no such ring.
     pub(super) fn master(&mut self, ring: usize) -> Option<&mut AnyMaster> {
         Some(&mut self.rings.get_mut(ring)?.master)
+    }
+
+    /// The master of a ring has something to say from now on that is no job.
+    pub(super) fn speak(&mut self, ring: usize) {
+        if let Some(ring) = self.rings.get_mut(ring) {
+            ring.idle = false;
+        }
     }
 
     /// The outcome of a job has come.
@@ -141,9 +155,10 @@ impl<'l> Pump<'l> {
         std::mem::take(&mut self.log)
     }
 
-    /// Takes what has come and does what is due, without letting time pass.
-    pub(super) fn poll(&mut self) {
+    /// Takes what has come and does what is due, without letting time pass. Says whether a master has reported something.
+    pub(super) fn poll(&mut self) -> bool {
         let now = self.link.now();
+        let mut news = false;
         for (index, ring) in self.rings.iter_mut().enumerate() {
             while let Some((at, received)) = self.link.receive(index) {
                 ring.master.handle_byte(at, received);
@@ -152,6 +167,7 @@ impl<'l> Pump<'l> {
                 ring.master.handle_timeout(now);
             }
             while let Some(event) = ring.master.poll_event() {
+                news = true;
                 match &event {
                     Event::Ended { id, outcome } => {
                         // A result that was given up is dropped.
@@ -169,44 +185,85 @@ impl<'l> Pump<'l> {
                 }
             }
         }
+        news
     }
 
-    /// Sends what the lines are free for and lets time pass until the next byte is due, at most until
-    /// `end`.
+    /// Sends what the lines are free for and lets time pass until the next byte is due or something is reported, at most until `end`.
+    /// Whoever calls waits for a report.
     pub(super) fn step(&mut self, end: Instant) {
-        self.poll();
+        self.work(end, true);
+    }
+
+    /// The same where nobody waits for anything but `end`.
+    pub(super) fn pass(&mut self, end: Instant) {
+        self.work(end, false);
+    }
+
+    /// Where time is real, hands over what keeps the line for a while without this program.
+    pub(super) fn keep(&mut self) {
+        if self.link.lead() != Lead::NONE {
+            self.work(self.link.now(), false);
+        }
+    }
+
+    fn work(&mut self, end: Instant, awaited: bool) {
+        let mut news = self.poll();
+        let rings = 0..self.rings.len();
+        let until = rings.fold(end, |until, ring| until.min(self.transmit(ring, awaited)));
+        while !news && self.link.now() < until && self.link.trouble().is_none() {
+            self.link.wait(until);
+            news = self.poll();
+        }
+    }
+
+    /// Hands over what may be handed over now, and says when there will be more.
+    ///
+    /// Where time is real, somebody waits and there is nothing to say, SYNCO goes no further than the time at which what was said before
+    /// comes home: there may be something to say then, and it leaves behind that SYNCO. When there is not, SYNCO goes on a byte time later.
+    fn transmit(&mut self, index: usize, awaited: bool) -> Instant {
         let now = self.link.now();
         let byte_time = self.link.byte_time();
         let lead = self.link.lead();
-        let mut until = end;
-        for (index, ring) in self.rings.iter_mut().enumerate() {
-            let mut idle = false;
-            // Where the link carries nothing, no byte takes any time.
-            while ring.free <= now + lead && !idle && self.link.trouble().is_none() {
-                // The time at which the byte leaves, not that at which it is handed over.
-                let start = ring.free.max(now);
-                ring.free = match ring.master.poll_transmit(start) {
-                    Some(byte) => self.link.send(index, &[byte]),
-                    None => {
-                        idle = true;
-                        now + byte_time
-                    }
-                };
-                idle |= lead == Span::ZERO;
-            }
-            // Where bytes are handed over ahead, the next are before the line has run dry, many at a time.
-            let ahead = if idle {
-                Span::ZERO
-            } else {
-                Span::from_nanos(lead.as_nanos() / 2)
+        let ring = &mut self.rings[index];
+        let round = byte_time * u64::from(ring.master.ring().drives());
+        let far = now + lead.far;
+        let mut bytes = Vec::new();
+        let next = loop {
+            let again = ring.home + byte_time;
+            let enough = match now < again {
+                true => ring.free >= ring.home + lead.near,
+                false => ring.free > now + lead.near,
             };
-            let next = Instant::START + ring.free.since_start().saturating_sub(ahead);
-            until = until.min(next.max(now + byte_time.min(lead)));
+            if awaited && ring.idle && enough && lead.near < lead.far {
+                break before(ring.free, lead.near).max(again);
+            }
+            if ring.free > far || self.link.trouble().is_some() {
+                // The next go out many at a time.
+                break before(ring.free, Span::from_nanos(lead.far.as_nanos() / 2));
+            }
+            // The time at which the byte leaves, not that at which it is handed over.
+            let start = ring.free.max(now);
+            let idle = ring.master.counters().idle;
+            let Some(byte) = ring.master.poll_transmit(start) else {
+                ring.free = ring.free.max(now + byte_time);
+                break now + byte_time;
+            };
+            bytes.push(byte);
+            ring.free = start + byte_time;
+            ring.idle = ring.master.counters().idle > idle;
+            if !ring.idle {
+                ring.home = ring.free + round;
+            }
+        };
+        if bytes.is_empty() {
+            return next;
         }
-        while self.link.now() < until && self.link.trouble().is_none() {
-            self.link.wait(until);
-            self.poll();
-        }
+        // Where a fault holds the line, all is later than thought; where the link carries nothing, no byte takes any time.
+        let free = self.link.send(index, &bytes);
+        let held = free.since(ring.free);
+        ring.free = free;
+        ring.home += held;
+        next + held
     }
 
     /// When the link wants a pause next.
@@ -229,9 +286,19 @@ impl<'l> Pump<'l> {
         let under_way = |ring: &Ring| ring.master.under_way() > 0;
         self.poll();
         while self.halt().is_none() && self.rings.iter().any(under_way) && self.link.now() < end {
-            let until = self.link.now() + self.link.byte_time();
+            let missed = self.rings.iter().filter_map(|r| r.master.poll_timeout());
+            let until = missed.fold(end, Instant::min);
+            let until = until.max(self.link.now() + self.link.byte_time());
             self.link.wait(until.min(end));
             self.poll();
         }
     }
 }
+
+fn before(at: Instant, span: Span) -> Instant {
+    Instant::START + at.since_start().saturating_sub(span)
+}
+
+#[cfg(test)]
+#[path = "pump_tests.rs"]
+mod tests;

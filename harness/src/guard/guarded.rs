@@ -2,7 +2,8 @@
 
 use super::Watch;
 use crate::link::{
-    Capability, DriveFault, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus, Trouble,
+    Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus,
+    Trouble,
 };
 use crate::scenario::run::read_byte;
 use harness_proto::line::Received;
@@ -318,7 +319,7 @@ impl<L: Line> Line for Guarded<L> {
         self.inner.trouble().or(self.trouble.as_ref())
     }
 
-    fn lead(&self) -> Span {
+    fn lead(&self) -> Lead {
         self.inner.lead()
     }
 }

@@ -1,7 +1,7 @@
 //! The safe state of a bench: every drive stopped, standing and blocked, and read back.
 
 use crate::bus::{Axis, Bus, Error, Options, Order, recover};
-use crate::link::{Line, Trouble};
+use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::ram;
@@ -387,7 +387,7 @@ impl Line for OneRing<'_> {
         self.line.trouble()
     }
 
-    fn lead(&self) -> Span {
+    fn lead(&self) -> Lead {
         self.line.lead()
     }
 }

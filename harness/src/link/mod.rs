@@ -4,6 +4,7 @@
 //! cannot makes a scenario that needs it skipped, never wrong.
 
 mod inner;
+mod lateness;
 mod record;
 mod replay;
 mod ring;
@@ -137,6 +138,35 @@ impl fmt::Display for Trouble {
     }
 }
 
+/// How far ahead of the line bytes may be handed over: where time is real, a busy computer would leave gaps between them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lead {
+    /// While nobody waits for an answer.
+    pub far: Span,
+    /// Beyond the time at which an answer comes home that somebody waits for: what he sends next leaves behind these bytes.
+    pub near: Span,
+}
+
+/// A gap on the line that harms nobody: drives that miss their bytes wait for 10 ms at least (ND21 9.9).
+const HARMLESS: Span = Span::from_millis(5);
+
+impl Lead {
+    /// Each byte is handed over when the line is free for it: time waits for whoever sends.
+    pub const NONE: Self = Self {
+        far: Span::ZERO,
+        near: Span::ZERO,
+    };
+
+    /// The longest gap between bytes that is the computer's: of a longer one the sender knew.
+    #[must_use]
+    pub fn gap(self) -> Span {
+        match self {
+            Self::NONE => Span::ZERO,
+            Self { near, .. } => near + HARMLESS,
+        }
+    }
+}
+
 /// One or two rings as the master sees them: bytes and time, and nothing else.
 pub trait Line: Send {
     /// How long a byte takes.
@@ -177,10 +207,9 @@ pub trait Line: Send {
     /// Behind it drives are as they were, and which drive was addressed last too; only time has passed.
     fn pause(&mut self) {}
 
-    /// How far ahead of the line a driver may hand over its bytes: where time is real, a busy computer would leave
-    /// gaps between them.
-    fn lead(&self) -> Span {
-        Span::ZERO
+    /// How far ahead of the line a driver may hand over its bytes.
+    fn lead(&self) -> Lead {
+        Lead::NONE
     }
 }
 
@@ -222,7 +251,7 @@ impl<L: Line + ?Sized> Line for &mut L {
         (**self).pause();
     }
 
-    fn lead(&self) -> Span {
+    fn lead(&self) -> Lead {
         (**self).lead()
     }
 }

@@ -3,7 +3,7 @@
 //! What a recorded link shows is what a rig shows: bytes and times. Cells, the error mode and what stands outside the
 //! bus are hidden, so that a record suffices to judge a conversation again.
 
-use super::{Capability, Line, Link, Moment, PlacedFault, Stimulus, Trouble};
+use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Stimulus, Trouble};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
@@ -117,7 +117,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         self.tell();
     }
 
-    fn lead(&self) -> Span {
+    fn lead(&self) -> Lead {
         self.link.lead()
     }
 }

@@ -5,9 +5,12 @@
 //! a little ahead of the line, so that a busy computer leaves no gaps in a telegram.
 
 use super::inner::InnerLink;
+use super::lateness::Lateness;
 use super::ring::{MOST_RECORDED, Ring};
 use super::tamper::Tamper;
-use super::{Capability, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name};
+use super::{
+    Capability, HARMLESS, Lead, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name,
+};
 use crate::port::{LastWords, Wire, wake_on_time};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::sync::SYNCO;
@@ -24,9 +27,12 @@ use std::time;
 /// How far ahead of the line bytes are with the operating system at least, while there are any.
 const AT_LEAST_AHEAD: Span = Span::from_millis(50);
 
-/// How far ahead of the line a driver may hand over its bytes: more than a busy computer is late, less than a person
+/// How far ahead of the line a driver may hand over its bytes at most: more than a busy computer is late, less than a person
 /// notices.
 const LEAD: Span = Span::from_millis(16);
+
+/// The least of it on a real line: an adapter takes and gives bytes a millisecond's worth at a time, and holds them for longer.
+const ADAPTER: Span = Span::from_millis(4);
 
 /// How much later than the ring itself needs a byte may come back: adapters, a busy computer.
 pub(super) const SLACK: Span = Span::from_millis(30);
@@ -53,6 +59,7 @@ pub struct StreamLink {
     start: time::Instant,
     /// The last time that somebody was told: what had not come then has come later, whatever is computed of it.
     told: Cell<Instant>,
+    late: Lateness,
     /// Somebody has been told of bytes that have come, and has fetched none since: only more of them are news.
     lying: bool,
     capabilities: Vec<Capability>,
@@ -102,6 +109,7 @@ impl StreamLink {
             rate,
             start: time::Instant::now(),
             told: Cell::new(Instant::START),
+            late: Lateness::new(time::Instant::now()),
             lying: false,
             capabilities,
             scheduled: VecDeque::new(),
@@ -178,8 +186,13 @@ impl StreamLink {
 
     /// Lets due faults happen, gives the operating system what is due, and takes what has come.
     fn pump(&mut self) {
+        self.give();
+        self.take();
+    }
+
+    /// Lets due faults happen and gives the operating system what is due.
+    fn give(&mut self) {
         self.beats.fetch_add(1, Ordering::Relaxed);
-        let told = self.told.get();
         let now = self.at(time::Instant::now());
         while let Some(&(at, ring, link, fault)) = self.scheduled.front()
             && at <= now
@@ -193,17 +206,23 @@ impl StreamLink {
             self.trouble = Some(Trouble::Interrupted);
         }
         for ring in &mut self.rings {
-            let done = match self.trouble {
-                None => ring.transmit(now).and_then(|()| {
-                    ring.collect((told, now), self.rate.byte_time(), self.recording)
-                }),
-                Some(_) => {
-                    ring.queue.clear();
-                    Ok(())
-                }
-            };
-            if let Err(trouble) = done {
-                self.trouble.get_or_insert(trouble);
+            if self.trouble.is_some() {
+                ring.queue.clear();
+            } else if let Err(trouble) = ring.transmit(now) {
+                self.trouble = Some(trouble);
+            }
+        }
+    }
+
+    /// Takes what has come.
+    fn take(&mut self) {
+        let told = self.told.get();
+        let now = self.at(time::Instant::now());
+        for ring in &mut self.rings {
+            if self.trouble.is_none() {
+                let times = (told, now);
+                let done = ring.collect(times, self.rate.byte_time(), self.recording);
+                self.trouble = done.err();
             }
         }
         // Between two drives bytes are passed on whatever happens to the conversation.
@@ -265,10 +284,14 @@ impl StreamLink {
         let calm = self.now() + CALM;
         if self.inner.is_empty() && self.rings.iter().all(|ring| ring.free > calm) {
             // What comes meanwhile can wait: the line is taken for longer, and to wake up for every byte costs more than all else.
-            std::thread::sleep(time::Duration::from_nanos(span.min(DOZE).as_nanos()));
+            let span = time::Duration::from_nanos(span.min(DOZE).as_nanos());
+            let due = time::Instant::now() + span;
+            std::thread::sleep(span);
+            self.late.woken(due, time::Instant::now());
             return;
         }
         let span = span.min(NAP).as_nanos();
+        let due = time::Instant::now() + time::Duration::from_nanos(span);
         let timeout = Timespec {
             tv_sec: 0,
             tv_nsec: i64::try_from(span).unwrap_or(0).min(999_999_999),
@@ -276,6 +299,7 @@ impl StreamLink {
         let mut fds: Vec<_> = self.rings.iter().map(|ring| ring.wire.poll_fd()).collect();
         fds.extend(self.inner.iter().flat_map(InnerLink::poll_fds));
         match poll(&mut fds, Some(&timeout)) {
+            Ok(0) => self.late.woken(due, time::Instant::now()),
             Ok(_) | Err(Errno::INTR | Errno::AGAIN) => {}
             Err(error) => {
                 let text = format!("failed to wait for the ports: {error}");
@@ -314,7 +338,7 @@ impl Line for StreamLink {
             own.send(now, *byte, byte_time, recording);
         }
         let free = own.free;
-        self.pump();
+        self.give();
         free
     }
 
@@ -331,7 +355,8 @@ impl Line for StreamLink {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        self.pump();
+        // What has come shows in the sleep, which it ends at once.
+        self.give();
         if (self.lying || !self.has_come()) && self.trouble.is_none() {
             let until = self.due().map_or(until, |due| due.min(until));
             let left = until.since(self.now());
@@ -348,8 +373,16 @@ impl Line for StreamLink {
         self.trouble.as_ref()
     }
 
-    fn lead(&self) -> Span {
-        LEAD
+    fn lead(&self) -> Lead {
+        let late = self.late.at(time::Instant::now());
+        let least = match self.rings.iter().all(|ring| ring.wire.is_prompt()) {
+            true => Span::ZERO,
+            false => ADAPTER,
+        };
+        Lead {
+            far: LEAD,
+            near: late.saturating_sub(HARMLESS).clamp(least, LEAD),
+        }
     }
 }
 

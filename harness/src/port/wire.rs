@@ -131,6 +131,15 @@ impl Wire {
         }
     }
 
+    /// Whether bytes go to whoever plays the ring as they are handed over: no adapter takes them a millisecond's worth at a time.
+    #[must_use]
+    pub fn is_prompt(&self) -> bool {
+        match self.coding {
+            Coding::Plain | Coding::Marked(_) => true,
+            Coding::Serial(..) | Coding::Telnet(_) => false,
+        }
+    }
+
     /// Line errors that the other end has told of without saying at which byte; counted since the last call.
     pub fn take_unplaced(&mut self) -> u64 {
         std::mem::take(&mut self.unplaced)

@@ -1,7 +1,7 @@
 //! The two kinds of ring ends that a rig can have, as one link.
 
 use crate::link::{
-    Capability, Line, Link, Moment, PlacedFault, Shown, SimulatedLink, Stimulus, StreamLink,
+    Capability, Lead, Line, Link, Moment, PlacedFault, Shown, SimulatedLink, Stimulus, StreamLink,
     Trouble,
 };
 use harness_proto::line::Received;
@@ -71,7 +71,7 @@ impl Line for Ends {
         each!(self, link => link.trouble())
     }
 
-    fn lead(&self) -> Span {
+    fn lead(&self) -> Lead {
         each!(self, link => link.lead())
     }
 }

@@ -1,7 +1,7 @@
 //! A rig in use as a line that a driver can own, with the rig itself kept for its end.
 
 use super::session::{End, Session};
-use crate::link::{Line, Trouble};
+use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,7 +18,6 @@ pub struct Shared {
 pub struct SharedLine {
     session: Arc<Mutex<Option<Session>>>,
     byte_time: Span,
-    lead: Span,
     trouble: Option<Trouble>,
 }
 
@@ -39,14 +38,12 @@ impl Shared {
     /// Its line.
     #[must_use]
     pub fn line(&self) -> SharedLine {
-        let (byte_time, lead) = match lock(&self.session).as_mut() {
-            Some(session) => (session.link().byte_time(), session.link().lead()),
-            None => (Span::ZERO, Span::ZERO),
-        };
+        let byte_time = lock(&self.session)
+            .as_mut()
+            .map_or(Span::ZERO, |session| session.link().byte_time());
         SharedLine {
             session: Arc::clone(&self.session),
             byte_time,
-            lead,
             trouble: None,
         }
     }
@@ -123,7 +120,9 @@ impl Line for SharedLine {
         self.with((), |line| line.pause());
     }
 
-    fn lead(&self) -> Span {
-        self.lead
+    fn lead(&self) -> Lead {
+        lock(&self.session)
+            .as_mut()
+            .map_or(Lead::NONE, |session| session.link().lead())
     }
 }

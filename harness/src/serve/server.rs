@@ -15,8 +15,11 @@ const SETTLED: Span = Span::from_millis(1);
 /// How much of a client's bytes waits for the line at most: the rest stays with the client.
 const WAITING: Span = Span::from_millis(500);
 
-/// While a client sends: how long what reaches the master waits for company. The last byte of an answer does not wait.
+/// While a client has given a lot ahead: how long what reaches the master waits for company.
 const BATCH: Span = Span::from_millis(1);
+
+/// How much that is. Who has given less may wait for an answer, and no byte of it waits.
+const AHEAD: Span = Span::from_millis(4);
 
 /// While nothing does: how often drives are let go on, so that it does not all come at once in front of the next byte.
 const IDLE: Span = Span::from_millis(20);
@@ -344,19 +347,22 @@ impl Server {
         let (from, to) = self.base;
         let on_clock = |at: Instant| from + at.since(to);
         let idle = self.clock + IDLE;
-        let now = self.link.now();
+        let soon = self.link.now() + AHEAD;
         let mut batch = BATCH;
         let mut next = self.link.next_event();
         let mut exact = idle;
         for seat in &self.seats {
             match seat.at {
-                // Somebody waits for what comes home now, and a byte that is not yet on the last link is there in a byte time.
-                At::Master(ring) if seat.taken && seat.sent_by <= now => {
+                // Somebody may wait for what comes home now, and a byte that is not yet on the last link is there in a byte time.
+                At::Master(ring) if seat.taken && seat.sent_by <= soon => {
                     batch = batch.min(self.link.byte_time());
                     let home = self.link.next_home(ring);
                     exact = home.map_or(exact, |home| exact.min(on_clock(home)));
                 }
-                At::Master(_) if seat.taken => exact = exact.min(on_clock(seat.sent_by)),
+                At::Master(_) if seat.taken => {
+                    let ahead = seat.sent_by.since_start().saturating_sub(AHEAD);
+                    exact = exact.min(on_clock(Instant::START + ahead));
+                }
                 At::Inner(inner) if inner.role.hears() => {
                     let fetch = self.link.next_fetch(inner.ring, inner.link);
                     next = next.into_iter().chain(fetch).min();

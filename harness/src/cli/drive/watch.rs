@@ -50,6 +50,7 @@ fn show(
     loop {
         let at = bench.bus.now().since(start);
         let found = look(bench, &drives, cells)?;
+        bench.bus.keep();
         let line = match arguments.format {
             WatchForm::Text => line(at, &found),
             WatchForm::Csv => row(at, &found),

@@ -4,7 +4,7 @@
 use super::outcome::Stop;
 use super::player::{Halt, Runner};
 use crate::bus::{Axis, Bus, Error, Options, conduct, count_drives};
-use crate::link::{Line, Trouble};
+use crate::link::{Lead, Line, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::PlannedCall;
 use crate::scenario::problem::Span;
@@ -39,8 +39,9 @@ impl Line for Through<'_, '_> {
         let end = self.runner.send(self.ring, bytes);
         let start = end - self.byte_time() * bytes.len() as u64;
         let tolerance = self.runner.link.time_tolerance();
+        let late = tolerance.max(self.runner.link.lead().gap());
         if let Some(left) = self.left.replace(end)
-            && left + tolerance < start
+            && left + late < start
         {
             self.runner.gap = Some(left);
         }
@@ -72,7 +73,7 @@ impl Line for Through<'_, '_> {
         self.runner.pause();
     }
 
-    fn lead(&self) -> time::Span {
+    fn lead(&self) -> Lead {
         self.runner.link.lead()
     }
 }

@@ -1,0 +1,159 @@
+//! How far ahead of the line bytes are handed over, in virtual time.
+
+use crate::bus::{Axis, Bus, Options};
+use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
+use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::{Instant, Span};
+use harness_sim::bench::Bench;
+use harness_sim::drive::Drive;
+use harness_sim::plain::PlainDrive;
+use harness_sim::ring::Ring;
+use std::sync::{Arc, Mutex};
+
+const DRIVES: u8 = 3;
+
+/// The byte time of 38400 bit/s (ND21 8.1): 11 bits.
+fn byte() -> Span {
+    Rate::Baud38400.byte_time()
+}
+
+/// A simulated ring that takes bytes ahead; what is sent and when is noted.
+struct Ahead {
+    link: SimulatedLink,
+    lead: Lead,
+    sent: Arc<Mutex<Vec<(Instant, u8)>>>,
+}
+
+impl Line for Ahead {
+    fn byte_time(&self) -> Span {
+        self.link.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.link.now()
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        let end = self.link.send(ring, bytes);
+        let before = (0..bytes.len() as u64).rev().map(|n| byte() * n);
+        let left = before.map(|before| Instant::START + end.since_start().saturating_sub(before));
+        let mut sent = self.sent.lock().expect("no panic");
+        sent.extend(left.zip(bytes.iter().copied()));
+        end
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        self.link.receive(ring)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.link.wait(until)
+    }
+
+    fn lead(&self) -> Lead {
+        self.lead
+    }
+}
+
+/// What was sent while a bus did something, and when it was done.
+fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, u8)>, Instant) {
+    let size = RingSize::new(u64::from(DRIVES)).expect("a size");
+    let ring = Ring::new(size, Rate::Baud38400, |_| {
+        Drive::Plain(PlainDrive::default())
+    });
+    let mut link = SimulatedLink::new(Bench::one(ring));
+    if late > Span::ZERO {
+        let fault = PlacedFault::Link(usize::from(DRIVES), LinkFault::Delay(late));
+        for number in 1..60 {
+            link.inject(0, fault, Moment::Byte(number));
+        }
+    }
+    let sent = Arc::default();
+    let line = Ahead {
+        link,
+        lead,
+        sent: Arc::clone(&sent),
+    };
+    let bus = Bus::open(Box::new(line), &[size], Options::default()).expect("an open bus");
+    act(&bus);
+    assert_eq!(bus.corrected_errors(), 0);
+    let end = bus.now();
+    bus.close();
+    let sent = sent.lock().expect("no panic").clone();
+    (sent, end)
+}
+
+fn reads(bus: &Bus<'_>) {
+    for drive in [0, 1, 2, 0, 1] {
+        let axis = Axis::new(0, drive).expect("an axis");
+        assert_eq!(bus.read_byte(axis, 0xFE13), Ok(0));
+    }
+}
+
+/// The longest time between two bytes.
+fn gap(sent: &[(Instant, u8)]) -> Span {
+    let gaps = sent.windows(2).map(|two| two[1].0.since(two[0].0 + byte()));
+    gaps.max().unwrap_or(Span::ZERO)
+}
+
+fn ahead(near: Span) -> Lead {
+    Lead {
+        far: Span::from_millis(16),
+        near,
+    }
+}
+
+/// Whoever waits for an answer sends the next bytes as soon as without any lead, and the same ones.
+#[test]
+fn a_job_does_not_wait_behind_synco() {
+    let (expected, end) = played(Lead::NONE, Span::ZERO, reads);
+    let (sent, took) = played(ahead(Span::ZERO), Span::ZERO, reads);
+    let count = expected.iter().filter(|(at, _)| *at <= end).count();
+    assert_eq!(sent[..count], expected[..count]);
+    assert_eq!(took, end);
+}
+
+/// Behind an adapter SYNCO goes on beyond the answer, so that the line has no gap (ND21 9.2): a job comes later by that, and no more.
+#[test]
+fn an_adapter_is_never_without_bytes() {
+    let near = Span::from_millis(4);
+    let (_, end) = played(Lead::NONE, Span::ZERO, reads);
+    let (sent, took) = played(ahead(near), Span::ZERO, reads);
+    assert_eq!(gap(&sent), Span::ZERO);
+    // The count of the drives and five reads.
+    assert!(
+        took > end && took <= end + (near + byte()) * 6,
+        "{took} {end}"
+    );
+}
+
+/// Where an answer is late, SYNCO goes on a byte time behind the time at which it was to be there.
+#[test]
+fn synco_goes_on_where_an_answer_is_late() {
+    let (sent, _) = played(ahead(Span::ZERO), Span::from_millis(3), reads);
+    let gap = gap(&sent);
+    assert!(gap > Span::ZERO && gap <= byte() + byte(), "{gap}");
+}
+
+/// Who passes the time, or keeps the line, may come back late: SYNCO lies ahead, and what he says then leaves behind it.
+#[test]
+fn the_line_is_kept_while_nobody_waits() {
+    let lead = ahead(Span::ZERO);
+    let (sent, _) = played(lead, Span::ZERO, |bus| {
+        bus.run(Span::from_millis(50));
+        let before = bus.now();
+        reads(bus);
+        bus.keep();
+        let took = bus.now().since(before);
+        // Sync, address, four bytes, a round and a byte on its way: 9.3, 10.1.
+        let most = lead.far + byte() * (5 * (6 + u64::from(DRIVES) + 2) + 1);
+        assert!(
+            took <= most,
+            "{took} for five reads, {most} expected at most"
+        );
+    });
+    assert_eq!(gap(&sent), Span::ZERO);
+    let behind = sent.iter().rev().take_while(|(_, byte)| *byte == 0x80);
+    assert!(byte() * behind.count() as u64 >= lead.far);
+}

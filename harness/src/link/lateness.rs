@@ -1,0 +1,80 @@
+//! By how much the computer has been late of late.
+
+use harness_proto::time::Span;
+use std::time::{Duration, Instant};
+
+/// The time in which what was seen counts half as much.
+const HALF: Duration = Duration::from_secs(2);
+
+/// The worst that has been seen, forgotten little by little.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lateness {
+    worst: Span,
+    seen: Instant,
+}
+
+impl Lateness {
+    /// Nothing has been late.
+    pub(super) fn new(now: Instant) -> Self {
+        Self {
+            worst: Span::ZERO,
+            seen: now,
+        }
+    }
+
+    /// Somebody who wanted to be woken at `due` is awake `now`.
+    pub(super) fn woken(&mut self, due: Instant, now: Instant) {
+        let late = now.saturating_duration_since(due).as_nanos();
+        let late = Span::from_nanos(u64::try_from(late).unwrap_or(u64::MAX));
+        if late >= self.at(now) {
+            *self = Self {
+                worst: late,
+                seen: now,
+            };
+        }
+    }
+
+    /// By how much whoever wants to be woken may be late now.
+    pub(super) fn at(&self, now: Instant) -> Span {
+        let halves = now.saturating_duration_since(self.seen).as_secs() / HALF.as_secs();
+        let left = self.worst.as_nanos() >> halves.min(63);
+        Span::from_nanos(left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HALF, Lateness};
+    use harness_proto::time::Span;
+    use std::time::{Duration, Instant};
+
+    #[test]
+    fn the_worst_counts_and_is_forgotten_by_and_by() {
+        let start = Instant::now();
+        let mut late = Lateness::new(start);
+        assert_eq!(late.at(start), Span::ZERO);
+        late.woken(start, start + Duration::from_millis(8));
+        let begun = start + Duration::from_millis(8);
+        assert_eq!(late.at(begun), Span::from_millis(8));
+        late.woken(begun, begun + Duration::from_millis(3));
+        assert_eq!(late.at(begun), Span::from_millis(8), "the worst counts");
+        assert_eq!(late.at(begun + HALF), Span::from_millis(4));
+        let then = begun + HALF;
+        late.woken(then, then + Duration::from_millis(5));
+        let then = then + Duration::from_millis(5);
+        assert_eq!(
+            late.at(then),
+            Span::from_millis(5),
+            "worse than what is left of it"
+        );
+        assert_eq!(late.at(then + 200 * HALF), Span::ZERO);
+    }
+
+    #[test]
+    fn whoever_is_woken_early_is_not_late() {
+        let start = Instant::now();
+        let mut late = Lateness::new(start);
+        late.woken(start + Duration::from_millis(1), start);
+        assert_eq!(late.at(start), Span::ZERO);
+    }
+}
