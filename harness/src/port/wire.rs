@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 
 /// What is read from the operating system at a time.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 256;
 
 /// What may wait to be taken by the operating system.
 pub(super) const MOST_WAITING: usize = 65_536;

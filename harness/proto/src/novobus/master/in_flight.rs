@@ -76,7 +76,8 @@ pub(super) struct InFlight {
 impl InFlight {
     pub(super) fn new(most: usize) -> Self {
         Self {
-            bytes: VecDeque::with_capacity(most),
+            // With a lot of slack it may be many, and is not.
+            bytes: VecDeque::new(),
             most,
         }
     }
