@@ -94,9 +94,10 @@ fn deadlines_are_prompt_when_busy_and_rare_when_idle() {
         }
         assert_eq!(server.clock, home, "{drives} drives");
         assert!(late <= BATCH, "{drives} drives: {late}");
-        // 600 bytes are sent in 172 ms; then each byte has its own moment, and there is a look for each that is not on the last link.
+        // 600 bytes are sent in 172 ms. From 4 ms before their end, which are 14 bytes, each byte has its own moment, and there is a look
+        // for each that is not on the last link.
         assert!(
-            wakes <= 172 + 2 * u64::from(drives) + 4,
+            wakes <= 168 + 2 * (14 + u64::from(drives)) + 4,
             "{drives} drives: {wakes}"
         );
         assert_eq!(server.deadline(), server.clock + IDLE);
