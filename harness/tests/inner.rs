@@ -3,7 +3,8 @@
 
 use harness::library::Entry;
 use harness::link::{
-    InnerLink, Link, LinkFault, Moment, PlacedFault, Ports, SimulatedLink, StreamLink,
+    InnerLink, Line, Link, LinkFault, Moment, PlacedFault, Ports, SimulatedLink, StreamLink,
+    Trouble,
 };
 use harness::port::{Endpoint, PortSettings, Wire, open};
 use harness::scenario::run::{AtFinding, lacks, play_over_bus, start_anew};
@@ -16,6 +17,7 @@ use harness_sim::fault::Flips;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Reads of FE13 from the drives 3 and 2 of a ring of four, one telegram behind the other (ND21 9.2, 10.1).
@@ -244,6 +246,26 @@ fn an_interposer_with_two_ports() {
     let mut model = simulated();
     assert_eq!(play(&mut link, &faults), play(&mut model, &faults));
     assert_eq!(column(&link, MIDDLE), column(&model, MIDDLE));
+}
+
+/// The ring of somebody else's conversation is not cut because ours has ended.
+#[test]
+fn an_interposer_goes_on_behind_an_interruption() {
+    let served = Served::start("tcp", true, &[("--cut", "2->1", 1)]);
+    let inner = InnerLink::new(0, MIDDLE, Ports::Interposer(served.wire(1)));
+    let ring = vec![(served.wire(0), 4)];
+    let interrupt: Arc<AtomicBool> = Arc::default();
+    let mut link = StreamLink::new(ring, vec![inner], Rate::default(), Arc::clone(&interrupt));
+    link.begin();
+    link.send(0, &READS);
+    interrupt.store(true, Ordering::Relaxed);
+    let passed = |link: &StreamLink| link.inner_links()[0].delay().bytes;
+    let end = link.now() + Span::from_millis(5_000);
+    while passed(&link) < READS.len() as u64 && link.now() < end {
+        assert!(!link.wait(end), "nothing more is said");
+    }
+    assert_eq!(link.trouble(), Some(&Trouble::Interrupted));
+    assert_eq!(passed(&link), READS.len() as u64);
 }
 
 /// The column of a tapped link is the simulator's, byte for byte; a byte is seen when it has arrived, and then it is

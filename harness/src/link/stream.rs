@@ -31,7 +31,8 @@ const AT_LEAST_AHEAD: Span = Span::from_millis(50);
 /// notices.
 const LEAD: Span = Span::from_millis(16);
 
-/// The least of it on a real line: an adapter takes and gives bytes a millisecond's worth at a time, and holds them for longer.
+/// How far beyond an answer that somebody waits for at least, on a real line: an adapter takes and gives bytes a millisecond's worth
+/// at a time, and holds them for longer.
 const ADAPTER: Span = Span::from_millis(4);
 
 /// How much later than the ring itself needs a byte may come back: adapters, a busy computer.
@@ -59,6 +60,7 @@ pub struct StreamLink {
     start: time::Instant,
     /// The last time that somebody was told: what had not come then has come later, whatever is computed of it.
     told: Cell<Instant>,
+    /// How late it has been woken.
     late: Lateness,
     /// Somebody has been told of bytes that have come, and has fetched none since: only more of them are news.
     lying: bool,
@@ -182,12 +184,6 @@ impl StreamLink {
     /// How long a byte may take to come back.
     fn round(&self, ring: &Ring) -> Span {
         self.rate.byte_time() * (2 * u64::from(ring.drives) + 4) + SLACK
-    }
-
-    /// Lets due faults happen, gives the operating system what is due, and takes what has come.
-    fn pump(&mut self) {
-        self.give();
-        self.take();
     }
 
     /// Lets due faults happen and gives the operating system what is due.
@@ -355,16 +351,17 @@ impl Line for StreamLink {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        // What has come shows in the sleep, which it ends at once.
         self.give();
         if (self.lying || !self.has_come()) && self.trouble.is_none() {
             let until = self.due().map_or(until, |due| due.min(until));
             let left = until.since(self.now());
+            // What has come, and has not been taken, ends the sleep at once.
             if left > Span::ZERO {
                 self.sleep(left);
             }
-            self.pump();
+            self.give();
         }
+        self.take();
         self.lying = self.has_come();
         self.trouble.is_none()
     }
@@ -420,7 +417,8 @@ impl Link for StreamLink {
     }
 
     fn begin(&mut self) {
-        self.pump();
+        self.give();
+        self.take();
         self.start = time::Instant::now();
         self.told.set(Instant::START);
         self.lying = false;
