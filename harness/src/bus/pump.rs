@@ -105,8 +105,8 @@ impl<'l> Pump<'l> {
     pub(super) fn submit(&mut self, ring: usize, job: Job) -> Option<Result<JobId, Refused>> {
         let ring = self.rings.get_mut(ring)?;
         let id = ring.master.submit(job);
-        ring.idle = false;
         if let Ok(id) = id {
+            ring.idle = false;
             ring.results.insert(id, None);
         }
         Some(id)
@@ -229,13 +229,16 @@ impl<'l> Pump<'l> {
         let far = now + lead.far;
         let mut bytes = Vec::new();
         let next = loop {
-            let again = ring.home + byte_time;
-            let enough = match now < again {
-                true => ring.free >= ring.home + lead.near,
-                false => ring.free > now + lead.near,
-            };
-            if awaited && ring.idle && enough && lead.near < lead.far {
-                break before(ring.free, lead.near).max(again);
+            // Without a lead, or with as much of it as there is, nothing is to be spared.
+            if awaited && ring.idle && lead.near < lead.far {
+                let again = ring.home + byte_time;
+                let enough = match now < again {
+                    true => ring.free >= ring.home + lead.near,
+                    false => ring.free > now + lead.near,
+                };
+                if enough {
+                    break before(ring.free, lead.near).max(again);
+                }
             }
             if ring.free > far || self.link.trouble().is_some() {
                 // The next go out many at a time.

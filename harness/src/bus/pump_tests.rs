@@ -9,7 +9,6 @@ use harness_sim::bench::Bench;
 use harness_sim::drive::Drive;
 use harness_sim::plain::PlainDrive;
 use harness_sim::ring::Ring;
-use std::sync::{Arc, Mutex};
 
 const DRIVES: u8 = 3;
 
@@ -18,14 +17,13 @@ fn byte() -> Span {
     Rate::Baud38400.byte_time()
 }
 
-/// A simulated ring that takes bytes ahead; what is sent and when is noted.
-struct Ahead {
-    link: SimulatedLink,
+/// A simulated ring that takes bytes ahead.
+struct Ahead<'l> {
+    link: &'l mut SimulatedLink,
     lead: Lead,
-    sent: Arc<Mutex<Vec<(Instant, u8)>>>,
 }
 
-impl Line for Ahead {
+impl Line for Ahead<'_> {
     fn byte_time(&self) -> Span {
         self.link.byte_time()
     }
@@ -35,12 +33,7 @@ impl Line for Ahead {
     }
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        let end = self.link.send(ring, bytes);
-        let before = (0..bytes.len() as u64).rev().map(|n| byte() * n);
-        let left = before.map(|before| Instant::START + end.since_start().saturating_sub(before));
-        let mut sent = self.sent.lock().expect("no panic");
-        sent.extend(left.zip(bytes.iter().copied()));
-        end
+        self.link.send(ring, bytes)
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
@@ -56,7 +49,7 @@ impl Line for Ahead {
     }
 }
 
-/// What was sent while a bus did something, and when it was done.
+/// What the master sent while a bus did something, with the times at which it had left, and when it was done.
 fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, u8)>, Instant) {
     let size = RingSize::new(u64::from(DRIVES)).expect("a size");
     let ring = Ring::new(size, Rate::Baud38400, |_| {
@@ -69,19 +62,22 @@ fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, 
             link.inject(0, fault, Moment::Byte(number));
         }
     }
-    let sent = Arc::default();
     let line = Ahead {
-        link,
+        link: &mut link,
         lead,
-        sent: Arc::clone(&sent),
     };
     let bus = Bus::open(Box::new(line), &[size], Options::default()).expect("an open bus");
     act(&bus);
     assert_eq!(bus.corrected_errors(), 0);
     let end = bus.now();
     bus.close();
-    let sent = sent.lock().expect("no panic").clone();
-    (sent, end)
+    // Behind what comes home SYNCO may still be on its way.
+    link.run_until(link.now() + Span::from_millis(50));
+    let sent = link.trace(0).links[0].bytes.clone();
+    let sent = sent
+        .iter()
+        .map(|byte| (byte.at, byte.sent.expect("a byte")));
+    (sent.collect(), end)
 }
 
 fn reads(bus: &Bus<'_>) {

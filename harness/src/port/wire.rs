@@ -12,7 +12,7 @@ use rustix::io::Errno;
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 
-/// What is read from the operating system at a time.
+/// What is read from the operating system at a time: a line brings few bytes between two looks at it.
 const CHUNK: usize = 256;
 
 /// What may wait to be taken by the operating system.

@@ -76,7 +76,7 @@ pub(super) struct InFlight {
 impl InFlight {
     pub(super) fn new(most: usize) -> Self {
         Self {
-            // With a lot of slack it may be many, and is not.
+            // The slack allows for many more than are ever under way.
             bytes: VecDeque::new(),
             most,
         }

@@ -186,21 +186,14 @@ impl Store {
 
     /// Adds a job behind the others; `None` where there is no room.
     pub(super) fn add(&mut self, job: &Job, read_long: ReadLongAnswer) -> Option<JobId> {
+        if self.free.is_empty() && self.entries.len() < usize::from(self.capacity) {
+            self.free.push(Slot::try_from(self.entries.len()).ok()?);
+            self.entries.push(None);
+        }
+        let slot = self.free.pop()?;
         let id = JobId(self.next_id);
-        let entry = Some(Entry::new(id, job, read_long));
-        let slot = match self.free.pop() {
-            Some(slot) => {
-                self.entries[usize::from(slot)] = entry;
-                slot
-            }
-            None => {
-                let slot = Slot::try_from(self.entries.len()).ok();
-                let slot = slot.filter(|slot| *slot < self.capacity)?;
-                self.entries.push(entry);
-                slot
-            }
-        };
         self.next_id += 1;
+        self.entries[usize::from(slot)] = Some(Entry::new(id, job, read_long));
         self.link(slot);
         Some(id)
     }
