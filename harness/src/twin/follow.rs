@@ -257,12 +257,12 @@ impl Twin {
                         bytes.push(*byte);
                         next += byte_time;
                     }
-                    self.pass_until(*at);
+                    self.link.run_until(*at);
                     self.link.send(*ring, &bytes);
                 }
                 Done::Fault(at, fault, moment) => {
                     if *moment == Moment::Now {
-                        self.pass_until(*at);
+                        self.link.run_until(*at);
                     }
                     // A byte that is due is on the wire before a fault that comes behind it.
                     self.link.wait(self.link.now());
@@ -271,7 +271,7 @@ impl Twin {
                 Done::Step(_) => {}
             }
         }
-        self.pass_until(conversation.end + slack);
+        self.link.run_until(conversation.end + slack);
         let mut received = vec![Vec::new(); self.sizes.len()];
         for (ring, received) in received.iter_mut().enumerate() {
             while let Some(byte) = self.link.receive(ring) {
@@ -281,12 +281,6 @@ impl Twin {
         received
     }
 
-    fn pass_until(&mut self, until: Instant) {
-        while self.link.now() < until {
-            self.link.wait(until);
-        }
-    }
-
     /// Lets time pass in which nothing is sent, until every drive has tested itself after its power-up (11.8).
     pub fn rest_through_self_tests(&mut self) {
         const STEP: Span = Span::from_millis(200);
@@ -294,7 +288,7 @@ impl Twin {
         let end = self.link.now() + LONGEST;
         loop {
             let next = self.link.now() + STEP;
-            self.pass_until(next);
+            self.link.run_until(next);
             if next >= end || !self.in_reset() {
                 return;
             }
