@@ -162,7 +162,8 @@ impl InnerLink {
         };
         let result = up.receive(&mut bytes);
         let read = time::Instant::now();
-        for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
+        let bytes: Vec<_> = stamped(bytes, now, byte_time, &mut self.last_arrival).collect();
+        for (at, byte) in bytes {
             self.carried += 1;
             let seen = if passes {
                 self.pass(at, byte, byte_time, read)
@@ -188,9 +189,9 @@ impl InnerLink {
         let passed = self.tamper.pass(byte, start);
         let mut free = start + passed.delay;
         self.taken += 1;
-        self.given += passed.bytes.len() as u64 + u64::from(passed.hold.is_some());
+        self.given += passed.bytes().count() as u64 + u64::from(passed.hold.is_some());
         let read = read + time::Duration::from_nanos(free.since(at).as_nanos());
-        for received in &passed.bytes {
+        for received in passed.bytes() {
             let outgoing = match received.error {
                 None | Some(LineError::Overrun) => Outgoing::Byte(received.byte),
                 Some(LineError::Break) => Outgoing::Break(byte_time * 2),
@@ -206,7 +207,7 @@ impl InnerLink {
         if passed.delay > Span::ZERO || passed.hold.is_some() {
             self.free = free;
         }
-        passed.seen(byte.byte, at, byte_time)
+        passed.seen(byte.byte, at, byte_time).collect()
     }
 
     fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {

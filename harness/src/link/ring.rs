@@ -80,7 +80,7 @@ impl Ring {
             free += length;
             self.sent += 1;
         };
-        for received in &passed.bytes {
+        for received in passed.bytes() {
             let outgoing = match received.error {
                 None => Outgoing::Byte(received.byte),
                 Some(_) => Outgoing::WrongParity(received.byte),
@@ -128,13 +128,11 @@ impl Ring {
             self.came += 1;
             self.carried += 1;
             let passed = self.incoming.pass(byte, at);
-            let seen = passed.seen(byte.byte, at + passed.delay, byte_time);
-            for byte in &seen {
+            let recording = recording && self.log[1].len() < MOST_RECORDED;
+            for byte in passed.seen(byte.byte, at + passed.delay, byte_time) {
                 let arrival = byte.arrival().map(|received| (byte.at, received));
                 self.received.extend(arrival);
-            }
-            if recording && self.log[1].len() < MOST_RECORDED {
-                self.log[1].extend(seen);
+                self.log[1].extend(recording.then_some(byte));
             }
         }
         result

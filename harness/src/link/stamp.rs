@@ -10,12 +10,12 @@ pub(super) fn stamped(
     now: Instant,
     byte_time: Span,
     last: &mut Instant,
-) -> Vec<(Instant, Received)> {
+) -> impl Iterator<Item = (Instant, Received)> {
     let behind = (0..bytes.len() as u64).rev();
-    let stamp = |(byte, behind)| {
+    let stamp = move |(byte, behind)| {
         let at = Instant::START + now.since_start().saturating_sub(byte_time * behind);
         *last = at.max(*last);
         (*last, byte)
     };
-    bytes.into_iter().zip(behind).map(stamp).collect()
+    bytes.into_iter().zip(behind).map(stamp)
 }

@@ -14,10 +14,11 @@ use std::collections::BTreeMap;
 /// What becomes of a byte.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Passed {
-    /// What goes on, in order; empty where it is lost.
-    pub(super) bytes: Vec<Received>,
-    /// How many of them were put in front of the byte itself.
-    pub(super) inserted: usize,
+    /// What goes on in front of it.
+    inserted: Vec<Received>,
+    /// The byte itself, unless it is lost.
+    own: Option<Received>,
+    twice: bool,
     /// How long the first of them is held back.
     pub(super) delay: Span,
     /// How long the line is held at 0 in place of the byte.
@@ -25,21 +26,39 @@ pub(super) struct Passed {
 }
 
 impl Passed {
+    /// What goes on, in order.
+    pub(super) fn bytes(&self) -> impl Iterator<Item = Received> + '_ {
+        let inserted = self.inserted.iter().copied();
+        inserted.chain(self.own).chain(self.again())
+    }
+
+    fn again(&self) -> Option<Received> {
+        self.own.filter(|_| self.twice)
+    }
+
     /// The wire's bytes for a record, the first of which ends at `at`: what was sent, and what arrives.
-    pub(super) fn seen(&self, sent: u8, at: Instant, byte_time: Span) -> Vec<LineByte> {
-        if self.hold.is_some() {
-            let error = Some(LineError::Break);
-            return vec![LineByte::seen(at, Some(sent), Some(0), error)];
-        }
-        if self.bytes.len() == self.inserted {
-            return vec![LineByte::seen(at, Some(sent), None, None)];
-        }
-        let each = self.bytes.iter().enumerate().map(|(index, byte)| {
-            let own = (index == self.inserted).then_some(sent);
-            let at = at + byte_time * index as u64;
-            LineByte::seen(at, own, Some(byte.byte), byte.error)
-        });
-        each.collect()
+    pub(super) fn seen(
+        &self,
+        sent: u8,
+        at: Instant,
+        byte_time: Span,
+    ) -> impl Iterator<Item = LineByte> + '_ {
+        let (byte, error) = match self.hold {
+            Some(_) => (Some(0), Some(LineError::Break)),
+            None => (
+                self.own.map(|own| own.byte),
+                self.own.and_then(|own| own.error),
+            ),
+        };
+        let own = LineByte::seen(at, Some(sent), byte, error);
+        let other = move |other: Received| LineByte::seen(at, None, Some(other.byte), other.error);
+        let inserted = self.inserted.iter().copied().map(other);
+        let all = inserted.chain([own]).chain(self.again().map(other));
+        let times = (0..).map(move |behind| at + byte_time * behind);
+        all.zip(times).map(|(mut byte, at)| {
+            byte.at = at;
+            byte
+        })
     }
 }
 
@@ -86,10 +105,8 @@ impl Tamper {
     pub(super) fn pass(&mut self, byte: Received, start: Instant) -> Passed {
         self.count += 1;
         let mut passed = Passed::default();
-        let mut before = Vec::new();
         let mut whole = Some(byte);
         let mut flips = Flips::default();
-        let mut copies = 1;
         for fault in self.armed.remove(&self.count).unwrap_or_default() {
             match fault {
                 LinkFault::Flip(more) => {
@@ -104,8 +121,8 @@ impl Tamper {
                     whole = whole.map(|_| Received::good(data));
                 }
                 LinkFault::Drop => whole = None,
-                LinkFault::Duplicate => copies = 2,
-                LinkFault::Insert(data) => before.push(Received::good(data)),
+                LinkFault::Duplicate => passed.twice = true,
+                LinkFault::Insert(data) => passed.inserted.push(Received::good(data)),
                 LinkFault::Delay(span) => passed.delay = passed.delay + span,
                 LinkFault::Break(span) => passed.hold = Some(span),
                 LinkFault::Overrun => {}
@@ -118,20 +135,16 @@ impl Tamper {
             self.held_until = Some(start + span);
         }
         if self.cut || held {
-            passed.hold = None;
-            return passed;
+            return Passed {
+                delay: passed.delay,
+                ..Passed::default()
+            };
         }
-        passed.inserted = before.len();
-        passed.bytes = before;
-        if passed.hold.is_some() {
-            return passed;
-        }
-        let arrives = whole.map(|b| Received {
-            error: b.error.or(flips.noticed()),
-            ..b
-        });
-        for _ in 0..copies {
-            passed.bytes.extend(arrives);
+        if passed.hold.is_none() {
+            passed.own = whole.map(|b| Received {
+                error: b.error.or(flips.noticed()),
+                ..b
+            });
         }
         passed
     }
@@ -164,7 +177,7 @@ mod tests {
     fn pass(tamper: &mut Tamper, bytes: &[u8]) -> Vec<(u8, bool)> {
         let all = bytes.iter().flat_map(|byte| {
             let passed = tamper.pass(Received::good(*byte), Instant::START);
-            passed.bytes
+            passed.bytes().collect::<Vec<_>>()
         });
         all.map(|b| (b.byte, b.error.is_some())).collect()
     }
@@ -189,6 +202,46 @@ mod tests {
         assert_eq!(tamper.unused().count(), 0);
     }
 
+    /// As on the simulated wire.
+    #[test]
+    fn what_is_put_in_front_of_a_byte_arrives_although_the_byte_does_not() {
+        let byte_time = Span::from_millis(1);
+        let at = |ms| Instant::START + Span::from_millis(ms);
+        let seen = |faults: &[LinkFault]| {
+            let mut tamper = Tamper::default();
+            faults.iter().for_each(|fault| tamper.arm(1, *fault));
+            let passed = tamper.pass(Received::good(0x10), at(0));
+            let seen = passed.seen(0x10, at(1), byte_time);
+            seen.map(|byte| (byte.at, byte.sent, byte.received, byte.error))
+                .collect::<Vec<_>>()
+        };
+        let inserted = (at(1), None, Some(0x55), None);
+        assert_eq!(
+            seen(&[LinkFault::Insert(0x55), LinkFault::Drop]),
+            [inserted, (at(2), Some(0x10), None, None)]
+        );
+        let hold = LinkFault::Break(Span::from_millis(5));
+        assert_eq!(
+            seen(&[LinkFault::Insert(0x55), hold]),
+            [
+                inserted,
+                (at(2), Some(0x10), Some(0), Some(LineError::Break))
+            ]
+        );
+        assert_eq!(
+            seen(&[LinkFault::Insert(0x55), LinkFault::Duplicate]),
+            [
+                inserted,
+                (at(2), Some(0x10), Some(0x10), None),
+                (at(3), None, Some(0x10), None)
+            ]
+        );
+        assert_eq!(
+            seen(&[LinkFault::Insert(0x55), LinkFault::Cut]),
+            [(at(1), Some(0x10), None, None)]
+        );
+    }
+
     #[test]
     fn cut_and_joined() {
         let mut tamper = Tamper::default();
@@ -209,10 +262,10 @@ mod tests {
         let at = |ms| Instant::START + Span::from_millis(ms);
         let passed = tamper.pass(Received::good(1), at(0));
         assert_eq!(
-            (passed.bytes.len(), passed.hold),
+            (passed.bytes().count(), passed.hold),
             (0, Some(Span::from_millis(5)))
         );
-        assert_eq!(tamper.pass(Received::good(2), at(4)).bytes, []);
-        assert_eq!(tamper.pass(Received::good(3), at(5)).bytes.len(), 1);
+        assert_eq!(tamper.pass(Received::good(2), at(4)).bytes().count(), 0);
+        assert_eq!(tamper.pass(Received::good(3), at(5)).bytes().count(), 1);
     }
 }
