@@ -168,7 +168,12 @@ impl<L: Line> Guarded<L> {
 
     /// The time on the guard's clock.
     fn guard_time(&self) -> Instant {
-        self.origin + self.inner.now().since_start()
+        self.on_guard_clock(self.inner.now())
+    }
+
+    /// A time of the conversation on the guard's clock.
+    fn on_guard_clock(&self, at: Instant) -> Instant {
+        self.origin + at.since_start()
     }
 
     fn deny(&mut self, text: String) {
@@ -275,7 +280,7 @@ impl<L: Line> Line for Guarded<L> {
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         let now = self.inner.now();
-        let guard_time = self.guard_time();
+        let guard_time = self.on_guard_clock(now);
         let Some(state) = self.rings.get_mut(ring) else {
             self.deny(format!("ring {} is not in the rig's file", ring + 1));
             return now;

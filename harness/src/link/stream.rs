@@ -187,9 +187,8 @@ impl StreamLink {
     }
 
     /// Lets due faults happen and gives the operating system what is due.
-    fn give(&mut self) {
+    fn give(&mut self, now: Instant) {
         self.beats.fetch_add(1, Ordering::Relaxed);
-        let now = self.at(time::Instant::now());
         while let Some(&(at, ring, link, fault)) = self.scheduled.front()
             && at <= now
         {
@@ -211,9 +210,8 @@ impl StreamLink {
     }
 
     /// Takes what has come.
-    fn take(&mut self) {
+    fn take(&mut self, now: Instant) {
         let told = self.told.get();
-        let now = self.at(time::Instant::now());
         for ring in &mut self.rings {
             if self.trouble.is_none() {
                 let times = (told, now);
@@ -248,15 +246,19 @@ impl StreamLink {
         }
     }
 
-    /// Whether there is a byte to be fetched.
-    fn has_come(&self) -> bool {
-        let now = self.now();
-        let mut fronts = self.rings.iter().filter_map(|ring| ring.received.front());
-        fronts.any(|(at, _)| *at <= now)
+    /// Whether there is a byte to be fetched from a ring; what is delayed on the last link has not come yet.
+    fn has_come(&self, ring: &Ring) -> bool {
+        let next = ring.received.front();
+        next.is_some_and(|(at, _)| *at <= self.told.get() || *at <= self.now())
+    }
+
+    /// The same of all of them.
+    fn any_has_come(&self) -> bool {
+        self.rings.iter().any(|ring| self.has_come(ring))
     }
 
     /// When something has to be done although nothing comes.
-    fn due(&self) -> Option<Instant> {
+    fn due(&self, now: Instant) -> Option<Instant> {
         let queues = self.rings.iter().filter_map(|ring| {
             let (start, exact, _) = ring.queue.front()?;
             // All that is due goes out at once, and then nothing for a while.
@@ -265,7 +267,6 @@ impl StreamLink {
         });
         let faults = self.scheduled.front().map(|(at, ..)| *at);
         // What is delayed on the last link.
-        let now = self.now();
         let fronts = self.rings.iter().filter_map(|ring| ring.received.front());
         let queues = queues.chain(fronts.map(|(at, _)| *at).filter(|at| *at > now));
         let relays = self.inner.iter().filter_map(InnerLink::due);
@@ -276,8 +277,9 @@ impl StreamLink {
         queues.chain(faults).chain(relays).chain(lost).min()
     }
 
-    fn sleep(&mut self, span: Span) {
-        let calm = self.now() + CALM;
+    fn sleep(&mut self, now: Instant, until: Instant) {
+        let span = until.since(now);
+        let calm = now + CALM;
         if self.inner.is_empty() && self.rings.iter().all(|ring| ring.free > calm) {
             // What comes meanwhile can wait: the line is taken for longer, and to wake up for every byte costs more than all else.
             let span = time::Duration::from_nanos(span.min(DOZE).as_nanos());
@@ -334,35 +336,32 @@ impl Line for StreamLink {
             own.send(now, *byte, byte_time, recording);
         }
         let free = own.free;
-        self.give();
+        self.give(now);
         free
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        let now = self.now();
-        let ring = self.rings.get_mut(ring)?;
-        // What is delayed on the last link has not come yet.
-        let (at, _) = ring.received.front()?;
-        if *at > now {
+        if !self.has_come(self.rings.get(ring)?) {
             return None;
         }
         self.lying = false;
-        ring.received.pop_front()
+        self.rings.get_mut(ring)?.received.pop_front()
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        self.give();
-        if (self.lying || !self.has_come()) && self.trouble.is_none() {
-            let until = self.due().map_or(until, |due| due.min(until));
-            let left = until.since(self.now());
+        let mut now = self.at(time::Instant::now());
+        self.give(now);
+        if (self.lying || !self.any_has_come()) && self.trouble.is_none() {
+            let until = self.due(now).map_or(until, |due| due.min(until));
             // What has come, and has not been taken, ends the sleep at once.
-            if left > Span::ZERO {
-                self.sleep(left);
+            if until > now {
+                self.sleep(now, until);
             }
-            self.give();
+            now = self.at(time::Instant::now());
+            self.give(now);
         }
-        self.take();
-        self.lying = self.has_come();
+        self.take(now);
+        self.lying = self.any_has_come();
         self.trouble.is_none()
     }
 
@@ -371,7 +370,8 @@ impl Line for StreamLink {
     }
 
     fn lead(&self) -> Lead {
-        let late = self.late.at(time::Instant::now());
+        let since = time::Duration::from_nanos(self.told.get().since_start().as_nanos());
+        let late = self.late.at(self.start + since);
         let least = match self.rings.iter().all(|ring| ring.wire.is_prompt()) {
             true => Span::ZERO,
             false => ADAPTER,
@@ -417,8 +417,9 @@ impl Link for StreamLink {
     }
 
     fn begin(&mut self) {
-        self.give();
-        self.take();
+        let now = self.at(time::Instant::now());
+        self.give(now);
+        self.take(now);
         self.start = time::Instant::now();
         self.told.set(Instant::START);
         self.lying = false;
