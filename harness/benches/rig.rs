@@ -1,10 +1,11 @@
 //! What the bench adds to the time on the wire, and what it costs of a processor, on rings that another process serves at the pace of
 //! the line, 38400 bit/s (ND21 8.1).
 //!
-//! Each conversation is played three times: in virtual time, which is the wire's own; by a program that only writes to the socket and
-//! reads from it, the baseline in the same run; and by the bench, with guard, record, and everything else that a rig has. The program
-//! writes what was sent in virtual time, and what was sent behind an answer when as much has come back. What both add is the system's:
-//! two processes that are woken up, once for each question and each answer. What the bench adds to that is its own.
+//! Each conversation is played in three ways: in virtual time, which is the wire's own; by a program that only writes to the socket and
+//! reads from it, the baseline; and by the bench, with guard, record, and everything else that a rig has. The program writes what was
+//! sent in virtual time, and what was sent behind an answer when as much has come back. What both add is the system's: two processes
+//! that are woken up, once for each question and each answer. What the bench adds to that is its own. The two take turns, each on a ring
+//! of its own, so that what else the computer does slows down both; each figure is the middle one of its own kind.
 
 #![expect(clippy::print_stdout, reason = "figures are what it is for")]
 
@@ -14,7 +15,8 @@ mod ring;
 use harness::library::Entry;
 use harness::link::{Line, Link};
 use harness::port::Endpoint;
-use harness::rig::{Options, Run, Session, parse};
+use harness::rig::{Options, Rig, Run, Session, parse};
+use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtFinding, play};
 use harness::scenario::simulate;
 use harness::scenario::source::Source;
@@ -28,7 +30,7 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// How often each is measured; the middle one counts.
-const TIMES: usize = 9;
+const TIMES: usize = 11;
 
 /// How long a served ring is given to see that its client has gone.
 const TURN: Duration = Duration::from_millis(500);
@@ -103,22 +105,34 @@ fn processor() -> Duration {
     )
 }
 
-fn middle(mut all: Vec<(f64, f64)>) -> (f64, f64) {
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+/// Seconds on the clock, and the share of a processor.
+struct Took {
+    clock: f64,
+    share: f64,
+}
+
+impl Took {
+    /// `clock` is what counts, where that is less than all that `act` does.
+    fn of(act: impl FnOnce() -> Option<f64>) -> Self {
+        let (before, begin) = (processor(), Instant::now());
+        let counts = act();
+        let clock = counts.unwrap_or(begin.elapsed().as_secs_f64());
+        Self {
+            clock,
+            share: (processor() - before).as_secs_f64() / clock,
+        }
+    }
+}
+
+fn middle(all: &[(Took, Took)], of: impl Fn(&(Took, Took)) -> f64) -> f64 {
+    let mut all: Vec<f64> = all.iter().map(of).collect();
+    all.sort_by(f64::total_cmp);
     all[all.len() / 2]
 }
 
-/// Seconds on a clock, and of a processor.
-fn timed(act: impl FnOnce()) -> (f64, f64) {
-    let (before, begin) = (processor(), Instant::now());
-    act();
-    let took = begin.elapsed();
-    (took.as_secs_f64(), (processor() - before).as_secs_f64())
-}
-
 /// The baseline: each chunk is written when what it is an answer to has come back.
-fn bare(stream: &mut TcpStream, chunks: &[Chunk]) -> (f64, f64) {
-    timed(|| {
+fn bare(stream: &mut TcpStream, chunks: &[Chunk]) -> Took {
+    Took::of(|| {
         let mut buffer = [0; 4_096];
         let (mut sent, mut came) = (0, 0);
         let mut read_until = |stream: &mut TcpStream, back| {
@@ -132,6 +146,8 @@ fn bare(stream: &mut TcpStream, chunks: &[Chunk]) -> (f64, f64) {
             sent += chunk.bytes.len();
         }
         read_until(stream, sent);
+        assert_eq!(came, sent, "what was sent comes home, and nothing else");
+        None
     })
 }
 
@@ -149,10 +165,8 @@ fn main() {
         "", "", "ms", "ms", "", "ms", "", "", "CPU", "CPU"
     );
     for drives in [1, 3, 100, 250] {
-        let served = Served::start("nd21", &[drives], "tcp", false, &[]);
-        let Endpoint::Tcp(address) = &served.endpoints[0] else {
-            unreachable!("a socket");
-        };
+        let serve = || Served::start("nd21", &[drives], "tcp", false, &[]);
+        let (for_bare, for_bench) = (serve(), serve());
         for case in cases(drives) {
             let source = Source {
                 name: "bench.scn".to_owned(),
@@ -165,61 +179,67 @@ fn main() {
             assert!(virtual_time.finding.is_none(), "{:?}", virtual_time.finding);
             let wire = virtual_time.took.as_millis_f64() / 1e3;
             let chunks = chunks(&link.trace(0), link.byte_time());
-            let mut stream = TcpStream::connect(address).expect("a server");
-            stream.set_nodelay(true).expect("no delay");
-            let bare = (0..TIMES).map(|_| bare(&mut stream, &chunks)).collect();
-            let bare = middle(bare);
-            drop(stream);
-            // A second client is turned away while the first one has not been seen to go.
-            std::thread::sleep(TURN);
-            let bench = middle(on_the_bench(address, served.sizes[0], plan));
-            std::thread::sleep(TURN);
-            let added = |(took, _): (f64, f64)| 100.0 * (took / wire - 1.0);
-            let of_a_core = |(took, cpu): (f64, f64)| 100.0 * cpu / took;
+            let both = in_turns(address(&for_bare), &chunks, &rig(&for_bench), plan);
+            let added = |clock: f64| 100.0 * (clock / wire - 1.0);
+            let of_bare = middle(&both, |(bare, _)| bare.clock);
+            let of_bench = middle(&both, |(_, bench)| bench.clock);
             println!(
                 "{drives:>6}  {:57} {:9.2} {:9.2} {:7.2}% {:9.2} {:7.2}% {:7.2}% {:6.2}% {:6.2}%",
                 case.name,
                 wire * 1e3,
-                bare.0 * 1e3,
-                added(bare),
-                bench.0 * 1e3,
-                added(bench),
-                added(bench) - added(bare),
-                of_a_core(bare),
-                of_a_core(bench)
+                of_bare * 1e3,
+                added(of_bare),
+                of_bench * 1e3,
+                added(of_bench),
+                100.0 * middle(&both, |(bare, bench)| bench.clock - bare.clock) / wire,
+                100.0 * middle(&both, |(bare, _)| bare.share),
+                100.0 * middle(&both, |(_, bench)| bench.share),
             );
+            // A second client is turned away while the first one has not been seen to go.
+            std::thread::sleep(TURN);
         }
     }
 }
 
-/// The conversation on a rig in use: its own time, and what it cost of a processor beside that of the checks around it.
-fn on_the_bench(
-    address: &str,
-    drives: u8,
-    plan: &harness::scenario::plan::Plan,
-) -> Vec<(f64, f64)> {
+fn address(served: &Served) -> &str {
+    match &served.endpoints[0] {
+        Endpoint::Tcp(address) => address,
+        _ => unreachable!("a socket"),
+    }
+}
+
+/// The served ring as a rig.
+fn rig(served: &Served) -> Rig {
     let text = format!(
-        "schema = 1\n[rig]\nid = \"bench\"\n[ring.1]\ndrives = {drives}\ntransport = \"tcp\"\nport = \"{address}\"\n\
-         time_tolerance = \"100ms\"\n[health]\nbetween = false\n"
+        "schema = 1\n[rig]\nid = \"bench\"\n[ring.1]\ndrives = {}\ntransport = \"tcp\"\nport = \"{}\"\n\
+         time_tolerance = \"100ms\"\n[health]\nbetween = false\n",
+        served.sizes[0],
+        address(served)
     );
     let rig = parse(&Source {
         name: "bench.toml".to_owned(),
         text: text.into(),
     });
-    let rig = rig.expect("a rig");
-    let mut session = Session::open(&rig, &Options::default()).expect("a rig in use");
+    rig.expect("a rig")
+}
+
+/// The conversation by the bare program and on a rig in use, again and again: its own time, and what it cost of a processor.
+fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> Vec<(Took, Took)> {
+    let mut stream = TcpStream::connect(address).expect("a server");
+    stream.set_nodelay(true).expect("no delay");
+    let mut session = Session::open(rig, &Options::default()).expect("a rig in use");
     let mut run = Run::new(&mut session).expect("a model");
-    let measured = (0..TIMES).map(|_| {
-        let mut took = Span::ZERO;
-        let (_, cpu) = timed(|| {
+    let both = (0..TIMES).map(|_| {
+        let bare = bare(&mut stream, chunks);
+        let bench = Took::of(|| {
             let played = run.play(plan, None).expect("a healthy rig");
             assert!(played.outcome.finding.is_none(), "{:?}", played.outcome);
-            took = played.outcome.took;
+            Some(played.outcome.took.as_millis_f64() / 1e3)
         });
-        (took.as_millis_f64() / 1e3, cpu)
+        (bare, bench)
     });
-    let measured = measured.collect();
+    let both = both.collect();
     assert_eq!(session.link().trouble(), None);
     let _end = session.close();
-    measured
+    both
 }
