@@ -3,8 +3,8 @@
 use harness_proto::time::Span;
 use std::time::{Duration, Instant};
 
-/// The time in which what was seen counts half as much.
-const HALF: Duration = Duration::from_secs(2);
+/// The time in which what was seen counts half as much: who was late once is not late for long, and SYNCO sent ahead delays each job.
+const HALF: Duration = Duration::from_millis(500);
 
 /// The worst that has been seen, forgotten little by little.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +36,7 @@ impl Lateness {
 
     /// By how much whoever wants to be woken may be late now.
     pub(super) fn at(&self, now: Instant) -> Span {
-        let halves = now.saturating_duration_since(self.seen).as_secs() / HALF.as_secs();
+        let halves = now.saturating_duration_since(self.seen).as_millis() / HALF.as_millis();
         let left = self.worst.as_nanos() >> halves.min(63);
         Span::from_nanos(left)
     }
