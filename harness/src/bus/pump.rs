@@ -237,12 +237,12 @@ impl<'l> Pump<'l> {
                     false => ring.free > now + lead.near,
                 };
                 if enough {
-                    break before(ring.free, lead.near).max(again);
+                    break (ring.free - lead.near).max(again);
                 }
             }
             if ring.free > far || self.link.trouble().is_some() {
                 // The next go out many at a time.
-                break before(ring.free, Span::from_nanos(lead.far.as_nanos() / 2));
+                break ring.free - Span::from_nanos(lead.far.as_nanos() / 2);
             }
             // The time at which the byte leaves, not that at which it is handed over.
             let start = ring.free.max(now);
@@ -296,10 +296,6 @@ impl<'l> Pump<'l> {
             self.poll();
         }
     }
-}
-
-fn before(at: Instant, span: Span) -> Instant {
-    Instant::START + at.since_start().saturating_sub(span)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ pub(super) fn stamped(
 ) -> impl Iterator<Item = (Instant, Received)> {
     let behind = (0..bytes.len() as u64).rev();
     let stamp = move |(byte, behind)| {
-        let at = Instant::START + now.since_start().saturating_sub(byte_time * behind);
+        let at = now - byte_time * behind;
         *last = at.max(*last);
         (*last, byte)
     };

@@ -263,7 +263,7 @@ impl StreamLink {
             let (start, exact, _) = ring.queue.front()?;
             // All that is due goes out at once, and then nothing for a while.
             let lead = if *exact { Span::ZERO } else { AT_LEAST_AHEAD };
-            Some(Instant::START + start.since_start().saturating_sub(lead))
+            Some(*start - lead)
         });
         let faults = self.scheduled.front().map(|(at, ..)| *at);
         // What is delayed on the last link.

@@ -360,8 +360,7 @@ impl Server {
                     exact = home.map_or(exact, |home| exact.min(on_clock(home)));
                 }
                 At::Master(_) if seat.taken => {
-                    let ahead = seat.sent_by.since_start().saturating_sub(AHEAD);
-                    exact = exact.min(on_clock(Instant::START + ahead));
+                    exact = exact.min(on_clock(seat.sent_by - AHEAD));
                 }
                 At::Inner(inner) if inner.role.hears() => {
                     let fetch = self.link.next_fetch(inner.ring, inner.link);

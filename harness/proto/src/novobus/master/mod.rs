@@ -378,7 +378,7 @@ impl Master {
     fn silent_until(&self, now: Instant) -> Span {
         // One byte time before the oldest byte under way is to come back.
         let early = self.options.slack + self.byte_time;
-        let from = |due: Instant| Instant::START + due.since_start().saturating_sub(early);
+        let from = |due: Instant| due - early;
         let from = self.in_flight.due().map(from);
         now.since(from.map_or(self.last_heard, |from| from.max(self.last_heard)))
     }

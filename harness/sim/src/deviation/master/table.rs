@@ -9,7 +9,6 @@ use harness_proto::novobus::master::{
     Data, End, Event, Fault, Job, JobId, Options, Outcome, Phase, Repeat, RingLink,
 };
 use harness_proto::novobus::sync::{Addressing, SYNCO};
-use harness_proto::time::Instant;
 
 /// Bits 6 and 5 of a sync byte: the next drive, the short address (ND21 9.2).
 const NEXT: u8 = 1 << 6;
@@ -240,7 +239,7 @@ pub(super) static DEVIATIONS: &[MasterDeviation] = &[
         section: "8.2",
         about: "it does not wait for as long as a byte needs to go round",
         how: How::Waits(|(phase, due, slack, byte_time): Due| {
-            let early = Instant::START + due.since_start().saturating_sub(slack + byte_time);
+            let early = due - (slack + byte_time);
             Some(if phase == Phase::Running { early } else { due })
         }),
     },
