@@ -1,8 +1,7 @@
-//! RFC 2217 as ser2net (Debian) speaks it: a served ring on a pseudo terminal, ser2net in front of it, and the bench behind that. Where
-//! ser2net is not installed, one line says so.
+//! RFC 2217 as ser2net (Debian) speaks it: a served ring on a pseudo terminal, ser2net in front of it, and the bench behind that.
 
-#![expect(clippy::print_stderr, reason = "a test that is left out says so")]
-
+#[path = "debian/mod.rs"]
+mod debian;
 #[path = "served/ring.rs"]
 mod ring;
 
@@ -24,9 +23,7 @@ impl Drop for Ends {
 
 #[test]
 fn a_ring_behind_ser2net() {
-    let version = Command::new("ser2net").arg("-v").output();
-    if version.is_err() {
-        eprintln!("skipped: ser2net is not installed (apt-get install ser2net)");
+    if !debian::has("ser2net", "RFC 2217 as it speaks it") {
         return;
     }
     let served = Served::start("nd21", &[2], "pty", false, &[]);

@@ -1,7 +1,5 @@
 //! The commands on drives, on a ring that another process serves: one process a command, as a person types them.
 
-#![expect(clippy::print_stderr, reason = "a test that is left out says so")]
-
 use super::ring::Served;
 use super::{Desk, ended, finish, playing, said, signal};
 use harness::port::Endpoint;
@@ -338,10 +336,7 @@ fn a_program_that_hangs_is_watched() {
 #[test]
 fn a_port_without_rights() {
     let root = rustix::process::geteuid().is_root();
-    if root && Command::new("setpriv").arg("--version").output().is_err() {
-        eprintln!(
-            "skipped: root cannot become somebody else without setpriv (apt-get install util-linux)"
-        );
+    if root && !super::debian::has("setpriv", "a port without rights, tried by root") {
         return;
     }
     let served = Served::start("plain", &[2], "pty", false, &[]);

@@ -2,6 +2,8 @@
 //! wrong between them.
 
 mod commands;
+#[path = "../debian/mod.rs"]
+mod debian;
 #[path = "../served/ring.rs"]
 mod ring;
 mod simulated;

@@ -1,5 +1,7 @@
 //! What a run leaves for other tools, and captures that are read back.
 
+#[path = "../debian/mod.rs"]
+mod debian;
 mod forms;
 mod hostile;
 mod judged;
@@ -14,13 +16,7 @@ use harness::scenario::run::{AtFinding, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-
-/// Says why a test is not made, past the harness, which hides what passing tests print.
-fn skip(why: &str) {
-    let _unwritable = writeln!(std::io::stderr(), "skipped: {why}");
-}
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -1,6 +1,6 @@
-//! What we write, read by programs that we did not write: sigrok-cli and tshark. `.ci/tools` installs them; where one is
-//! not installed its test says so in one line, and `DRIVEBENCH_TOOLS=required` makes that a failure.
+//! What we write, read by programs that we did not write: sigrok-cli and tshark.
 
+use super::debian::has;
 use super::{DAMAGED, built_in, file, pcapng, root, run};
 use harness::capture::{Capture, read};
 use harness::report::csv::{self, status};
@@ -10,29 +10,19 @@ use std::process::Command;
 
 /// What a program prints; `None` where it is not installed.
 fn output(program: &str, arguments: &[&str]) -> Option<String> {
-    match Command::new(program).args(arguments).output() {
-        Ok(output) => {
-            let text = String::from_utf8_lossy(&output.stdout).into_owned();
-            let errors = String::from_utf8_lossy(&output.stderr);
-            assert!(output.status.success(), "{program} {arguments:?}: {errors}");
-            assert!(
-                !text.contains("Lua Error") && !errors.contains("Lua:"),
-                "{text}{errors}"
-            );
-            Some(text)
-        }
-        Err(_) => {
-            let required = std::env::var("DRIVEBENCH_TOOLS").is_ok_and(|value| value == "required");
-            assert!(
-                !required,
-                "{program} is not installed: `bash .ci/tools` does it"
-            );
-            super::skip(&format!(
-                "{program} is not installed; `bash .ci/tools` does it"
-            ));
-            None
-        }
+    if !has(program, "what it reads of captures") {
+        return None;
     }
+    let output = Command::new(program).args(arguments).output();
+    let output = output.expect("it is there");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{program} {arguments:?}: {errors}");
+    assert!(
+        !text.contains("Lua Error") && !errors.contains("Lua:"),
+        "{text}{errors}"
+    );
+    Some(text)
 }
 
 /// Bytes and what is wrong with them, as sigrok's decoder says for one line.

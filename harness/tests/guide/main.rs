@@ -2,6 +2,8 @@
 //! citations and pipelines are checked.
 
 mod compare;
+#[path = "../debian/mod.rs"]
+mod debian;
 mod page;
 mod pipeline;
 mod shell;
@@ -11,7 +13,6 @@ use harness::manual::{errata, tables};
 use page::{Page, Step};
 use std::cell::Cell;
 use std::collections::BTreeSet;
-use std::io::Write as _;
 use std::panic::{self, UnwindSafe};
 use std::path::Path;
 use std::sync::Once;
@@ -42,14 +43,9 @@ fn commands(path: &Path) -> datatest_stable::Result<()> {
         }
     }
     let name = path.display().to_string();
-    let differences = shell::differences(&steps, &name, |why| skip(&name, why));
+    let differences = shell::differences(&steps, &name);
     assert!(differences.is_empty(), "\n{differences}");
     Ok(())
-}
-
-/// Says in one line that something was not run.
-fn skip(page: &str, why: &str) {
-    let _unwritable = writeln!(std::io::stderr(), "skipped: {page}: {why}");
 }
 
 /// Every `drivebench` command that the guide names is one that the program takes, also where it is not run.

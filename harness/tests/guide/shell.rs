@@ -1,6 +1,7 @@
 //! The commands of a page, run in one shell in a folder of their own.
 
 use super::compare::fits;
+use super::debian;
 use super::page::{Mode, Shown, Step};
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 use std::fmt::Write as _;
@@ -13,7 +14,7 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Does the steps and says what came out otherwise than the page shows.
-pub(super) fn differences(steps: &[Step], page: &str, skip: impl Fn(&str)) -> String {
+pub(super) fn differences(steps: &[Step], page: &str) -> String {
     let home = tempfile::tempdir().expect("a folder");
     let (work, out) = (home.path().join("work"), home.path().join("out"));
     for folder in [&work, &out, &home.path().join("bin")] {
@@ -35,7 +36,7 @@ pub(super) fn differences(steps: &[Step], page: &str, skip: impl Fn(&str)) -> St
                     "mkdir -p \"$(dirname '{name}')\"; cp ../out/file{number} '{name}'"
                 );
             }
-            Step::Command(mode, shown) if wanted(mode, &skip) => {
+            Step::Command(mode, shown) if wanted(mode, page) => {
                 script.push_str(&one(&shown.command, commands.len()));
                 commands.push(shown);
             }
@@ -54,21 +55,11 @@ pub(super) fn differences(steps: &[Step], page: &str, skip: impl Fn(&str)) -> St
     text
 }
 
-fn wanted(mode: &Mode, skip: impl Fn(&str)) -> bool {
+fn wanted(mode: &Mode, page: &str) -> bool {
     let Mode::Needs(tool) = mode else {
         return *mode == Mode::Run;
     };
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let there = std::env::split_paths(&path).any(|folder| folder.join(tool).is_file());
-    let required = std::env::var("DRIVEBENCH_TOOLS").is_ok_and(|value| value == "required");
-    assert!(
-        there || !required,
-        "{tool} is not installed: `bash .ci/tools` does it"
-    );
-    if !there {
-        skip(&format!("{tool} is not installed; `.ci/tools` does it"));
-    }
-    there
+    debian::has(tool, page)
 }
 
 /// One command of the script. One in the background has begun when it has said its first line.

@@ -1,9 +1,8 @@
 //! Chromium without a window, spoken to by its DevTools protocol over a pipe: JSON, a zero byte behind each message.
 //!
-//! `.ci/tools` installs it (Debian's `chromium`). Where it is missing a test says so in one line, and `DRIVEBENCH_TOOLS=required` makes
-//! that a failure. Every wait has an end, and the browser is ended with the test.
+//! Every wait has an end, and the browser is ended with the test.
 
-use super::skip;
+use super::debian::has;
 use serde_json::{Value, json};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -38,14 +37,7 @@ impl Drop for Browser {
 impl Browser {
     /// Starts one with a folder of its own; `None` where there is none.
     pub(crate) fn start(folder: &Path) -> Option<Self> {
-        let version = Command::new("chromium").arg("--version").output();
-        if !version.is_ok_and(|output| output.status.success()) {
-            let required = std::env::var("DRIVEBENCH_TOOLS").is_ok_and(|value| value == "required");
-            assert!(
-                !required,
-                "chromium is not installed: `bash .ci/tools` does it"
-            );
-            skip("chromium is not installed; `bash .ci/tools` does it");
+        if !has("chromium", "what it makes of pages") {
             return None;
         }
         // It reads from 3 and writes to 4.

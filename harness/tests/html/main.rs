@@ -1,6 +1,8 @@
 //! The page of a run: its structure, its bounds, text that would be markup, and what a browser makes of it.
 
 mod browser;
+#[path = "../debian/mod.rs"]
+mod debian;
 mod devtools;
 mod hostile;
 mod pages;
@@ -14,13 +16,7 @@ use harness::scenario::run::{AtFinding, Outcome, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness_sim::trace::Trace;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-
-/// Says why a test is not made, past the harness, which hides what passing tests print.
-fn skip(why: &str) {
-    let _unwritable = writeln!(std::io::stderr(), "skipped: {why}");
-}
 
 /// A folder of one test's own, empty.
 fn folder(name: &str) -> PathBuf {

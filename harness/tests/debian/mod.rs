@@ -1,0 +1,26 @@
+//! Programs of others that tests use, from Debian. `.ci/tools` installs them; a test whose program is not there says so in one line, and
+//! `DRIVEBENCH_TOOLS=required` makes that a failure.
+
+use std::io::Write as _;
+
+/// Whether a program can be called; where not, `who` says that it is left out.
+pub(crate) fn has(program: &str, who: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let there = std::env::split_paths(&path).any(|folder| folder.join(program).is_file());
+    let required = std::env::var("DRIVEBENCH_TOOLS").is_ok_and(|value| value == "required");
+    assert!(
+        there || !required,
+        "{who}: {program} is not installed: `bash .ci/tools` does it"
+    );
+    if !there {
+        skip(&format!(
+            "{who}: {program} is not installed; `bash .ci/tools` does it"
+        ));
+    }
+    there
+}
+
+/// Says what is left out and why, past the test harness, which hides what passing tests print.
+pub(crate) fn skip(why: &str) {
+    let _unwritable = writeln!(std::io::stderr(), "skipped: {why}");
+}
