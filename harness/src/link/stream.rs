@@ -297,9 +297,8 @@ impl StreamLink {
         let awaited = self.awaited(now);
         if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
             let end = until.min(at + STAY);
-            while !self.listen(Span::ZERO) && self.at(time::Instant::now()) < end {
-                std::thread::yield_now();
-            }
+            // Whoever gives way here is out of it for a whole slice of time where others are busy.
+            while !self.listen(Span::ZERO) && self.at(time::Instant::now()) < end {}
             return;
         }
         let span = awaited.map_or(span, |at| span.min((at - AWAKE).since(now)));
