@@ -122,6 +122,7 @@ fn taken_away() -> f64 {
     let stat = std::fs::read_to_string("/proc/stat").unwrap_or_default();
     let all = stat.lines().find_map(|line| line.strip_prefix("cpu "));
     let steal = all.and_then(|all| all.split_whitespace().nth(7)?.parse::<f64>().ok());
+    // In hundredths of a second.
     steal.unwrap_or(0.0) / 100.0
 }
 
@@ -274,10 +275,11 @@ fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<(To
     };
     let mut all = Vec::new();
     while all.len() < AT_MOST && all.iter().filter(calm).count() < TIMES {
-        all.push(turn());
-        if !all.last().is_some_and(|last| calm(&last)) {
+        let last = turn();
+        if !calm(&&last) {
             std::thread::sleep(CALM);
         }
+        all.push(last);
     }
     let turns = all.len();
     all.sort_by(|one, other| one.0.total_cmp(&other.0));
