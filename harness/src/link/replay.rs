@@ -89,9 +89,6 @@ impl Replay {
     }
 }
 
-/// How much longer than it wanted a busy computer may have waited.
-const JITTER: Span = Span::from_millis(50);
-
 impl Line for Replay {
     fn byte_time(&self) -> Span {
         self.rate.byte_time()
@@ -133,13 +130,10 @@ impl Line for Replay {
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        // Whoever wanted to wait until a time has waited a little longer, and fetched what came meanwhile.
-        let jitter = match self.tolerance {
-            Span::ZERO => Span::ZERO,
-            _ => JITTER,
-        };
+        // In real time whoever wanted to wait until a time has waited longer, and fetched what came meanwhile.
+        let late = self.tolerance > Span::ZERO;
         match self.events.front() {
-            Some(Event::Received(own, at, byte)) if *own == ring && *at <= self.now + jitter => {
+            Some(Event::Received(own, at, byte)) if *own == ring && (late || *at <= self.now) => {
                 let byte = (*at, *byte);
                 self.events.pop_front();
                 self.now = self.now.max(byte.0);
@@ -246,5 +240,59 @@ impl Link for Replay {
             links: Vec::new(),
             marks: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(at: u64) -> Instant {
+        Instant::START + Span::from_millis(at)
+    }
+
+    /// A byte that comes long behind the time until which it was waited for, and one that is sent then.
+    fn overslept(tolerance: Span) -> Replay {
+        let byte = Received::good(0x80);
+        let events = vec![
+            Event::Begin(Instant::START),
+            Event::Sent(0, ms(1), vec![0x80]),
+            Event::Received(0, ms(300), byte),
+            Event::Sent(0, ms(301), vec![0x81]),
+        ];
+        Replay::new(events, Rate::default(), tolerance, vec![1], Vec::new())
+    }
+
+    /// Sends, looks for an answer until a time as whoever listens does, and sends what comes next.
+    fn play(replay: &mut Replay) -> Vec<Instant> {
+        replay.begin();
+        replay.send(0, &[0x80]);
+        let mut came = Vec::new();
+        while replay.now() < ms(50) {
+            replay.wait(ms(50));
+            while let Some((at, _)) = replay.receive(0) {
+                came.push(at);
+            }
+        }
+        replay.send(0, &[0x81]);
+        came
+    }
+
+    #[test]
+    fn whoever_slept_too_long_has_fetched_what_came_meanwhile() {
+        let mut replay = overslept(Span::from_millis(20));
+        assert_eq!(play(&mut replay), [ms(300)]);
+        assert_eq!((replay.trouble(), replay.left()), (None, None));
+    }
+
+    #[test]
+    fn nobody_sleeps_too_long_where_time_is_virtual() {
+        let mut replay = overslept(Span::ZERO);
+        assert_eq!(play(&mut replay), []);
+        let trouble = replay.trouble().expect("trouble").to_string();
+        assert!(
+            trouble.contains("something else than what is sent"),
+            "{trouble}"
+        );
     }
 }
