@@ -2,7 +2,10 @@
 
 use harness::library::{Entry, sources};
 use harness::link::{Event, Link, Recording, Replay};
-use harness::qualify::{Answer, Asked, Hypothesis, Probe, answer, explaining, hypotheses, probes};
+use harness::qualify::{
+    Answer, Asked, Hypothesis, Probe, answer, deviating, explaining, explaining_most, hypotheses,
+    probes,
+};
 use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus};
 use harness::scenario::simulate::bench;
@@ -290,4 +293,41 @@ fn measured_differ(lines: &[String], text: &str) {
     let divergence = comparisons.iter().find_map(|one| one.divergence.as_ref());
     assert_eq!(divergence, None, "{}", divergence.expect("one"));
     assert_eq!(measured, 1);
+}
+
+/// Bytes that are right and late by what no deviation explains name none. Another byte does (ND21 9.6).
+#[test]
+fn what_the_right_drive_explains_names_no_deviation() {
+    let names = |lines: &[String], late: Span| {
+        let plan = entry("title x\nring 3\nread-byte 1 FE13\n").plan;
+        let plan = plan.expect("novobus");
+        let (_, mut link) = model(lines);
+        let mut seen = conversations(&plan, &mut link);
+        for conversation in &mut seen {
+            for (_, at, _) in conversation.received.iter_mut().skip(2) {
+                *at = *at + late;
+            }
+        }
+        let real = Exactness {
+            tolerance: Span::from_millis(20),
+            ..EXACT
+        };
+        let twin = |lines: &[String]| -> Result<Twin, ()> {
+            let (plan, link) = model(lines);
+            Ok(Twin::new(link, &plan.rings))
+        };
+        let found = explaining_most(deviating(3, &[1]), &[seen], real, &twin);
+        let names = found.into_iter().map(|found| found.name);
+        names.collect::<Vec<_>>()
+    };
+    assert_eq!(names(&[], Span::from_millis(60)), [""; 0]);
+    assert_eq!(names(&[], Span::ZERO), [""; 0]);
+    let wrong = ["drive 1 deviates checksum-wrong".to_owned()];
+    let named = names(&wrong, Span::ZERO);
+    assert!(
+        named
+            .iter()
+            .any(|name| name.contains("drive 1: checksum-wrong")),
+        "{named:?}"
+    );
 }

@@ -54,28 +54,20 @@ impl Findings {
         }
     }
 
-    /// Notes what came of a scenario.
-    pub(super) fn note(&mut self, played: &Played) {
+    /// Notes what came of a scenario on a rig that states this tolerance of times.
+    pub(super) fn note(&mut self, played: &Played, tolerance: Span) {
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());
             self.master_is_wrong |= !attempt.master_is_right;
         }
-        // What was late once and not again says nothing of a drive.
-        let steady = played.outcome.verdict == Verdict::Marginal;
-        for attempt in &played.attempts {
-            let diverged = attempt.comparisons.iter().filter_map(|c| {
-                let untimely = c.untimely.as_ref().filter(|_| steady);
-                c.divergence.as_ref().or(untimely)
-            });
-            let drives: Vec<_> = diverged.map(|divergence| divergence.drive).collect();
-            if !drives.is_empty() {
-                let own = match attempt.driven {
-                    Some(_) => &mut self.with_driver,
-                    None => &mut self.diverged,
-                };
-                own.push(attempt.conversations.clone());
-                self.suspects.extend(drives.into_iter().flatten());
-            }
+        if let Some((attempt, divergences)) = played.telling(tolerance) {
+            let own = match attempt.driven {
+                Some(_) => &mut self.with_driver,
+                None => &mut self.diverged,
+            };
+            own.push(attempt.conversations.clone());
+            let drives = divergences.iter().filter_map(|there| there.drive);
+            self.suspects.extend(drives);
         }
         self.suspects.sort_unstable();
         self.suspects.dedup();
@@ -125,6 +117,8 @@ pub(super) fn settle(
     output: &mut Output,
 ) -> Result<Exit, Stop> {
     let drives = run.session().rig().file.ring.first.drives;
+    let tolerance = run.exactness().tolerance;
+    let mut open = 0;
     if !ill {
         // A damaged byte on a simulated inner link is no more than what the scenarios have.
         let simulated = run.session().rig().is_simulated();
@@ -137,7 +131,13 @@ pub(super) fn settle(
             let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
             output.result(&line(&entry, &played.outcome, output))?;
             output.say(&details(&entry, &played.outcome, traces));
-            findings.note(&played);
+            findings.note(&played, tolerance);
+            open += usize::from(match played.outcome.verdict {
+                // Drives could not be made ready.
+                Verdict::Skipped => !played.attempts.is_empty(),
+                Verdict::Flaky | Verdict::Inconclusive => true,
+                _ => false,
+            });
             if over(run, output) {
                 break;
             }
@@ -147,13 +147,20 @@ pub(super) fn settle(
         true => None,
         false => Some(profile(run, findings, folder.as_deref_mut(), output)?),
     };
-    let named = format!(
+    let mut named = format!(
         "{}{}",
         name_master(findings, output)?,
         name(run, findings, output)?
     );
+    if open > 0 {
+        let text =
+            format!("{open} of the conversations above settle nothing: see what is said of them\n");
+        output.result(&text)?;
+        named.push_str(&text);
+    }
     let exit = match (findings.master_is_wrong, findings.attempts().is_empty()) {
         (true, _) => Exit::RigError,
+        (false, true) if open > 0 => Exit::Incomplete,
         (false, true) => Exit::Passed,
         (false, false) => Exit::Failed,
     };
@@ -320,7 +327,9 @@ fn ask(
         last.clear();
         for entry in entries {
             let played = play(run, entry, folder.as_deref_mut())?;
-            let Some(attempt) = played.attempts.last() else {
+            let was_played = played.outcome.verdict != Verdict::Skipped;
+            let Some(attempt) = played.last_played().filter(|_| was_played) else {
+                findings.note(&played, exactness.tolerance);
                 return Ok(Asking::Not(played.outcome.remarks.join("; ")));
             };
             conversations.push(attempt.conversations.clone());
@@ -336,6 +345,7 @@ fn ask(
             break;
         }
     }
-    last.iter().for_each(|played| findings.note(played));
+    last.iter()
+        .for_each(|played| findings.note(played, exactness.tolerance));
     Ok(Asking::Answer(Answer::Unexplained))
 }

@@ -164,12 +164,14 @@ fn all(
     };
     if job.qualify {
         run.rehearse();
+        run.repeat();
     }
     if let Some(path) = &job.evidence {
         *folder = Some(Folder::create(path, &about(&mut run))?);
     }
     let bar = progress_bar(entries.len(), output.progress);
     let mut findings = Findings::default();
+    let tolerance = run.exactness().tolerance;
     let name = run.session().rig().id().to_owned();
     let mut cases = Cases::new(&name, job.junit.as_deref());
     let mut verdicts = Vec::new();
@@ -201,7 +203,7 @@ fn all(
             page.add(entry, outcome, traces);
         }
         bar.inc(1);
-        findings.note(&played);
+        findings.note(&played, tolerance);
         ill = played.outcome.verdict == Verdict::RigError
             && played
                 .attempts

@@ -140,7 +140,7 @@ impl Target for OnRig<'_, '_> {
             took: Span::from_nanos(took),
             ..Tried::default()
         };
-        let Some(last) = played.attempts.last() else {
+        let Some(last) = played.last_played() else {
             tried.not_played = Some(played.outcome.remarks.join("; "));
             return Ok(tried);
         };
@@ -163,6 +163,8 @@ impl Target for OnRig<'_, '_> {
                 tried.not_played = Some(last.outcome.remarks.join("; "));
                 None
             }
+            // A busy computer is late now and then, and not as late again.
+            Verdict::Marginal if played.telling(self.run.exactness().tolerance).is_none() => None,
             _ => difference(last),
         };
         Ok(tried)

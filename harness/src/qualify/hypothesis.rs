@@ -51,7 +51,7 @@ const ASKED_OF_ALL: usize = 3;
 
 /// The hypotheses that explain the most of several attempts, in the order given: a drive that a deviation has left in another
 /// state explains what comes behind in its own way. Where one has explained every attempt so far, those that have explained none
-/// are asked no more.
+/// are asked no more. What the right drive explains as well is explained by no deviation.
 pub fn explaining_most<E>(
     mut hypotheses: Vec<Hypothesis>,
     attempts: &[Vec<Conversation>],
@@ -61,8 +61,11 @@ pub fn explaining_most<E>(
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     let most = |counts: &BTreeMap<String, usize>| counts.values().max().copied();
     for (number, attempt) in attempts.iter().enumerate() {
-        let found = explaining(&hypotheses, attempt, exactness, twin);
-        for (hypothesis, _) in found.unwrap_or_default() {
+        let right = twin(&[]).ok();
+        let right = right.and_then(|twin| judge(twin, attempt, exactness));
+        let better = |own: Evidence| right.is_none_or(|right| own.timely && !right.timely);
+        let found = explaining(&hypotheses, attempt, exactness, twin).unwrap_or_default();
+        for (hypothesis, _) in found.into_iter().filter(|(_, own)| better(*own)) {
             *counts.entry(hypothesis.name.clone()).or_default() += 1;
         }
         if number + 1 >= ASKED_OF_ALL && most(&counts) == Some(number + 1) {

@@ -5,6 +5,7 @@ use super::Rig;
 use super::driven::Driven;
 use super::file::Deviation;
 use super::health::{Unhealthy, examine};
+use super::played::{Again, Attempt, Played};
 use super::session::{Session, SessionError};
 use crate::guard::Guarded;
 use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
@@ -17,34 +18,8 @@ use crate::twin::{Comparison, Conversation, Exactness, Twin};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 use harness_sim::deviation::{self, MasterDeviation};
-use harness_sim::trace::Trace;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// How often a scenario is played whose bytes are right and come at other times than the model says.
-const MOST_UNTIMELY: usize = 3;
-
-/// How often drives are made ready before a scenario is skipped.
-const MOST_UNREADY: usize = 2;
-
-/// One attempt at a scenario.
-#[derive(Clone, Debug)]
-pub struct Attempt {
-    /// What came of it, the twin's word heard.
-    pub outcome: Outcome,
-    /// The conversations, those of the health check and of what is set up before among them.
-    pub conversations: Vec<Conversation>,
-    /// How they compare with the twin's.
-    pub comparisons: Vec<Comparison>,
-    /// What the links carried in the scenario itself, ring by ring.
-    pub traces: Vec<Trace>,
-    /// Line errors that the transport told of without their bytes.
-    pub unplaced: u64,
-    /// What the bench's own master did in it on a simulated rig, if it had a part.
-    pub driven: Option<Driven>,
-    /// Whether that is what the master of the manual does.
-    pub master_is_right: bool,
-}
 
 /// Keeps attempts: events as they happen, and what came of each.
 pub trait Keeper: Sink {
@@ -55,15 +30,6 @@ pub trait Keeper: Sink {
     fn ends(&mut self, number: usize, attempt: &Attempt);
 }
 
-/// A scenario that was played as often as the rig's file says.
-#[derive(Clone, Debug)]
-pub struct Played {
-    /// What came of all attempts together.
-    pub outcome: Outcome,
-    /// The attempts, in order; none where it was skipped.
-    pub attempts: Vec<Attempt>,
-}
-
 /// A rig that scenarios are played on, and its twin.
 pub struct Run<'s> {
     session: &'s mut Session,
@@ -72,12 +38,14 @@ pub struct Run<'s> {
     byte_time: Span,
     /// The sign of life of whoever only computes; see the session's watchdog.
     beats: Option<Arc<AtomicU64>>,
-    /// Drives that cannot be made ready are made ready once more: until that, too, has not helped.
-    once_more: bool,
+    /// When a scenario is played once more.
+    again: Again,
     /// Drives are not reset before a scenario, whatever is allowed.
     as_they_are: bool,
     /// What the rig's limits do not let be played to its end is not begun.
     rehearses: bool,
+    /// How often a scenario that does not pass is played where the rig's file asks for less.
+    least: u8,
     /// How the bench's own master breaks the manual on this rig, on purpose.
     master: Option<&'static MasterDeviation>,
 }
@@ -107,7 +75,8 @@ impl<'s> Run<'s> {
             session,
             twin,
             byte_time,
-            once_more: true,
+            again: Again::default(),
+            least: 1,
             as_they_are: false,
             rehearses: false,
         })
@@ -172,7 +141,7 @@ impl<'s> Run<'s> {
             return Ok(Played::skipped(why));
         }
         let mut attempts = Vec::new();
-        let most = usize::from(self.session.rig().file.retry.attempts.max(1));
+        let most = usize::from(self.session.rig().file.retry.attempts.max(self.least));
         loop {
             let number = attempts.len() + 1;
             if let Some(keeper) = &mut keeper {
@@ -183,18 +152,8 @@ impl<'s> Run<'s> {
             if let Some(keeper) = &mut keeper {
                 keeper.ends(number, &attempt);
             }
-            let verdict = attempt.outcome.verdict;
             attempts.push(attempt);
-            let again = match verdict {
-                Verdict::Passed | Verdict::RigError => false,
-                // Drives that could not be made ready: what disturbed them may have been the computer.
-                Verdict::Skipped => self.once_more && attempts.len() < MOST_UNREADY,
-                // A busy computer is late now and then, a drive at the same byte each time.
-                Verdict::Marginal => attempts.len() < MOST_UNTIMELY,
-                _ => attempts.len() < most,
-            };
-            // It is the drives, then, and not the computer.
-            self.once_more &= verdict != Verdict::Skipped || again;
+            let again = self.again.after(&attempts, most);
             if !again || self.session.link().trouble().is_some() {
                 return Ok(Played::of(attempts));
             }
@@ -281,6 +240,14 @@ impl<'s> Run<'s> {
     /// is sent.
     pub fn rehearse(&mut self) {
         self.rehearses = !self.session.limits().allow_everything();
+    }
+
+    /// Plays from now on what does not pass once more at least, where time is real: what a busy computer has caused does not come
+    /// again.
+    pub fn repeat(&mut self) {
+        if self.exactness.tolerance > Span::ZERO {
+            self.least = 2;
+        }
     }
 
     /// What the guard refuses of a plan on the model.
@@ -382,45 +349,6 @@ impl Sink for Both<'_> {
         if let Some(sink) = &mut self.sink {
             sink.take(event);
         }
-    }
-}
-
-impl Played {
-    fn skipped(why: String) -> Self {
-        Self {
-            outcome: Outcome::skipped(why),
-            attempts: Vec::new(),
-        }
-    }
-
-    /// The last attempt that was played speaks for all; one that passed behind one that did not is flaky.
-    fn of(attempts: Vec<Attempt>) -> Self {
-        // What could not be played again takes nothing back.
-        let was_played = |attempt: &&Attempt| attempt.outcome.verdict != Verdict::Skipped;
-        let last = attempts.iter().rfind(was_played).or(attempts.last());
-        let mut outcome = match last {
-            Some(last) => last.outcome.clone(),
-            None => Outcome::skipped("it was not played".to_owned()),
-        };
-        if attempts.len() > 1 {
-            let verdicts: Vec<_> = attempts
-                .iter()
-                .map(|attempt| attempt.outcome.verdict.name())
-                .collect();
-            let remark = format!("{} attempts: {}", attempts.len(), verdicts.join(", "));
-            outcome.remarks.push(remark);
-            let verdict = |attempt: &Attempt| attempt.outcome.verdict;
-            let no_fault =
-                |attempt| matches!(verdict(attempt), Verdict::Marginal | Verdict::Skipped);
-            let before = &attempts[..attempts.len() - 1];
-            if let Some(unready) = before.iter().find(|a| verdict(a) == Verdict::Skipped) {
-                outcome.remarks.extend(unready.outcome.remarks.clone());
-            }
-            if outcome.verdict == Verdict::Passed && !before.iter().all(no_fault) {
-                outcome.verdict = Verdict::Flaky;
-            }
-        }
-        Self { outcome, attempts }
     }
 }
 
@@ -532,41 +460,5 @@ fn sizes(rings: &[RingSize]) -> String {
     match sizes.len() {
         1 => format!("a ring of {}", sizes[0]),
         _ => format!("rings of {}", sizes.join(" and ")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn of(verdicts: &[Verdict]) -> Verdict {
-        let attempt = |verdict: &Verdict| Attempt {
-            driven: None,
-            master_is_right: true,
-            outcome: Outcome {
-                verdict: *verdict,
-                ..Outcome::skipped("it does not answer ResetH8".to_owned())
-            },
-            conversations: Vec::new(),
-            comparisons: Vec::new(),
-            traces: Vec::new(),
-            unplaced: 0,
-        };
-        Played::of(verdicts.iter().map(attempt).collect())
-            .outcome
-            .verdict
-    }
-
-    #[test]
-    fn attempts_together() {
-        use Verdict::{Failed, Flaky, Marginal, Passed, Skipped};
-        assert_eq!(of(&[Passed]), Passed);
-        assert_eq!(of(&[Failed, Passed]), Flaky);
-        assert_eq!(of(&[Marginal, Passed]), Passed);
-        assert_eq!(of(&[Failed, Skipped]), Failed);
-        assert_eq!(of(&[Marginal, Skipped]), Marginal);
-        assert_eq!(of(&[Skipped]), Skipped);
-        assert_eq!(of(&[Skipped, Passed]), Passed);
-        assert_eq!(of(&[Skipped, Failed]), Failed);
     }
 }

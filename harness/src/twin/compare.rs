@@ -90,6 +90,31 @@ pub struct Divergence {
     pub drive: Option<u8>,
 }
 
+impl Divergence {
+    /// Whether another conversation differed at the same place, in the same way, and as late or as early but for a tolerance.
+    #[must_use]
+    pub fn is_like(&self, other: &Self, tolerance: Span) -> bool {
+        let place = |own: &Self| (own.ring, own.role, own.step, own.drive);
+        let apart = |(early, late): (Span, Span), (before, behind): (Span, Span)| {
+            early.max(before).saturating_sub(early.min(before))
+                + late.max(behind).saturating_sub(late.min(behind))
+        };
+        place(self) == place(other)
+            && self.what == other.what
+            && apart(self.off(), other.off()) <= tolerance
+    }
+
+    /// How much too early the byte came, and how much too late.
+    fn off(&self) -> (Span, Span) {
+        match (self.expected, self.received) {
+            (Some((expected, _)), Some((received, _))) => {
+                (expected.since(received), received.since(expected))
+            }
+            _ => (Span::ZERO, Span::ZERO),
+        }
+    }
+}
+
 impl fmt::Display for Divergence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let show = |byte: &Option<(Instant, Received)>| match byte {

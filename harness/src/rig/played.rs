@@ -1,0 +1,316 @@
+//! Attempts at a scenario: what they come to together, and whether there is another one.
+
+use super::driven::Driven;
+use crate::scenario::run::Outcome;
+use crate::scenario::verdict::Verdict;
+use crate::twin::{Comparison, Conversation, Divergence};
+use harness_proto::time::Span;
+use harness_sim::trace::Trace;
+use std::collections::BTreeSet;
+
+/// How often a scenario is played whose bytes are right and come at other times than the model says.
+const MOST_UNTIMELY: usize = 3;
+
+/// How often drives are made ready before a scenario is skipped.
+const MOST_UNREADY: usize = 3;
+
+/// One attempt at a scenario.
+#[derive(Clone, Debug)]
+pub struct Attempt {
+    /// What came of it, the twin's word heard.
+    pub outcome: Outcome,
+    /// The conversations, those of the health check and of what is set up before among them.
+    pub conversations: Vec<Conversation>,
+    /// How they compare with the twin's.
+    pub comparisons: Vec<Comparison>,
+    /// What the links carried in the scenario itself, ring by ring.
+    pub traces: Vec<Trace>,
+    /// Line errors that the transport told of without their bytes.
+    pub unplaced: u64,
+    /// What the bench's own master did in it on a simulated rig, if it had a part.
+    pub driven: Option<Driven>,
+    /// Whether that is what the master of the manual does.
+    pub master_is_right: bool,
+}
+
+impl Attempt {
+    /// Why the drives could not be made ready for it, if they could not.
+    fn unready(&self) -> Option<&str> {
+        let why = self.outcome.remarks.first().map(String::as_str);
+        why.filter(|_| self.outcome.verdict == Verdict::Skipped)
+    }
+
+    /// The first byte that came at another time than the model says.
+    fn untimely(&self) -> Option<&Divergence> {
+        self.comparisons.iter().find_map(|c| c.untimely.as_ref())
+    }
+}
+
+/// A scenario that was played as often as the rig's file says.
+#[derive(Clone, Debug)]
+pub struct Played {
+    /// What came of all attempts together.
+    pub outcome: Outcome,
+    /// The attempts, in order; none where it was skipped.
+    pub attempts: Vec<Attempt>,
+}
+
+impl Played {
+    pub(super) fn skipped(why: String) -> Self {
+        Self {
+            outcome: Outcome::skipped(why),
+            attempts: Vec::new(),
+        }
+    }
+
+    /// The last attempt that was played speaks for all; one that passed behind one that did not is flaky.
+    pub(super) fn of(attempts: Vec<Attempt>) -> Self {
+        let mut played = Self {
+            outcome: Outcome::skipped("it was not played".to_owned()),
+            attempts,
+        };
+        // What could not be played again takes nothing back.
+        if let Some(last) = played.last_played() {
+            played.outcome = last.outcome.clone();
+        }
+        let (outcome, attempts) = (&mut played.outcome, &played.attempts);
+        if attempts.len() > 1 {
+            let verdicts: Vec<_> = attempts
+                .iter()
+                .map(|attempt| attempt.outcome.verdict.name())
+                .collect();
+            let remark = format!("{} attempts: {}", attempts.len(), verdicts.join(", "));
+            outcome.remarks.push(remark);
+            let verdict = |attempt: &Attempt| attempt.outcome.verdict;
+            let no_fault =
+                |attempt| matches!(verdict(attempt), Verdict::Marginal | Verdict::Skipped);
+            let before = &attempts[..attempts.len() - 1];
+            if let Some(unready) = before.iter().find(|a| verdict(a) == Verdict::Skipped) {
+                outcome.remarks.extend(unready.outcome.remarks.clone());
+            }
+            if outcome.verdict == Verdict::Passed && !before.iter().all(no_fault) {
+                outcome.verdict = Verdict::Flaky;
+            }
+        }
+        played
+    }
+
+    /// The attempt that was otherwise than the model and says something of the drives, and where it was. What did not come again may
+    /// have been the computer: drives that could not be made ready once, bytes that were late at another place or by another span the
+    /// next time.
+    #[must_use]
+    pub fn telling(&self, tolerance: Span) -> Option<(&Attempt, Vec<&Divergence>)> {
+        let last = self.last_played()?;
+        let divergences: Vec<_> = match self.outcome.verdict {
+            Verdict::Passed | Verdict::Flaky | Verdict::Inconclusive => Vec::new(),
+            Verdict::Skipped if unready_each_time(&self.attempts).is_none() => Vec::new(),
+            Verdict::Marginal => {
+                let late = last.untimely().into_iter();
+                late.filter(|late| self.comes_each_time(late, tolerance))
+                    .collect()
+            }
+            _ => {
+                let all = last.comparisons.iter();
+                all.filter_map(|c| c.divergence.as_ref()).collect()
+            }
+        };
+        (!divergences.is_empty()).then_some((last, divergences))
+    }
+
+    /// The last attempt that was played; the last one at all where none was.
+    #[must_use]
+    pub fn last_played(&self) -> Option<&Attempt> {
+        let was_played = |attempt: &&Attempt| attempt.unready().is_none();
+        self.attempts
+            .iter()
+            .rfind(was_played)
+            .or(self.attempts.last())
+    }
+
+    /// Whether a byte came as late at every attempt.
+    fn comes_each_time(&self, late: &Divergence, tolerance: Span) -> bool {
+        let mut played = self.attempts.iter().filter(|own| own.unready().is_none());
+        played.all(|attempt| {
+            let there = attempt.untimely();
+            there.is_some_and(|there| there.is_like(late, tolerance))
+        })
+    }
+}
+
+/// Why drives could not be made ready, where it was the same at every attempt.
+fn unready_each_time(attempts: &[Attempt]) -> Option<&str> {
+    let why = attempts.first()?.unready()?;
+    let same = |attempt: &Attempt| attempt.unready() == Some(why);
+    attempts.iter().all(same).then_some(why)
+}
+
+/// When a scenario is played once more.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Again {
+    /// Why drives could not be made ready, as often as it was tried: it is the drives, then, and not the computer.
+    hopeless: BTreeSet<String>,
+}
+
+impl Again {
+    /// Whether there is another attempt behind these; `most` is how often the rig's file has one that does not pass.
+    pub(super) fn after(&mut self, attempts: &[Attempt], most: usize) -> bool {
+        let Some(last) = attempts.last() else {
+            return true;
+        };
+        let played = attempts.len();
+        match last.outcome.verdict {
+            Verdict::Passed | Verdict::RigError => false,
+            // Drives that could not be made ready: what disturbed them may have been the computer.
+            Verdict::Skipped if played < MOST_UNREADY => {
+                let hopeless = |why| self.hopeless.contains(why);
+                !last.unready().is_some_and(hopeless)
+            }
+            Verdict::Skipped => {
+                let why = unready_each_time(attempts);
+                self.hopeless.extend(why.map(str::to_owned));
+                false
+            }
+            // A busy computer is late now and then, a drive at the same byte each time.
+            Verdict::Marginal => played < MOST_UNTIMELY,
+            _ => played < most,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::What;
+    use Verdict::{Failed, Flaky, Marginal, Passed, Skipped};
+    use harness_proto::line::Received;
+    use harness_proto::novobus::role::Role;
+    use harness_proto::time::Instant;
+
+    const SILENT: &str = "cell FF00 of drive 1: it does not answer ResetH8";
+    const OWN_CELL: &str = "cell FF18 of drive 0: 56 was written, 00 is read";
+
+    fn attempt(verdict: Verdict, remark: &str) -> Attempt {
+        Attempt {
+            driven: None,
+            master_is_right: true,
+            outcome: Outcome {
+                verdict,
+                ..Outcome::skipped(remark.to_owned())
+            },
+            conversations: Vec::new(),
+            comparisons: Vec::new(),
+            traces: Vec::new(),
+            unplaced: 0,
+        }
+    }
+
+    fn of(verdicts: &[Verdict]) -> Verdict {
+        let attempts = verdicts.iter().map(|verdict| attempt(*verdict, SILENT));
+        Played::of(attempts.collect()).outcome.verdict
+    }
+
+    #[test]
+    fn attempts_together() {
+        assert_eq!(of(&[Passed]), Passed);
+        assert_eq!(of(&[Failed, Passed]), Flaky);
+        assert_eq!(of(&[Marginal, Passed]), Passed);
+        assert_eq!(of(&[Failed, Skipped]), Failed);
+        assert_eq!(of(&[Marginal, Skipped]), Marginal);
+        assert_eq!(of(&[Skipped]), Skipped);
+        assert_eq!(of(&[Skipped, Passed]), Passed);
+        assert_eq!(of(&[Skipped, Failed]), Failed);
+    }
+
+    /// How many attempts there are where each ends like this, the last over and over.
+    fn attempts(again: &mut Again, most: usize, ends: &[(Verdict, &str)]) -> usize {
+        let mut played: Vec<Attempt> = Vec::new();
+        while again.after(&played, most) {
+            let end = ends.get(played.len()).or(ends.last());
+            let (verdict, remark) = *end.expect("an end");
+            played.push(attempt(verdict, remark));
+        }
+        played.len()
+    }
+
+    #[test]
+    fn whatever_does_not_pass_is_played_again_as_often_as_it_may_be() {
+        let again = &mut Again::default();
+        assert_eq!(attempts(again, 3, &[(Passed, "")]), 1);
+        assert_eq!(attempts(again, 3, &[(Verdict::RigError, "")]), 1);
+        assert_eq!(attempts(again, 1, &[(Failed, "")]), 1);
+        assert_eq!(attempts(again, 5, &[(Failed, "")]), 5);
+        assert_eq!(attempts(again, 5, &[(Failed, ""), (Passed, "")]), 2);
+        assert_eq!(attempts(again, 1, &[(Marginal, "")]), MOST_UNTIMELY);
+    }
+
+    #[test]
+    fn a_drive_that_is_never_ready_takes_no_attempt_from_one_that_was_disturbed() {
+        let again = &mut Again::default();
+        assert_eq!(attempts(again, 1, &[(Skipped, OWN_CELL)]), MOST_UNREADY);
+        assert_eq!(attempts(again, 1, &[(Skipped, OWN_CELL)]), 1);
+        let disturbed = [(Skipped, SILENT), (Passed, "")];
+        assert_eq!(attempts(again, 1, &disturbed), 2);
+        assert_eq!(attempts(again, 1, &disturbed), 2);
+        let mixed = [(Skipped, SILENT), (Skipped, "another"), (Skipped, SILENT)];
+        assert_eq!(attempts(again, 1, &mixed), MOST_UNREADY);
+        assert_eq!(attempts(again, 1, &disturbed), 2);
+    }
+
+    /// An attempt in which a byte at a place of the scenario is otherwise: late by so many milliseconds, or of another value.
+    fn differing(verdict: Verdict, step: usize, late: Option<u64>) -> Attempt {
+        let byte = |at| Some((Instant::START + Span::from_millis(at), Received::good(0x80)));
+        let divergence = Divergence {
+            ring: 0,
+            byte: step + 7,
+            what: late.map_or(What::Value, |_| What::Time),
+            expected: byte(100),
+            received: byte(100 + late.unwrap_or(0)),
+            role: Role::Foreign,
+            step: Some(step),
+            drive: Some(1),
+        };
+        let comparison = Comparison {
+            divergence: late.is_none().then(|| divergence.clone()),
+            untimely: late.map(|_| divergence),
+            ..Comparison::default()
+        };
+        Attempt {
+            comparisons: vec![comparison],
+            ..attempt(verdict, SILENT)
+        }
+    }
+
+    fn tells(attempts: Vec<Attempt>) -> bool {
+        let tolerance = Span::from_millis(20);
+        Played::of(attempts).telling(tolerance).is_some()
+    }
+
+    #[test]
+    fn what_did_not_come_again_tells_nothing_of_the_drives() {
+        let failed = || differing(Failed, 3, None);
+        assert!(tells(vec![failed()]));
+        assert!(tells(vec![failed(), failed()]));
+        assert!(!tells(vec![failed(), attempt(Passed, "")]));
+        assert!(!tells(vec![attempt(Failed, "")]));
+        assert!(!tells(vec![differing(Verdict::Inconclusive, 3, None)]));
+        let unready = || differing(Skipped, 0, None);
+        assert!(tells(vec![unready(), unready(), unready()]));
+        assert!(!tells(vec![unready(), attempt(Passed, "")]));
+        assert!(!tells(vec![unready(), attempt(Skipped, OWN_CELL)]));
+        assert!(tells(vec![unready(), failed()]));
+    }
+
+    #[test]
+    fn a_drive_is_as_late_each_time_and_a_computer_is_not() {
+        let late = |step, by| differing(Marginal, step, Some(by));
+        assert!(tells(vec![late(3, 40), late(3, 45), late(3, 25)]));
+        assert!(!tells(vec![late(3, 40), late(3, 90), late(3, 40)]));
+        assert!(!tells(vec![late(3, 40), late(5, 40), late(3, 40)]));
+        assert!(!tells(vec![late(3, 40), late(3, 40), attempt(Passed, "")]));
+        assert!(tells(vec![
+            late(3, 40),
+            differing(Skipped, 0, None),
+            late(3, 40)
+        ]));
+    }
+}
