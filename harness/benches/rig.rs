@@ -4,7 +4,8 @@
 //! Each conversation is played in three ways: in virtual time, which is the wire's own; by a program that only writes to the socket and
 //! reads from it, the baseline; and by the bench, with guard, record, and everything else that a rig has. The program writes what was
 //! sent in virtual time, and what was sent behind an answer when as much has come back. What both add is the system's: two processes
-//! that are woken up, once for each question and each answer. What the bench adds to that is its own.
+//! that are woken up, once for each question and each answer. What the bench adds to that is its own: less than nothing where it is awake
+//! when an answer comes, and the program has to be woken up.
 //!
 //! The two take turns, each on a ring of its own, so that what else the computer does slows down both; each figure is the middle one of
 //! its own kind. Turns in which the host of a virtual machine took its processors away are taken again: who stands still for 10 ms and

@@ -266,6 +266,9 @@ impl<'l> Pump<'l> {
         let held = free.since(ring.free);
         ring.free = free;
         ring.home += held;
+        if awaited {
+            self.link.attend(index, ring.home);
+        }
         next + held
     }
 

@@ -9,6 +9,7 @@ use harness_sim::bench::Bench;
 use harness_sim::drive::Drive;
 use harness_sim::plain::PlainDrive;
 use harness_sim::ring::Ring;
+use std::sync::{Arc, Mutex};
 
 const DRIVES: u8 = 3;
 
@@ -21,6 +22,8 @@ fn byte() -> Span {
 struct Ahead<'l> {
     link: &'l mut SimulatedLink,
     lead: Lead,
+    /// When something was waited for.
+    attended: Arc<Mutex<Vec<Instant>>>,
 }
 
 impl Line for Ahead<'_> {
@@ -44,18 +47,29 @@ impl Line for Ahead<'_> {
         self.link.wait(until)
     }
 
+    fn attend(&mut self, _ring: usize, at: Instant) {
+        self.attended.lock().expect("no panic").push(at);
+    }
+
     fn lead(&self) -> Lead {
         self.lead
     }
 }
 
-/// What the master sent while a bus did something, with the times at which it had left, and when it was done.
-fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, u8)>, Instant) {
-    let size = RingSize::new(u64::from(DRIVES)).expect("a size");
-    let ring = Ring::new(size, Rate::Baud38400, |_| {
+fn size() -> RingSize {
+    RingSize::new(u64::from(DRIVES)).expect("a size")
+}
+
+fn simulated() -> SimulatedLink {
+    let ring = Ring::new(size(), Rate::Baud38400, |_| {
         Drive::Plain(PlainDrive::default())
     });
-    let mut link = SimulatedLink::new(Bench::one(ring));
+    SimulatedLink::new(Bench::one(ring))
+}
+
+/// What the master sent while a bus did something, with the times at which it had left, and when it was done.
+fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, u8)>, Instant) {
+    let mut link = simulated();
     if late > Span::ZERO {
         let fault = PlacedFault::Link(usize::from(DRIVES), LinkFault::Delay(late));
         for number in 1..60 {
@@ -65,8 +79,9 @@ fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, 
     let line = Ahead {
         link: &mut link,
         lead,
+        attended: Arc::default(),
     };
-    let bus = Bus::open(Box::new(line), &[size], Options::default()).expect("an open bus");
+    let bus = Bus::open(Box::new(line), &[size()], Options::default()).expect("an open bus");
     act(&bus);
     assert_eq!(bus.corrected_errors(), 0);
     let end = bus.now();
@@ -122,6 +137,28 @@ fn an_adapter_is_never_without_bytes() {
         took > end && took <= end + (near + byte()) * 6,
         "{took} {end}"
     );
+}
+
+/// Whoever waits for an answer says when it is due, whatever goes out behind the question.
+#[test]
+fn an_answer_is_attended_to_when_it_comes() {
+    for near in [Span::ZERO, Span::from_millis(4)] {
+        let attended = Arc::<Mutex<Vec<Instant>>>::default();
+        let mut link = simulated();
+        let line = Ahead {
+            link: &mut link,
+            lead: ahead(near),
+            attended: Arc::clone(&attended),
+        };
+        let last = || attended.lock().expect("no panic").last().copied();
+        let bus = Bus::open(Box::new(line), &[size()], Options::default()).expect("an open bus");
+        assert_eq!(last(), Some(bus.now()), "the count of the drives");
+        for _ in 0..3 {
+            let axis = Axis::new(0, 1).expect("an axis");
+            assert_eq!(bus.read_byte(axis, 0xFE13), Ok(0));
+            assert_eq!(last(), Some(bus.now()), "an answer");
+        }
+    }
 }
 
 /// Where an answer is late, SYNCO goes on a byte time behind the time at which it was to be there.

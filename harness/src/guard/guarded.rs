@@ -320,6 +320,10 @@ impl<L: Line> Line for Guarded<L> {
         self.inner.wait(until)
     }
 
+    fn attend(&mut self, ring: usize, at: Instant) {
+        self.inner.attend(ring, at);
+    }
+
     fn trouble(&self) -> Option<&Trouble> {
         self.inner.trouble().or(self.trouble.as_ref())
     }

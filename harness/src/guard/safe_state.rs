@@ -383,6 +383,10 @@ impl Line for OneRing<'_> {
         self.line.wait(until)
     }
 
+    fn attend(&mut self, _: usize, at: Instant) {
+        self.line.attend(self.ring, at);
+    }
+
     fn trouble(&self) -> Option<&Trouble> {
         self.line.trouble()
     }

@@ -192,6 +192,11 @@ pub trait Line: Send {
     /// told again. With [trouble](Self::trouble) time may stand still: who waits in a loop looks at it.
     fn wait(&mut self, until: Instant) -> bool;
 
+    /// Somebody waits for what comes home from a ring at `at`: where time is real, he is awake then.
+    fn attend(&mut self, ring: usize, at: Instant) {
+        let _always_awake = (ring, at);
+    }
+
     /// Why nothing more is carried; `None` while all is well. A simulated link has no trouble.
     fn trouble(&self) -> Option<&Trouble> {
         None
@@ -237,6 +242,10 @@ impl<L: Line + ?Sized> Line for &mut L {
 
     fn wait(&mut self, until: Instant) -> bool {
         (**self).wait(until)
+    }
+
+    fn attend(&mut self, ring: usize, at: Instant) {
+        (**self).attend(ring, at);
     }
 
     fn trouble(&self) -> Option<&Trouble> {

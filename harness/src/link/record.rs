@@ -104,6 +104,10 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         more
     }
 
+    fn attend(&mut self, ring: usize, at: Instant) {
+        self.link.attend(ring, at);
+    }
+
     fn trouble(&self) -> Option<&Trouble> {
         self.link.trouble()
     }

@@ -25,6 +25,8 @@ pub(super) struct Ring {
     pub(super) queue: VecDeque<(Instant, bool, Outgoing)>,
     /// When the line is free for the next byte.
     pub(super) free: Instant,
+    /// When what somebody waits for comes home.
+    pub(super) attended: Option<Instant>,
     pub(super) received: VecDeque<(Instant, Received)>,
     pub(super) last_arrival: Instant,
     /// Bytes sent and received since the ring was last at rest.
@@ -44,6 +46,7 @@ impl Ring {
             drives,
             queue: VecDeque::new(),
             free: Instant::START,
+            attended: None,
             received: VecDeque::new(),
             last_arrival: Instant::START,
             sent: 0,
@@ -59,6 +62,7 @@ impl Ring {
     pub(super) fn begin(&mut self) {
         self.queue.clear();
         self.free = Instant::START;
+        self.attended = None;
         self.received.clear();
         self.last_arrival = Instant::START;
         (self.sent, self.came, self.carried) = (0, 0, 0);

@@ -50,6 +50,12 @@ const CALM: Span = Span::from_millis(4);
 /// The sleep then: some bytes.
 const DOZE: Span = Span::from_millis(2);
 
+/// How long before an answer is due whoever waits for it is woken: that takes longer than all that is done about the answer.
+const AWAKE: Span = Span::from_micros(40);
+
+/// For how long he stays awake behind that time; what is later than that finds him asleep.
+const STAY: Span = Span::from_micros(150);
+
 /// One or two rings over streams.
 #[derive(Debug)]
 pub struct StreamLink {
@@ -288,20 +294,46 @@ impl StreamLink {
             self.late.woken(due, time::Instant::now());
             return;
         }
-        let span = span.min(NAP).as_nanos();
-        let due = time::Instant::now() + time::Duration::from_nanos(span);
+        let awaited = self.awaited(now);
+        if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
+            let end = until.min(at + STAY);
+            // Whoever gives way here is out of it for a whole slice of time where others are busy.
+            while !self.listen(Span::ZERO) && self.at(time::Instant::now()) < end {}
+            return;
+        }
+        let span = awaited.map_or(span, |at| span.min((at - AWAKE).since(now)));
+        let span = span.min(NAP);
+        let due = time::Instant::now() + time::Duration::from_nanos(span.as_nanos());
+        if !self.listen(span) {
+            self.late.woken(due, time::Instant::now());
+        }
+    }
+
+    /// When something is due for which whoever waits is to be awake: what he has said, and the last byte that was sent. Where an adapter
+    /// brings it, nobody knows when.
+    fn awaited(&self, now: Instant) -> Option<Instant> {
+        let out = |ring: &&Ring| ring.sent > ring.came && ring.wire.is_prompt();
+        let home = |ring: &Ring| ring.free + self.rate.byte_time() * u64::from(ring.drives);
+        let due = self.rings.iter().filter(out);
+        let due = due.flat_map(|ring| ring.attended.into_iter().chain([home(ring)]));
+        due.filter(|at| now < *at + STAY).min()
+    }
+
+    /// Waits for the ports, at most this long, and says whether there was anything but the end of that time.
+    fn listen(&mut self, span: Span) -> bool {
         let timeout = Timespec {
             tv_sec: 0,
-            tv_nsec: i64::try_from(span).unwrap_or(0).min(999_999_999),
+            tv_nsec: i64::try_from(span.as_nanos()).unwrap_or(0).min(999_999_999),
         };
         let mut fds: Vec<_> = self.rings.iter().map(|ring| ring.wire.poll_fd()).collect();
         fds.extend(self.inner.iter().flat_map(InnerLink::poll_fds));
         match poll(&mut fds, Some(&timeout)) {
-            Ok(0) => self.late.woken(due, time::Instant::now()),
-            Ok(_) | Err(Errno::INTR | Errno::AGAIN) => {}
+            Ok(ready) => ready > 0,
+            Err(Errno::INTR | Errno::AGAIN) => true,
             Err(error) => {
                 let text = format!("failed to wait for the ports: {error}");
                 self.trouble.get_or_insert(Trouble::Lost(text));
+                true
             }
         }
     }
@@ -363,6 +395,12 @@ impl Line for StreamLink {
         self.take(now);
         self.lying = self.any_has_come();
         self.trouble.is_none()
+    }
+
+    fn attend(&mut self, ring: usize, at: Instant) {
+        if let Some(ring) = self.rings.get_mut(ring) {
+            ring.attended = Some(at);
+        }
     }
 
     fn trouble(&self) -> Option<&Trouble> {
@@ -551,3 +589,7 @@ fn drive_before(place: usize, drives: usize) -> Option<u8> {
             .and_then(|drive| u8::try_from(drive).ok()),
     }
 }
+
+#[cfg(test)]
+#[path = "stream_tests.rs"]
+mod tests;

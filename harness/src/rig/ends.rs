@@ -67,6 +67,10 @@ impl Line for Ends {
         each!(self, link => link.wait(until))
     }
 
+    fn attend(&mut self, ring: usize, at: Instant) {
+        each!(self, link => link.attend(ring, at));
+    }
+
     fn trouble(&self) -> Option<&Trouble> {
         each!(self, link => link.trouble())
     }

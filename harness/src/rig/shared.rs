@@ -106,6 +106,10 @@ impl Line for SharedLine {
         self.with(false, |line| line.wait(until))
     }
 
+    fn attend(&mut self, ring: usize, at: Instant) {
+        self.with((), |line| line.attend(ring, at));
+    }
+
     fn trouble(&self) -> Option<&Trouble> {
         self.trouble.as_ref()
     }

@@ -61,6 +61,10 @@ impl Line for Through<'_, '_> {
         more
     }
 
+    fn attend(&mut self, _ring: usize, at: Instant) {
+        self.runner.link.attend(self.ring, at);
+    }
+
     fn trouble(&self) -> Option<&Trouble> {
         self.halted.as_ref().or_else(|| self.runner.link.trouble())
     }

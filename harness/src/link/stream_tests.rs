@@ -1,0 +1,71 @@
+//! When who waits for an answer is awake.
+
+use super::*;
+use crate::port::{Endpoint, PortSettings, open};
+use std::io::Write as _;
+use std::net::{TcpListener, TcpStream};
+
+const DRIVES: u8 = 3;
+
+/// A link with a ring of three on a socket, and the end of that socket that is the ring's.
+fn link() -> (StreamLink, TcpStream) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let settings = PortSettings {
+        endpoint: Endpoint::Tcp(address),
+        rate: Rate::default(),
+        marks: false,
+        low_latency: false,
+    };
+    let wire = open(&settings).expect("a wire");
+    let (ring, _) = listener.accept().expect("a client");
+    let link = StreamLink::new(
+        vec![(wire, DRIVES)],
+        Vec::new(),
+        Rate::default(),
+        Arc::default(),
+    );
+    (link, ring)
+}
+
+/// The last byte comes home when it has passed all drives, each of which takes a byte time (ND21 8.2).
+#[test]
+fn who_waits_is_awake_for_the_last_byte() {
+    let (mut link, _ring) = link();
+    assert_eq!(link.awaited(link.now()), None, "nothing is under way");
+    let free = link.send(0, &[0x88, 0xFF]);
+    let home = free + link.byte_time() * u64::from(DRIVES);
+    assert_eq!(link.awaited(Instant::START), Some(home));
+    assert_eq!(link.awaited(home), Some(home));
+    assert_eq!(
+        link.awaited(home + STAY),
+        None,
+        "it is late: who knows when it comes"
+    );
+}
+
+/// What somebody waits for comes before SYNCO that was sent behind it.
+#[test]
+fn who_waits_says_for_what() {
+    let (mut link, _ring) = link();
+    let free = link.send(0, &[0x88, SYNCO, SYNCO]);
+    let home = free + link.byte_time() * u64::from(DRIVES);
+    let said = home - link.byte_time() * 2;
+    link.attend(0, said);
+    assert_eq!(link.awaited(Instant::START), Some(said));
+    assert_eq!(link.awaited(said + STAY), Some(home));
+    link.begin();
+    assert_eq!(link.awaited(Instant::START), None);
+}
+
+/// Nobody stays awake for what has come.
+#[test]
+fn what_has_come_is_not_waited_for() {
+    let (mut link, mut ring) = link();
+    let end = link.send(0, &[0x88]) + Span::from_millis(60_000);
+    ring.write_all(&[0x8B]).expect("room");
+    while link.receive(0).is_none() {
+        assert!(link.now() < end && link.wait(end), "{:?}", link.trouble());
+    }
+    assert_eq!(link.awaited(Instant::START), None);
+}
