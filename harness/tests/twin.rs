@@ -305,7 +305,7 @@ fn what_the_right_drive_explains_names_no_deviation() {
         let mut seen = conversations(&plan, &mut link);
         for conversation in &mut seen {
             for (_, at, _) in conversation.received.iter_mut().skip(2) {
-                *at = *at + late;
+                *at += late;
             }
         }
         let real = Exactness {

@@ -369,7 +369,7 @@ pub(crate) fn judge(
         ));
     }
     match (outcome.verdict, divergence) {
-        (Verdict::Passed | Verdict::Failed, Some(divergence)) => {
+        (Verdict::Passed | Verdict::Failed | Verdict::Marginal, Some(divergence)) => {
             let rule = format!("nd21 {}", divergence.role.rule().0);
             match known
                 .iter()

@@ -45,6 +45,20 @@ fn play_on(link: &mut StreamLink, entry: &Entry) -> Outcome {
     play_over_bus(plan, link, AtFinding::Stop)
 }
 
+/// How often a scenario is played whose bytes are right and some late, as a rig plays it.
+const MOST_UNTIMELY: usize = 3;
+
+/// Plays a scenario, and again where the computer was busy.
+fn play_again_on(link: &mut StreamLink, entry: &Entry) -> Outcome {
+    let mut outcome = play_on(link, entry);
+    for _ in 1..MOST_UNTIMELY {
+        if outcome.verdict == Verdict::Marginal {
+            outcome = play_on(link, entry);
+        }
+    }
+    outcome
+}
+
 /// Every built-in scenario, by its model and the sizes of its rings.
 fn by_rings() -> BTreeMap<(&'static str, Vec<u8>), Vec<Entry>> {
     let mut all: BTreeMap<_, Vec<_>> = BTreeMap::new();
@@ -84,7 +98,7 @@ fn all_that_fit(transport: &str, marks: bool, largest: u8) -> usize {
         let served = Served::start(model, &sizes, transport, marks, &[]);
         let mut link = link(&served, marks);
         for entry in entries {
-            let outcome = play_on(&mut link, &entry);
+            let outcome = play_again_on(&mut link, &entry);
             match outcome.verdict {
                 Verdict::Passed => passed += 1,
                 Verdict::Skipped => {}

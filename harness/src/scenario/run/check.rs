@@ -68,9 +68,7 @@ impl Runner<'_> {
             )),
             PlannedCheck::Named(ring, link, broken) => self.named((*ring, *link), *broken, span),
             PlannedCheck::Ended(ending) => self.all_ended(*ending, span),
-            PlannedCheck::RulesKept(ring) => self
-                .rules_kept(*ring)
-                .map_err(|wrong| Stop::failed(span, wrong)),
+            PlannedCheck::RulesKept(ring) => self.rules_kept(*ring, span),
             PlannedCheck::Sent(bytes, time) => {
                 if *bytes != self.sent {
                     return failed(format!(

@@ -157,21 +157,25 @@ impl Runner<'_> {
         }
     }
 
-    /// Whether what was sent into a ring is as the manual says, without a gap where nothing was wrong.
-    pub(super) fn rules_kept(&self, ring: usize) -> Result<(), String> {
+    /// Whether what was sent into a ring is as the manual says, without a gap where nothing was wrong. Where time is real, a gap is that
+    /// of a busy computer, and no drive's fault.
+    pub(super) fn rules_kept(&self, ring: usize, span: Span) -> Result<(), Stop> {
         let drives = self.link.drives(ring);
         let record = self.rings.get(ring);
         let sent = record.into_iter().flat_map(|record| &record.sent);
         let sent: Vec<u8> = sent.map(|(byte, _)| *byte).collect();
         let asked = self.asked.get(ring).and_then(Option::as_deref);
+        let own = |wrong: String| format!("of the bench's own master: {wrong}");
         conduct(drives, &sent, asked)
-            .map_err(|wrong| format!("of the bench's own master: {wrong}"))?;
-        match self.gap {
-            Some(gap) => Err(format!(
-                "of the bench's own master: it left a gap on the line behind {gap} (ND21 9.1)"
-            )),
-            None => Ok(()),
-        }
+            .map_err(|wrong| Stop::failed(span, own(wrong.to_string())))?;
+        let Some(gap) = self.gap else {
+            return Ok(());
+        };
+        let message = own(format!("it left a gap on the line behind {gap} (ND21 9.1)"));
+        Err(match self.link.time_tolerance() {
+            time::Span::ZERO => Stop::failed(span, message),
+            _ => Stop::marginal(span, message + ": the computer was busy"),
+        })
     }
 
     /// Lets the driver count the drives.

@@ -107,6 +107,14 @@ impl Stop {
         }
     }
 
+    /// All bytes are right, and some were late.
+    pub(super) fn marginal(span: Span, message: impl Into<String>) -> Self {
+        Self {
+            verdict: Verdict::Marginal,
+            ..Self::failed(span, message)
+        }
+    }
+
     /// The bench's fault; a denied command and an interruption are nobody's.
     pub(super) fn trouble(span: Span, trouble: &Trouble) -> Self {
         let verdict = match trouble {
