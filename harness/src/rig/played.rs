@@ -40,6 +40,12 @@ impl Attempt {
         why.filter(|_| self.outcome.verdict == Verdict::Skipped)
     }
 
+    /// Whether it was played and something was otherwise than late.
+    fn failed(&self) -> bool {
+        let right = [Verdict::Passed, Verdict::Marginal, Verdict::Skipped];
+        !right.contains(&self.outcome.verdict)
+    }
+
     /// The first byte that came at another time than the model says.
     fn untimely(&self) -> Option<&Divergence> {
         self.comparisons.iter().find_map(|c| c.untimely.as_ref())
@@ -63,7 +69,7 @@ impl Played {
         }
     }
 
-    /// The last attempt that was played speaks for all; one that passed behind one that did not is flaky.
+    /// The last attempt that was played speaks for all; one whose bytes are right behind one that failed is flaky.
     pub(super) fn of(attempts: Vec<Attempt>) -> Self {
         let mut played = Self {
             outcome: Outcome::skipped("it was not played".to_owned()),
@@ -81,14 +87,12 @@ impl Played {
                 .collect();
             let remark = format!("{} attempts: {}", attempts.len(), verdicts.join(", "));
             outcome.remarks.push(remark);
-            let verdict = |attempt: &Attempt| attempt.outcome.verdict;
-            let no_fault =
-                |attempt| matches!(verdict(attempt), Verdict::Marginal | Verdict::Skipped);
             let before = &attempts[..attempts.len() - 1];
-            if let Some(unready) = before.iter().find(|a| verdict(a) == Verdict::Skipped) {
+            if let Some(unready) = before.iter().find(|own| own.unready().is_some()) {
                 outcome.remarks.extend(unready.outcome.remarks.clone());
             }
-            if outcome.verdict == Verdict::Passed && !before.iter().all(no_fault) {
+            let right = matches!(outcome.verdict, Verdict::Passed | Verdict::Marginal);
+            if right && before.iter().any(Attempt::failed) {
                 outcome.verdict = Verdict::Flaky;
             }
         }
@@ -172,7 +176,7 @@ impl Again {
             }
             // A busy computer is late now and then, a drive at the same byte each time.
             Verdict::Marginal => played < MOST_UNTIMELY,
-            _ => played < most,
+            _ => attempts.iter().filter(|own| own.failed()).count() < most,
         }
     }
 }
@@ -213,6 +217,8 @@ mod tests {
     fn attempts_together() {
         assert_eq!(of(&[Passed]), Passed);
         assert_eq!(of(&[Failed, Passed]), Flaky);
+        assert_eq!(of(&[Failed, Marginal]), Flaky);
+        assert_eq!(of(&[Marginal, Failed, Failed]), Failed);
         assert_eq!(of(&[Marginal, Passed]), Passed);
         assert_eq!(of(&[Failed, Skipped]), Failed);
         assert_eq!(of(&[Marginal, Skipped]), Marginal);
@@ -241,6 +247,12 @@ mod tests {
         assert_eq!(attempts(again, 5, &[(Failed, "")]), 5);
         assert_eq!(attempts(again, 5, &[(Failed, ""), (Passed, "")]), 2);
         assert_eq!(attempts(again, 1, &[(Marginal, "")]), MOST_UNTIMELY);
+        // What was late before takes no attempt from what fails.
+        let late = [(Marginal, ""), (Marginal, ""), (Failed, "")];
+        assert_eq!(attempts(again, 1, &late), 3);
+        assert_eq!(attempts(again, 2, &late), 4);
+        let turns = [(Failed, ""), (Marginal, ""), (Failed, ""), (Marginal, "")];
+        assert_eq!(attempts(again, 3, &turns), 4);
     }
 
     #[test]
