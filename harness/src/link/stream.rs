@@ -187,9 +187,15 @@ impl StreamLink {
         Instant::START + Span::from_nanos(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
     }
 
-    /// How long a byte may take to come back.
+    /// How long a byte may take to come back: whoever was not there at that time looks again.
     fn round(&self, ring: &Ring) -> Span {
-        self.rate.byte_time() * (2 * u64::from(ring.drives) + 4) + SLACK
+        self.rate.byte_time() * (2 * u64::from(ring.drives) + 4) + SLACK + self.lateness()
+    }
+
+    /// How late the computer has been of late.
+    fn lateness(&self) -> Span {
+        let since = time::Duration::from_nanos(self.told.get().since_start().as_nanos());
+        self.late.at(self.start + since)
     }
 
     /// Lets due faults happen and gives the operating system what is due.
@@ -296,17 +302,18 @@ impl StreamLink {
         }
         let awaited = self.awaited(now);
         if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
-            let end = until.min(at + STAY);
+            let span = until.min(at + STAY).since(now);
+            let end = time::Instant::now() + time::Duration::from_nanos(span.as_nanos());
             // Whoever gives way here is out of it for a whole slice of time where others are busy.
-            while !self.listen(Span::ZERO) && self.at(time::Instant::now()) < end {}
+            while !self.listen(Span::ZERO) && time::Instant::now() < end {}
+            self.late.woken(end, time::Instant::now());
             return;
         }
         let span = awaited.map_or(span, |at| span.min((at - AWAKE).since(now)));
         let span = span.min(NAP);
         let due = time::Instant::now() + time::Duration::from_nanos(span.as_nanos());
-        if !self.listen(span) {
-            self.late.woken(due, time::Instant::now());
-        }
+        self.listen(span);
+        self.late.woken(due, time::Instant::now());
     }
 
     /// When something is due for which whoever waits is to be awake: what he has said, and the last byte that was sent. Where an adapter
@@ -408,8 +415,7 @@ impl Line for StreamLink {
     }
 
     fn lead(&self) -> Lead {
-        let since = time::Duration::from_nanos(self.told.get().since_start().as_nanos());
-        let late = self.late.at(self.start + since);
+        let late = self.lateness();
         let least = match self.rings.iter().all(|ring| ring.wire.is_prompt()) {
             true => Span::ZERO,
             false => ADAPTER,

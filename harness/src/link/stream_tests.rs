@@ -69,3 +69,16 @@ fn what_has_come_is_not_waited_for() {
     }
     assert_eq!(link.awaited(Instant::START), None);
 }
+
+/// Whoever was away at the time until which a byte may take looks again: it may lie there, or the ring was away as well.
+#[test]
+fn who_was_away_waits_for_lost_bytes_as_much_longer() {
+    let (mut link, _ring) = link();
+    link.send(0, &[0x80]);
+    let calm = link.round(&link.rings[0]);
+    let now = time::Instant::now();
+    let due = now.checked_sub(time::Duration::from_secs(8));
+    link.late.woken(due.expect("no machine is that young"), now);
+    let away = link.round(&link.rings[0]);
+    assert!(away > calm + SLACK, "{away}, {calm} before");
+}
