@@ -154,7 +154,7 @@ pub(super) fn settle(
     );
     if open > 0 {
         let text =
-            format!("{open} of the conversations above settle nothing: see what is said of them\n");
+            format!("conversations that settle nothing: {open}; see what is said of them above\n");
         output.result(&text)?;
         named.push_str(&text);
     }

@@ -88,9 +88,9 @@ impl Played {
             let remark = format!("{} attempts: {}", attempts.len(), verdicts.join(", "));
             outcome.remarks.push(remark);
             let before = &attempts[..attempts.len() - 1];
-            if let Some(unready) = before.iter().find(|own| own.unready().is_some()) {
-                outcome.remarks.extend(unready.outcome.remarks.clone());
-            }
+            let why = before.iter().find_map(Attempt::unready).map(str::to_owned);
+            let why = why.filter(|why| !outcome.remarks.contains(why));
+            outcome.remarks.extend(why);
             let right = matches!(outcome.verdict, Verdict::Passed | Verdict::Marginal);
             if right && before.iter().any(Attempt::failed) {
                 outcome.verdict = Verdict::Flaky;
@@ -149,13 +149,23 @@ fn unready_each_time(attempts: &[Attempt]) -> Option<&str> {
 }
 
 /// When a scenario is played once more.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Again {
+    /// How often drives are made ready.
+    unready: usize,
     /// Why drives could not be made ready, as often as it was tried: it is the drives, then, and not the computer.
     hopeless: BTreeSet<String>,
 }
 
 impl Again {
+    /// On a rig whose time is real; where it is virtual, no computer is busy, and drives that are not ready never will be.
+    pub(super) fn new(real_time: bool) -> Self {
+        Self {
+            unready: if real_time { MOST_UNREADY } else { 1 },
+            hopeless: BTreeSet::new(),
+        }
+    }
+
     /// Whether there is another attempt behind these; `most` is how often the rig's file has one that does not pass.
     pub(super) fn after(&mut self, attempts: &[Attempt], most: usize) -> bool {
         let Some(last) = attempts.last() else {
@@ -165,7 +175,7 @@ impl Again {
         match last.outcome.verdict {
             Verdict::Passed | Verdict::RigError => false,
             // Drives that could not be made ready: what disturbed them may have been the computer.
-            Verdict::Skipped if played < MOST_UNREADY => {
+            Verdict::Skipped if played < self.unready => {
                 let hopeless = |why| self.hopeless.contains(why);
                 !last.unready().is_some_and(hopeless)
             }
@@ -240,7 +250,7 @@ mod tests {
 
     #[test]
     fn whatever_does_not_pass_is_played_again_as_often_as_it_may_be() {
-        let again = &mut Again::default();
+        let again = &mut Again::new(true);
         assert_eq!(attempts(again, 3, &[(Passed, "")]), 1);
         assert_eq!(attempts(again, 3, &[(Verdict::RigError, "")]), 1);
         assert_eq!(attempts(again, 1, &[(Failed, "")]), 1);
@@ -257,7 +267,7 @@ mod tests {
 
     #[test]
     fn a_drive_that_is_never_ready_takes_no_attempt_from_one_that_was_disturbed() {
-        let again = &mut Again::default();
+        let again = &mut Again::new(true);
         assert_eq!(attempts(again, 1, &[(Skipped, OWN_CELL)]), MOST_UNREADY);
         assert_eq!(attempts(again, 1, &[(Skipped, OWN_CELL)]), 1);
         let disturbed = [(Skipped, SILENT), (Passed, "")];
@@ -295,6 +305,24 @@ mod tests {
     fn tells(attempts: Vec<Attempt>) -> bool {
         let tolerance = Span::from_millis(20);
         Played::of(attempts).telling(tolerance).is_some()
+    }
+
+    #[test]
+    fn nothing_disturbs_a_drive_where_time_is_virtual() {
+        let again = &mut Again::new(false);
+        assert_eq!(attempts(again, 1, &[(Skipped, SILENT)]), 1);
+    }
+
+    #[test]
+    fn a_reason_is_told_once() {
+        let same = vec![attempt(Skipped, SILENT), attempt(Skipped, SILENT)];
+        let told = ["2 attempts: skipped, skipped", SILENT];
+        let mut remarks = Played::of(same).outcome.remarks;
+        remarks.sort_unstable();
+        assert_eq!(remarks, told);
+        let passed = vec![attempt(Skipped, SILENT), attempt(Passed, "well")];
+        let told = ["well", "2 attempts: skipped, passed", SILENT];
+        assert_eq!(Played::of(passed).outcome.remarks, told);
     }
 
     #[test]

@@ -75,7 +75,7 @@ impl<'s> Run<'s> {
             session,
             twin,
             byte_time,
-            again: Again::default(),
+            again: Again::new(tolerance > Span::ZERO),
             least: 1,
             as_they_are: false,
             rehearses: false,
