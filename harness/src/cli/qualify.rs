@@ -120,10 +120,8 @@ pub(super) fn settle(
     let tolerance = run.exactness().tolerance;
     let mut open = 0;
     if !ill {
-        // A damaged byte on a simulated inner link is no more than what the scenarios have.
-        let simulated = run.session().rig().is_simulated();
         let reached: Vec<bool> = (0..usize::from(drives))
-            .map(|place| place == 0 || !simulated && run.session().link().reaches(0, place))
+            .map(|place| place == 0 || run.session().link().reaches(0, place))
             .collect();
         let reaches = |place: usize| reached.get(place) == Some(&true);
         for entry in conversations(drives, &reaches).unwrap_or_default() {

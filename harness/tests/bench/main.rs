@@ -178,6 +178,7 @@ fn deviations_of_telegrams_are_named() {
 #[test]
 fn deviations_of_the_error_mode_are_named() {
     named(&[
+        "ignores-parity-errors",
         "counts-7-zeros",
         "sends-16-zeros",
         "sends-18-zeros",
