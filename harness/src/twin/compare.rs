@@ -95,22 +95,20 @@ impl Divergence {
     #[must_use]
     pub fn is_like(&self, other: &Self, tolerance: Span) -> bool {
         let place = |own: &Self| (own.ring, own.role, own.step, own.drive);
-        let apart = |(early, late): (Span, Span), (before, behind): (Span, Span)| {
-            early.max(before).saturating_sub(early.min(before))
-                + late.max(behind).saturating_sub(late.min(behind))
-        };
+        let apart = self.late_by().abs_diff(other.late_by());
         place(self) == place(other)
             && self.what == other.what
-            && apart(self.off(), other.off()) <= tolerance
+            && apart <= u128::from(tolerance.as_nanos())
     }
 
-    /// How much too early the byte came, and how much too late.
-    fn off(&self) -> (Span, Span) {
-        match (self.expected, self.received) {
-            (Some((expected, _)), Some((received, _))) => {
-                (expected.since(received), received.since(expected))
-            }
-            _ => (Span::ZERO, Span::ZERO),
+    /// By how many nanoseconds the byte came too late; less than nothing where it was early.
+    fn late_by(&self) -> i128 {
+        let at = |byte: &Option<(Instant, Received)>| {
+            byte.map(|(at, _)| i128::from(at.since_start().as_nanos()))
+        };
+        match (at(&self.expected), at(&self.received)) {
+            (Some(expected), Some(received)) => received - expected,
+            _ => 0,
         }
     }
 }
