@@ -262,9 +262,9 @@ fn profile(
         }
         let section = format!("nd21 {}", probe.section);
         let property = probe.property;
-        let whose = match (probe.asked, &probe.entries) {
-            (Asked::Drive(drive, _), Ok(_)) => format!("drive {drive}: "),
-            _ => String::new(),
+        let whose = match probe.asked {
+            Asked::Drive(drive, _) => format!("drive {drive}: "),
+            Asked::Ring => String::new(),
         };
         let why = match ask(run, findings, &probe, &known, folder.as_deref_mut(), output)? {
             Asking::Answer(Answer::Settled { value, lines }) => {
@@ -308,10 +308,6 @@ fn ask(
     mut folder: Option<&mut Folder>,
     output: &mut Output,
 ) -> Result<Asking, Stop> {
-    let entries = match &probe.entries {
-        Ok(entries) => entries,
-        Err(why) => return Ok(Asking::Not((*why).to_owned())),
-    };
     let drives = run.session().rig().file.ring.first.drives;
     let exactness = run.exactness();
     // Simulated drives answer alike each time.
@@ -323,7 +319,7 @@ fn ask(
     for _ in 0..most {
         let mut conversations = Vec::new();
         last.clear();
-        for entry in entries {
+        for entry in &probe.entries {
             let played = play(run, entry, folder.as_deref_mut())?;
             let was_played = played.outcome.verdict != Verdict::Skipped;
             let Some(attempt) = played.last_played().filter(|_| was_played) else {

@@ -6,9 +6,12 @@ use crate::link::link_name;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::twin::Look;
-use harness_proto::nd21::bits::{ps_status, status};
+use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::ram;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::command::Command;
 use harness_proto::novobus::properties::PROPERTIES;
+use harness_proto::novobus::telegram::{Address, Telegram};
 use harness_sim::nd21::PROPERTIES as OF_THE_DRIVE;
 use include_dir::{Dir, include_dir};
 use std::collections::BTreeSet;
@@ -26,6 +29,13 @@ const EACH: &str = "{drive}";
 /// What stands for a silence, and what is put there: halves, since computers are not on time.
 const GAP: &str = "{gap}";
 const GAPS: [&str; 3] = ["12.5ms", "15.5ms", "18.5ms"];
+
+/// What stands for telegrams that switch the monitoring of time-outs on or off in every drive (14.10.2), one behind the other: while the
+/// last drives are told, the first ones miss their bytes already where there is a gap (9.9).
+const MONITORING: [(&str, u8); 2] = [
+    ("{monitoring on}", flags2::MONITORING),
+    ("{monitoring off}", 0),
+];
 
 /// Times that a time-out may have, in milliseconds (ND21 9.9: 10 to 20).
 const TIME_OUTS: std::ops::RangeInclusive<u64> = 10..=20;
@@ -46,8 +56,8 @@ pub struct Probe {
     pub asked: Asked,
     /// What is taken for granted: the header lines of the scenario language that make it so.
     pub assumed: Vec<String>,
-    /// The conversations; or why there is none.
-    pub entries: Result<Vec<Entry>, &'static str>,
+    /// The conversations.
+    pub entries: Vec<Entry>,
 }
 
 /// Who is asked by a probe.
@@ -68,6 +78,15 @@ const LOOKS: &[(&str, &[Look])] = &[
         "ps-calculation-time",
         &[look(ram::PS_STATUS, ps_status::CALCULATED)],
     ),
+    // The limit of the current that holds now is imax, and i0 behind the property's time; and the motor must have had all of it.
+    (
+        "i2t-time",
+        &[
+            look(ram::MMAX, 0xFF),
+            look(ram::STATUS, status::CURRENT_LIMIT),
+        ],
+    ),
+    ("s-ramp-wire", &[look(ram::PS_STATUS, 0xFF)]),
     // 4096 turns are to be told from 28,672 of them, some more or less.
     ("ps-position", &[look(ram::PS_UMDREHUNG, 0x60)]),
     (
@@ -77,18 +96,6 @@ const LOOKS: &[(&str, &[Look])] = &[
             look(ram::ERRORCODE, 0xFF),
             look(ram::ERRORCODE + 1, 0xFF),
         ],
-    ),
-];
-
-/// Properties of the drive that no conversation shows, and why.
-const NOT_SHOWN: &[(&str, &str)] = &[
-    (
-        "i2t-time",
-        "only a motor that needs its peak current for so long shows it",
-    ),
-    (
-        "s-ramp-wire",
-        "the manual does not say how the points come to the drive; the other value is this project's own",
     ),
 ];
 
@@ -102,6 +109,11 @@ fn some_drives(drives: u8) -> BTreeSet<u8> {
     some.into_iter().filter(|drive| *drive < drives).collect()
 }
 
+/// The conversation of a property.
+fn text(files: &'static Dir<'_>, property: &str) -> Option<&'static str> {
+    files.get_file(format!("{property}.scn"))?.contents_utf8()
+}
+
 /// The probes for a ring of `drives`: those of the bus, then those of the drives behind it.
 ///
 /// # Errors
@@ -109,19 +121,18 @@ fn some_drives(drives: u8) -> BTreeSet<u8> {
 pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
     let mut probes = Vec::new();
     for property in &PROPERTIES {
-        let file = FILES.get_file(format!("{}.scn", property.name));
-        let text = file.and_then(|file| file.contents_utf8());
-        let entries = match text {
-            None => Err("no conversation on the bus alone shows it"),
-            Some(text) if text.contains(GAP) => {
-                let mut entries = Vec::new();
-                for gap in GAPS {
+        let Some(text) = text(&FILES, property.name) else {
+            continue;
+        };
+        let entries = match text.contains(GAP) {
+            true => {
+                let each = GAPS.iter().map(|gap| {
                     let name = format!("{}-{gap}", property.name);
-                    entries.push(probe(&name, &text.replace(GAP, gap), drives)?);
-                }
-                Ok(entries)
+                    probe(&name, &text.replace(GAP, gap), drives)
+                });
+                each.collect::<Result<_, _>>()?
             }
-            Some(text) => Ok(vec![probe(property.name, text, drives)?]),
+            false => vec![probe(property.name, text, drives)?],
         };
         probes.push(Probe {
             property: property.name,
@@ -133,19 +144,8 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
         });
     }
     for property in &OF_THE_DRIVE {
-        let file = OF_DRIVES.get_file(format!("{}.scn", property.name));
-        let text = file.and_then(|file| file.contents_utf8());
         let looks = LOOKS.iter().find(|(name, _)| *name == property.name);
-        let Some((text, (_, looks))) = text.zip(looks) else {
-            let known = NOT_SHOWN.iter().find(|(name, _)| *name == property.name);
-            probes.push(Probe {
-                property: property.name,
-                section: property.section,
-                about: property.about,
-                asked: Asked::Drive(0, &[]),
-                assumed: Vec::new(),
-                entries: Err(known.map_or("no conversation shows it", |(_, why)| why)),
-            });
+        let Some((text, (_, looks))) = text(&OF_DRIVES, property.name).zip(looks) else {
             continue;
         };
         for drive in some_drives(drives) {
@@ -158,7 +158,7 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
                 asked: Asked::Drive(drive, looks),
                 // 5.3.3: the two inputs that release and start a drive, of which the bus shows nothing.
                 assumed: vec![format!("drive {drive} input GPIN3 GPIN5 high")],
-                entries: Ok(vec![probe(&name, &text, drives)?]),
+                entries: vec![probe(&name, &text, drives)?],
             });
         }
     }
@@ -166,11 +166,33 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
 }
 
 fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
+    let mut text = text.to_owned();
+    for (stands, data) in MONITORING {
+        if text.contains(stands) {
+            text = text.replace(stands, &telegrams(drives, ram::FLAGS2, data));
+        }
+    }
     let source = Source {
         name: format!("probe-{name}"),
         text: text.into(),
     };
     Entry::new(source, Some(drives))
+}
+
+/// The telegrams that write a byte to a cell of every drive (9.1, 10.2), the first drive behind the master first, as a scenario has bytes.
+fn telegrams(drives: u8, address: u16, data: u8) -> String {
+    let command = Command::WriteByte { address, data };
+    let bytes = (0..drives).rev().filter_map(|drive| {
+        let ring = RingSize::new(u64::from(drives)).ok()?;
+        let address = Address::Byte(ring.address_byte(drive).ok()?);
+        Some(
+            Telegram::new(address, None, &command.encode())
+                .ok()?
+                .encode(),
+        )
+    });
+    let bytes: Vec<_> = bytes.flatten().map(|byte| format!("{byte:02X}")).collect();
+    bytes.join(" ")
 }
 
 /// The longest silence before a drive sends zeros that the manual allows, in milliseconds: 20 and 10 (9.9).
@@ -179,23 +201,6 @@ const LONGEST_SILENCE: u64 = 30;
 /// What stands for a link in a conversation that is played for every link that faults can be put on, and for the drive behind it.
 const LINK: &str = "{link}";
 const RECEIVER: &str = "{receiver}";
-
-/// More links than this are not all asked: the first ones, the middle one and the last one to a drive.
-const MOST_LINKS: usize = 8;
-
-/// The links of a conversation: their places, counted from the master's outgoing one.
-fn links(drives: u8, reaches: &dyn Fn(usize) -> bool) -> Vec<u8> {
-    let all: Vec<u8> = (0..drives)
-        .filter(|place| reaches(usize::from(*place)))
-        .collect();
-    if all.len() <= MOST_LINKS {
-        return all;
-    }
-    let some = [0, 1, all.len() / 2, all.len() - 1];
-    some.into_iter()
-        .filter_map(|at| all.get(at).copied())
-        .collect()
-}
 
 /// The conversations of a qualification, for a ring of `drives`, by their names; `reaches` says on which links faults can be put.
 ///
@@ -214,7 +219,8 @@ pub fn conversations(
     let mut entries = Vec::new();
     for (name, text) in named {
         if text.contains(LINK) {
-            for place in links(drives, reaches) {
+            // Places are counted from the master's outgoing link; behind the last drive there is no drive that would locate a fault.
+            for place in (0..drives).filter(|place| reaches(usize::from(*place))) {
                 let link = link_name(0, drives, usize::from(place));
                 let receiver = (drives - 1 - place).to_string();
                 let source = Source {
@@ -326,15 +332,12 @@ mod tests {
             inner,
             ["qualify-location-master-to-2", "qualify-location-2-to-1"]
         );
-        assert_eq!(names(250, &|_| true).len(), 4);
+        assert_eq!(names(250, &|_| true).len(), 250);
     }
 
     #[test]
-    fn every_property_has_a_probe_or_a_reason() {
+    fn every_property_has_a_probe() {
         let probes = probes(3).expect("no mistakes");
-        let without = probes.iter().filter(|probe| probe.entries.is_err());
-        let without: Vec<_> = without.map(|probe| probe.property).collect();
-        assert_eq!(without, ["i2t-time", "s-ramp-wire"]);
         let asked = probes.iter().map(|probe| probe.property);
         let asked: BTreeSet<_> = asked.collect();
         let of_the_bus = PROPERTIES.iter().map(|property| property.name);

@@ -273,7 +273,8 @@ impl Motion {
         let (imax, i0) = (cells.byte(ram::IMAX), cells.byte(ram::I0));
         let current = i64::from(cells.signed(ram::MSOLL)).abs() / 256;
         let sum = i64::from(cells.long(ram::I2)) + current * current - i64::from(i0).pow(2);
-        let full = i2t_step(imax, i0) * i64::from(outside.i2t_cycles);
+        // Without a current there is nothing to limit: it takes a cycle at least.
+        let full = i2t_step(imax, i0) * i64::from(outside.i2t_cycles.max(1));
         let sum = sum.clamp(0, full.clamp(0, i64::from(u32::MAX)));
         cells.put_long(ram::I2, u32::try_from(sum).unwrap_or(u32::MAX));
         self.i2t = full > 0 && (sum >= full || self.i2t && sum > full / 2);

@@ -151,6 +151,26 @@ fn torque_is_limited_by_imax_then_by_i0() {
     assert_eq!((rig.byte(ram::MMAX), rig.word(ram::MSOLL)), (0x3A, 0x3A00));
 }
 
+/// ND21 14.4.2: where `imax` may last for no time, `i0` is the limit as soon as there is a current.
+#[test]
+fn no_time_for_imax() {
+    let none = Nd21Properties {
+        i2t_time: Span::ZERO,
+        ..Nd21Properties::default()
+    };
+    let mut rig = Rig::with(none, |_| {});
+    rig.input(Input::Gpin3, true);
+    rig.input(Input::Gpin5, true);
+    rig.clear(ram::STATUS, status::BLOCK);
+    rig.run(Span::from_millis(10));
+    assert_eq!(rig.byte(ram::MMAX), 0x74);
+    rig.drive.stimulate(Stimulus::Jammed(true));
+    rig.write_word(ram::NSOLL, 800);
+    rig.run(Span::from_millis(10));
+    assert_eq!(rig.byte(ram::MMAX), 0x3A);
+    assert_eq!(rig.byte(ram::FLAGS) & flags::I2T, flags::I2T);
+}
+
 /// A load is held by the integral part: 5 Aeff are 5 / 0.000671 bits of `msoll` (ND21 14.5.2).
 #[test]
 fn load_is_held() {

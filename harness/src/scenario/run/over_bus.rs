@@ -210,8 +210,8 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), Stri
             return Err(wrong(link, cell, "it does not answer ResetH8"));
         }
         // Whoever was in the middle of something hears the next telegram whole (9.8).
-        link.send(*ring, &CHECK_SEQUENCE);
-        settle(link);
+        let left = link.send(*ring, &CHECK_SEQUENCE);
+        settle(link, left);
     }
     let end = link.now() + SELF_TEST;
     for &(ring, drive) in all {
@@ -292,8 +292,8 @@ fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), String> {
             bytes.extend(own.into_iter().flat_map(|exchange| exchange.bytes));
         }
         if bytes.len() > CHECK_SEQUENCE.len() {
-            link.send(ring, &bytes);
-            settle(link);
+            let left = link.send(ring, &bytes);
+            settle(link, left);
         }
     }
     for cell in before {
@@ -306,8 +306,9 @@ fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), String> {
     Ok(())
 }
 
-fn settle(link: &mut dyn Link) {
-    let end = link.now() + PATIENCE;
+/// Lets time pass until what leaves until `left` has come round, or should have.
+fn settle(link: &mut dyn Link, left: Instant) {
+    let end = left + PATIENCE;
     while link.busy() && link.now() < end && link.wait(end) {}
 }
 
