@@ -265,9 +265,8 @@ fn asked(property: &str, value: &str, lines: &str) -> Answer {
 /// What a rig's drives held before is set back, however long all the telegrams take.
 #[test]
 fn many_cells_are_set_back() {
-    let plan = entry(
-        "title x\nring 60\ndrive 0..last memory FDB0 = 01*20\nread-byte 0 FDB0 = 01\n",
-    );
+    let plan =
+        entry("title x\nring 60\ndrive 0..last memory FDB0 = 01*20\nread-byte 0 FDB0 = 01\n");
     let plan = plan.plan.expect("novobus");
     let (_, mut link) = model_of(60, &[]);
     let mut events: Vec<Event> = Vec::new();

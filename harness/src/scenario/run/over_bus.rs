@@ -7,6 +7,7 @@ use super::bytes::{matches, resolve};
 use super::outcome::Outcome;
 use super::player::{AtFinding, Runner, lacks, play};
 use crate::link::{Line, Link};
+use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use harness_proto::line::Received;
 use harness_proto::nd21;
@@ -113,11 +114,24 @@ fn exchange_in(
     command: Command,
 ) -> Option<Vec<u8>> {
     let exchange = Exchange::new(drives, drive, command)?;
+    exchange_all(link, drives, ring, &[exchange])?.pop()
+}
+
+/// Sends telegrams one behind the other, since on a long ring a round takes much longer than a telegram, and gives the data of each
+/// answer; `None` where not all answers are as ND21 10.1 and 10.2 say.
+fn exchange_all(
+    link: &mut dyn Line,
+    drives: u8,
+    ring: usize,
+    exchanges: &[Exchange],
+) -> Option<Vec<Vec<u8>>> {
+    let bytes: Vec<u8> = exchanges.iter().flat_map(|e| e.bytes.clone()).collect();
+    let expected: Vec<_> = exchanges.iter().flat_map(|e| e.expected.clone()).collect();
     while link.receive(ring).is_some() {}
-    let sent = link.send(ring, &exchange.bytes);
+    let sent = link.send(ring, &bytes);
     let end = sent + link.byte_time() * (2 * u64::from(drives) + 4) + PATIENCE;
     let mut received: Vec<(Instant, Received)> = Vec::new();
-    while received.len() < exchange.expected.len() {
+    while received.len() < expected.len() {
         match link.receive(ring) {
             // A busy computer may look for it late, but not take a late one for an answer.
             Some((at, _)) if at > end => return None,
@@ -128,14 +142,18 @@ fn exchange_in(
             None => return None,
         }
     }
-    let all = exchange.expected.iter().zip(&received).enumerate();
-    for (index, (expected, (_, byte))) in all {
+    for (index, (expected, (_, byte))) in expected.iter().zip(&received).enumerate() {
         if !matches(resolve(*expected, &received[..index]), *byte) {
             return None;
         }
     }
-    let data = exchange.data.iter().map(|place| received[*place].1.byte);
-    Some(data.collect())
+    let mut rest = received.as_slice();
+    let data = exchanges.iter().map(|exchange| {
+        let (own, others) = rest.split_at(exchange.expected.len());
+        rest = others;
+        exchange.data.iter().map(|place| own[*place].1.byte)
+    });
+    Some(data.map(Iterator::collect).collect())
 }
 
 /// Reads a byte of RAM of a drive, given its ring and its place in a ring of `drives`, by a telegram of its own (10.1); `None` where it
@@ -199,37 +217,65 @@ pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String>
 /// The first drive that does not come back, in a sentence.
 pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), String> {
     link.begin();
-    for (ring, drive) in all {
-        let cell = Before {
-            ring: *ring,
-            drive: *drive,
-            address: nd21::ram::STATUS,
-            data: 0,
-        };
-        if exchange(link, *ring, *drive, Command::ResetH8).is_none() {
-            return Err(wrong(link, cell, "it does not answer ResetH8"));
+    let cell = |&(ring, drive): &(usize, u8)| Before {
+        ring,
+        drive,
+        address: nd21::ram::STATUS,
+        data: 0,
+    };
+    let cells: Vec<Before> = all.iter().map(cell).collect();
+    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
+        if reset_at_once(link, own).is_none() {
+            reset_one_by_one(link, own)?;
         }
-        // Whoever was in the middle of something hears the next telegram whole (9.8).
-        let left = link.send(*ring, &CHECK_SEQUENCE);
-        settle(link, left);
     }
     let end = link.now() + SELF_TEST;
-    for &(ring, drive) in all {
-        let cell = Before {
-            ring,
-            drive,
-            address: nd21::ram::STATUS,
-            data: 0,
+    let mut waiting = cells;
+    loop {
+        let status = read_all(link, &waiting);
+        let back = |status: &Result<u8, String>| {
+            let status = status.as_ref();
+            status.is_ok_and(|status| status & nd21::bits::status::RESET == 0)
         };
-        loop {
-            let status = read(link, cell);
-            if status.is_ok_and(|status| status & nd21::bits::status::RESET == 0) {
-                break;
+        let still = waiting.iter().zip(&status);
+        waiting = still
+            .filter(|(_, status)| !back(status))
+            .map(|(cell, _)| *cell)
+            .collect();
+        match waiting.first() {
+            None => return Ok(()),
+            Some(cell) if link.now() >= end || link.trouble().is_some() => {
+                return Err(wrong(link, *cell, "it does not come back from its reset"));
             }
-            if link.now() >= end || link.trouble().is_some() {
-                return Err(wrong(link, cell, "it does not come back from its reset"));
-            }
+            Some(_) => {}
         }
+    }
+}
+
+/// A check sequence stands behind each telegram: whoever was in the middle of something hears the next one whole (9.8).
+fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
+    let ring = cells.first()?.ring;
+    let drives = link.drives(ring);
+    let mut exchanges = Vec::new();
+    for cell in cells {
+        exchanges.push(Exchange::new(drives, cell.drive, Command::ResetH8)?);
+        exchanges.push(Exchange {
+            bytes: CHECK_SEQUENCE.to_vec(),
+            expected: CHECK_SEQUENCE.map(Expected::Byte).to_vec(),
+            data: Vec::new(),
+        });
+    }
+    exchange_all(link, drives, ring, &exchanges).map(|_| ())
+}
+
+/// Where a ring does not stand that, or a drive does not answer.
+fn reset_one_by_one(link: &mut dyn Link, cells: &[Before]) -> Result<(), String> {
+    for cell in cells {
+        if exchange(link, cell.ring, cell.drive, Command::ResetH8).is_none() {
+            return Err(wrong(link, *cell, "it does not answer ResetH8"));
+        }
+        let left = link.send(cell.ring, &CHECK_SEQUENCE);
+        settle(link, left);
     }
     Ok(())
 }
@@ -247,6 +293,21 @@ struct Before {
     data: u8,
 }
 
+impl Before {
+    fn read(&self) -> Command {
+        Command::ReadByte {
+            address: self.address,
+        }
+    }
+
+    fn write(&self) -> Command {
+        Command::WriteByte {
+            address: self.address,
+            data: self.data,
+        }
+    }
+}
+
 /// Sets the cells that a plan's header asks for, by telegrams, and reads them back. What they held before is added to
 /// `before`, also where it fails on the way.
 ///
@@ -254,21 +315,37 @@ struct Before {
 /// The first cell that does not hold what it must, in a sentence.
 fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
     for (ring, drives, address, bytes) in plan.memory_setups() {
+        let mut cells = Vec::new();
         for drive in drives {
-            for (address, data) in (address..=u16::MAX).zip(bytes) {
-                let cell = Before {
-                    ring,
-                    drive,
-                    address,
-                    data: *data,
-                };
-                let old = read(link, cell)?;
-                if old != *data {
-                    before.push(Before { data: old, ..cell });
-                    write(link, cell)?;
-                }
-            }
+            let own = (address..=u16::MAX).zip(bytes);
+            cells.extend(own.map(|(address, data)| Before {
+                ring,
+                drive,
+                address,
+                data: *data,
+            }));
         }
+        let held: Vec<u8> = read_all(link, &cells)
+            .into_iter()
+            .collect::<Result<_, _>>()?;
+        let other = cells
+            .iter()
+            .zip(held)
+            .filter(|(cell, held)| cell.data != *held);
+        let (other, old): (Vec<_>, Vec<_>) = other
+            .map(|(cell, held)| {
+                (
+                    *cell,
+                    Before {
+                        data: held,
+                        ..*cell
+                    },
+                )
+            })
+            .unzip();
+        before.extend(old);
+        write_all(link, &other)?;
+        holds_all(link, &other)?;
     }
     Ok(())
 }
@@ -284,11 +361,7 @@ fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), String> {
     for ring in 0..2 {
         let mut bytes = CHECK_SEQUENCE.to_vec();
         for cell in before.iter().rev().filter(|cell| cell.ring == ring) {
-            let command = Command::WriteByte {
-                address: cell.address,
-                data: cell.data,
-            };
-            let own = Exchange::new(link.drives(ring), cell.drive, command);
+            let own = Exchange::new(link.drives(ring), cell.drive, cell.write());
             bytes.extend(own.into_iter().flat_map(|exchange| exchange.bytes));
         }
         if bytes.len() > CHECK_SEQUENCE.len() {
@@ -296,14 +369,7 @@ fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), String> {
             settle(link, left);
         }
     }
-    for cell in before {
-        let held = read(link, *cell)?;
-        if (held ^ cell.data) & !own_bits(cell.address) != 0 {
-            let why = format!("it held {:02X} and now {held:02X}", cell.data);
-            return Err(wrong(link, *cell, &why));
-        }
-    }
-    Ok(())
+    holds_all(link, before)
 }
 
 /// Lets time pass until what leaves until `left` has come round, or should have.
@@ -318,29 +384,68 @@ fn own_bits(address: u16) -> u8 {
 }
 
 fn read(link: &mut dyn Link, cell: Before) -> Result<u8, String> {
-    let command = Command::ReadByte {
-        address: cell.address,
-    };
-    match exchange(link, cell.ring, cell.drive, command).as_deref() {
+    match exchange(link, cell.ring, cell.drive, cell.read()).as_deref() {
         Some([byte]) => Ok(*byte),
         _ => Err(wrong(link, cell, "no answer")),
     }
 }
 
-fn write(link: &mut dyn Link, cell: Before) -> Result<(), String> {
-    let command = Command::WriteByte {
-        address: cell.address,
-        data: cell.data,
-    };
-    if exchange(link, cell.ring, cell.drive, command).is_none() {
-        return Err(wrong(link, cell, "no answer"));
+/// What each of these cells holds, those of a ring together. Where not all answer it is each for itself, and a sentence for those that do not.
+fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, String>> {
+    let mut held = Vec::new();
+    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
+        match together(link, own, Before::read) {
+            Some(data) => held.extend(data.concat().into_iter().map(Ok)),
+            None => held.extend(own.iter().map(|cell| read(link, *cell))),
+        }
     }
-    let held = read(link, cell)?;
-    if (held ^ cell.data) & !own_bits(cell.address) == 0 {
-        return Ok(());
+    held
+}
+
+/// Writes to each of these cells, those of a ring together, or where not all answer each for itself.
+///
+/// # Errors
+/// The first one that does not answer, in a sentence.
+fn write_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), String> {
+    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
+        if together(link, own, Before::write).is_some() {
+            continue;
+        }
+        for cell in own {
+            if exchange(link, cell.ring, cell.drive, cell.write()).is_none() {
+                return Err(wrong(link, *cell, "no answer"));
+            }
+        }
     }
-    let why = format!("{:02X} was written, {held:02X} is read", cell.data);
-    Err(wrong(link, cell, &why))
+    Ok(())
+}
+
+/// A command for each of these cells of one ring, one behind the other.
+fn together(
+    link: &mut dyn Link,
+    cells: &[Before],
+    command: fn(&Before) -> Command,
+) -> Option<Vec<Vec<u8>>> {
+    let ring = cells.first()?.ring;
+    let drives = link.drives(ring);
+    let exchange = |cell: &Before| Exchange::new(drives, cell.drive, command(cell));
+    let exchanges: Option<Vec<_>> = cells.iter().map(exchange).collect();
+    exchange_all(link, drives, ring, &exchanges?)
+}
+
+/// Whether each of these cells holds what it must, but for bits that the drive writes itself (14.2).
+///
+/// # Errors
+/// The first one that does not, in a sentence.
+fn holds_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), String> {
+    for (cell, held) in cells.iter().zip(read_all(link, cells)) {
+        let held = held?;
+        if (held ^ cell.data) & !own_bits(cell.address) != 0 {
+            let why = format!("{:02X} was written, {held:02X} is read", cell.data);
+            return Err(wrong(link, *cell, &why));
+        }
+    }
+    Ok(())
 }
 
 fn wrong(link: &dyn Link, cell: Before, why: &str) -> String {
