@@ -1,13 +1,14 @@
 //! What the bench adds to the time on the wire, and what it costs of a processor, on rings that another process serves at the pace of
 //! the line, 38400 bit/s (ND21 8.1).
 //!
-//! Each conversation is played in three ways: in virtual time, which is the wire's own; by a program that only writes to the socket and
-//! reads from it, the baseline; and by the bench, with guard, record, and everything else that a rig has. The program writes what was
-//! sent in virtual time, and what was sent behind an answer when as much has come back. What both add is the system's: two processes
-//! that are woken up, once for each question and each answer. What the bench adds to that is its own: less than nothing where it is awake
-//! when an answer comes, and the program has to be woken up.
+//! Each conversation is played in four ways: in virtual time, which is the wire's own; by a program that only writes to the socket and
+//! reads from it, the baseline; by the same program where it never sleeps, which nothing can be faster than; and by the bench, with guard,
+//! record, and everything else that a rig has. The program writes what was sent in virtual time, and what was sent behind an answer when
+//! as much has come back. What all add is the system's and the served ring's: processes that are woken up, once for each question and each
+//! answer, and bytes that go from one to the other. What the bench adds to that is its own: less than nothing where it is awake when an
+//! answer comes, and the program has to be woken up. Beside the program that never sleeps it is all that the bench does with an answer.
 //!
-//! The two take turns, each on a ring of its own, so that what else the computer does slows down both; each figure is the middle one of
+//! They take turns, on rings of their own, so that what else the computer does slows down all; each figure is the middle one of
 //! its own kind. Turns in which the host of a virtual machine took its processors away are taken again: who stands still for 10 ms and
 //! more is to send SYNCO further ahead for a while, and that is not what is measured here.
 
@@ -29,7 +30,7 @@ use harness_sim::link::LineByte;
 use harness_sim::trace::Trace;
 use ring::Served;
 use rustix::time::{ClockId, clock_gettime};
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
@@ -146,20 +147,31 @@ impl Took {
     }
 }
 
-fn middle(all: &[(Took, Took)], of: impl Fn(&(Took, Took)) -> f64) -> f64 {
+/// What each took in a turn.
+struct Turn {
+    bare: Took,
+    awake: Took,
+    bench: Took,
+}
+
+fn middle(all: &[Turn], of: impl Fn(&Turn) -> f64) -> f64 {
     let mut all: Vec<f64> = all.iter().map(of).collect();
     all.sort_by(f64::total_cmp);
     all[all.len() / 2]
 }
 
 /// The baseline: each chunk is written when what it is an answer to has come back.
-fn bare(stream: &mut TcpStream, chunks: &[Chunk]) -> Took {
+fn bare(stream: &mut TcpStream, chunks: &[Chunk], awake: bool) -> Took {
+    stream.set_nonblocking(awake).expect("a socket");
     Took::of(|| {
         let mut buffer = [0; 4_096];
         let (mut sent, mut came) = (0, 0);
         let mut read_until = |stream: &mut TcpStream, back| {
             while came < back {
-                came += stream.read(&mut buffer).expect("bytes");
+                match stream.read(&mut buffer) {
+                    Err(error) if error.kind() == ErrorKind::WouldBlock => std::hint::spin_loop(),
+                    read => came += read.expect("bytes"),
+                }
             }
         };
         for chunk in chunks {
@@ -179,22 +191,22 @@ fn main() {
         return;
     }
     println!(
-        "{:>6}  {:57} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7} {:>5}",
+        "{:>6}  {:57} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>5}",
         "drives",
         "conversation",
         "wire",
         "bare",
-        "added",
+        "awake",
         "bench",
-        "added",
+        "own",
         "own",
         "bare",
         "bench",
         "turns"
     );
     println!(
-        "{:>6}  {:57} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7} {:>5}",
-        "", "", "ms", "ms", "", "ms", "", "", "CPU", "CPU", ""
+        "{:>6}  {:57} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>5}",
+        "", "", "ms", "added", "added", "added", "to bare", "to awake", "CPU", "CPU", ""
     );
     for drives in [1, 3, 100, 250] {
         let serve = || Served::start("nd21", &[drives], "tcp", false, &[]);
@@ -211,21 +223,22 @@ fn main() {
             assert!(virtual_time.finding.is_none(), "{:?}", virtual_time.finding);
             let wire = virtual_time.took.as_millis_f64() / 1e3;
             let chunks = chunks(&link.trace(0), link.byte_time());
-            let (both, turns) = in_turns(address(&for_bare), &chunks, &rig(&for_bench), plan);
+            let (all, turns) = in_turns(address(&for_bare), &chunks, &rig(&for_bench), plan);
             let added = |clock: f64| 100.0 * (clock / wire - 1.0);
-            let of_bare = middle(&both, |(bare, _)| bare.clock);
-            let of_bench = middle(&both, |(_, bench)| bench.clock);
+            let own = |than: fn(&Turn) -> f64| {
+                100.0 * middle(&all, |turn| turn.bench.clock - than(turn)) / wire
+            };
             println!(
-                "{drives:>6}  {:57} {:9.2} {:9.2} {:7.2}% {:9.2} {:7.2}% {:7.2}% {:6.2}% {:6.2}% {turns:>5}",
+                "{drives:>6}  {:57} {:9.2} {:7.2}% {:7.2}% {:7.2}% {:7.2}% {:7.2}% {:6.2}% {:6.2}% {turns:>5}",
                 case.name,
                 wire * 1e3,
-                of_bare * 1e3,
-                added(of_bare),
-                of_bench * 1e3,
-                added(of_bench),
-                100.0 * middle(&both, |(bare, bench)| bench.clock - bare.clock) / wire,
-                100.0 * middle(&both, |(bare, _)| bare.share),
-                100.0 * middle(&both, |(_, bench)| bench.share),
+                added(middle(&all, |turn| turn.bare.clock)),
+                added(middle(&all, |turn| turn.awake.clock)),
+                added(middle(&all, |turn| turn.bench.clock)),
+                own(|turn| turn.bare.clock),
+                own(|turn| turn.awake.clock),
+                100.0 * middle(&all, |turn| turn.bare.share),
+                100.0 * middle(&all, |turn| turn.bench.share),
             );
             // A second client is turned away while the first one has not been seen to go.
             std::thread::sleep(TURN);
@@ -255,9 +268,9 @@ fn rig(served: &Served) -> Rig {
     rig.expect("a rig")
 }
 
-/// The conversation by the bare program and on a rig in use, again and again: its own time, and what it cost of a processor. The second
-/// value says how many turns it took.
-fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<(Took, Took)>, usize) {
+/// The conversation by the bare program, asleep and awake, and on a rig in use, again and again: its own time, and what it cost of a processor.
+/// The second value says how many turns it took.
+fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<Turn>, usize) {
     let mut stream = TcpStream::connect(address).expect("a server");
     stream.set_nodelay(true).expect("no delay");
     let mut session = Session::open(rig, &Options::default()).expect("a rig in use");
@@ -265,14 +278,20 @@ fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<(To
     let calm = |turn: &&(f64, _)| turn.0 < DISTURBED;
     let mut turn = || {
         let before = taken_away();
-        let bare = bare(&mut stream, chunks);
+        let asleep = bare(&mut stream, chunks, false);
+        let awake = bare(&mut stream, chunks, true);
         let bench = Took::of(|| {
             let played = run.play(plan, None).expect("a healthy rig");
             assert!(played.outcome.finding.is_none(), "{:?}", played.outcome);
             Some(played.outcome.took.as_millis_f64() / 1e3)
         });
-        let disturbed = (taken_away() - before) / (bare.clock + bench.clock);
-        (disturbed, (bare, bench))
+        let turn = Turn {
+            bare: asleep,
+            awake,
+            bench,
+        };
+        let clocks = turn.bare.clock + turn.awake.clock + turn.bench.clock;
+        ((taken_away() - before) / clocks, turn)
     };
     let mut all = Vec::new();
     while all.len() < AT_MOST && all.iter().filter(calm).count() < TIMES {
@@ -285,8 +304,8 @@ fn in_turns(address: &str, chunks: &[Chunk], rig: &Rig, plan: &Plan) -> (Vec<(To
     let turns = all.len();
     all.sort_by(|one, other| one.0.total_cmp(&other.0));
     all.truncate(TIMES);
-    let both = all.into_iter().map(|(_, both)| both).collect();
+    let all = all.into_iter().map(|(_, turn)| turn).collect();
     assert_eq!(session.link().trouble(), None);
     let _end = session.close();
-    (both, turns)
+    (all, turns)
 }
