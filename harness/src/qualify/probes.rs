@@ -3,15 +3,14 @@
 use super::hypothesis::Hypothesis;
 use crate::library::Entry;
 use crate::link::link_name;
+use crate::scenario::plan::Exchange;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use crate::twin::Look;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::ram;
-use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::properties::PROPERTIES;
-use harness_proto::novobus::telegram::{Address, Telegram};
 use harness_sim::nd21::PROPERTIES as OF_THE_DRIVE;
 use include_dir::{Dir, include_dir};
 use std::collections::BTreeSet;
@@ -182,16 +181,10 @@ fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
 /// The telegrams that write a byte to a cell of every drive (9.1, 10.2), the first drive behind the master first, as a scenario has bytes.
 fn telegrams(drives: u8, address: u16, data: u8) -> String {
     let command = Command::WriteByte { address, data };
-    let bytes = (0..drives).rev().filter_map(|drive| {
-        let ring = RingSize::new(u64::from(drives)).ok()?;
-        let address = Address::Byte(ring.address_byte(drive).ok()?);
-        Some(
-            Telegram::new(address, None, &command.encode())
-                .ok()?
-                .encode(),
-        )
-    });
-    let bytes: Vec<_> = bytes.flatten().map(|byte| format!("{byte:02X}")).collect();
+    let all = (0..drives).rev();
+    let all = all.filter_map(|drive| Exchange::new(drives, drive, command));
+    let bytes = all.flat_map(|exchange| exchange.bytes);
+    let bytes: Vec<_> = bytes.map(|byte| format!("{byte:02X}")).collect();
     bytes.join(" ")
 }
 

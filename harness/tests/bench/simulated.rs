@@ -66,7 +66,8 @@ fn limits_leave_out_what_they_deny() {
 fn a_profile_is_loaded_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let open = ", \"drive 0..last property read-long = as-printed\", \"drive 0..last property time-out = 13ms\", \
-                \"drive 1 property bus-errors = time-out-only\", \"drive 1 property self-test-time = 300ms\"";
+                \"drive 1 property bus-errors = time-out-only\", \"drive 1 property self-test-time = 300ms\", \
+                \"drive 1 property i2t-time = 700ms\", \"drive 1 property s-ramp-wire = puffer\"";
     let found = [
         "read-long (nd21 10.1): as-printed",
         "time-out (nd21 9.9): 13ms",
@@ -74,6 +75,9 @@ fn a_profile_is_loaded_again() {
         "bus-errors (nd21 11.8): drive 1: time-out-only",
         "self-test-time (nd21 11.8): drive 1: ",
         "eeprom-write-time (nd21 14.10.5.3): drive 0: 10ms to 10ms",
+        "i2t-time (nd21 14.4.2): drive 1: 69",
+        "s-ramp-wire (nd21 13.5.3): drive 0: none",
+        "s-ramp-wire (nd21 13.5.3): drive 1: puffer",
     ];
     let first = qualify(folder.path(), "first", &rig(2, true, "", open));
     let profile = "profile = \"first/profile.toml\"";

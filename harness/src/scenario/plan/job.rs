@@ -274,9 +274,9 @@ impl Planner {
 }
 
 /// A telegram with one command for one drive, and the answer that it must get.
-pub(in crate::scenario) struct Exchange {
+pub(crate) struct Exchange {
     /// What is sent.
-    pub(in crate::scenario) bytes: Vec<u8>,
+    pub(crate) bytes: Vec<u8>,
     /// What must come back.
     pub(in crate::scenario) expected: Vec<Expected>,
     /// Where in it the data stand that are read, in memory order.
@@ -285,7 +285,7 @@ pub(in crate::scenario) struct Exchange {
 
 impl Exchange {
     /// For a ring of `drives`; `None` where there is no such drive.
-    pub(in crate::scenario) fn new(drives: u8, drive: u8, command: Command) -> Option<Self> {
+    pub(crate) fn new(drives: u8, drive: u8, command: Command) -> Option<Self> {
         let form = ReadLongAnswer::default();
         let ring = RingSize::new(u64::from(drives)).ok()?;
         let address = Address::Byte(ring.address_byte(drive).ok()?);

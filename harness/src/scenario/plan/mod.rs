@@ -9,7 +9,7 @@ mod setup;
 mod types;
 
 pub(super) use drive::{MAX_LOOKS, number};
-pub(in crate::scenario) use job::Exchange;
+pub(crate) use job::Exchange;
 pub(super) use planner::MAX_CARRIED;
 pub use planner::{plan, plan_step};
 pub(super) use setup::{in_memory, number_bytes};
