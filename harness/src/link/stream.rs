@@ -187,6 +187,11 @@ impl StreamLink {
         Instant::START + Span::from_nanos(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
     }
 
+    /// The same the other way.
+    fn clock(&self, at: Instant) -> time::Instant {
+        self.start + time::Duration::from_nanos(at.since_start().as_nanos())
+    }
+
     /// How long a byte may take to come back: whoever was not there at that time looks again.
     fn round(&self, ring: &Ring) -> Span {
         self.rate.byte_time() * (2 * u64::from(ring.drives) + 4) + SLACK + self.lateness()
@@ -194,8 +199,7 @@ impl StreamLink {
 
     /// How late the computer has been of late.
     fn lateness(&self) -> Span {
-        let since = time::Duration::from_nanos(self.told.get().since_start().as_nanos());
-        self.late.at(self.start + since)
+        self.late.at(self.clock(self.told.get()))
     }
 
     /// Lets due faults happen and gives the operating system what is due.
@@ -289,31 +293,41 @@ impl StreamLink {
         queues.chain(faults).chain(relays).chain(lost).min()
     }
 
-    fn sleep(&mut self, now: Instant, until: Instant) {
-        let span = until.since(now);
+    /// Lets time pass until then, or until something has come, and looks.
+    fn pass(&mut self, now: Instant, until: Instant) {
         let calm = now + CALM;
+        let awaited = self.awaited(now);
         if self.inner.is_empty() && self.rings.iter().all(|ring| ring.free > calm) {
             // What comes meanwhile can wait: the line is taken for longer, and to wake up for every byte costs more than all else.
-            let span = time::Duration::from_nanos(span.min(DOZE).as_nanos());
-            let due = time::Instant::now() + span;
-            std::thread::sleep(span);
-            self.late.woken(due, time::Instant::now());
-            return;
+            let until = until.min(now + DOZE);
+            std::thread::sleep(time::Duration::from_nanos(until.since(now).as_nanos()));
+            self.late.woken(self.clock(until), time::Instant::now());
+        } else if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
+            return self.watch(until.min(at + STAY));
+        } else {
+            let wake = awaited.map_or(until, |at| until.min(at - AWAKE));
+            let wake = wake.min(now + NAP);
+            self.listen(wake.since(now));
+            self.late.woken(self.clock(wake), time::Instant::now());
         }
-        let awaited = self.awaited(now);
-        if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
-            let span = until.min(at + STAY).since(now);
-            let end = time::Instant::now() + time::Duration::from_nanos(span.as_nanos());
-            // Whoever gives way here is out of it for a whole slice of time where others are busy.
-            while !self.listen(Span::ZERO) && time::Instant::now() < end {}
-            self.late.woken(end, time::Instant::now());
-            return;
-        }
-        let span = awaited.map_or(span, |at| span.min((at - AWAKE).since(now)));
-        let span = span.min(NAP);
-        let due = time::Instant::now() + time::Duration::from_nanos(span.as_nanos());
-        self.listen(span);
-        self.late.woken(due, time::Instant::now());
+        self.look();
+    }
+
+    /// Looks again and again until then, or until something has come. Whoever gives way here is out of it for a whole slice of time where
+    /// others are busy.
+    fn watch(&mut self, until: Instant) {
+        let came = |link: &Self| link.rings.iter().map(|ring| ring.came).sum::<u64>();
+        let before = came(self);
+        while self.look() < until && came(self) == before && self.trouble.is_none() {}
+        self.late.woken(self.clock(until), time::Instant::now());
+    }
+
+    /// Gives the operating system what is due and takes what has come.
+    fn look(&mut self) -> Instant {
+        let now = self.at(time::Instant::now());
+        self.give(now);
+        self.take(now);
+        now
     }
 
     /// When something is due for which whoever waits is to be awake: what he has said, and the last byte that was sent. Where an adapter
@@ -326,8 +340,8 @@ impl StreamLink {
         due.filter(|at| now < *at + STAY).min()
     }
 
-    /// Waits for the ports, at most this long, and says whether there was anything but the end of that time.
-    fn listen(&mut self, span: Span) -> bool {
+    /// Waits for the ports, at most this long.
+    fn listen(&mut self, span: Span) {
         let timeout = Timespec {
             tv_sec: 0,
             tv_nsec: i64::try_from(span.as_nanos()).unwrap_or(0).min(999_999_999),
@@ -335,12 +349,10 @@ impl StreamLink {
         let mut fds: Vec<_> = self.rings.iter().map(|ring| ring.wire.poll_fd()).collect();
         fds.extend(self.inner.iter().flat_map(InnerLink::poll_fds));
         match poll(&mut fds, Some(&timeout)) {
-            Ok(ready) => ready > 0,
-            Err(Errno::INTR | Errno::AGAIN) => true,
+            Ok(_) | Err(Errno::INTR | Errno::AGAIN) => {}
             Err(error) => {
                 let text = format!("failed to wait for the ports: {error}");
                 self.trouble.get_or_insert(Trouble::Lost(text));
-                true
             }
         }
     }
@@ -388,18 +400,14 @@ impl Line for StreamLink {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        let mut now = self.at(time::Instant::now());
+        let now = self.at(time::Instant::now());
         self.give(now);
-        if (self.lying || !self.any_has_come()) && self.trouble.is_none() {
-            let until = self.due(now).map_or(until, |due| due.min(until));
-            // What has come, and has not been taken, ends the sleep at once.
-            if until > now {
-                self.sleep(now, until);
-            }
-            now = self.at(time::Instant::now());
-            self.give(now);
+        let until = self.due(now).map_or(until, |due| due.min(until));
+        if (self.lying || !self.any_has_come()) && self.trouble.is_none() && now < until {
+            self.pass(now, until);
+        } else {
+            self.take(now);
         }
-        self.take(now);
         self.lying = self.any_has_come();
         self.trouble.is_none()
     }
@@ -461,9 +469,7 @@ impl Link for StreamLink {
     }
 
     fn begin(&mut self) {
-        let now = self.at(time::Instant::now());
-        self.give(now);
-        self.take(now);
+        self.look();
         self.start = time::Instant::now();
         self.told.set(Instant::START);
         self.lying = false;
