@@ -208,7 +208,16 @@ fn main() {
         "{:>6}  {:57} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>5}",
         "", "", "ms", "added", "added", "added", "to bare", "to awake", "CPU", "CPU", ""
     );
-    for drives in [1, 3, 100, 250] {
+    // `cargo bench --bench rig -- 1 3` for these alone.
+    let asked: Vec<u8> = std::env::args()
+        .filter_map(|argument| argument.parse().ok())
+        .collect();
+    let rings = if asked.is_empty() {
+        vec![1, 3, 100, 250]
+    } else {
+        asked
+    };
+    for drives in rings {
         let serve = || Served::start("nd21", &[drives], "tcp", false, &[]);
         let (for_bare, for_bench) = (serve(), serve());
         for case in cases(drives) {

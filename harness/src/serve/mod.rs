@@ -3,6 +3,8 @@
 //! [`Server`] is the whole of it without I/O: bytes of a client in, bytes of the ring out, the time an argument. [`serve`] is
 //! the shell around it: one thread that waits for pseudo terminals, sockets, signals and lines of control.
 
+mod arrival;
+mod clock;
 mod control;
 mod lines;
 mod place;

@@ -338,6 +338,19 @@ impl Server {
         self.seats.get(seat).map_or(0, |seat| seat.lost)
     }
 
+    /// When, by the clock, the next byte comes home that somebody may wait for: until then he cannot know what to send, and all by
+    /// which he has it later is lost on the line.
+    #[must_use]
+    pub fn awaited(&self) -> Option<Instant> {
+        let (from, to) = self.base;
+        let soon = self.link.now() + AHEAD;
+        let homes = self.seats.iter().filter_map(|seat| match seat.at {
+            At::Master(ring) if seat.taken && seat.sent_by <= soon => self.link.next_home(ring),
+            At::Master(_) | At::Inner(_) => None,
+        });
+        homes.min().map(|home| from + home.since(to))
+    }
+
     /// When, by the clock, [`Self::advance`] is to be called again if nothing comes before.
     #[must_use]
     pub fn deadline(&self) -> Instant {
@@ -350,14 +363,12 @@ impl Server {
         let soon = self.link.now() + AHEAD;
         let mut batch = BATCH;
         let mut next = self.link.next_event();
-        let mut exact = idle;
+        let mut exact = self.awaited().unwrap_or(idle);
         for seat in &self.seats {
             match seat.at {
-                // Somebody may wait for what comes home now, and a byte that is not yet on the last link is there in a byte time.
-                At::Master(ring) if seat.taken && seat.sent_by <= soon => {
+                // A byte that is not yet on the last link is there in a byte time.
+                At::Master(_) if seat.taken && seat.sent_by <= soon => {
                     batch = batch.min(self.link.byte_time());
-                    let home = self.link.next_home(ring);
-                    exact = home.map_or(exact, |home| exact.min(on_clock(home)));
                 }
                 At::Master(_) if seat.taken => {
                     exact = exact.min(on_clock(seat.sent_by - AHEAD));

@@ -1,5 +1,6 @@
 //! The shell around a [`Server`]: one thread that waits for sockets, pseudo terminals, signals and the next deadline.
 
+use super::clock::Clock;
 use super::control::Answer;
 use super::lines::{Line, Lines};
 use super::place::{ControlPlace, Place};
@@ -17,6 +18,9 @@ use std::path::PathBuf;
 
 /// Bytes read at a time.
 const CHUNK: usize = 4096;
+
+/// How long before a byte comes home that somebody waits for this program is woken: that takes longer than to hand the byte over.
+const AWAKE: Span = Span::from_micros(60);
 
 /// Answers that wait for whoever sends lines of control; further lines wait meanwhile.
 const UNREAD: usize = 64 << 10;
@@ -147,6 +151,7 @@ pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, Serv
         control,
         host,
         signals,
+        clock: Clock::start(),
         here: 0,
         gone: false,
     };
@@ -217,6 +222,7 @@ struct Shell<'a> {
     control: Option<Control>,
     host: &'a mut dyn Host,
     signals: Signals,
+    clock: Clock,
     /// Clients there are.
     here: usize,
     /// A client was there, and none is left.
@@ -258,32 +264,39 @@ impl Shell<'_> {
 
     fn run(&mut self, job: &Job) -> Result<End, ServeError> {
         wake_on_time();
-        let started = std::time::Instant::now();
         let end = job.length.map(|length| Instant::START + length);
         loop {
-            let clock = clock(started);
-            if end.is_some_and(|end| end <= clock) {
+            if end.is_some_and(|end| end <= self.clock.now()) {
                 return Ok(End::TimeOver);
             }
             let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
-            self.wait(until.since(clock)).map_err(ServeError::Wait)?;
-            // What comes now comes at this time, not at that of the last look.
-            self.server.advance(self::clock(started));
-            if self.interrupted() {
+            let ready = self.wait(until).map_err(ServeError::Wait)?;
+            if ready && self.interrupted() {
                 return Ok(End::Interrupted);
             }
-            for seat in 0..self.ends.len() {
+            let seats = 0..self.ends.len();
+            for seat in seats.clone().filter(|_| ready) {
                 self.attend(seat);
             }
-            self.obey().map_err(ServeError::Output)?;
+            self.server.advance(self.clock.now());
+            for seat in seats {
+                if let Err(error) = self.speak(seat) {
+                    self.fail(seat, &error);
+                }
+            }
+            if ready {
+                self.obey().map_err(ServeError::Output)?;
+            }
             if job.once && self.gone {
                 return Ok(End::ClientsGone);
             }
         }
     }
 
-    /// Waits until something can be read or written, at most so long.
-    fn wait(&mut self, longest: Span) -> io::Result<()> {
+    /// Waits until something can be read or written, at most until then, and says whether something can. Whoever has a byte that
+    /// somebody waits for is awake when it comes home, as a line is.
+    fn wait(&mut self, until: Instant) -> io::Result<bool> {
+        let awaited = self.server.awaited();
         let mut fds = vec![PollFd::new(&self.signals.read, PollFlags::IN)];
         for (seat, end) in self.ends.iter().enumerate() {
             let mut stream = PollFlags::empty();
@@ -318,14 +331,20 @@ impl Shell<'_> {
                 Source::Ended => {}
             }
         }
-        let nanos = longest.as_nanos();
-        let longest = Timespec {
-            tv_sec: i64::try_from(nanos / 1_000_000_000).unwrap_or(i64::MAX),
-            tv_nsec: i64::try_from(nanos % 1_000_000_000).unwrap_or(0),
-        };
-        match poll(&mut fds, Some(&longest)) {
-            Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
-            Err(error) => Err(error.into()),
+        loop {
+            let now = self.clock.now();
+            let wake = awaited.map_or(until, |home| until.min(home - AWAKE));
+            let nanos = wake.since(now).as_nanos();
+            let longest = Timespec {
+                tv_sec: i64::try_from(nanos / 1_000_000_000).unwrap_or(i64::MAX),
+                tv_nsec: i64::try_from(nanos % 1_000_000_000).unwrap_or(0),
+            };
+            match poll(&mut fds, Some(&longest)) {
+                Ok(0) if self.clock.now() < until => {}
+                Ok(ready) => return Ok(ready > 0),
+                Err(rustix::io::Errno::INTR) => return Ok(true),
+                Err(error) => return Err(error.into()),
+            }
         }
     }
 
@@ -334,7 +353,7 @@ impl Shell<'_> {
         self.signals.read.read(&mut byte).is_ok_and(|read| read > 0)
     }
 
-    /// Lets clients come, speak, hear and go.
+    /// Lets clients come, speak and go.
     fn attend(&mut self, seat: usize) {
         let visitors = match &mut self.ends[seat] {
             Seat::Tcp(tcp) => tcp.accept(),
@@ -349,25 +368,29 @@ impl Shell<'_> {
                 ),
             }
         }
-        let heard = self.hear(seat);
-        let drained = matches!(heard, Ok(true));
-        let alive = heard.and_then(|_| self.speak(seat));
-        match (&mut self.ends[seat], alive) {
-            (Seat::Tcp(tcp), Err(error)) if tcp.taken() => {
-                tcp.close();
-                let why = match error.kind() {
-                    io::ErrorKind::UnexpectedEof => String::new(),
-                    _ => format!(" ({error})"),
-                };
-                self.go(seat, &format!("the client has gone{why}"));
-            }
+        match (self.hear(seat), &mut self.ends[seat]) {
+            (Err(error), _) => self.fail(seat, &error),
             // Who has gone is still here until all that it sent has been read.
-            (Seat::Pty(pty), _) if drained => {
+            (Ok(true), Seat::Pty(pty)) => {
                 for change in pty.changes() {
                     self.change(seat, change);
                 }
             }
-            _ => {}
+            (Ok(_), _) => {}
+        }
+    }
+
+    /// A client's stream has failed: over a socket it has gone. At a pseudo terminal nobody is there, and that is seen otherwise.
+    fn fail(&mut self, seat: usize, error: &io::Error) {
+        if let Seat::Tcp(tcp) = &mut self.ends[seat]
+            && tcp.taken()
+        {
+            tcp.close();
+            let why = match error.kind() {
+                io::ErrorKind::UnexpectedEof => String::new(),
+                _ => format!(" ({error})"),
+            };
+            self.go(seat, &format!("the client has gone{why}"));
         }
     }
 
@@ -411,7 +434,8 @@ impl Shell<'_> {
             .say(&format!("{}: {text}", self.server.name(seat)));
     }
 
-    /// Takes what a client has sent, as far as there is room for it; says whether that was all.
+    /// Takes what a client has sent, as far as there is room for it; says whether that was all. What the system has had for a while came
+    /// then, and not now.
     fn hear(&mut self, seat: usize) -> io::Result<bool> {
         let mut buffer = [0; CHUNK];
         loop {
@@ -421,10 +445,10 @@ impl Shell<'_> {
             }
             let read = match &mut self.ends[seat] {
                 Seat::Tcp(tcp) => tcp.read(&mut buffer[..room]),
-                Seat::Pty(pty) => pty.read(&mut buffer[..room]),
+                Seat::Pty(pty) => pty.read(&mut buffer[..room]).map(|read| (read, Span::ZERO)),
             };
-            let read = match read {
-                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+            let (read, ago) = match read {
+                Ok((0, _)) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(read) => read,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(true),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
@@ -437,6 +461,7 @@ impl Shell<'_> {
             if news {
                 self.come(seat, "a client came");
             }
+            self.server.advance(self.clock.left(ago));
             if let Err(bad) = self.server.receive(seat, &buffer[..read])
                 && !std::mem::replace(&mut self.garbled[seat], true)
             {
@@ -455,12 +480,16 @@ impl Shell<'_> {
             if bytes.is_empty() {
                 return Ok(());
             }
+            let before = std::time::Instant::now();
             let written = match &mut self.ends[seat] {
                 Seat::Tcp(tcp) => tcp.write(bytes),
                 Seat::Pty(pty) => pty.write(bytes),
             };
             match written {
-                Ok(written) => self.server.transmitted(seat, written),
+                Ok(written) => {
+                    self.clock.handed_over(before.elapsed());
+                    self.server.transmitted(seat, written);
+                }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(error),
@@ -481,7 +510,7 @@ impl Shell<'_> {
         while control.answers.len() < UNREAD {
             let read = match &mut control.source {
                 Source::Standard => standard(&mut buffer),
-                Source::Tcp(tcp) => tcp.read(&mut buffer),
+                Source::Tcp(tcp) => tcp.read(&mut buffer).map(|(read, _)| read),
                 Source::Ended => break,
             };
             let (lines, ended) = match read {
@@ -547,9 +576,4 @@ fn standard(buffer: &mut [u8]) -> io::Result<usize> {
         return Err(io::ErrorKind::WouldBlock.into());
     }
     Ok(rustix::io::read(stdin, buffer)?)
-}
-
-fn clock(started: std::time::Instant) -> Instant {
-    let nanos = started.elapsed().as_nanos();
-    Instant::START + Span::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
 }

@@ -1,8 +1,10 @@
 //! A socket that listens for one client at a time.
 
+use super::arrival;
 use super::shell::ServeError;
+use harness_proto::time::Span;
 use rustix::event::{PollFd, PollFlags};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 
 /// Second clients taken at a time, and turned away.
@@ -70,6 +72,7 @@ impl Tcp {
             } else if stream.set_nonblocking(true).is_ok() {
                 // A byte is to be on its way at once; without this it comes late, and comes.
                 let _late = stream.set_nodelay(true);
+                arrival::ask(&stream);
                 self.client = Some((stream, address));
                 visitors.push(Visitor::Came(address));
             }
@@ -77,10 +80,10 @@ impl Tcp {
         visitors
     }
 
-    /// Reads of the client; 0 bytes where it has gone.
-    pub(super) fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+    /// Reads of the client; 0 bytes where it has gone. The second value says how long ago the last of them came.
+    pub(super) fn read(&mut self, buffer: &mut [u8]) -> io::Result<(usize, Span)> {
         match &mut self.client {
-            Some((stream, _)) => stream.read(buffer),
+            Some((stream, _)) => arrival::read(stream, buffer),
             None => Err(io::ErrorKind::WouldBlock.into()),
         }
     }

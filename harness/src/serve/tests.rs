@@ -104,6 +104,27 @@ fn deadlines_are_prompt_when_busy_and_rare_when_idle() {
     }
 }
 
+/// Whoever has given little may wait for each byte that comes home, and the shell is awake for it; of what is given far ahead, and where
+/// nobody is, nothing is awaited.
+#[test]
+fn a_byte_that_somebody_may_wait_for_is_awaited() {
+    let mut server = server(HEADER, &[1], Pace::Line, Marks::None);
+    let byte = server.link.byte_time();
+    assert_eq!(server.awaited(), None, "nothing is under way");
+    server.receive(0, &[0x80]).expect("no marks");
+    server.advance(at(0) + byte);
+    assert_eq!(server.awaited(), Some(at(0) + byte * 2));
+    assert_eq!(server.deadline(), at(0) + byte * 2);
+    run(&mut server, at(5));
+    assert_eq!(server.awaited(), None, "it has come");
+    server.receive(0, &[0x80; 100]).expect("no marks");
+    server.advance(at(5) + byte);
+    assert_eq!(server.awaited(), None, "the line is taken for long");
+    server.go(0);
+    server.advance(at(5) + byte * 100);
+    assert_eq!(server.awaited(), None, "nobody is there");
+}
+
 /// ND21 9.7, 9.8: a byte that the client marks as damaged is a parity error for the first drive; the ring spells its address out,
 /// and the check sequence behind 17 zeros brings it back.
 #[test]

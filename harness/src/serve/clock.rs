@@ -1,0 +1,75 @@
+//! The time in the rings, as clients have it.
+
+use harness_proto::time::{Instant, Span};
+use std::time;
+
+/// The most that handing over bytes counts for: less than a bit (ND21 8.1).
+const MOST: Span = Span::from_micros(20);
+
+/// How many times the last handing over counts in what it takes.
+const LAST: u64 = 8;
+
+/// The clock of served rings. A write to a socket takes microseconds, a line's end none: the time in the rings is that much ahead of the
+/// system's, so that a byte is with the client when it comes home, and what a client sends has left it that much before it came here.
+#[derive(Debug)]
+pub(super) struct Clock {
+    start: time::Instant,
+    handing: Span,
+}
+
+impl Clock {
+    /// The rings start now.
+    pub(super) fn start() -> Self {
+        Self {
+            start: time::Instant::now(),
+            handing: Span::ZERO,
+        }
+    }
+
+    /// The time in the rings.
+    pub(super) fn now(&self) -> Instant {
+        self.at(time::Instant::now()) + self.handing
+    }
+
+    /// When bytes that came here so long ago have left the client.
+    pub(super) fn left(&self, ago: Span) -> Instant {
+        self.at(time::Instant::now()) - ago - self.handing
+    }
+
+    /// Bytes have been handed over, and it took so long.
+    pub(super) fn handed_over(&mut self, took: time::Duration) {
+        let took = u64::try_from(took.as_nanos()).map_or(MOST, Span::from_nanos);
+        let all = self.handing * (LAST - 1) + took.min(MOST);
+        self.handing = Span::from_nanos(all.as_nanos() / LAST);
+    }
+
+    fn at(&self, time: time::Instant) -> Instant {
+        let since = time.saturating_duration_since(self.start);
+        Instant::START + Span::from_nanos(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Clock, MOST};
+    use harness_proto::time::Span;
+    use std::time::Duration;
+
+    #[test]
+    fn the_rings_are_ahead_by_what_handing_over_takes() {
+        let mut clock = Clock::start();
+        for _ in 0..100 {
+            clock.handed_over(Duration::from_micros(6));
+        }
+        let (left, now) = (clock.left(Span::ZERO), clock.now());
+        let apart = now.since(left);
+        assert!(
+            apart >= Span::from_micros(11),
+            "both ways: {apart:?}, and what was computed between"
+        );
+        for _ in 0..100 {
+            clock.handed_over(Duration::from_secs(100));
+        }
+        assert!(clock.handing <= MOST, "who stood still is not ahead");
+    }
+}
