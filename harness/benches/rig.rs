@@ -4,9 +4,9 @@
 //! Each conversation is played in four ways: in virtual time, which is the wire's own; by a program that only writes to the socket and
 //! reads from it, the baseline; by the same program where it never sleeps, which nothing can be faster than; and by the bench, with guard,
 //! record, and everything else that a rig has. The program writes what was sent in virtual time, and what was sent behind an answer when
-//! as much has come back. What all add is the system's and the served ring's: processes that are woken up, once for each question and each
-//! answer, and bytes that go from one to the other. What the bench adds to that is its own: less than nothing where it is awake when an
-//! answer comes, and the program has to be woken up. Beside the program that never sleeps it is all that the bench does with an answer.
+//! as much has come back. What the first adds is the system's, which wakes it for each answer; what the second adds, the served ring's. What
+//! the bench adds to that is its own: less than nothing where it is awake when an answer comes, and the program has to be woken up. Beside
+//! the program that never sleeps it is all that the bench does with an answer.
 //!
 //! They take turns, on rings of their own, so that what else the computer does slows down all; each figure is the middle one of
 //! its own kind. Turns in which the host of a virtual machine took its processors away are taken again: who stands still for 10 ms and

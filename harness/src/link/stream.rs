@@ -303,7 +303,10 @@ impl StreamLink {
             std::thread::sleep(time::Duration::from_nanos(until.since(now).as_nanos()));
             self.late.woken(self.clock(until), time::Instant::now());
         } else if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
-            return self.watch(until.min(at + STAY));
+            // Whoever waits looks at what has come, again and again, and so he has all that he needs at hand when something has.
+            // To give way here is to be out of it for a whole slice of time where others are busy.
+            let until = until.min(at + STAY);
+            self.late.woken(self.clock(until), time::Instant::now());
         } else {
             let wake = awaited.map_or(until, |at| until.min(at - AWAKE));
             let wake = wake.min(now + NAP);
@@ -311,15 +314,6 @@ impl StreamLink {
             self.late.woken(self.clock(wake), time::Instant::now());
         }
         self.look();
-    }
-
-    /// Looks again and again until then, or until something has come. Whoever gives way here is out of it for a whole slice of time where
-    /// others are busy.
-    fn watch(&mut self, until: Instant) {
-        let came = |link: &Self| link.rings.iter().map(|ring| ring.came).sum::<u64>();
-        let before = came(self);
-        while self.look() < until && came(self) == before && self.trouble.is_none() {}
-        self.late.woken(self.clock(until), time::Instant::now());
     }
 
     /// Gives the operating system what is due and takes what has come.
