@@ -68,6 +68,10 @@ pub struct StreamLink {
     told: Cell<Instant>,
     /// How late it has been woken.
     late: Lateness,
+    /// When the ports were last looked at.
+    looked: Instant,
+    /// Whoever waits is awake and looks again before this time.
+    awake: Option<Instant>,
     /// Somebody has been told of bytes that have come, and has fetched none since: only more of them are news.
     lying: bool,
     capabilities: Vec<Capability>,
@@ -118,6 +122,8 @@ impl StreamLink {
             start: time::Instant::now(),
             told: Cell::new(Instant::START),
             late: Lateness::new(time::Instant::now()),
+            looked: Instant::START,
+            awake: None,
             lying: false,
             capabilities,
             scheduled: VecDeque::new(),
@@ -227,6 +233,7 @@ impl StreamLink {
 
     /// Takes what has come.
     fn take(&mut self, now: Instant) {
+        self.looked = now;
         let told = self.told.get();
         for ring in &mut self.rings {
             if self.trouble.is_none() {
@@ -289,7 +296,7 @@ impl StreamLink {
         // From when on a byte that has not come home counts as lost.
         let expecting = self.rings.iter().filter(|ring| ring.sent > ring.came);
         let lost = expecting.map(|ring| ring.free + self.round(ring));
-        let lost = lost.filter(|at| *at > now);
+        let lost = lost.filter(|at| *at > self.looked);
         queues.chain(faults).chain(relays).chain(lost).min()
     }
 
@@ -305,8 +312,7 @@ impl StreamLink {
         } else if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
             // Whoever waits looks at what has come, again and again, and so he has all that he needs at hand when something has.
             // To give way here is to be out of it for a whole slice of time where others are busy.
-            let until = until.min(at + STAY);
-            self.late.woken(self.clock(until), time::Instant::now());
+            self.awake = Some(until.min(at + STAY));
         } else {
             let wake = awaited.map_or(until, |at| until.min(at - AWAKE));
             let wake = wake.min(now + NAP);
@@ -395,6 +401,9 @@ impl Line for StreamLink {
 
     fn wait(&mut self, until: Instant) -> bool {
         let now = self.at(time::Instant::now());
+        if let Some(until) = self.awake.take() {
+            self.late.woken(self.clock(until), self.clock(now));
+        }
         self.give(now);
         let until = self.due(now).map_or(until, |due| due.min(until));
         if (self.lying || !self.any_has_come()) && self.trouble.is_none() && now < until {
@@ -403,6 +412,7 @@ impl Line for StreamLink {
             self.take(now);
         }
         self.lying = self.any_has_come();
+        self.awake = self.awake.filter(|_| !self.lying);
         self.trouble.is_none()
     }
 
@@ -432,10 +442,10 @@ impl Line for StreamLink {
 impl StreamLink {
     /// Whether the port at an inner link still has to show bytes that have come home: its adapter may be slower than
     /// the master's own.
-    fn lags(&self, inner: &InnerLink, now: Instant) -> bool {
+    fn lags(&self, inner: &InnerLink) -> bool {
         let ring = self.rings.get(inner.ring);
         ring.is_some_and(|ring| {
-            inner.carried < ring.incoming.count() && now < ring.last_arrival + SLACK
+            inner.carried < ring.incoming.count() && self.looked < ring.last_arrival + SLACK
         })
     }
 
@@ -453,7 +463,8 @@ impl StreamLink {
             (taken + inner.taken, given + inner.given)
         });
         let home = ring.came + taken == ring.sent + given;
-        !home && now < ring.free + self.round(ring)
+        // Whoever was away at that time has still to look.
+        !home && self.looked < ring.free + self.round(ring)
     }
 }
 
@@ -467,6 +478,8 @@ impl Link for StreamLink {
         self.start = time::Instant::now();
         self.told.set(Instant::START);
         self.lying = false;
+        self.looked = Instant::START;
+        self.awake = None;
         self.scheduled.clear();
         self.rings.iter_mut().for_each(Ring::begin);
         self.inner.iter_mut().for_each(InnerLink::begin);
@@ -474,7 +487,7 @@ impl Link for StreamLink {
 
     fn busy(&self) -> bool {
         let now = self.now();
-        let late = |inner: &InnerLink| inner.busy() || self.lags(inner, now);
+        let late = |inner: &InnerLink| inner.busy() || self.lags(inner);
         let relays = self.inner.iter().any(late);
         let rings = (0..self.rings.len()).any(|ring| self.ring_busy(ring, now));
         self.trouble.is_none() && (relays || rings)

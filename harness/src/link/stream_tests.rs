@@ -82,3 +82,47 @@ fn who_was_away_waits_for_lost_bytes_as_much_longer() {
     let away = link.round(&link.rings[0]);
     assert!(away > calm + SLACK, "{away}, {calm} before");
 }
+
+/// A byte that came while nobody was there to look is not lost, however long that was.
+#[test]
+fn who_was_away_looks_before_a_byte_counts_as_lost() {
+    let (mut link, mut ring) = link();
+    let free = link.send(0, &[0x80]);
+    ring.write_all(&[0x80]).expect("room");
+    let over = free + link.round(&link.rings[0]);
+    while link.now() <= over {
+        std::thread::sleep(time::Duration::from_millis(5));
+    }
+    assert!(link.busy(), "nobody has looked");
+    assert!(link.wait(link.now() + Span::from_millis(60_000)));
+    assert!(!link.busy());
+    assert_eq!(link.receive(0).map(|(_, byte)| byte.byte), Some(0x80));
+    // What is lost is lost at the first look behind that time, and nobody sleeps for it.
+    let free = link.send(0, &[0x80]);
+    let over = free + link.round(&link.rings[0]);
+    while link.now() <= over {
+        std::thread::sleep(time::Duration::from_millis(5));
+    }
+    assert!(link.busy(), "nobody has looked");
+    assert!(link.wait(link.now() + Span::from_millis(60_000)));
+    assert!(!link.busy(), "it is lost");
+}
+
+/// Whoever stands still while he is awake for an answer is late, as one who is woken late is.
+#[test]
+fn who_stands_still_while_awake_is_late() {
+    let (mut link, _ring) = link();
+    let long = Span::from_millis(60_000);
+    while link.awake.is_none() {
+        // The computer may be late here too: then it is for the next byte.
+        let free = link.send(0, &[0x88]);
+        let home = free + link.byte_time() * u64::from(DRIVES);
+        while link.awake.is_none() && link.now() < home + STAY {
+            assert!(link.wait(home + long));
+        }
+    }
+    std::thread::sleep(time::Duration::from_millis(20));
+    assert!(link.wait(link.now() + long));
+    let late = link.lateness();
+    assert!(late > Span::from_millis(15), "{late}");
+}
