@@ -52,8 +52,14 @@ const MOST_UNTIMELY: usize = 3;
 fn play_again_on(link: &mut StreamLink, entry: &Entry) -> Outcome {
     let mut outcome = play_on(link, entry);
     for _ in 1..MOST_UNTIMELY {
-        // A line whose time has passed before it is reached is the computer's doing, too.
-        if matches!(outcome.verdict, Verdict::Marginal | Verdict::Aborted) {
+        // A line whose time has passed before it is reached is the computer's doing, too, and so may all be that went wrong where it
+        // has just stood still for so long that drives take it for silence.
+        let stood_still = link.lead().near > Span::ZERO;
+        if match outcome.verdict {
+            Verdict::Marginal | Verdict::Aborted => true,
+            Verdict::Failed => stood_still,
+            _ => false,
+        } {
             outcome = play_on(link, entry);
         }
     }
