@@ -198,7 +198,7 @@ fn a_terminal_is_raw_and_its_link_goes_with_the_program() {
 fn the_next_program_at_a_terminal_reads_nothing_old() {
     let link = path("next");
     let place = link.to_str().expect("a plain path");
-    let mut sim = Sim::start(&["--rig", "sim:3", "--pty", place]);
+    let mut sim = Sim::start(&["--rig", "sim:3", "--pty", place, "--control", "-"]);
     sim.line();
     let mut first = terminal(&link);
     assert_eq!(read_byte(&mut first), ANSWER);
@@ -208,8 +208,12 @@ fn the_next_program_at_a_terminal_reads_nothing_old() {
     drop(first);
     assert_eq!(sim.said(), "ring 1: a client came");
     assert_eq!(sim.said(), "ring 1: the client has gone");
-    // What was still on its way round comes while nobody is there, at the latest after six byte times.
+    // The bytes still under way return while no client is there, within six byte times. The answer to a line of control shows that
+    // the server has caught up with the time.
     std::thread::sleep(Duration::from_millis(100));
+    let control = sim.child.stdin.as_mut().expect("a pipe");
+    control.write_all(b"state 0\n").expect("sent");
+    assert!(sim.line().starts_with("ok "));
     assert_eq!(read_byte(&mut terminal(&link)), ANSWER);
 }
 

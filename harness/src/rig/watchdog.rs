@@ -41,6 +41,22 @@ impl fmt::Debug for Alarm {
     }
 }
 
+/// The count at the last look at which it had gone up, and when that was.
+struct LastBeat {
+    count: u64,
+    seen: Instant,
+}
+
+impl LastBeat {
+    /// For how long the count has stood still.
+    fn age(&mut self, count: u64, now: Instant) -> Duration {
+        if count != self.count {
+            *self = Self { count, seen: now };
+        }
+        now.saturating_duration_since(self.seen)
+    }
+}
+
 /// A watchdog on duty; it leaves when this is dropped.
 #[derive(Debug)]
 pub(super) struct Watchdog {
@@ -61,12 +77,12 @@ impl Watchdog {
         std::thread::Builder::new()
             .name("watchdog".to_owned())
             .spawn(move || {
-                let mut seen = (beats.load(Ordering::Relaxed), Instant::now());
+                let mut last = LastBeat {
+                    count: beats.load(Ordering::Relaxed),
+                    seen: Instant::now(),
+                };
                 while left.recv_timeout(EVERY.min(limit)) == Err(RecvTimeoutError::Timeout) {
-                    let now = beats.load(Ordering::Relaxed);
-                    if now != seen.0 {
-                        seen = (now, Instant::now());
-                    } else if seen.1.elapsed() >= limit {
+                    if last.age(beats.load(Ordering::Relaxed), Instant::now()) >= limit {
                         let mut why = vec![format!(
                             "the program has shown no sign of life for {} s; the drives were told to stop, and nobody knows whether they \
                              did: use the emergency stop",
@@ -88,35 +104,38 @@ impl Watchdog {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Mutex;
 
-    /// It bites only when the count stands still, and not once it has been called off.
     #[test]
-    fn it_bites_what_stands_still() {
-        let bitten = Arc::new(Mutex::new(Vec::new()));
-        let beats = Arc::new(AtomicU64::new(0));
-        let start = || {
-            let bitten = Arc::clone(&bitten);
-            let alarm = Alarm::new(move |why| bitten.lock().expect("sound").push(why.to_owned()));
-            let limit = Duration::from_millis(400);
-            let then = || vec!["the power is off".to_owned()];
-            Watchdog::start(Arc::clone(&beats), limit, Vec::new(), then, alarm).expect("a thread")
-        };
-        let watchdog = start();
-        for _ in 0..40 {
-            beats.fetch_add(1, Ordering::Relaxed);
-            std::thread::sleep(Duration::from_millis(20));
+    fn only_a_count_that_stands_still_grows_old() {
+        let seen = Instant::now();
+        let at = |seconds| seen + Duration::from_secs(seconds);
+        let mut last = LastBeat { count: 7, seen };
+        for (count, second, age) in [(7, 3, 3), (8, 4, 0), (8, 9, 5), (9, 10, 0), (9, 10, 0)] {
+            assert_eq!(last.age(count, at(second)), Duration::from_secs(age));
         }
-        drop(watchdog);
-        std::thread::sleep(Duration::from_millis(600));
-        assert!(bitten.lock().expect("sound").is_empty());
-        let _watchdog = start();
-        let end = Instant::now() + Duration::from_secs(20);
-        while bitten.lock().expect("sound").is_empty() && Instant::now() < end {
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        let bitten = bitten.lock().expect("sound");
-        assert_eq!(bitten.len(), 1);
-        assert!(bitten[0].contains("no sign of life") && bitten[0].ends_with("the power is off"));
+    }
+
+    /// Starts a watchdog over a count that stands still. What it says arrives at the receiver, which ends with the watchdog's thread.
+    fn start(limit: Duration) -> (Watchdog, std::sync::mpsc::Receiver<String>) {
+        let (bite, bitten) = channel();
+        let alarm = Alarm::new(move |why| bite.send(why.to_owned()).expect("the test waits"));
+        let then = || vec!["the power is off".to_owned()];
+        let dog = Watchdog::start(Arc::default(), limit, Vec::new(), then, alarm);
+        (dog.expect("a thread"), bitten)
+    }
+
+    #[test]
+    fn it_bites_a_program_that_stands_still() {
+        let (_dog, bitten) = start(Duration::from_millis(50));
+        let said = bitten.recv().expect("it bites");
+        assert!(said.contains("no sign of life") && said.ends_with("the power is off"));
+        assert!(bitten.recv().is_err(), "it bites once");
+    }
+
+    #[test]
+    fn it_leaves_when_it_is_called_off() {
+        let (dog, bitten) = start(Duration::from_secs(3_600));
+        drop(dog);
+        assert!(bitten.recv().is_err(), "its thread ends without a word");
     }
 }

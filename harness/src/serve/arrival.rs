@@ -1,35 +1,92 @@
-//! When bytes came over a socket: by the operating system's stamp, so that it does not count how late this program is woken.
+//! A client's socket, and when its bytes arrived: by the operating system's stamp, so that a late wake-up of this program does not count.
 
 use harness_proto::time::Span;
-use std::io;
+use std::io::{self, Write};
 use std::net::TcpStream;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::time::{Duration, Instant};
 
-#[cfg(target_os = "linux")]
-pub(super) use linux::{ask, read};
+pub(super) use system::ask;
+use system::receive;
 
-/// Stamps of the system's clock, of the last segment of what is read (socket(7), `SO_TIMESTAMPNS`).
-#[cfg(target_os = "linux")]
-mod linux {
-    use super::{Span, TcpStream, io};
-    use nix::cmsg_space;
-    use nix::sys::socket::sockopt::ReceiveTimestampns;
-    use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg, setsockopt};
-    use nix::sys::time::{TimeSpec, TimeValLike};
-    use nix::time::{ClockId, clock_gettime};
-    use std::io::IoSliceMut;
-    use std::os::fd::AsRawFd;
+/// A client's socket.
+#[derive(Debug)]
+pub(super) struct Client {
+    stream: TcpStream,
+    /// When nothing was left to read for the last time: whatever is read next arrived later.
+    empty: Instant,
+}
 
-    /// Asks for stamps from now on. Where there are none, what is read has come just now.
-    pub(in super::super) fn ask(stream: &TcpStream) {
-        let _without = setsockopt(stream.as_raw_fd(), ReceiveTimestampns, &true);
+impl Client {
+    /// An accepted connection of a socket that listens since then.
+    pub(super) fn new(stream: TcpStream, listening: Instant) -> Self {
+        Self {
+            stream,
+            empty: listening,
+        }
     }
 
-    /// Reads, and says how long ago the last byte of it came.
-    pub(in super::super) fn read(
-        stream: &mut TcpStream,
+    /// Reads; 0 bytes where the client closed its end. The second value says how long ago the last of the bytes arrived.
+    ///
+    /// # Errors
+    /// Nothing is there to read, or the connection failed.
+    pub(super) fn read(&mut self, buffer: &mut [u8]) -> io::Result<(usize, Span)> {
+        let result = receive(&self.stream, buffer);
+        let now = Instant::now();
+        match result {
+            Ok((count, age)) => Ok((count, credible(age, now - self.empty))),
+            Err(error) => {
+                self.empty = now;
+                Err(error)
+            }
+        }
+    }
+
+    /// Writes as much as the system takes.
+    ///
+    /// # Errors
+    /// It takes nothing now, or the connection failed.
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stream.write(bytes)
+    }
+}
+
+impl AsFd for Client {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.stream.as_fd()
+    }
+}
+
+/// The age of bytes by their stamp, if the stamp can be true: not from the time before the socket was last empty, as after a step of
+/// the computer's clock. Bytes without a stamp, and with one that cannot be true, arrived when they were read.
+fn credible(age: Option<Duration>, longest: Duration) -> Span {
+    let age = age.filter(|age| *age <= longest).unwrap_or_default();
+    u64::try_from(age.as_nanos()).map_or(Span::ZERO, Span::from_nanos)
+}
+
+#[cfg(target_os = "linux")]
+mod system {
+    use nix::sys::socket::sockopt::ReceiveTimestampns;
+    use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg, setsockopt};
+    use nix::sys::time::TimeSpec;
+    use std::io::{self, IoSliceMut};
+    use std::net::{TcpListener, TcpStream};
+    use std::os::fd::AsRawFd;
+    use std::time::{Duration, SystemTime};
+
+    /// Asks for stamps of the bytes of all clients to come (socket(7), `SO_TIMESTAMPNS`): accepted sockets inherit the option. The
+    /// kernel begins to stamp a moment after the first socket of the computer asked, so it is asked before a client can send.
+    pub(in super::super) fn ask(listener: &TcpListener) {
+        // Without stamps the time of the read counts.
+        let _without = setsockopt(listener.as_raw_fd(), ReceiveTimestampns, &true);
+    }
+
+    /// Reads, and says how old the stamp of the last byte is, if there is a stamp and it does not lie ahead of the clock.
+    pub(super) fn receive(
+        stream: &TcpStream,
         buffer: &mut [u8],
-    ) -> io::Result<(usize, Span)> {
-        let mut space = cmsg_space!(TimeSpec);
+    ) -> io::Result<(usize, Option<Duration>)> {
+        let mut space = nix::cmsg_space!(TimeSpec);
         let mut slices = [IoSliceMut::new(buffer)];
         let read = recvmsg::<()>(
             stream.as_raw_fd(),
@@ -38,57 +95,86 @@ mod linux {
             MsgFlags::empty(),
         )?;
         let stamp = read.cmsgs().find_map(|message| match message {
-            ControlMessageOwned::ScmTimestampns(stamp) => Some(stamp),
+            ControlMessageOwned::ScmTimestampns(stamp) => Some(Duration::from(stamp)),
             _ => None,
         });
-        let now = clock_gettime(ClockId::CLOCK_REALTIME);
-        // Whoever sets the clock meanwhile has the stamp lie ahead.
-        let ago = now
-            .ok()
-            .zip(stamp)
-            .map_or(0, |(now, stamp)| (now - stamp).num_nanoseconds());
-        Ok((
-            read.bytes,
-            Span::from_nanos(u64::try_from(ago).unwrap_or(0)),
-        ))
+        let age = stamp.and_then(|stamp| {
+            let stamped = SystemTime::UNIX_EPOCH.checked_add(stamp)?;
+            SystemTime::now().duration_since(stamped).ok()
+        });
+        Ok((read.bytes, age))
     }
 }
 
-/// Where the system has no stamps, all has come when it is read.
+/// Where the system has no stamps, bytes arrive when they are read.
 #[cfg(not(target_os = "linux"))]
-pub(super) fn ask(_stream: &TcpStream) {}
+mod system {
+    use std::io::{self, Read};
+    use std::net::{TcpListener, TcpStream};
+    use std::time::Duration;
 
-#[cfg(not(target_os = "linux"))]
-pub(super) fn read(stream: &mut TcpStream, buffer: &mut [u8]) -> io::Result<(usize, Span)> {
-    Ok((io::Read::read(stream, buffer)?, Span::ZERO))
+    pub(in super::super) fn ask(_listener: &TcpListener) {}
+
+    pub(super) fn receive(
+        mut stream: &TcpStream,
+        buffer: &mut [u8],
+    ) -> io::Result<(usize, Option<Duration>)> {
+        Ok((stream.read(buffer)?, None))
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ask, read};
+    use super::{Client, ask, credible};
     use harness_proto::time::Span;
-    use std::io::Write;
+    use std::io::{ErrorKind, Write};
     use std::net::{TcpListener, TcpStream};
-    use std::time::Duration;
+    use std::time::{Duration, Instant};
 
     #[test]
-    fn what_was_not_read_at_once_has_come_before() {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-        let mut client = TcpStream::connect(listener.local_addr().expect("bound")).expect("there");
-        let (mut stream, _) = listener.accept().expect("a client");
-        ask(&stream);
-        client.write_all(&[0x80]).expect("room");
-        let nap = Duration::from_millis(20);
-        std::thread::sleep(nap);
-        let mut buffer = [0; 8];
-        let (count, ago) = read(&mut stream, &mut buffer).expect("a byte");
-        assert_eq!(buffer[..count], [0x80]);
-        if cfg!(target_os = "linux") {
-            // Clocks may be slewed a little.
-            assert!(ago >= Span::from_millis(19), "{ago}");
+    fn only_a_stamp_that_can_be_true_counts() {
+        let ms = Duration::from_millis;
+        for (age, empty, expected) in [
+            (Some(ms(20)), ms(30), 20),
+            (Some(ms(0)), ms(30), 0),
+            (Some(ms(30)), ms(30), 30),
+            // No stamp; one from before the socket was last empty; one as old as the epoch.
+            (None, ms(30), 0),
+            (Some(ms(31)), ms(30), 0),
+            (Some(Duration::MAX), ms(30), 0),
+        ] {
+            let expected = Span::from_millis(expected);
+            assert_eq!(credible(age, empty), expected, "{age:?} {empty:?}");
         }
-        drop(client);
-        let (count, _) = read(&mut stream, &mut buffer).expect("the end");
-        assert_eq!(count, 0);
+    }
+
+    /// Accepted sockets are asked for stamps before anything can be read of them, and no stamp is older than the client.
+    #[test]
+    fn clients_inherit_the_stamps_of_the_listening_socket() {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        ask(&listener);
+        let listening = Instant::now();
+        let mut far = TcpStream::connect(listener.local_addr().expect("bound")).expect("there");
+        let (stream, _) = listener.accept().expect("a client");
+        #[cfg(target_os = "linux")]
+        {
+            use nix::sys::socket::{getsockopt, sockopt::ReceiveTimestampns};
+            use std::os::fd::AsRawFd;
+            assert_eq!(getsockopt(stream.as_raw_fd(), ReceiveTimestampns), Ok(true));
+        }
+        stream.set_nonblocking(true).expect("a socket");
+        let mut client = Client::new(stream, listening);
+        let mut buffer = [0; 8];
+        let nothing = client.read(&mut buffer).expect_err("nothing was sent");
+        assert_eq!(nothing.kind(), ErrorKind::WouldBlock);
+        assert!(client.empty > listening, "it was seen empty");
+        far.write_all(&[0x80]).expect("room");
+        client.stream.set_nonblocking(false).expect("a socket");
+        let (count, ago) = client.read(&mut buffer).expect("a byte");
+        assert_eq!(buffer[..count], [0x80]);
+        let since = u64::try_from(listening.elapsed().as_nanos()).expect("not long ago");
+        assert!(ago <= Span::from_nanos(since), "{ago}");
+        drop(far);
+        assert_eq!(client.read(&mut buffer).expect("the end").0, 0);
     }
 }

@@ -28,12 +28,12 @@ impl Clock {
 
     /// The time in the rings.
     pub(super) fn now(&self) -> Instant {
-        self.at(time::Instant::now()) + self.handing
+        self.at(time::Instant::now())
     }
 
-    /// When bytes that came here so long ago have left the client.
+    /// When bytes that arrived here so long ago left the client.
     pub(super) fn left(&self, ago: Span) -> Instant {
-        self.at(time::Instant::now()) - ago - self.handing
+        self.sent(time::Instant::now(), ago)
     }
 
     /// Bytes have been handed over, and it took so long.
@@ -44,6 +44,14 @@ impl Clock {
     }
 
     fn at(&self, time: time::Instant) -> Instant {
+        self.since_start(time) + self.handing
+    }
+
+    fn sent(&self, time: time::Instant, ago: Span) -> Instant {
+        self.since_start(time) - ago - self.handing
+    }
+
+    fn since_start(&self, time: time::Instant) -> Instant {
         let since = time.saturating_duration_since(self.start);
         Instant::START + Span::from_nanos(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
     }
@@ -51,25 +59,33 @@ impl Clock {
 
 #[cfg(test)]
 mod tests {
-    use super::{Clock, MOST};
-    use harness_proto::time::Span;
+    use super::{Clock, LAST, MOST};
+    use harness_proto::time::{Instant, Span};
     use std::time::Duration;
 
     #[test]
     fn the_rings_are_ahead_by_what_handing_over_takes() {
         let mut clock = Clock::start();
+        let time = clock.start + Duration::from_secs(1);
+        let second = Instant::START + Span::from_millis(1000);
+        assert_eq!(clock.at(time), second);
+        let took = Duration::from_micros(6);
         for _ in 0..100 {
-            clock.handed_over(Duration::from_micros(6));
+            clock.handed_over(took);
         }
-        let (left, now) = (clock.left(Span::ZERO), clock.now());
-        let apart = now.since(left);
-        assert!(
-            apart >= Span::from_micros(11),
-            "both ways: {apart:?}, and what was computed between"
-        );
+        // The mean is rounded down to nanoseconds each time.
+        let ahead = clock.at(time).since(second);
+        let least = Span::from_nanos(6_000 - LAST);
+        assert!(least <= ahead && ahead <= Span::from_micros(6), "{ahead:?}");
+        let ago = Span::from_millis(3);
+        assert_eq!(clock.sent(time, ago) + ago + ahead, second);
         for _ in 0..100 {
             clock.handed_over(Duration::from_secs(100));
         }
-        assert!(clock.handing <= MOST, "who stood still is not ahead");
+        let ahead = clock.at(time).since(second);
+        assert!(
+            ahead <= MOST,
+            "a program that stood still is not ahead: {ahead:?}"
+        );
     }
 }

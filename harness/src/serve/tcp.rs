@@ -1,11 +1,12 @@
 //! A socket that listens for one client at a time.
 
-use super::arrival;
+use super::arrival::{Client, ask};
 use super::shell::ServeError;
 use harness_proto::time::Span;
 use rustix::event::{PollFd, PollFlags};
-use std::io::{self, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::io;
+use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
+use std::time::Instant;
 
 /// Second clients taken at a time, and turned away.
 const TURNED_AWAY: usize = 16;
@@ -15,7 +16,8 @@ const TURNED_AWAY: usize = 16;
 pub(super) struct Tcp {
     listener: TcpListener,
     address: SocketAddr,
-    client: Option<(TcpStream, SocketAddr)>,
+    since: Instant,
+    client: Option<Client>,
 }
 
 /// Somebody at the door.
@@ -41,12 +43,15 @@ impl Tcp {
         if !address.ip().is_loopback() && !allow_remote {
             return Err(ServeError::Remote { address });
         }
+        let since = Instant::now();
         let listener = TcpListener::bind(address).map_err(failed)?;
+        ask(&listener);
         listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         Ok(Self {
             listener,
             address,
+            since,
             client: None,
         })
     }
@@ -72,25 +77,24 @@ impl Tcp {
             } else if stream.set_nonblocking(true).is_ok() {
                 // A byte is to be on its way at once; without this it comes late, and comes.
                 let _late = stream.set_nodelay(true);
-                arrival::ask(&stream);
-                self.client = Some((stream, address));
+                self.client = Some(Client::new(stream, self.since));
                 visitors.push(Visitor::Came(address));
             }
         }
         visitors
     }
 
-    /// Reads of the client; 0 bytes where it has gone. The second value says how long ago the last of them came.
+    /// Reads of the client; 0 bytes where it has gone. The second value says how long ago the last of them arrived.
     pub(super) fn read(&mut self, buffer: &mut [u8]) -> io::Result<(usize, Span)> {
         match &mut self.client {
-            Some((stream, _)) => arrival::read(stream, buffer),
+            Some(client) => client.read(buffer),
             None => Err(io::ErrorKind::WouldBlock.into()),
         }
     }
 
     pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.client {
-            Some((stream, _)) => stream.write(bytes),
+            Some(client) => client.write(bytes),
             None => Err(io::ErrorKind::WouldBlock.into()),
         }
     }
@@ -101,9 +105,9 @@ impl Tcp {
     }
 
     /// What to wait for: the door, and the client where something is wanted of it.
-    pub(super) fn polls(&self, client: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
+    pub(super) fn polls(&self, events: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
         let door = PollFd::new(&self.listener, PollFlags::IN);
-        let stream = self.client.as_ref().filter(|_| !client.is_empty());
-        (door, stream.map(|(stream, _)| PollFd::new(stream, client)))
+        let client = self.client.as_ref().filter(|_| !events.is_empty());
+        (door, client.map(|client| PollFd::new(client, events)))
     }
 }

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 mod locks;
 
@@ -363,18 +363,20 @@ fn hooks_are_bounded_and_know_their_rig() {
         Err(HookError::Start { .. })
     ));
     assert!(matches!(run(&[], minute), Err(HookError::Start { .. })));
-    let begun = Instant::now();
-    let late = run(
-        &["sh", "-c", "echo slow >&2; sleep 60"],
-        Duration::from_millis(300),
-    );
+    // On a busy machine the hook may not have begun when its time is over.
+    let late = [1, 10, 100].into_iter().find(|seconds| {
+        let late = run(
+            &["sh", "-c", "echo slow >&2; sleep 3600"],
+            Duration::from_secs(*seconds),
+        );
+        let Err(HookError::TimeOut { stderr, .. }) = late else {
+            panic!("{late:?}");
+        };
+        stderr == "slow\n"
+    });
     assert!(
-        matches!(&late, Err(HookError::TimeOut { stderr, .. }) if stderr == "slow\n"),
-        "{late:?}"
-    );
-    assert!(
-        begun.elapsed() < Duration::from_secs(30),
-        "its children ended too"
+        late.is_some(),
+        "what it said is kept, and its children end too"
     );
     let long =
         run(&["sh", "-c", "head -c 1000000 /dev/zero"], minute).expect("it does not stand still");
