@@ -112,6 +112,11 @@ fn text(rig: &Rig, figures: &Figures) -> String {
             ring.endpoint.line.baud()
         );
         let _infallible = writeln!(text, "  {}", line_of(found));
+        let _infallible = writeln!(
+            text,
+            "  rate test: SYNCO without a gap comes back at {} bit/s",
+            found.rate.bits_per_second()
+        );
     }
     for (ring, drive) in &figures.reported {
         let _infallible = writeln!(
@@ -163,6 +168,7 @@ fn object(rig: &Rig, figures: &Figures) -> serde_json::Value {
             let spread = ring.spread().map(|spread| spread.map(Span::as_millis_f64));
             json!({
                 "drives": ring.size.drives(),
+                "rate": ring.rate.bits_per_second(),
                 "nominal_ms": ring.nominal.as_millis_f64(),
                 "least_ms": spread.map(|spread| spread[0]),
                 "middle_ms": spread.map(|spread| spread[1]),

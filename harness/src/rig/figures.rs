@@ -1,10 +1,12 @@
 //! What a rig shows of itself: who its drives are, how long a byte takes round its rings, and what went wrong meanwhile.
 
 use super::Rig;
+use super::line_test;
 use super::session::{End, Session};
 use super::shared::Shared;
 use crate::bus::{self, Axis, Bus, Identity, State};
 use crate::link::{Line, Link};
+use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
@@ -21,6 +23,8 @@ const SIDE_BY_SIDE: usize = 25;
 pub struct RingFigures {
     /// How many drives answer.
     pub size: RingSize,
+    /// The rate at which SYNCO without a gap comes back (ND21 8.3, 9.2).
+    pub rate: Rate,
     /// How long the ring itself needs for a byte, by the rule that each drive takes one byte time (ND21 8.2).
     pub nominal: Span,
     /// How long it took: from the shortest to the longest, sorted; what does not come back is missing.
@@ -98,7 +102,10 @@ pub fn measure(
 /// Sends SYNCO one by one and waits for each.
 fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     let simulated = session.rig().is_simulated();
+    let stated = session.rig().file.ring.first.endpoint.line.into();
     let link = session.link();
+    let rate = line_test::slower(link, ring, stated).unwrap_or(stated);
+    link.begin();
     let nominal = link.byte_time() * u64::from(size.drives());
     let mut rounds = Vec::new();
     let (mut lost, mut line_errors) = (0, 0);
@@ -133,6 +140,7 @@ fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     rounds.sort_unstable();
     RingFigures {
         size,
+        rate,
         nominal,
         rounds,
         lost,

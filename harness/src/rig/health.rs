@@ -1,43 +1,47 @@
 //! Whether a ring is sound and as large as its rig's file says.
 
-use crate::bus::recover;
+use crate::bus::{count_behind, recover};
 use crate::link::{Link, Trouble};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use std::fmt::Write as _;
 
-/// Bytes of somebody else's that are shown.
+/// Maximum number of unexpected bytes shown.
 const SHOWN: usize = 8;
 
 /// What is wrong with a ring.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unhealthy {
     /// Bytes come although the bench sends nothing.
-    #[error(
-        "{count} bytes came although nothing was sent ({bytes}): another master on this line, drives that miss their bytes (ND21 9.9), or noise"
-    )]
+    #[error("{count} bytes came although nothing was sent ({bytes})")]
     Talking {
         /// How many.
         count: usize,
         /// The first of them.
         bytes: String,
     },
+    /// Bytes come back slower than they are sent.
+    #[error("bytes come back at {found} bit/s, they are sent at {stated} bit/s")]
+    Slow {
+        /// The rate at which they come back, in bit/s.
+        found: u32,
+        /// The rate of the rig's file, in bit/s.
+        stated: u32,
+    },
     /// Nothing comes back.
-    #[error(
-        "nothing comes back: the ring is open, a drive has no power, or this is another port (ND21 8.2)"
-    )]
+    #[error("nothing comes back for the bytes that were sent")]
     Silent,
     /// What comes back is no ring's answer.
-    #[error(
-        "what comes back is no answer of a ring: {bytes}; is the other end a master, or another rate?"
-    )]
+    #[error("the bytes that come back are not those of a ring: {bytes}")]
     Foreign {
         /// The first bytes.
         bytes: String,
     },
-    /// A drive reports an error behind the check sequence.
-    #[error("the ring does not come back: drive {0} reports a fault in front of it (ND21 9.7)")]
+    /// A drive still spells out its address after the check sequence.
+    #[error(
+        "the ring does not leave the error mode: drive {0} reports a fault in front of it (ND21 9.7)"
+    )]
     Broken(u8),
     /// Another number of drives.
     #[error("the ring has {found} drives, the rig's file says {stated}")]
@@ -111,11 +115,12 @@ fn examine_once(
     }
     match recovery.drives {
         Some(found) if found == stated => Ok(recovery.before),
-        Some(found) => Err(Unhealthy::Size {
+        // Noise can look like an answer once, and not twice.
+        Some(found) if count_behind(link, ring, &[]) == Some(found) => Err(Unhealthy::Size {
             found: found.drives(),
             stated: stated.drives(),
         }),
-        None => {
+        _ => {
             let bytes = link.probe(ring, 4 * usize::from(stated.drives()) + 8);
             Err(match (recovery.after, bytes.is_empty()) {
                 (Some(drive), _) => Unhealthy::Broken(drive),

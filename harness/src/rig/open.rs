@@ -2,7 +2,7 @@
 
 use super::Rig;
 use super::ends::Ends;
-use super::file::{Endpoint, Line, Marks, Transport};
+use super::file::{Endpoint, Marks, Transport};
 use super::lock::{PortLock, PortLockError};
 use super::scan::{self, MatchError, Port};
 use crate::link::{InnerLink, Ports, SimulatedLink, StreamLink};
@@ -69,10 +69,10 @@ pub(super) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     }
     let ports = scan::scan(Path::new("/"));
     let mut locks = Vec::new();
-    let rate = rate(rig.file.ring.first.endpoint.line);
+    let rate = Rate::from(rig.file.ring.first.endpoint.line);
     let mut wires = Vec::new();
     for (_, ring) in rig.rings() {
-        let own = self::rate(ring.endpoint.line);
+        let own = Rate::from(ring.endpoint.line);
         if own != rate {
             return Err(OpenRigError::Rates {
                 first: rate.bits_per_second(),
@@ -114,14 +114,6 @@ fn run_until_warm(link: &mut SimulatedLink) {
     link.begin();
 }
 
-fn rate(line: Line) -> Rate {
-    match line {
-        Line::Baud38400 => Rate::Baud38400,
-        Line::Baud19200 => Rate::Baud19200,
-        Line::Baud9600 => Rate::Baud9600,
-    }
-}
-
 fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: Ports) -> InnerLink {
     let index = usize::from(ring.saturating_sub(1));
     let drives = rig.rings().nth(index).map_or(0, |(_, ring)| ring.drives);
@@ -148,7 +140,7 @@ fn wire(
     let name = place.to_string();
     let wire = port::open(&PortSettings {
         endpoint: place,
-        rate: rate(endpoint.line),
+        rate: endpoint.line.into(),
         marks: endpoint.marks == Marks::InBand,
         low_latency: endpoint.low_latency,
     })?;

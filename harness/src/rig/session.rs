@@ -7,6 +7,7 @@ use super::file;
 use super::health::{Health, Unhealthy, examine};
 use super::hook::HookError;
 use super::interlock::Interlocks;
+use super::line_test::{self, Cause};
 use super::lock::{LockError, PortLock, RigLock};
 use super::open::{OpenRigError, open};
 use super::state;
@@ -14,12 +15,12 @@ use super::watchdog::{Alarm, Watchdog};
 use crate::bus::{Axis, count_behind};
 use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, StreamLink};
-use harness_proto::line::Received;
+use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// How long a rig must be silent before anything is sent.
@@ -86,7 +87,7 @@ pub enum SessionError {
         error: Box<HookError>,
     },
     /// It is not healthy.
-    #[error("rig {rig}, ring {ring}: {ill}")]
+    #[error("rig {rig}, ring {ring}: {ill}{}", likely(cause.as_ref()))]
     Ill {
         /// Which.
         rig: String,
@@ -94,7 +95,13 @@ pub enum SessionError {
         ring: usize,
         /// What is wrong.
         ill: Unhealthy,
+        /// The likely cause, and what to do next; only known when a rig is opened.
+        cause: Option<Cause>,
     },
+}
+
+fn likely(cause: Option<&Cause>) -> String {
+    cause.map_or(String::new(), |cause| format!(". Likely cause: {cause}"))
 }
 
 /// How a session ended.
@@ -134,6 +141,53 @@ impl Session {
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
     pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+        let (error, opens) = match Self::open_as_stated(rig, options) {
+            Ok(mut session) => {
+                if !session.lacks_marks() {
+                    return Ok(session);
+                }
+                let bytes = "a net byte FF comes back damaged".to_owned();
+                let error = session.ill(0, Unhealthy::Foreign { bytes });
+                let _end = session.release();
+                (error, true)
+            }
+            Err(error @ SessionError::Ill { .. }) => (error, false),
+            Err(other) => return Err(other),
+        };
+        match (error, Self::cause_by_neighbour(rig, options)) {
+            (SessionError::Ill { rig, ring, ill, .. }, cause @ Some(_)) => Err(SessionError::Ill {
+                rig,
+                ring,
+                ill,
+                cause,
+            }),
+            // The marks are right, and a drive is wrong.
+            (_, None) if opens => Self::open_as_stated(rig, options),
+            (error, _) => Err(error),
+        }
+    }
+
+    /// The cause that a rig file with one other setting proves by opening the ring.
+    fn cause_by_neighbour(rig: &Rig, options: &Options) -> Option<Cause> {
+        let plain = Options {
+            ill_as_well: false,
+            allow_motion: false,
+            ..options.clone()
+        };
+        let mut neighbours = line_test::neighbours(rig).into_iter();
+        let opens = |other: &Rig| {
+            !options.interrupt.load(Ordering::Relaxed)
+                && Self::open_as_stated(other, &plain)
+                    .map(Self::release)
+                    .is_ok()
+        };
+        neighbours
+            .find(|(_, other)| opens(other))
+            .map(|(cause, _)| cause)
+    }
+
+    /// Takes a rig as its file describes it.
+    fn open_as_stated(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
         let own = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
             rig: rig.id().to_owned(),
             since: quarantine.since.clone(),
@@ -184,8 +238,10 @@ impl Session {
             match session.health() {
                 Err(SessionError::Ill { ill, .. })
                     if options.ill_as_well && !matches!(ill, Unhealthy::Trouble(_)) => {}
-                other => session.opening = Some(other?),
+                Err(error) => return Err(session.with_cause(error)),
+                Ok(health) => session.opening = Some(health),
             }
+            session.runs_at_its_rate()?;
         }
         session.ended = rig.is_simulated();
         let watch = Interlocks::of(rig).map(|watch| Box::new(watch) as Box<dyn Watch>);
@@ -276,9 +332,79 @@ impl Session {
             return Ok(());
         }
         match heard.iter().position(|heard| !heard.is_empty()) {
-            Some(ring) => Err(self.ill(ring, Unhealthy::talking(&heard[ring]))),
+            Some(ring) => Err(SessionError::Ill {
+                rig: self.rig.id().to_owned(),
+                ring: ring + 1,
+                ill: Unhealthy::talking(&heard[ring]),
+                cause: Some(line_test::unasked(&heard[ring])),
+            }),
             None => Ok(()),
         }
+    }
+
+    /// Adds the likely cause to the error of a ring that did not open.
+    fn with_cause(&mut self, error: SessionError) -> SessionError {
+        match error {
+            SessionError::Ill { rig, ring, ill, .. } => {
+                let cause = self.link.trouble().is_none().then(|| {
+                    self.link.begin();
+                    let heard = line_test::listen(&mut self.link, ring - 1);
+                    line_test::cause(&ill, &heard, self.rate())
+                });
+                SessionError::Ill {
+                    rig,
+                    ring,
+                    ill,
+                    cause,
+                }
+            }
+            other => other,
+        }
+    }
+
+    /// Refuses a ring whose bytes come back slower than its file says.
+    fn runs_at_its_rate(&mut self) -> Result<(), SessionError> {
+        if self.rig.is_simulated() {
+            return Ok(());
+        }
+        let stated = self.rate();
+        for ring in 0..self.rings.len() {
+            self.link.begin();
+            let found = line_test::slower(&mut self.link, ring, stated);
+            self.link.begin();
+            let Some(found) = found else { continue };
+            return Err(SessionError::Ill {
+                rig: self.rig.id().to_owned(),
+                ring: ring + 1,
+                ill: Unhealthy::Slow {
+                    found: found.bits_per_second(),
+                    stated: stated.bits_per_second(),
+                },
+                cause: Some(Cause::Rate { found, stated }),
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether a ring answers as one that knows no in-band marks, although its file says so.
+    fn lacks_marks(&mut self) -> bool {
+        if self.opening.is_none() {
+            return false;
+        }
+        let marked: Vec<_> = self
+            .rig
+            .rings()
+            .map(|(_, ring)| ring.endpoint.marks == file::Marks::InBand)
+            .collect();
+        let lacks = (0..).zip(marked).any(|(ring, marked)| {
+            marked && line_test::lacks_marks(&mut self.link, ring) && self.link.trouble().is_none()
+        });
+        self.link.begin();
+        lacks
+    }
+
+    fn rate(&self) -> Rate {
+        self.rig.file.ring.first.endpoint.line.into()
     }
 
     /// Lets a thread watch that the program lives.
@@ -353,6 +479,7 @@ impl Session {
             rig: self.rig.id().to_owned(),
             ring: ring + 1,
             ill,
+            cause: None,
         }
     }
 

@@ -127,6 +127,8 @@ fn a_rig_is_checked() {
         0,
         "a byte takes 0.573 ms round the ring (ND21 8.2)",
     );
+    let rate = "SYNCO without a gap comes back at 38400 bit/s";
+    ended(&output, 0, rate);
     ended(&output, 0, "drive 1: serial 000001");
     let output = check(&["--format", "json"]);
     let figures: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");

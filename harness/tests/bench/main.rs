@@ -272,6 +272,7 @@ fn what_is_no_ring_says_so() {
         let desk = Desk::new(stated, "pty", path.to_str().expect("a name"));
         let words = format!("the ring has 2 drives, the rig's file says {stated}");
         ended(&desk.run(&["run"]), 3, &words);
+        ended(&desk.run(&["run"]), 3, "with 2 drives set `drives = 2`");
     }
     // An open ring: nothing comes back.
     let open = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -280,14 +281,46 @@ fn what_is_no_ring_says_so() {
     ended(&desk.run(&["run"]), 3, "nothing comes back");
     // Another master talks, or noise.
     let talker = std::thread::spawn(move || {
-        let (_old, _) = open.accept().expect("the first");
-        let (mut stream, _) = open.accept().expect("a bench");
-        while stream.write_all(&[0x80, 0x88, 0x55]).is_ok() {
-            std::thread::sleep(Duration::from_millis(2));
+        // Two connections of the run before, which tried the port with marks and without, and two of the next one.
+        for stream in open.incoming().take(4) {
+            let mut stream = stream.expect("a bench");
+            while stream.write_all(&[0x80, 0x88, 0x55]).is_ok() {
+                std::thread::sleep(Duration::from_millis(2));
+            }
         }
     });
-    ended(&desk.run(&["run"]), 3, "although nothing was sent");
+    ended(
+        &desk.run(&["run"]),
+        3,
+        "noise on the cable, or another master",
+    );
     talker.join().expect("an end");
+}
+
+/// A ring that does not open as its file says: the cause and the remedy are named (ND21 8.3, 9.9).
+#[test]
+fn a_ring_that_does_not_open_says_why() {
+    let edited = |desk: &Desk, from: &str, to: &str| {
+        let path = desk.path("desk.toml");
+        let text = std::fs::read_to_string(&path).expect("a rig file");
+        std::fs::write(&path, text.replace(from, to)).expect("room");
+    };
+    // The drives are set to half the rate.
+    let slow = Served::start_with("nd21", &[3], "tcp", true, &[], &["line 19200"]);
+    let desk = Desk::of(&slow);
+    ended(&desk.run(&["run"]), 3, "set `line = \"19200 8O1\"`");
+    edited(&desk, "drives = 3", "drives = 3\nline = \"19200 8O1\"");
+    ended(&desk.run(&["run", "9.2-synco"]), 0, "");
+    // Either end alone knows in-band marks.
+    let marked = Served::start("nd21", &[3], "tcp", true, &[]);
+    let desk = Desk::of(&marked);
+    edited(&desk, "marks = \"in-band\"", "");
+    ended(&desk.run(&["run"]), 3, "set `marks = \"in-band\"`");
+    let plain = Served::start("nd21", &[3], "tcp", false, &[]);
+    let desk = Desk::of(&plain);
+    ended(&desk.run(&["run"]), 3, "set `marks = \"none\"`");
+    edited(&desk, "marks = \"in-band\"", "");
+    ended(&desk.run(&["run", "9.2-synco"]), 0, "");
 }
 
 #[test]
