@@ -6,14 +6,16 @@ use super::junit::Cases;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_rig;
-use super::run_rig::{Job, work};
+use super::run_rig::{Job, reports, work};
+use crate::evidence::{About, EvidenceError, Folder};
 use crate::library::{Entry, LibraryError, sources};
-use crate::link::Link;
+use crate::link::{Link, Recording, SimulatedLink};
 use crate::report::html::Head;
 use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
-use crate::rig::Rig;
+use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::parse::parse;
+use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
 use crate::scenario::syntax::{Bus, Scenario};
@@ -79,8 +81,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     let Ok(page) = Page::new(arguments.html.as_deref(), output) else {
         return Ok(Exit::Usage);
     };
-    let recorded = arguments.evidence.is_some();
-    if let Some(rig) = rig.as_ref().filter(|rig| recorded || !rig.is_bare()) {
+    if let Some(rig) = rig.as_ref().filter(|rig| !rig.is_bare()) {
         let job = Job {
             purpose: "run",
             allow_motion: arguments.allow_motion,
@@ -96,7 +97,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     on_simulated(arguments, &entries, rig.as_ref(), page, output)
 }
 
-/// Plays scenarios on simulated rings, each of its own.
+/// Plays scenarios on simulated rings, each of its own, and keeps evidence where it is asked for.
 fn on_simulated(
     arguments: &RunArguments,
     entries: &[Entry],
@@ -104,6 +105,15 @@ fn on_simulated(
     mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
+    let folder = rig.zip(arguments.evidence.as_deref());
+    let folder = folder.map(|(rig, path)| Folder::create(path, &About::own_rings(rig)));
+    let mut folder = match folder.transpose() {
+        Ok(folder) => folder,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(Exit::Usage);
+        }
+    };
     let bar = progress_bar(entries.len(), output.progress);
     let mut verdicts = Vec::new();
     let mut took = Span::ZERO;
@@ -111,12 +121,12 @@ fn on_simulated(
     let mut cases = Cases::new(name, arguments.junit.as_deref());
     for entry in entries {
         bar.set_message(entry.short_name().to_owned());
-        let played = match rig.and_then(|rig| too_large(entry, rig)) {
-            Some(why) => Played {
-                outcome: Outcome::skipped(why),
-                traces: Vec::new(),
-            },
-            None => play_entry(entry, AtFinding::Stop),
+        let played = match keep(entry, rig, folder.as_mut()) {
+            Ok(played) => played,
+            Err(error) => {
+                output.complain(&error.to_string());
+                return Ok(Exit::Usage);
+            }
         };
         let outcome = &played.outcome;
         took = took + outcome.took;
@@ -140,10 +150,67 @@ fn on_simulated(
         title: "drivebench: scenarios on simulated rings",
         facts: Vec::new(),
     };
-    if page.is_some_and(|page| !page.write(&head, output)) {
+    let written = match (rig, folder) {
+        (Some(rig), Some(folder)) => reports(rig, Some(folder), page, None, output),
+        _ => page.is_none_or(|page| page.write(&head, output)),
+    };
+    if !written {
         return Ok(Exit::RigError);
     }
     Ok(cases.write(Exit::of(&verdicts, arguments.require_all), output))
+}
+
+/// Plays a scenario on simulated rings of its own, into the folder where there is one.
+fn keep(
+    entry: &Entry,
+    rig: Option<&Rig>,
+    folder: Option<&mut Folder>,
+) -> Result<Played, EvidenceError> {
+    let too_large = rig.and_then(|rig| too_large(entry, rig));
+    let not_played = |why| Played {
+        outcome: Outcome::skipped(why),
+        traces: Vec::new(),
+    };
+    let Some(folder) = folder else {
+        return Ok(match too_large {
+            Some(why) => not_played(why),
+            None => play_entry(entry, AtFinding::Stop),
+        });
+    };
+    let mut kept = folder.keep(entry.short_name(), &entry.source.text);
+    let played = match (too_large, &entry.plan) {
+        (Some(why), _) => not_played(why),
+        (None, None) => play_entry(entry, AtFinding::Stop),
+        (None, Some(plan)) => {
+            kept.begins(1);
+            let mut link = simulated(plan);
+            let played = {
+                let mut recording = Recording::whole(&mut link, &mut kept);
+                play(plan, &mut recording, AtFinding::Stop)
+            };
+            let traces = traces(plan, &link);
+            let attempt = Attempt::on_own_rings(played, traces);
+            kept.ends(1, &attempt);
+            Played {
+                outcome: attempt.outcome,
+                traces: attempt.traces,
+            }
+        }
+    };
+    let name = kept.finish()?;
+    folder.done(
+        &name,
+        &drives(entry),
+        &entry.scenario.title,
+        &played.outcome,
+    );
+    Ok(played)
+}
+
+/// What the links of every ring carried.
+fn traces(plan: &Plan, link: &SimulatedLink) -> Vec<Trace> {
+    let rings = 0..plan.rings.len();
+    rings.map(|ring| link.trace(ring)).collect()
 }
 
 /// A scenario that was played, with what it left.
@@ -176,7 +243,7 @@ pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
     let outcome = play(plan, &mut link, at_finding);
     Played {
         outcome,
-        traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
+        traces: traces(plan, &link),
     }
 }
 

@@ -115,7 +115,7 @@ pub(super) fn work(
 
 /// Ends the folder and writes the page; false where that failed, which has been said then. The page of a run with a folder is
 /// the folder's.
-fn reports(
+pub(super) fn reports(
     rig: &Rig,
     folder: Option<Folder>,
     page: Option<Page>,
@@ -286,6 +286,7 @@ fn about<'r>(run: &'r mut Run<'_>) -> About<'r> {
         exactness,
         capabilities,
         anew: way.anew,
+        own_rings: false,
         rig: run.session().rig(),
     }
 }

@@ -2,12 +2,13 @@
 
 use super::derive::{Settled, derive, xml};
 use super::record::{Line, SCHEMA, Writer};
-use crate::link::{Capability, Event, Sink};
+use crate::link::{Capability, Event, SimulatedLink, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
 use crate::twin::Exactness;
 use harness_proto::line::Rate;
+use harness_proto::time::Span;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -68,6 +69,28 @@ pub struct About<'r> {
     pub capabilities: Vec<Capability>,
     /// Whether drives are reset before each scenario.
     pub anew: bool,
+    /// Whether each scenario is played on simulated rings of its own, as its text describes them.
+    pub own_rings: bool,
+}
+
+impl<'r> About<'r> {
+    /// Of scenarios that are each played on simulated rings of their own.
+    #[must_use]
+    pub fn own_rings(rig: &'r Rig) -> Self {
+        Self {
+            rig,
+            rate: Rate::default(),
+            exactness: Exactness {
+                tolerance: Span::ZERO,
+                line_errors: true,
+                knows_cells: true,
+                looks: None,
+            },
+            capabilities: SimulatedLink::CAPABILITIES.to_vec(),
+            anew: false,
+            own_rings: true,
+        }
+    }
 }
 
 /// A folder of evidence that is being written.
@@ -127,6 +150,7 @@ impl Folder {
             simulated: about.rig.is_simulated(),
             capabilities: names.collect(),
             anew: about.anew,
+            own_rings: about.own_rings,
         });
         folder.check()?;
         Ok(folder)

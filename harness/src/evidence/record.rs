@@ -46,6 +46,9 @@ pub enum Line {
         capabilities: Vec<String>,
         /// Whether drives were reset before each scenario.
         anew: bool,
+        /// Whether each scenario was played on simulated rings of its own, as its text describes them.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        own_rings: bool,
     },
     /// An attempt at a scenario begins.
     Scenario {

@@ -4,10 +4,13 @@ use super::folder::{EvidenceError, KNOWN_PROFILE, RECORD, RIG, SCENARIOS, SUMS, 
 use super::read::{MAX_SIZE, RecordError, read};
 use super::record::{Line, capabilities};
 use crate::library::Entry;
-use crate::link::{Event, LinkFault, PlacedFault, Replay};
-use crate::rig::run::{judge, known, twin};
+use crate::link::{Event, LinkFault, PlacedFault, Recording, Replay};
+use crate::rig::judge::{Heard, judge};
+use crate::rig::run::{known, twin};
 use crate::rig::{Driven, Rig, Way, parse_beside, play_one};
-use crate::scenario::run::Outcome;
+use crate::scenario::plan::Plan;
+use crate::scenario::run::{AtFinding, Outcome, play};
+use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use crate::twin::{Conversation, Exactness, Twin};
@@ -54,6 +57,8 @@ struct Header {
     exactness: Exactness,
     capabilities: Vec<crate::link::Capability>,
     simulated: bool,
+    /// Whether each scenario had simulated rings of its own.
+    own_rings: bool,
     way: Way,
 }
 
@@ -82,6 +87,8 @@ pub(super) struct Again {
     stale: bool,
     /// What the record holds behind the end of the attempt.
     left: Option<String>,
+    /// Where the record differs from what simulated rings of its own do.
+    other: Option<String>,
     ended: Ended,
 }
 
@@ -257,6 +264,7 @@ fn header(lines: &[Line], rig: &Rig, files: &mut Vec<String>) -> Result<Header, 
         simulated,
         capabilities: names,
         anew,
+        own_rings,
         ..
     }) = lines.first()
     else {
@@ -289,6 +297,7 @@ fn header(lines: &[Line], rig: &Rig, files: &mut Vec<String>) -> Result<Header, 
         },
         capabilities,
         simulated: *simulated,
+        own_rings: *own_rings,
         way: Way {
             rings: rings.clone(),
             attempts: health.between.then_some(health.attempts),
@@ -361,6 +370,9 @@ fn again(recorded: &Recorded, text: &str, header: &Header, rig: &Rig, twin: &mut
         Ok(_) => return Again::impossible("it is for other rings than the rig has".to_owned()),
         Err(why) => return Again::impossible(why),
     };
+    if header.own_rings {
+        return simulated_again(recorded, &plan);
+    }
     let own = rig.plan().ok().and_then(|rig| rig.master);
     plan.master = own.or(plan.master);
     let mut replay = Replay::new(
@@ -389,11 +401,50 @@ fn again(recorded: &Recorded, text: &str, header: &Header, rig: &Rig, twin: &mut
     if let Some(driven) = driven.filter(|_| header.simulated) {
         driven.judge(&mut outcome);
     }
-    judge(&mut outcome, &comparisons, unplaced, &rig.file.deviation);
+    let heard = Heard {
+        rig,
+        plan: &plan,
+        way: &header.way,
+        exactness: header.exactness,
+        conversations: &conversations,
+        comparisons: &comparisons,
+        unplaced,
+    };
+    judge(&mut outcome, &heard);
     Again {
         outcome,
         stale,
         left: replay.left(),
+        other: None,
+        ended: Ended::of(&recorded.events),
+    }
+}
+
+/// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.
+fn simulated_again(recorded: &Recorded, plan: &Plan) -> Again {
+    let mut link = simulated(plan);
+    let mut events: Vec<Event> = Vec::new();
+    let mut recording = Recording::whole(&mut link, &mut events);
+    let outcome = play(plan, &mut recording, AtFinding::Stop);
+    let written = |events: &[Event]| -> Vec<Line> { events.iter().filter_map(Line::of).collect() };
+    let (theirs, own) = (written(&recorded.events), written(&events));
+    let differs = (0..theirs.len().max(own.len())).find(|at| theirs.get(*at) != own.get(*at));
+    let show = |line: Option<&Line>| match line.map(serde_json::to_string) {
+        Some(Ok(text)) => text,
+        _ => "nothing more".to_owned(),
+    };
+    Again {
+        outcome,
+        stale: false,
+        left: None,
+        other: differs.map(|at| {
+            format!(
+                "event {}: the record has {}, the simulated rings give {}",
+                at + 1,
+                show(theirs.get(at)),
+                show(own.get(at))
+            )
+        }),
         ended: Ended::of(&recorded.events),
     }
 }
@@ -405,6 +456,7 @@ impl Again {
             outcome: Outcome::rig_error(why),
             stale: false,
             left: None,
+            other: None,
             ended: Ended::of(&[]),
         }
     }
@@ -445,6 +497,9 @@ impl Recalled {
     /// What of it the bytes do not bear out.
     fn differs(&self, again: &Again, header: &Header) -> Option<String> {
         let outcome = &again.outcome;
+        if let Some(other) = &again.other {
+            return Some(other.clone());
+        }
         let judged = outcome.verdict.name();
         let found = outcome.finding.as_ref().map(|found| found.message.clone());
         if self.verdict != judged {

@@ -3,8 +3,9 @@
 //! What a recorded link shows is what a rig shows: bytes and times. Cells, the error mode and what stands outside the
 //! bus are hidden, so that a record suffices to judge a conversation again.
 
-use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Stimulus, Trouble};
+use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Shown, Stimulus, Trouble};
 use harness_proto::line::Received;
+use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
 
@@ -45,6 +46,12 @@ pub struct Recording<'l, L: ?Sized> {
     sink: &'l mut dyn Sink,
     capabilities: Vec<Capability>,
     told: bool,
+    /// Whether what no rig shows is shown too.
+    whole: bool,
+    /// Whether a step of a scenario belongs to the present conversation.
+    stepped: bool,
+    /// What the links carried in the conversation of the scenario, ring by ring; empty while it lasts.
+    scenario: Vec<Trace>,
 }
 
 impl<'l, L: Link + ?Sized> Recording<'l, L> {
@@ -60,6 +67,20 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             sink,
             capabilities,
             told: false,
+            whole: false,
+            stepped: false,
+            scenario: Vec::new(),
+        }
+    }
+
+    /// Records a link from now on and hides nothing of it: for simulated rings, which verify plays again instead of reading
+    /// them from the record.
+    pub fn whole(link: &'l mut L, sink: &'l mut dyn Sink) -> Self {
+        let capabilities = link.capabilities().to_vec();
+        Self {
+            capabilities,
+            whole: true,
+            ..Self::new(link, sink)
         }
     }
 
@@ -133,10 +154,16 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
 
     fn begin(&mut self) {
         self.sink.take(&Event::Begin(self.link.now()));
+        if std::mem::take(&mut self.stepped) {
+            let rings = (0..2).filter(|ring| self.link.drives(*ring) > 0);
+            self.scenario = rings.map(|ring| self.link.trace(ring)).collect();
+        }
         self.link.begin();
     }
 
     fn step(&mut self, place: usize) {
+        self.stepped = true;
+        self.scenario.clear();
         self.sink.take(&Event::Step(place));
         self.link.step(place);
     }
@@ -183,7 +210,26 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         self.link.drives(ring)
     }
 
+    /// That of the conversation of the scenario, if there has been one: cells are set back in another one.
     fn trace(&self, ring: usize) -> Trace {
-        self.link.trace(ring)
+        match self.scenario.get(ring) {
+            Some(trace) => trace.clone(),
+            None => self.link.trace(ring),
+        }
+    }
+
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
+        let shown = self.whole.then(|| self.link.error_of(ring, drive));
+        shown.flatten()
+    }
+
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
+        let shown = self.whole.then(|| self.link.shown(ring, drive));
+        shown.flatten()
+    }
+
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
+        let shown = self.whole.then(|| self.link.peek(ring, drive, address));
+        shown.flatten()
     }
 }

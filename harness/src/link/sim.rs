@@ -25,19 +25,6 @@ pub struct SimulatedLink {
     scheduled: VecDeque<(Instant, usize, PlacedFault)>,
 }
 
-const CAPABILITIES: [Capability; 10] = [
-    Capability::Interposer,
-    Capability::Tap,
-    Capability::Memory,
-    Capability::Power,
-    Capability::Motion,
-    Capability::Eeprom,
-    Capability::Reset,
-    Capability::LineErrors,
-    Capability::TwoRings,
-    Capability::Simulator,
-];
-
 /// What a drive without power shows.
 const DARK: Shown = Shown {
     gpo1: false,
@@ -50,6 +37,20 @@ const DARK: Shown = Shown {
 };
 
 impl SimulatedLink {
+    /// What a simulated link can do: everything.
+    pub const CAPABILITIES: [Capability; 10] = [
+        Capability::Interposer,
+        Capability::Tap,
+        Capability::Memory,
+        Capability::Power,
+        Capability::Motion,
+        Capability::Eeprom,
+        Capability::Reset,
+        Capability::LineErrors,
+        Capability::TwoRings,
+        Capability::Simulator,
+    ];
+
     /// A link to the rings of a bench.
     #[must_use]
     pub fn new(bench: Bench) -> Self {
@@ -286,7 +287,7 @@ impl Line for SimulatedLink {
 
 impl Link for SimulatedLink {
     fn capabilities(&self) -> &[Capability] {
-        &CAPABILITIES
+        &Self::CAPABILITIES
     }
 
     fn begin(&mut self) {

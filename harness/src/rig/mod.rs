@@ -15,6 +15,7 @@ pub mod find;
 mod health;
 pub mod hook;
 mod interlock;
+pub(crate) mod judge;
 mod line_test;
 pub mod lock;
 mod open;

@@ -34,6 +34,20 @@ pub struct Attempt {
 }
 
 impl Attempt {
+    /// An attempt on simulated rings of its own, which no twin stands beside.
+    #[must_use]
+    pub fn on_own_rings(outcome: Outcome, traces: Vec<Trace>) -> Self {
+        Self {
+            outcome,
+            traces,
+            conversations: Vec::new(),
+            comparisons: Vec::new(),
+            unplaced: 0,
+            driven: None,
+            master_is_right: true,
+        }
+    }
+
     /// Why the drives could not be made ready for it, if they could not.
     fn unready(&self) -> Option<&str> {
         let why = self.outcome.remarks.first().map(String::as_str);

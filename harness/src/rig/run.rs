@@ -3,8 +3,8 @@
 
 use super::Rig;
 use super::driven::Driven;
-use super::file::Deviation;
 use super::health::{Unhealthy, examine};
+use super::judge::{Heard, by_hand, judge};
 use super::played::{Again, Attempt, Played};
 use super::session::{Session, SessionError};
 use crate::guard::Guarded;
@@ -13,11 +13,10 @@ use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_anew};
 use crate::scenario::simulate;
-use crate::scenario::verdict::Verdict;
 use crate::twin::{Comparison, Conversation, Exactness, Twin};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
-use harness_sim::deviation::{self, MasterDeviation};
+use harness_sim::deviation::MasterDeviation;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -210,9 +209,17 @@ impl<'s> Run<'s> {
         let driven = Driven::new(plan, &both.events, &way, recorded, &outcome);
         // In real time a record does not hold every moment at which the master was asked.
         let driven = driven.filter(|_| simulated);
-        let deviations = &self.session.rig().file.deviation;
+        let heard = Heard {
+            rig: self.session.rig(),
+            plan,
+            way: &way,
+            exactness: self.exactness,
+            conversations: &conversations,
+            comparisons: &comparisons,
+            unplaced,
+        };
         let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
-        judge(&mut outcome, &comparisons, unplaced, deviations);
+        judge(&mut outcome, &heard);
         Ok(Attempt {
             driven,
             master_is_right,
@@ -350,82 +357,6 @@ impl Sink for Both<'_> {
             sink.take(event);
         }
     }
-}
-
-/// Hears the twin: a difference is the drive's fault, what a known deviation explains is none, and what the transport
-/// could not have shown settles nothing.
-pub(crate) fn judge(
-    outcome: &mut Outcome,
-    comparisons: &[Comparison],
-    unplaced: u64,
-    known: &[Deviation],
-) {
-    let divergence = comparisons.iter().find_map(|c| c.divergence.as_ref());
-    let untimely = comparisons.iter().find_map(|c| c.untimely.as_ref());
-    for adopted in comparisons.iter().flat_map(|c| &c.adopted).take(8) {
-        outcome.remarks.push(format!(
-            "cell {:04X} of drive {} holds {:02X}, which the model did not know",
-            adopted.address, adopted.drive, adopted.value
-        ));
-    }
-    match (outcome.verdict, divergence) {
-        (Verdict::Passed | Verdict::Failed | Verdict::Marginal, Some(divergence)) => {
-            let rule = format!("nd21 {}", divergence.role.rule().0);
-            match known
-                .iter()
-                .find(|entry| entry.rule == rule && by_hand(entry))
-            {
-                Some(entry) => {
-                    outcome.verdict = Verdict::Passed;
-                    outcome.remarks.push(told(entry));
-                }
-                None => outcome.verdict = Verdict::Failed,
-            }
-            outcome.remarks.push(format!("the model: {divergence}"));
-        }
-        (Verdict::Failed, None) if !known.is_empty() => {
-            // The twin has the deviations too, and gave every byte that the drives gave.
-            outcome.verdict = Verdict::Passed;
-            outcome.remarks.extend(known.iter().map(told));
-        }
-        (Verdict::Failed, None) => {
-            outcome.verdict = Verdict::Inconclusive;
-            outcome.remarks.push(
-                "the model does what the drives do: the scenario expects a rig in another state"
-                    .to_owned(),
-            );
-        }
-        (Verdict::Passed, None) => {
-            if let Some(untimely) = untimely {
-                outcome.verdict = Verdict::Marginal;
-                outcome.remarks.push(format!("the model: {untimely}"));
-            }
-        }
-        _ => {}
-    }
-    if unplaced > 0
-        && matches!(
-            outcome.verdict,
-            Verdict::Passed | Verdict::Failed | Verdict::Marginal
-        )
-    {
-        outcome.verdict = Verdict::Inconclusive;
-        outcome.remarks.push(format!(
-            "{unplaced} line errors were told of without their bytes: the transport could not have shown them"
-        ));
-    }
-}
-
-/// Whether a known deviation is none that the simulator has.
-fn by_hand(entry: &Deviation) -> bool {
-    deviation::deviation(&entry.name).is_none()
-}
-
-fn told(entry: &Deviation) -> String {
-    format!(
-        "known deviation {} ({}): {}",
-        entry.name, entry.rule, entry.reason
-    )
 }
 
 /// The known deviations of a rig that the simulator has, as lines of a header.

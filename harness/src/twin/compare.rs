@@ -1,16 +1,17 @@
 //! Byte for byte: what a ring sent back, and what its twin says.
 
+use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, What};
 use super::follow::Conversation;
 use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
+use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 
 /// The longest run of one byte in which each counts: more than the 25 zeros of 9.7.
 const LONGEST_RUN: usize = 32;
@@ -18,155 +19,8 @@ const LONGEST_RUN: usize = 32;
 /// How long before the end of a conversation in real time bytes may be missing.
 const TAIL: Span = Span::from_millis(20);
 
-/// How exactly is compared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Exactness {
-    /// How far times may be apart.
-    pub tolerance: Span,
-    /// Whether the link shows line errors at their bytes.
-    pub line_errors: bool,
-    /// Whether the twin knows what every cell holds: a rig whose drives are simulated too.
-    pub knows_cells: bool,
-    /// Cells of a drive that are compared although it writes them itself.
-    pub looks: Option<(u8, &'static [Look])>,
-}
-
-/// Bits of a cell that a question is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Look {
-    /// The address of the byte.
-    pub address: u16,
-    /// The bits.
-    pub mask: u8,
-}
-
-/// How two bytes differ.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum What {
-    /// Another value.
-    Value,
-    /// The same value, with or without a line error.
-    LineStatus,
-    /// The model expects a byte that did not come.
-    Missing,
-    /// A byte came that the model does not expect.
-    Surplus,
-    /// The right byte, at another time.
-    Time,
-}
-
-impl What {
-    /// It in a few words.
-    #[must_use]
-    pub const fn words(&self) -> &'static str {
-        match self {
-            Self::Value => "another value",
-            Self::LineStatus => "another line status",
-            Self::Missing => "a byte is missing",
-            Self::Surplus => "a byte too many",
-            Self::Time => "another time",
-        }
-    }
-}
-
-/// The first byte that is otherwise than the model says.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Divergence {
-    /// In which ring, counted from 0.
-    pub ring: usize,
-    /// Which byte received in this conversation, counted from 1.
-    pub byte: usize,
-    /// How it differs.
-    pub what: What,
-    /// What the model says, and when.
-    pub expected: Option<(Instant, Received)>,
-    /// What came, and when.
-    pub received: Option<(Instant, Received)>,
-    /// What the byte is for.
-    pub role: Role,
-    /// The step of the scenario that was under way when the byte went out, as a place in its text.
-    pub step: Option<usize>,
-    /// The drive that is meant by the telegram, or that the ring spells out.
-    pub drive: Option<u8>,
-}
-
-impl Divergence {
-    /// Whether another conversation differed at the same place, in the same way, and as late or as early but for a tolerance.
-    #[must_use]
-    pub fn is_like(&self, other: &Self, tolerance: Span) -> bool {
-        let place = |own: &Self| (own.ring, own.role, own.step, own.drive);
-        let apart = self.late_by().abs_diff(other.late_by());
-        place(self) == place(other)
-            && self.what == other.what
-            && apart <= u128::from(tolerance.as_nanos())
-    }
-
-    /// By how many nanoseconds the byte came too late; less than nothing where it was early.
-    fn late_by(&self) -> i128 {
-        let at = |byte: &Option<(Instant, Received)>| {
-            byte.map(|(at, _)| i128::from(at.since_start().as_nanos()))
-        };
-        match (at(&self.expected), at(&self.received)) {
-            (Some(expected), Some(received)) => received - expected,
-            _ => 0,
-        }
-    }
-}
-
-impl fmt::Display for Divergence {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let show = |byte: &Option<(Instant, Received)>| match byte {
-            None => "nothing".to_owned(),
-            Some((at, byte)) => match byte.error {
-                None => format!("{:02X} at {at}", byte.byte),
-                Some(error) => format!("{:02X} ({error}) at {at}", byte.byte),
-            },
-        };
-        let (section, rule) = self.role.rule();
-        let what = self.what.words();
-        let ring = if self.ring == 0 { "" } else { " of ring 2" };
-        write!(f, "byte {}{ring}", self.byte)?;
-        if let Some(drive) = self.drive {
-            write!(f, ", drive {drive}")?;
-        }
-        write!(
-            f,
-            ": {what}: received {}, the manual says {} (ND21 {section}, {rule})",
-            show(&self.received),
-            show(&self.expected)
-        )
-    }
-}
-
-/// A cell of which the model did not know what it holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Adopted {
-    /// In which ring, counted from 0.
-    pub ring: usize,
-    /// Of which drive.
-    pub drive: u8,
-    /// Which cell.
-    pub address: u16,
-    /// What it holds.
-    pub value: u8,
-}
-
-/// What came of a comparison.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Comparison {
-    /// How many bytes were compared.
-    pub compared: u64,
-    /// How many were data that the drive measures itself, and were not.
-    pub measured: u64,
-    /// What was taken over.
-    pub adopted: Vec<Adopted>,
-    /// The first byte that is otherwise, apart from its time.
-    pub divergence: Option<Divergence>,
-    /// The first byte at another time.
-    pub untimely: Option<Divergence>,
-    /// All differences of times together.
-    pub apart: Span,
-}
+/// `scope_puffer` (ND21 14.10.6.6).
+const SCOPE_BUFFER: std::ops::RangeInclusive<u16> = ram::SCOPE_PUFFER..=ram::SCOPE_PUFFER + 255;
 
 /// What a ring sent back, beside what its twin received.
 struct Rows<'a> {
@@ -200,10 +54,14 @@ pub(super) struct Comparer<'a> {
     pub(super) exactness: Exactness,
     /// Cells that were written in the rig's session: of these the model knows what they hold.
     pub(super) written: &'a mut BTreeSet<(usize, u8, u16)>,
+    /// Cells that were written in the present attempt.
+    pub(super) written_now: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells taken over.
     pub(super) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
     /// Drives whose outgoing process data (14.10.3) change by themselves.
     pub(super) moving: BTreeSet<(usize, u8)>,
+    /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
+    pub(super) recording: BTreeSet<(usize, u8)>,
     pub(super) comparison: Comparison,
 }
 
@@ -247,6 +105,7 @@ impl Comparer<'_> {
                 let place = places.get(index).copied().unwrap_or(index);
                 conversation.step_at(ring, place)
             };
+            self.note_own(&rows, index, places.get(index).copied());
             let what = self.row(&rows, index, step);
             self.comparison.compared += 1;
             let Some(what) = what else { continue };
@@ -328,7 +187,8 @@ impl Comparer<'_> {
                 if let Some(look) = looks_at(drive, address) {
                     return (value ^ wanted) & look.mask == 0;
                 }
-                if measured(address) || !self.exactness.knows_cells && changes_by_itself(address) {
+                let writes = !self.exactness.knows_cells && self.may_write(ring, drive, address);
+                if measured(address) || writes {
                     self.comparison.measured += 1;
                     return true;
                 }
@@ -353,20 +213,75 @@ impl Comparer<'_> {
                 self.comparison.measured += u64::from(moves);
                 moves
             }
-            Role::Check { drive, length, .. } => {
-                // A command may be cut over several telegrams (9.5): its bytes need not stand together.
-                let own = |role: &Role| {
-                    matches!(role, Role::Command { .. } | Role::Data { .. })
-                        && role.drive() == drive
-                };
-                let before = roles[..index].iter().zip(received).rev();
-                let before = before.filter(|(role, _)| own(role));
-                let bytes = before.take(usize::from(length).saturating_sub(1));
-                let sum = bytes.fold(Checksum::EMPTY, |sum, (_, (_, byte))| sum.with(byte.byte));
+            Role::Check {
+                drive: Some(drive),
+                length,
+                ..
+            } => {
+                let bytes = answer_of(&roles[..index], drive, length);
+                let bytes = bytes.map(|(index, _)| received[index].1.byte);
+                let sum = bytes.fold(Checksum::EMPTY, Checksum::with);
                 sum.minus() == value
             }
             _ => false,
         }
+    }
+
+    /// Whether a drive may have written to a cell by itself.
+    fn may_write(&self, ring: usize, drive: u8, address: u16) -> bool {
+        let status = (ring, drive, ram::SCOPE_STATUS);
+        match SCOPE_BUFFER.contains(&address) {
+            true => self.recording.contains(&(ring, drive)) || self.written.contains(&status),
+            false => changes_by_itself(address),
+        }
+    }
+
+    /// Notes a byte whose value the drive decides.
+    fn note_own(&mut self, rows: &Rows<'_>, index: usize, place: Option<usize>) {
+        let Some((place, (at, _))) = place.zip(rows.received.get(index)) else {
+            return;
+        };
+        if self.exactness.knows_cells || index >= rows.known {
+            return;
+        }
+        let ring = rows.ring;
+        let is_own = |drive, address| {
+            measured(address)
+                || self.may_write(ring, drive, address)
+                || !self.written_now.contains(&(ring, drive, address))
+        };
+        let (drive, address) = match rows.role(index) {
+            Role::Data {
+                drive: Some(drive),
+                address,
+            } if is_own(drive, address) => (drive, Some(address)),
+            Role::ProcessData { drive: Some(drive) } if self.moving.contains(&(ring, drive)) => {
+                (drive, None)
+            }
+            Role::Check {
+                drive: Some(drive),
+                length,
+                ..
+            } => {
+                let mut answer = answer_of(&rows.roles[..index], drive, length);
+                let own = answer.find_map(|(_, role)| match role {
+                    Role::Data { address, .. } if is_own(drive, *address) => Some(*address),
+                    _ => None,
+                });
+                match own {
+                    Some(address) => (drive, Some(address)),
+                    None => return,
+                }
+            }
+            _ => return,
+        };
+        self.comparison.own.push(Own {
+            ring,
+            at: *at,
+            place,
+            drive,
+            address,
+        });
     }
 
     fn note_write(&mut self, ring: usize, role: Role) {
@@ -379,6 +294,7 @@ impl Comparer<'_> {
             for offset in 0..u16::from(width) {
                 let cell = (ring, drive, address.wrapping_add(offset));
                 self.written.insert(cell);
+                self.written_now.insert(cell);
                 self.held.remove(&cell);
             }
         }
@@ -410,6 +326,16 @@ impl Comparer<'_> {
             });
         }
     }
+}
+
+/// The bytes of an answer of a drive in front of its checking byte, the last one first, with their places. A command may be cut over
+/// several telegrams (9.5): its bytes need not stand together.
+fn answer_of(roles: &[Role], drive: u8, length: u8) -> impl Iterator<Item = (usize, &Role)> {
+    let own = move |(_, role): &(usize, &Role)| {
+        matches!(role, Role::Command { .. } | Role::Data { .. }) && role.drive() == Some(drive)
+    };
+    let before = roles.iter().enumerate().rev().filter(own);
+    before.take(usize::from(length).saturating_sub(1))
 }
 
 /// The drive that a ring spells out with these bytes (9.7).
@@ -522,7 +448,6 @@ mod tests {
     use crate::link::{Line, Link};
     use crate::scenario::simulate::bench;
     use crate::scenario::source::Source;
-    use harness_proto::nd21::ram;
 
     /// ND21 14.2.1: what a drive changes by itself, while it stands and while it turns, is compared with nobody's.
     #[test]

@@ -1,9 +1,10 @@
 //! The twin itself, and what it is given.
 
-use super::compare::{Comparer, Comparison, Exactness, unknowable};
+use super::compare::{Comparer, unknowable};
+use super::comparison::{Comparison, Exactness};
 use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
-use harness_proto::nd21::bits::status as status_bits;
+use harness_proto::nd21::bits::{scope_status, status as status_bits};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::PAGE;
@@ -111,7 +112,7 @@ impl Conversation {
     }
 
     /// The step that was under way when the `index`-th byte was sent into a ring, counted from 0.
-    pub(super) fn step_at(&self, ring: usize, index: usize) -> Option<usize> {
+    pub(crate) fn step_at(&self, ring: usize, index: usize) -> Option<usize> {
         let mut step = None;
         let mut sent = 0;
         for (at, done) in &self.done {
@@ -144,6 +145,8 @@ pub struct Twin {
     link: SimulatedLink,
     sizes: Vec<RingSize>,
     written: BTreeSet<(usize, u8, u16)>,
+    /// Of these, those of the present attempt.
+    written_now: BTreeSet<(usize, u8, u16)>,
     held: BTreeMap<(usize, u8, u16), u8>,
 }
 
@@ -155,22 +158,32 @@ impl Twin {
             link,
             sizes: sizes.to_vec(),
             written: BTreeSet::new(),
+            written_now: BTreeSet::new(),
             held: BTreeMap::new(),
         }
+    }
+
+    /// The simulated ring of a twin that nobody has spoken to.
+    #[must_use]
+    pub fn into_link(self) -> SimulatedLink {
+        self.link
     }
 
     /// Lives through a conversation, and says how what was received compares with what it received itself.
     pub fn follow(&mut self, conversation: &Conversation, exactness: Exactness) -> Comparison {
         let real_time = exactness.tolerance > Span::ZERO;
         let slack = if real_time { SLACK } else { Span::ZERO };
-        let mut moving = self.moving();
+        let (mut moving, mut recording) = (self.moving(), self.recording());
         let received = self.answer(conversation, slack);
         moving.extend(self.moving());
+        recording.extend(self.recording());
         let mut comparer = Comparer {
             exactness,
             written: &mut self.written,
+            written_now: &mut self.written_now,
             held: &mut self.held,
             moving,
+            recording,
             comparison: Comparison::default(),
         };
         for (ring, (size, expected)) in self.sizes.iter().zip(&received).enumerate() {
@@ -181,13 +194,23 @@ impl Twin {
 
     /// Drives whose outgoing process data (ND21 14.10.3) come from a cell that changes by itself, as the actual speed does.
     fn moving(&self) -> BTreeSet<(usize, u8)> {
+        self.drives(ram::DATA_OUT, |low| unknowable(PAGE | u16::from(low)))
+    }
+
+    /// Drives whose oscilloscope is not stopped (ND21 14.10.6.5).
+    fn recording(&self) -> BTreeSet<(usize, u8)> {
+        self.drives(ram::SCOPE_STATUS, |status| {
+            status & scope_status::STOPPED == 0
+        })
+    }
+
+    /// Drives with such a byte in a cell.
+    fn drives(&self, address: u16, such: impl Fn(u8) -> bool) -> BTreeSet<(usize, u8)> {
         let rings = self.sizes.iter().enumerate();
         let drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
-        let moves = |(ring, drive): &(usize, u8)| {
-            let low = self.link.peek(*ring, *drive, ram::DATA_OUT).unwrap_or(0);
-            unknowable(PAGE | u16::from(low))
-        };
-        drives.filter(moves).collect()
+        let holds =
+            |(ring, drive): &(usize, u8)| such(self.link.peek(*ring, *drive, address).unwrap_or(0));
+        drives.filter(holds).collect()
     }
 
     /// Lives through conversations one after another. In real time nobody knows how a ring comes out of one in which drives
@@ -199,6 +222,7 @@ impl Twin {
         exactness: Exactness,
     ) -> (Vec<Comparison>, bool) {
         let mut comparisons = Vec::new();
+        self.written_now.clear();
         for conversation in conversations {
             comparisons.push(self.follow(conversation, exactness));
             if exactness.tolerance > Span::ZERO && self.is_a_race(conversation) {
@@ -297,11 +321,7 @@ impl Twin {
 
     /// Whether a drive is in its reset mode (11.8).
     fn in_reset(&self) -> bool {
-        let rings = self.sizes.iter().enumerate();
-        let mut drives = rings.flat_map(|(ring, size)| (0..size.drives()).map(move |k| (ring, k)));
-        drives.any(|(ring, drive)| {
-            let status = self.link.peek(ring, drive, ram::STATUS).unwrap_or(0);
-            status & status_bits::RESET != 0
-        })
+        let resets = |status: u8| status & status_bits::RESET != 0;
+        !self.drives(ram::STATUS, resets).is_empty()
     }
 }

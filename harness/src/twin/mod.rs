@@ -6,8 +6,9 @@
 //! value, order, line status and, within the rig's tolerance, time.
 
 mod compare;
+mod comparison;
 mod follow;
 
-pub use compare::{Adopted, Comparison, Divergence, Exactness, Look, What};
 pub(crate) use compare::{unknowable, what_of};
+pub use comparison::{Adopted, Comparison, Divergence, Exactness, Look, Own, What};
 pub use follow::{Conversation, Done, Twin};

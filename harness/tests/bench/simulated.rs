@@ -96,3 +96,66 @@ fn a_profile_is_loaded_again() {
         "the path of a profile that `drivebench qualify` has written",
     );
 }
+
+/// A scenario that asks for something else than the manual does, with cells that are set back behind it.
+const WRONG: &str = "title wrong\nring 4\ndrive 1 memory FE13 = 88\n> 88 FD C0 13 FE D1\n> 80*6\n< 88 01 C0 13 88 A5\n< 81\n";
+
+/// Whether evidence is kept changes no verdict, no exit code and no word of what is said, and what is kept is judged alike.
+#[test]
+fn evidence_changes_no_verdict() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let wrong = folder.path().join("wrong.scn");
+    std::fs::write(&wrong, WRONG).expect("room");
+    let wrong = wrong.to_str().expect("a name");
+    for (number, (what, size, code)) in [(wrong, 4, 1), ("9", 3, 0), ("10", 4, 0), ("14", 3, 0)]
+        .into_iter()
+        .enumerate()
+    {
+        let run = |more: &[&str]| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+            match what == wrong {
+                true => command.args(["run", wrong]),
+                false => command.args(["run", "--filter", &format!("{what}.")]),
+            };
+            command.args(["--rig", &format!("sim:{size}")]).args(more);
+            command.output().expect("the program")
+        };
+        let kept = folder.path().join(number.to_string());
+        let kept = kept.to_str().expect("a name");
+        let (bare, with) = (run(&[]), run(&["--evidence", kept]));
+        ended(&bare, code, "");
+        ended(&with, code, "");
+        let told = said(&with).replace(&format!("evidence in {kept}\n"), "");
+        assert_eq!(told, said(&bare));
+        ended(&verify(Path::new(kept)), 0, "0 things wrong");
+    }
+    // The row that differs is that of the scenario, not of what sets the cell back.
+    let kept = folder.path().join("0");
+    let xml = std::fs::read_to_string(kept.join("junit.xml")).expect("verdicts");
+    assert!(xml.contains("failures=\"1\""), "{xml}");
+    // Another byte in the record is not what the ring gives.
+    let record = kept.join("run.jsonl");
+    let text = std::fs::read_to_string(&record).expect("a record");
+    let changed = text.replacen("\"byte\":\"A5\"", "\"byte\":\"A6\"", 1);
+    std::fs::write(&record, changed).expect("room");
+    ended(&verify(&kept), 1, "the simulated rings give");
+}
+
+/// The same on a simulated rig with drives of its own, where all scenarios share them; and the table shows the scenario's bytes.
+#[test]
+fn a_rig_with_drives_of_its_own_fails_alike() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = rig(4, true, "", ", \"drive 0 memory FE20 = 11\"");
+    std::fs::write(folder.path().join("own.toml"), text).expect("room");
+    std::fs::write(folder.path().join("wrong.scn"), WRONG).expect("room");
+    for more in [&[][..], &["--evidence", "kept"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.args(["run", "wrong.scn", "--rig", "own.toml"]);
+        let output = command.args(more).current_dir(folder.path()).output();
+        let output = output.expect("the program");
+        ended(&output, 1, "1 failed");
+        ended(&output, 1, "the master received 80 where 81 is expected");
+        ended(&output, 1, "→    7      80  80  80   80  [80]");
+    }
+    ended(&verify(&folder.path().join("kept")), 0, "0 things wrong");
+}

@@ -102,7 +102,7 @@ fn a_folder_gives_its_reports_again() {
         "--html",
         path(&page),
     ]);
-    assert_eq!(output.status.code(), Some(5), "{output:?}");
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
     let output = drivebench(&[
         "report",
         path(&evidence),

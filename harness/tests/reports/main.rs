@@ -10,7 +10,10 @@ mod schema;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A folder with a rig of two simulated drives that may do everything, played with right and wrong scenarios.
+/// What makes the drives of a simulated rig its own, which all scenarios share.
+const OWN: &str = "[sim]\nsetup = [\"drive 0 memory FE20 = 00\"]\n";
+
+/// A folder with a rig of two simulated drives of its own that may do everything, played with right and wrong scenarios.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -39,7 +42,7 @@ impl Bench {
     fn new(more: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let text = format!(
-            "schema = 1 # this one is kept as it is\n[rig]\nid = \"two\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n[limits]\nallow_motion = true\n\
+            "schema = 1 # this one is kept as it is\n[rig]\nid = \"two\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n{OWN}[limits]\nallow_motion = true\n\
              allow_eeprom = true\nallow_reset = true\nallow_outputs = true\n{more}"
         );
         std::fs::write(folder.path().join("two.toml"), text).expect("room");

@@ -70,7 +70,15 @@ fn a_changed_line_is_none() {
     ] {
         assert!(names.contains(&kind), "{kind} is not among {names:?}");
     }
-    let optional = ["error", "byte", "at", "finding", "safe", "unplaced"];
+    let optional = [
+        "error",
+        "byte",
+        "at",
+        "finding",
+        "safe",
+        "unplaced",
+        "own_rings",
+    ];
     for line in kinds.values().chain([&trouble]) {
         let refused = |changed: Value| {
             assert!(!validator.is_valid(&changed), "{changed}");
@@ -170,6 +178,7 @@ fn a_killed_run_over_a_port() {
     let bench = Bench::new("");
     let text = std::fs::read_to_string(bench.path("two.toml"))
         .expect("a rig")
+        .replace(super::OWN, "")
         .replace(
             "transport = \"sim\"",
             &format!(

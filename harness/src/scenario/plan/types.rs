@@ -383,7 +383,7 @@ impl Plan {
     }
 
     /// Cells that drives are to hold before anything is sent, in order of the lines.
-    pub(in crate::scenario) fn memory_setups(
+    pub(crate) fn memory_setups(
         &self,
     ) -> impl Iterator<Item = (usize, RangeInclusive<u8>, u16, &[u8])> + '_ {
         self.setups.iter().filter_map(|setup| match &setup.what {

@@ -68,6 +68,8 @@ pub struct Difference {
     pub ring: usize,
     /// Which byte that the master received, counted from 1.
     pub byte: usize,
+    /// When it was received; none where it never came.
+    pub at: Option<time::Instant>,
     /// Which byte of the line, counted from 0.
     pub index: usize,
     /// What the line says.

@@ -448,6 +448,7 @@ impl Runner<'_> {
             let difference = || Difference {
                 ring,
                 byte: first + index + 1,
+                at: received.get(index).map(|(at, _)| *at),
                 index,
                 // A checking byte is shown as the byte that it must be, where that is known.
                 expected: (0..expected.len())
@@ -574,6 +575,7 @@ impl Runner<'_> {
                 return Err(Stop::failed(span, message).differs(Difference {
                     ring,
                     byte: record.next + 1,
+                    at: Some(*at),
                     index: 0,
                     expected: Vec::new(),
                     received: unasked.iter().take(UNASKED).map(|(_, b)| *b).collect(),

@@ -1,0 +1,193 @@
+//! The verdict of an attempt beside its twin.
+
+use super::check::Rig;
+use super::file::Deviation;
+use super::run::{Way, known, play_one, twin};
+use crate::link::{Event, Recording};
+use crate::scenario::plan::Plan;
+use crate::scenario::run::{Finding, Outcome};
+use crate::scenario::verdict::Verdict;
+use crate::twin::{Comparison, Conversation, Divergence, Exactness, Own};
+use harness_proto::time::Span;
+use harness_sim::deviation;
+
+/// Cells that the twin took over and that are listed at most.
+const MOST_ADOPTED: usize = 8;
+
+/// What is known of an attempt beside its outcome.
+pub(crate) struct Heard<'h> {
+    /// The rig.
+    pub(crate) rig: &'h Rig,
+    /// The scenario.
+    pub(crate) plan: &'h Plan,
+    /// How it was played.
+    pub(crate) way: &'h Way,
+    /// How exactly the twin was compared.
+    pub(crate) exactness: Exactness,
+    /// The conversations that were compared.
+    pub(crate) conversations: &'h [Conversation],
+    /// How they compare with the twin's; fewer where the rest could not be compared.
+    pub(crate) comparisons: &'h [Comparison],
+    /// Line errors that the transport reported without their bytes.
+    pub(crate) unplaced: u64,
+}
+
+/// Settles the verdict of an attempt. A byte that differs from the twin's is the drive's fault, unless the rig's file says that the
+/// deviation is known. Where no byte differs, what the scenario found stands, unless the drive's own state, a known deviation or the
+/// computer's time explains it.
+pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) {
+    let comparisons = || heard.comparisons.iter();
+    for adopted in comparisons().flat_map(|c| &c.adopted).take(MOST_ADOPTED) {
+        outcome.remarks.push(format!(
+            "cell {:04X} of drive {} holds {:02X}, which the model did not know",
+            adopted.address, adopted.drive, adopted.value
+        ));
+    }
+    let divergence = comparisons().find_map(|c| c.divergence.as_ref());
+    let untimely = comparisons().find_map(|c| c.untimely.as_ref());
+    match (outcome.verdict, divergence, untimely) {
+        (
+            Verdict::Passed | Verdict::Failed | Verdict::Marginal | Verdict::Inconclusive,
+            Some(divergence),
+            _,
+        ) => diverged(outcome, divergence, heard),
+        (Verdict::Failed, None, untimely) => failed_alike(outcome, untimely, heard),
+        (Verdict::Passed, None, Some(untimely)) => {
+            outcome.verdict = Verdict::Marginal;
+            outcome.remarks.push(format!("the model: {untimely}"));
+        }
+        _ => {}
+    }
+    if heard.unplaced > 0
+        && matches!(
+            outcome.verdict,
+            Verdict::Passed | Verdict::Failed | Verdict::Marginal
+        )
+    {
+        outcome.verdict = Verdict::Inconclusive;
+        outcome.remarks.push(format!(
+            "{} line errors were told of without their bytes: the transport could not have shown them",
+            heard.unplaced
+        ));
+    }
+}
+
+/// A byte differs from the twin's.
+fn diverged(outcome: &mut Outcome, divergence: &Divergence, heard: &Heard<'_>) {
+    let rule = format!("nd21 {}", divergence.role.rule().0);
+    let mut known = heard.rig.file.deviation.iter();
+    let explains = |entry: &&Deviation| {
+        let drives = &entry.drives;
+        let own = |drive: u8| drives.contains(&drive);
+        entry.rule == rule
+            && by_hand(entry)
+            && usize::from(entry.ring) == divergence.ring + 1
+            && (drives.is_empty() || divergence.drive.is_some_and(own))
+    };
+    match known.find(explains) {
+        Some(entry) => {
+            if outcome.verdict != Verdict::Inconclusive {
+                outcome.verdict = Verdict::Passed;
+            }
+            outcome.remarks.push(told(entry));
+        }
+        None => outcome.verdict = Verdict::Failed,
+    }
+    outcome.remarks.push(format!("the model: {divergence}"));
+}
+
+/// The scenario failed, and the drives gave every byte that the twin gave.
+fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &Heard<'_>) {
+    let Some(finding) = &outcome.finding else {
+        return;
+    };
+    if explained_by_known(finding, heard) {
+        outcome.verdict = Verdict::Passed;
+        let known = heard.rig.file.deviation.iter();
+        outcome.remarks.extend(known.map(told));
+    } else if let Some(own) = of_the_drive(finding, heard) {
+        outcome.verdict = Verdict::Inconclusive;
+        let what = match own.address {
+            Some(address) => format!("cell {address:04X}"),
+            None => "an answer".to_owned(),
+        };
+        outcome.remarks.push(format!(
+            "{what} of drive {} depends on the drive's own state, which the scenario does not set; set it in the header, or write it first",
+            own.drive
+        ));
+    } else if let Some(untimely) = untimely
+        && finding.difference.is_none()
+        && heard.exactness.tolerance > Span::ZERO
+    {
+        outcome.verdict = Verdict::Inconclusive;
+        outcome.remarks.push(format!(
+            "every byte is as the model says, but the computer or the drive was late: {untimely}"
+        ));
+    } else {
+        outcome.remarks.push(
+            "the model of the manual gives the same bytes: either the scenario asks for something else than the manual says, or the model is wrong"
+                .to_owned(),
+        );
+    }
+}
+
+/// Whether the scenario passes on the model of the manual and fails at the same line on the model with the known deviations.
+fn explained_by_known(finding: &Finding, heard: &Heard<'_>) -> bool {
+    let deviations = known(heard.rig);
+    let plays = |lines: &[String]| {
+        let mut link = twin(heard.rig, lines).ok()?.into_link();
+        let mut forgotten: Vec<Event> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut forgotten);
+        play_one(&mut recording, heard.plan, heard.way).ok()
+    };
+    let fails_alike = |outcome: Outcome| {
+        let found = outcome.finding;
+        found.is_some_and(|found| found.span == finding.span)
+    };
+    !deviations.is_empty()
+        && plays(&[]).is_some_and(|right| right.verdict == Verdict::Passed)
+        && plays(&deviations).is_some_and(fails_alike)
+}
+
+/// The answer of a drive that a finding is about, if its value depends on the drive's own state: the byte that differs, or else one
+/// that the line of the finding asked for. The cells of the scenario's header are not the drive's own.
+fn of_the_drive<'h>(finding: &Finding, heard: &Heard<'h>) -> Option<&'h Own> {
+    let set = |own: &Own| {
+        let mut setups = heard.plan.memory_setups();
+        setups.any(|(ring, drives, from, bytes)| {
+            let offset = own.address.and_then(|address| address.checked_sub(from));
+            let within = offset.is_some_and(|offset| usize::from(offset) < bytes.len());
+            ring == own.ring && drives.contains(&own.drive) && within
+        })
+    };
+    let about = |conversation: &Conversation, own: &Own| match &finding.difference {
+        Some(difference) => {
+            let asked_for = difference.index < difference.expected.len();
+            asked_for && difference.ring == own.ring && difference.at == Some(own.at)
+        }
+        None => conversation.step_at(own.ring, own.place) == Some(finding.span.start),
+    };
+    let compared = heard.conversations.iter().zip(heard.comparisons);
+    let of_scenario = compared.filter(|(conversation, _)| conversation.has_steps());
+    let mut all = of_scenario.flat_map(|(conversation, comparison)| {
+        comparison.own.iter().map(move |own| (conversation, own))
+    });
+    let found = all.find(|(conversation, own)| about(conversation, own) && !set(own));
+    found.map(|(_, own)| own)
+}
+
+/// Whether a known deviation is none that the simulator has.
+pub(super) fn by_hand(entry: &Deviation) -> bool {
+    deviation::deviation(&entry.name).is_none()
+}
+
+fn told(entry: &Deviation) -> String {
+    format!(
+        "known deviation {} ({}): {}",
+        entry.name, entry.rule, entry.reason
+    )
+}
+
+#[cfg(test)]
+#[path = "judge_tests.rs"]
+mod tests;

@@ -1,0 +1,135 @@
+//! Verdicts of attempts on rings in virtual time that are seen as through a port.
+
+use super::super::check::parse;
+use super::super::run::{Way, known, play_one, twin};
+use super::{Heard, judge};
+use crate::library::Entry;
+use crate::link::{Event, Line, Recording};
+use crate::scenario::run::Outcome;
+use crate::scenario::simulate::bench;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict::{self, Failed, Inconclusive, Passed};
+use crate::twin::{Conversation, Exactness};
+use harness_proto::time::Span;
+
+/// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.
+fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
+    let source = |text: String| Source {
+        name: "test".to_owned(),
+        text: text.into(),
+    };
+    let entry = |text: String| {
+        let entry = Entry::new(source(text), None).expect("no mistakes");
+        entry.plan.expect("novobus")
+    };
+    let rig = format!(
+        "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"in-band\"\n{rig}"
+    );
+    let rig = parse(&source(rig)).expect("a rig");
+    let plan = entry(format!("title x\nring 3\n{scenario}"));
+    let way = Way {
+        rings: plan.rings.clone(),
+        attempts: None,
+        anew: false,
+    };
+    let own = entry(format!(
+        "title x\nring 3\ndrive 0..last model nd21\n{ring}\n> 80\n"
+    ));
+    let mut link = bench(&own);
+    let byte_time = link.byte_time();
+    let mut events: Vec<Event> = Vec::new();
+    let mut recording = Recording::new(&mut link, &mut events);
+    let mut outcome = play_one(&mut recording, &plan, &way).expect("it is not examined");
+    let exactness = Exactness {
+        tolerance: Span::from_millis(3),
+        line_errors: true,
+        knows_cells: false,
+        looks: None,
+    };
+    let conversations = Conversation::all(&events, byte_time, true);
+    let mut twin = twin(&rig, &known(&rig)).expect("a twin");
+    let (comparisons, _) = twin.follow_all(&conversations, exactness);
+    let heard = Heard {
+        rig: &rig,
+        plan: &plan,
+        way: &way,
+        exactness,
+        conversations: &conversations,
+        comparisons: &comparisons,
+        unplaced: 0,
+    };
+    judge(&mut outcome, &heard);
+    outcome
+}
+
+#[track_caller]
+fn check(ring: &str, rig: &str, scenario: &str, expected: Verdict) {
+    let outcome = judged(ring, rig, scenario);
+    assert_eq!(outcome.verdict, expected, "{scenario}: {outcome:#?}");
+}
+
+const READ: &str = "> 88 FE C0 13 FE D1\n";
+const SET: &str = "drive 1 memory FE13 = 88\n";
+
+/// ND21 10.1: what a cell holds that nobody has set is the drive's own affair.
+#[test]
+fn a_state_that_the_scenario_does_not_set_settles_nothing() {
+    let holds = "drive 1 memory FE13 = 12";
+    for ring in ["", holds] {
+        check(ring, "", "read-byte 1 FE13 = 77\n", Inconclusive);
+        check(ring, "", "? drive 1 memory FE13 = 77\n", Inconclusive);
+        let read = format!("{READ}< 88 01 C0 13 77 xx\n");
+        check(ring, "", &read, Inconclusive);
+        let read = format!("{READ}< 88 01 C0 13 xx 77\n");
+        check(ring, "", &read, Inconclusive);
+        // ND21 14.2: written, and the drive writes it itself.
+        check(
+            ring,
+            "",
+            "write-byte 1 FF26 = 11\nread-byte 1 FF26 = 77\n",
+            Inconclusive,
+        );
+    }
+}
+
+/// What the scenario sets or writes, and what no state can explain, is a failure, although the model does the same.
+#[test]
+fn a_scenario_that_asks_for_something_else_fails() {
+    let read = |answer: &str| format!("{READ}< {answer}\n");
+    for scenario in [
+        SET.to_owned() + &read("88 01 C0 13 77"),
+        SET.to_owned() + &read("88 01 C0 13 xx 77"),
+        format!("{SET}? drive 1 memory FE13 = 77\n"),
+        "write-byte 1 FE13 = 77\nread-byte 1 FE13 = 78\n".to_owned(),
+        read("88 02"),
+        read("88 01 C0 13 xx xx 80"),
+        format!("{READ}? received 7 bytes\n"),
+    ] {
+        // The cell holds it already, and is not written.
+        for ring in ["", "drive 1 memory FE13 = 88"] {
+            check(ring, "", &scenario, Failed);
+        }
+    }
+}
+
+/// A known deviation is put up with where it explains what differs, in the drives that have it.
+#[test]
+fn a_known_deviation_excuses_nothing_else() {
+    let known = |name: &str, drive: u8, rule: &str| {
+        format!(
+            "[[deviation]]\nname = \"{name}\"\ndrives = [{drive}]\nrule = \"nd21 {rule}\"\nreason = \"x\"\n"
+        )
+    };
+    let ignores = "drive 1 deviates writes-ignored";
+    let writes = "write-byte 1 FE13 = 77\nread-byte 1 FE13 = 77\n";
+    let own = known("writes-ignored", 1, "10.2");
+    check(ignores, &own, writes, Passed);
+    check(ignores, "", writes, Failed);
+    check(ignores, &own, &format!("{READ}< 88 02\n"), Failed);
+    check("", &own, &format!("{READ}< 88 02\n"), Failed);
+    // One that the simulator does not have, of another drive.
+    let wrong = "drive 1 deviates checksum-wrong";
+    let reads = "read-byte 1 FE13\n";
+    check(wrong, &known("odd-sums", 1, "9.6"), reads, Passed);
+    check(wrong, &known("odd-sums", 2, "9.6"), reads, Failed);
+}

@@ -1,0 +1,174 @@
+//! What a comparison with a twin is asked for, and what comes of it.
+
+use harness_proto::line::Received;
+use harness_proto::novobus::role::Role;
+use harness_proto::time::{Instant, Span};
+use std::fmt;
+
+/// How exactly is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Exactness {
+    /// How far times may be apart.
+    pub tolerance: Span,
+    /// Whether the link shows line errors at their bytes.
+    pub line_errors: bool,
+    /// Whether the twin knows what every cell holds: a rig whose drives are simulated too.
+    pub knows_cells: bool,
+    /// Cells of a drive that are compared although it writes them itself.
+    pub looks: Option<(u8, &'static [Look])>,
+}
+
+/// Bits of a cell that a question is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// The address of the byte.
+    pub address: u16,
+    /// The bits.
+    pub mask: u8,
+}
+
+/// How two bytes differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum What {
+    /// Another value.
+    Value,
+    /// The same value, with or without a line error.
+    LineStatus,
+    /// The model expects a byte that did not come.
+    Missing,
+    /// A byte came that the model does not expect.
+    Surplus,
+    /// The right byte, at another time.
+    Time,
+}
+
+impl What {
+    /// It in a few words.
+    #[must_use]
+    pub const fn words(&self) -> &'static str {
+        match self {
+            Self::Value => "another value",
+            Self::LineStatus => "another line status",
+            Self::Missing => "a byte is missing",
+            Self::Surplus => "a byte too many",
+            Self::Time => "another time",
+        }
+    }
+}
+
+/// The first byte that is otherwise than the model says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Divergence {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// Which byte received in this conversation, counted from 1.
+    pub byte: usize,
+    /// How it differs.
+    pub what: What,
+    /// What the model says, and when.
+    pub expected: Option<(Instant, Received)>,
+    /// What came, and when.
+    pub received: Option<(Instant, Received)>,
+    /// What the byte is for.
+    pub role: Role,
+    /// The step of the scenario that was under way when the byte went out, as a place in its text.
+    pub step: Option<usize>,
+    /// The drive that is meant by the telegram, or that the ring spells out.
+    pub drive: Option<u8>,
+}
+
+impl Divergence {
+    /// Whether another conversation differed at the same place, in the same way, and as late or as early but for a tolerance.
+    #[must_use]
+    pub fn is_like(&self, other: &Self, tolerance: Span) -> bool {
+        let place = |own: &Self| (own.ring, own.role, own.step, own.drive);
+        let apart = self.late_by().abs_diff(other.late_by());
+        place(self) == place(other)
+            && self.what == other.what
+            && apart <= u128::from(tolerance.as_nanos())
+    }
+
+    /// By how many nanoseconds the byte came too late; less than nothing where it was early.
+    fn late_by(&self) -> i128 {
+        let at = |byte: &Option<(Instant, Received)>| {
+            byte.map(|(at, _)| i128::from(at.since_start().as_nanos()))
+        };
+        match (at(&self.expected), at(&self.received)) {
+            (Some(expected), Some(received)) => received - expected,
+            _ => 0,
+        }
+    }
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let show = |byte: &Option<(Instant, Received)>| match byte {
+            None => "nothing".to_owned(),
+            Some((at, byte)) => match byte.error {
+                None => format!("{:02X} at {at}", byte.byte),
+                Some(error) => format!("{:02X} ({error}) at {at}", byte.byte),
+            },
+        };
+        let (section, rule) = self.role.rule();
+        let what = self.what.words();
+        let ring = if self.ring == 0 { "" } else { " of ring 2" };
+        write!(f, "byte {}{ring}", self.byte)?;
+        if let Some(drive) = self.drive {
+            write!(f, ", drive {drive}")?;
+        }
+        write!(
+            f,
+            ": {what}: received {}, the manual says {} (ND21 {section}, {rule})",
+            show(&self.received),
+            show(&self.expected)
+        )
+    }
+}
+
+/// A cell of which the model did not know what it holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Adopted {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// Of which drive.
+    pub drive: u8,
+    /// Which cell.
+    pub address: u16,
+    /// What it holds.
+    pub value: u8,
+}
+
+/// A byte received whose value the drive decides: a cell that it writes itself or that was not written since the attempt began, or the
+/// checking byte behind one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Own {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// When it was received.
+    pub at: Instant,
+    /// The place of the byte sent that it answers, counted from 0.
+    pub place: usize,
+    /// The drive.
+    pub drive: u8,
+    /// The cell, also of a checking byte behind it; none for process data.
+    pub address: Option<u16>,
+}
+
+/// What came of a comparison.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Comparison {
+    /// How many bytes were compared.
+    pub compared: u64,
+    /// How many were data that the drive measures itself, and were not.
+    pub measured: u64,
+    /// What was taken over.
+    pub adopted: Vec<Adopted>,
+    /// The bytes whose values the drives decide, in order; none where the twin knows what every cell holds.
+    pub own: Vec<Own>,
+    /// The first byte that is otherwise, apart from its time.
+    pub divergence: Option<Divergence>,
+    /// The first byte at another time.
+    pub untimely: Option<Divergence>,
+    /// All differences of times together.
+    pub apart: Span,
+}
