@@ -69,6 +69,14 @@ pub enum LinkFault {
     Join,
 }
 
+impl LinkFault {
+    /// Whether it changes one byte; the others act on the line at once.
+    #[must_use]
+    pub const fn takes_a_byte(self) -> bool {
+        !matches!(self, Self::Break(_) | Self::Cut | Self::Join)
+    }
+}
+
 impl fmt::Display for LinkFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

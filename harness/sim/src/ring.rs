@@ -220,6 +220,14 @@ impl<D: Device> Ring<D> {
         }
     }
 
+    /// Arms a fault for the first byte on the master's outgoing link that is sent behind all that are queued now.
+    pub fn arm_behind_queued(&mut self, fault: LinkFault) {
+        let queued = self.outbox.len() as u64;
+        if let Some(first) = self.links.first_mut() {
+            first.arm(first.transmitted() + queued + 1, fault);
+        }
+    }
+
     /// Lets a fault happen to link `link` now. A fault that needs a byte waits for the next one.
     pub fn suffer_link(&mut self, link: usize, fault: LinkFault) {
         let now = self.now;

@@ -306,7 +306,16 @@ impl Link for SimulatedLink {
 
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
         match moment {
-            Moment::Now => self.suffer(ring, fault),
+            Moment::Now => match fault {
+                // On the master's own link the next byte is the next one that is sent: a link over a port hands bytes over ahead of the
+                // line, and both must damage the same one.
+                PlacedFault::Link(0, fault) if fault.takes_a_byte() => {
+                    if let Some(ring) = self.bench.ring_mut(ring) {
+                        ring.arm_behind_queued(fault);
+                    }
+                }
+                fault => self.suffer(ring, fault),
+            },
             Moment::At(at) => {
                 let at = self.on_bench(at);
                 let place = self.scheduled.partition_point(|(other, ..)| *other <= at);
