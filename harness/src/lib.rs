@@ -19,6 +19,7 @@ pub mod locate;
 pub mod manual;
 pub mod port;
 pub mod qualify;
+mod regular;
 pub mod report;
 pub mod rig;
 pub mod scenario;

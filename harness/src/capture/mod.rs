@@ -21,6 +21,7 @@ pub use diff::{Difference, Run, Summary, diff};
 pub use judge::{JudgeError, Judged, judge};
 pub use scenario::{Options, SketchError, scenario};
 
+use crate::regular::{self, Links};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::time::{Instant, Span};
@@ -82,9 +83,10 @@ pub enum CaptureError {
 pub fn read_file(path: &Path, rate: Option<Rate>) -> Result<Capture, CaptureError> {
     let failed =
         |error: std::io::Error| CaptureError::File(path.display().to_string(), error.to_string());
+    let mut file = regular::open_input(path)
+        .map_err(failed)?
+        .take(MAX_FILE + 1);
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(failed)?;
-    let mut file = file.take(MAX_FILE + 1);
     file.read_to_end(&mut bytes).map_err(failed)?;
     read(&bytes, rate)
 }
@@ -116,7 +118,7 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
 #[must_use]
 pub fn is_capture(path: &Path) -> bool {
     let mut start = [0; 4];
-    let read = std::fs::File::open(path).and_then(|mut file| file.read(&mut start));
+    let read = regular::open(path, Links::Follow).and_then(|mut file| file.read(&mut start));
     matches!(read, Ok(1..)) && (start == [0x0A, 0x0D, 0x0D, 0x0A] || start[0] == b'{')
 }
 

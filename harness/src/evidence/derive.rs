@@ -4,11 +4,12 @@
 //! record: as `verify` does, each attempt is played again from what was received, and where that says the same as the record
 //! the bytes that differ are shown.
 
-use super::folder::{CAPTURES, EvidenceError, SCENARIOS};
+use super::files::{self, CAPTURES, SCENARIOS};
+use super::folder::EvidenceError;
 use super::junit::{Case, junit};
 use super::record::Line;
 use super::verify::{Opened, is_name, scenarios};
-use crate::capture::{CaptureError, read_file};
+use crate::capture::read;
 use crate::library::Entry;
 use crate::report::html::{Head, Played, Shown, run, section};
 use crate::scenario::problem;
@@ -19,6 +20,7 @@ use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::trace::Trace;
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Duration;
 
@@ -191,14 +193,14 @@ fn traces(
     rate: Rate,
 ) -> Result<Vec<Trace>, EvidenceError> {
     let file = format!("{CAPTURES}/{name}.{attempt}.json");
-    let whole = path.join(&file);
-    if !whole.exists() {
-        return Ok(Vec::new());
-    }
-    let read = read_file(&whole, Some(rate));
-    let capture = read.map_err(|error: CaptureError| {
+    let foreign = |error: String| {
         EvidenceError::Foreign(path.display().to_string(), format!("{file}: {error}"))
-    })?;
+    };
+    let bytes = match files::read(path, &file) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        bytes => bytes.map_err(|error| foreign(error.to_string()))?,
+    };
+    let capture = read(&bytes, Some(rate)).map_err(|error| foreign(error.to_string()))?;
     Ok(capture.traces)
 }
 

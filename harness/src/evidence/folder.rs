@@ -1,6 +1,9 @@
 //! The folder of a run, written as the run goes on.
 
 use super::derive::{Settled, derive, xml};
+use super::files::{
+    CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS, sum, sums,
+};
 use super::record::{Line, SCHEMA, Writer};
 use crate::link::{Capability, Event, SimulatedLink, Sink};
 use crate::report::json;
@@ -9,30 +12,12 @@ use crate::scenario::run::Outcome;
 use crate::twin::Exactness;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-
-/// The file of sums.
-pub(super) const SUMS: &str = "SHA256SUMS";
-/// The file of the record.
-pub(super) const RECORD: &str = "run.jsonl";
-/// The file of the rig.
-pub const RIG: &str = "rig.toml";
-/// The profile that the rig's file names.
-pub(super) const KNOWN_PROFILE: &str = "known-profile.toml";
-/// The file of verdicts for programs.
-const JUNIT: &str = "junit.xml";
-/// The file of the page for people.
-pub const PAGE: &str = "report.html";
-/// The folder of scenarios.
-pub(super) const SCENARIOS: &str = "scenarios";
-/// The folder of captures.
-pub(super) const CAPTURES: &str = "captures";
 
 /// Why a folder cannot be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -135,7 +120,7 @@ impl Folder {
         if let Some(profile) = &about.rig.profile {
             folder.write(KNOWN_PROFILE, &profile.text)?;
         }
-        folder.write("versions.json", &versions(&started))?;
+        folder.write(VERSIONS, &versions(&started))?;
         let rings: Vec<u8> = about.rig.rings().map(|(_, ring)| ring.drives).collect();
         let names = about.capabilities.iter().map(|own| own.name().to_owned());
         folder.writer.line(&Line::Run {
@@ -212,7 +197,7 @@ impl Folder {
         self.check()?;
         self.write(JUNIT, &xml(&self.path, &self.rig, &self.cases))?;
         let report = format!("rig {}\n\n{}", self.rig, self.report);
-        self.write("report.txt", &report)?;
+        self.write(REPORT, &report)?;
         // A page that cannot be made is no reason to leave a folder without its sums.
         let page = derive(&self.path).and_then(|derived| self.write(PAGE, &derived.html));
         let sums = sums(&self.path)?;
@@ -344,54 +329,4 @@ fn versions(started: &str) -> String {
         "started": started,
     });
     format!("{value:#}\n")
-}
-
-/// The sum of some bytes, as `sha256sum` prints it.
-pub(super) fn sum(bytes: &[u8]) -> String {
-    let digest = Sha256::digest(bytes);
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// The sums of every file of a folder but that of sums, as `sha256sum` prints them.
-pub(super) fn sums(path: &Path) -> Result<String, EvidenceError> {
-    let mut lines = String::new();
-    for file in files(path)? {
-        let bytes = fs::read(path.join(&file)).map_err(|error| EvidenceError::File {
-            path: file.clone(),
-            error,
-        })?;
-        // Writing to a String cannot fail.
-        let _infallible = writeln!(lines, "{}  {file}", sum(&bytes));
-    }
-    Ok(lines)
-}
-
-/// The files of a folder but that of sums, in order.
-fn files(path: &Path) -> Result<BTreeSet<String>, EvidenceError> {
-    let mut all = BTreeSet::new();
-    for folder in ["", SCENARIOS, CAPTURES] {
-        let failed = |error| EvidenceError::File {
-            path: path.join(folder).display().to_string(),
-            error,
-        };
-        let entries = match fs::read_dir(path.join(folder)) {
-            Ok(entries) => entries,
-            Err(error) if error.kind() == io::ErrorKind::NotFound && !folder.is_empty() => continue,
-            Err(error) => return Err(failed(error)),
-        };
-        for entry in entries {
-            let entry = entry.map_err(failed)?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let is_file = entry.file_type().map_err(failed)?.is_file();
-            if is_file && !(folder.is_empty() && name == SUMS) {
-                let prefix = if folder.is_empty() {
-                    String::new()
-                } else {
-                    format!("{folder}/")
-                };
-                all.insert(prefix + &name);
-            }
-        }
-    }
-    Ok(all)
 }

@@ -15,6 +15,7 @@
 //! `drivebench schema record` prints the JSON schema of a line of the record.
 
 mod derive;
+mod files;
 mod folder;
 pub mod fuzz;
 mod junit;
@@ -23,7 +24,8 @@ mod record;
 mod verify;
 
 pub use derive::{Derived, derive};
-pub use folder::{About, EvidenceError, Folder, Kept, PAGE, RIG};
+pub use files::{PAGE, RIG};
+pub use folder::{About, EvidenceError, Folder, Kept};
 pub use junit::{Case, junit};
 pub use read::{MAX_SIZE, MAX_TIME, RecordError, read};
 pub use record::{Line, Writer, schema};

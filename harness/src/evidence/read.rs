@@ -2,7 +2,7 @@
 //! place.
 
 use super::record::{Line, SCHEMA};
-use crate::link::{Event, LinkFault, Moment, PlacedFault};
+use crate::link::{Event, Lead, LinkFault, Moment, PlacedFault};
 use crate::scenario::verdict::Verdict;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
@@ -172,6 +172,13 @@ impl Order {
     fn event(&self, event: &Event) -> Result<(), String> {
         let (ring, at) = match event {
             Event::Begin(at) => (0, *at),
+            Event::Look(look) => {
+                let lead = look.lead.unwrap_or(Lead::NONE);
+                in_time(lead.far)?;
+                in_time(lead.near)?;
+                in_time(look.pause.unwrap_or(look.at).since_start())?;
+                (0, look.at)
+            }
             Event::Sent(ring, at, _)
             | Event::Received(ring, at, _)
             | Event::Fault(ring, at, ..)

@@ -1,6 +1,6 @@
 //! The lines of a record, and events written as such.
 
-use crate::link::{Capability, Event, LinkFault, Moment, PlacedFault, Sink, Trouble};
+use crate::link::{Capability, Event, Lead, LinkFault, Look, Moment, PlacedFault, Sink, Trouble};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
@@ -81,6 +81,22 @@ pub enum Line {
         /// Which.
         #[schemars(regex(pattern = "^([0-9A-F]{2})*$"))]
         bytes: String,
+    },
+    /// The bench looked at its ports, where time is real. What had come since the last look follows. Between two looks the bench goes by
+    /// what this one says; a wait ends with a look, and only where there is news or its time is over.
+    Look {
+        /// When.
+        t: u64,
+        /// Whether bytes were still on their way round.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        busy: bool,
+        /// How far ahead of the line bytes may be handed over, where that has changed: while no answer is awaited, and beyond the time of
+        /// an awaited answer.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        lead: Option<(u64, u64)>,
+        /// When the line wants a pause for its interlocks; none where it wants none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pause: Option<u64>,
     },
     /// A byte was received.
     Received {
@@ -339,6 +355,12 @@ impl Line {
                 what: fault(*what),
             },
             Event::Fault(..) => return None,
+            Event::Look(look) => Self::Look {
+                t: units(&look.at),
+                busy: look.busy,
+                lead: look.lead.map(|lead| (lead.far.units(), lead.near.units())),
+                pause: look.pause.as_ref().map(units),
+            },
             Event::Trouble(trouble) => Self::Trouble {
                 cause: match trouble {
                     Trouble::Denied(_) => "denied",
@@ -367,6 +389,7 @@ impl Line {
             | Self::Sent { t, .. }
             | Self::Received { t, .. }
             | Self::Probe { t, .. } => *t,
+            Self::Look { t, pause, .. } => (*t).max(pause.unwrap_or(0)),
             Self::Fault { t, at, what, .. } => (*t).max(at.unwrap_or(0)).max(what.1),
             Self::Run { .. }
             | Self::Scenario { .. }
@@ -410,6 +433,20 @@ impl Line {
                 let what = PlacedFault::Link(*link, unfault(what)?);
                 Event::Fault(index(ring)?, instant(t), what, moment)
             }
+            Self::Look {
+                t,
+                busy,
+                lead,
+                pause,
+            } => Event::Look(Look {
+                at: instant(t),
+                busy: *busy,
+                lead: lead.map(|(far, near)| Lead {
+                    far: Span::from_units(far),
+                    near: Span::from_units(near),
+                }),
+                pause: pause.as_ref().map(instant),
+            }),
             Self::Trouble { cause, text } => Event::Trouble(match cause.as_str() {
                 "denied" => Trouble::Denied(text.clone()),
                 "lost" => Trouble::Lost(text.clone()),

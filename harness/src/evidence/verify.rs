@@ -1,7 +1,10 @@
 //! Every verdict of a folder, judged again from its record.
 
-use super::folder::{EvidenceError, KNOWN_PROFILE, RECORD, RIG, SCENARIOS, SUMS, sum, sums};
-use super::read::{MAX_SIZE, RecordError, read};
+use super::files::{
+    self, KNOWN_PROFILE, RECORD, RIG, SCENARIOS, SUMS, compare_sums, read_text, sum,
+};
+use super::folder::EvidenceError;
+use super::read::{RecordError, read};
 use super::record::{Line, capabilities};
 use crate::library::Entry;
 use crate::link::{Event, LinkFault, PlacedFault, Recording, Replay};
@@ -17,8 +20,6 @@ use crate::twin::{Conversation, Exactness, Twin};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
-use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::Path;
 
 /// How much longer a busy computer may have waited in one attempt.
@@ -117,25 +118,7 @@ pub fn verify(path: &Path) -> Result<Verified, EvidenceError> {
 /// The texts of a folder's scenarios.
 pub(super) fn scenarios(path: &Path) -> impl Fn(&str) -> Result<String, String> {
     let path = path.to_owned();
-    move |name| {
-        let file = format!("{SCENARIOS}/{name}.scn");
-        let text = std::fs::read_to_string(path.join(&file));
-        text.map_err(|error| format!("{file}: {error}"))
-    }
-}
-
-/// The bytes of the record of a folder.
-fn record(path: &Path) -> std::io::Result<Vec<u8>> {
-    let file = std::fs::File::open(path.join(RECORD))?;
-    let mut bytes = Vec::new();
-    file.take(MAX_SIZE + 1).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > MAX_SIZE {
-        true => Err(std::io::Error::other(format!(
-            "it has more than {} MiB",
-            MAX_SIZE >> 20
-        ))),
-        false => Ok(bytes),
-    }
+    move |name| read_text(&path, &format!("{SCENARIOS}/{name}.scn"))
 }
 
 /// Judges a record again.
@@ -162,11 +145,15 @@ impl Opened {
     /// Reads the record and the rig's file of a folder.
     pub(super) fn folder(path: &Path) -> Result<Self, EvidenceError> {
         let foreign = |what: String| EvidenceError::Foreign(path.display().to_string(), what);
-        let record = record(path).map_err(|error| foreign(format!("{RECORD}: {error}")))?;
-        let source = Source::read(&path.join(RIG)).map_err(|error| foreign(error.to_string()))?;
-        let rig = parse_beside(&source, &|_| {
-            Source::read(&path.join(KNOWN_PROFILE)).map_err(|error| error.to_string())
-        });
+        let record =
+            files::read(path, RECORD).map_err(|error| foreign(format!("{RECORD}: {error}")))?;
+        let beside = |name: &str| {
+            let text = read_text(path, name)?.into_bytes();
+            let name = path.join(name).display().to_string();
+            Source::from_bytes(name, text).map_err(|error| error.to_string())
+        };
+        let source = beside(RIG).map_err(foreign)?;
+        let rig = parse_beside(&source, &|_| beside(KNOWN_PROFILE));
         Self::of(
             &record,
             rig.map_err(|problems| foreign(problems.to_string()))?,
@@ -583,30 +570,4 @@ impl Ended {
         }
         ended
     }
-}
-
-/// What is wrong with the files of a folder; nothing where there are no sums, as of a run that did not end.
-fn compare_sums(path: &Path) -> Result<Vec<String>, EvidenceError> {
-    let stated = match std::fs::read(path.join(SUMS)) {
-        Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
-        Err(_) => return Ok(Vec::new()),
-    };
-    let table = |text: &str| -> BTreeMap<String, String> {
-        let pairs = text.lines().filter_map(|line| line.split_once("  "));
-        pairs
-            .map(|(sum, file)| (file.to_owned(), sum.to_owned()))
-            .collect()
-    };
-    let (stated, found) = (table(&stated), table(&sums(path)?));
-    let mut wrong = Vec::new();
-    for (file, sum) in &stated {
-        match found.get(file) {
-            None => wrong.push(format!("{file} is missing")),
-            Some(own) if own != sum => wrong.push(format!("{file} was changed")),
-            Some(_) => {}
-        }
-    }
-    let added = found.keys().filter(|file| !stated.contains_key(*file));
-    wrong.extend(added.map(|file| format!("{file} was added")));
-    Ok(wrong)
 }

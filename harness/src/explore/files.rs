@@ -1,7 +1,8 @@
 //! Files: whole or not at all, and read within bounds.
 
 use super::error::ExploreError;
-use std::io::{Read, Write};
+use crate::regular::{self, Links};
+use std::io::Write;
 use std::path::Path;
 
 /// The longest file that is read.
@@ -27,10 +28,8 @@ pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), ExploreError> {
 /// Reads a text.
 pub(super) fn read_text(path: &Path) -> Result<String, ExploreError> {
     let read = || {
-        let mut text = String::new();
-        let file = std::fs::File::open(path)?;
-        file.take(LONGEST).read_to_string(&mut text)?;
-        Ok::<_, std::io::Error>(text)
+        let bytes = regular::read(path, Links::Refuse, LONGEST)?;
+        String::from_utf8(bytes).map_err(std::io::Error::other)
     };
     read().map_err(|error| ExploreError::file("read", path, &error))
 }

@@ -16,7 +16,7 @@ mod tamper;
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use inner::{Delay, InnerLink, Ports};
-pub use record::{Event, Recording, Sink};
+pub use record::{Event, Look, Recording, Sink};
 pub use replay::Replay;
 pub use sim::SimulatedLink;
 pub use stream::{StreamLink, TOLERANCE};
@@ -125,6 +125,14 @@ pub enum Trouble {
     Interlock(String),
     /// Somebody wants the program to end.
     Interrupted,
+}
+
+impl Trouble {
+    /// Whether nothing arrives any more. After a denial, and where an interlock does not hold, what was sent before still comes round.
+    #[must_use]
+    pub fn stops_the_line(&self) -> bool {
+        matches!(self, Self::Lost(_) | Self::Garbled(_) | Self::Interrupted)
+    }
 }
 
 impl fmt::Display for Trouble {

@@ -2,12 +2,32 @@
 //!
 //! What a recorded link shows is what a rig shows: bytes and times. Cells, the error mode and what stands outside the
 //! bus are hidden, so that a record suffices to judge a conversation again.
+//!
+//! Where time is real, a recorded link shows its state as of the last [`Look`], and each look is an event. The caller sees nothing that is
+//! not in the record, so that [`Replay`](super::Replay) repeats the conversation exactly, decisions that depend on time included.
 
 use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Shown, Stimulus, Trouble};
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
+use std::collections::VecDeque;
+
+/// The most rings of a bench (ND21 8.4).
+const RINGS: usize = 2;
+
+/// State of a link in real time, as the caller sees it until the next look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// The time of the look.
+    pub at: Instant,
+    /// Whether bytes were still on their way round.
+    pub busy: bool,
+    /// How far ahead of the line bytes may be handed over; `None` where that has not changed.
+    pub lead: Option<Lead>,
+    /// When the line wants a pause; `None` where it wants none.
+    pub pause: Option<Instant>,
+}
 
 /// Something that happened. Times are those of the conversation, but that of [`Event::Begin`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,6 +44,8 @@ pub enum Event {
     Fault(usize, Instant, PlacedFault, Moment),
     /// The link carries nothing more.
     Trouble(Trouble),
+    /// The bench looked at its ports; only where time is real. Bytes that had come since the last look follow it.
+    Look(Look),
     /// So many SYNCO were sent into a ring from this time on to let it spell out its address, and these bytes came.
     Probe(usize, Instant, usize, Vec<Received>),
 }
@@ -45,13 +67,38 @@ pub struct Recording<'l, L: ?Sized> {
     link: &'l mut L,
     sink: &'l mut dyn Sink,
     capabilities: Vec<Capability>,
-    told: bool,
     /// Whether what no rig shows is shown too.
     whole: bool,
     /// Whether a step of a scenario belongs to the present conversation.
     stepped: bool,
     /// What the links carried in the conversation of the scenario, ring by ring; empty while it lasts.
     scenario: Vec<Trace>,
+    /// Trouble that has been recorded.
+    trouble: Option<Trouble>,
+    /// What the caller knows; `None` where time is virtual, as nothing changes between two calls there.
+    known: Option<Known>,
+}
+
+/// What the caller knows of a link in real time.
+struct Known {
+    now: Instant,
+    busy: bool,
+    lead: Lead,
+    pause: Option<Instant>,
+    /// Bytes that are recorded and not yet fetched.
+    came: [VecDeque<(Instant, Received)>; RINGS],
+}
+
+impl Known {
+    fn new() -> Self {
+        Self {
+            now: Instant::START,
+            busy: false,
+            lead: Lead::NONE,
+            pause: None,
+            came: Default::default(),
+        }
+    }
 }
 
 impl<'l, L: Link + ?Sized> Recording<'l, L> {
@@ -62,14 +109,16 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         let capabilities = own
             .filter(|own| !seen_beside_the_bus.contains(own))
             .collect();
+        let real = link.lead() != Lead::NONE;
         Self {
             link,
             sink,
             capabilities,
-            told: false,
             whole: false,
             stepped: false,
             scenario: Vec::new(),
+            trouble: None,
+            known: real.then(Known::new),
         }
     }
 
@@ -84,12 +133,57 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         }
     }
 
-    /// Tells of trouble once, where it shows.
+    /// Records trouble once, where it shows.
     fn tell(&mut self) {
-        if let Some(trouble) = self.link.trouble().filter(|_| !self.told) {
-            self.told = true;
+        if self.trouble.is_none()
+            && let Some(trouble) = self.link.trouble()
+        {
+            self.trouble = Some(trouble.clone());
             self.sink.take(&Event::Trouble(trouble.clone()));
         }
+    }
+
+    /// Takes what has come from the link.
+    fn take_arrived(&mut self) -> Vec<(usize, Instant, Received)> {
+        let mut came = Vec::new();
+        for ring in 0..RINGS {
+            while let Some((at, byte)) = self.link.receive(ring) {
+                came.push((ring, at, byte));
+            }
+        }
+        came
+    }
+
+    /// Records the state of the link and what has come, where time is real.
+    fn look(&mut self, came: Vec<(usize, Instant, Received)>) {
+        let Some(known) = &mut self.known else {
+            return;
+        };
+        known.now = self.link.now();
+        known.busy = self.link.busy();
+        known.pause = self.link.pause_due();
+        let lead = self.link.lead();
+        let look = Look {
+            at: known.now,
+            busy: known.busy,
+            lead: (lead != known.lead).then_some(lead),
+            pause: known.pause,
+        };
+        known.lead = lead;
+        self.sink.take(&Event::Look(look));
+        for (ring, at, byte) in came {
+            self.sink.take(&Event::Received(ring, at, byte));
+            known.came[ring].push_back((at, byte));
+        }
+    }
+
+    /// The same with what has come by now.
+    fn look_now(&mut self) {
+        if self.known.is_some() {
+            let came = self.take_arrived();
+            self.look(came);
+        }
+        self.tell();
     }
 }
 
@@ -99,30 +193,55 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
     }
 
     fn now(&self) -> Instant {
-        self.link.now()
+        let known = self.known.as_ref();
+        known.map_or_else(|| self.link.now(), |known| known.now)
     }
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        if self.trouble.is_some() {
+            return self.now();
+        }
         let end = self.link.send(ring, bytes);
         let taken = bytes.len().saturating_sub(self.link.refused());
         if taken > 0 {
             self.sink
                 .take(&Event::Sent(ring, end, bytes[..taken].to_vec()));
+            if let Some(known) = &mut self.known {
+                known.busy = true;
+            }
         }
         self.tell();
-        end
+        if taken > 0 { end } else { self.now() }
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+        if let Some(known) = &mut self.known {
+            return known.came.get_mut(ring)?.pop_front();
+        }
         let (at, byte) = self.link.receive(ring)?;
         self.sink.take(&Event::Received(ring, at, byte));
         Some((at, byte))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        let more = self.link.wait(until);
+        let Some(busy) = self.known.as_ref().map(|known| known.busy) else {
+            let more = self.link.wait(until);
+            self.tell();
+            return more;
+        };
+        // A wake-up without news is no event.
+        let came = loop {
+            let more = self.link.wait(until);
+            let came = self.take_arrived();
+            let trouble = self.link.trouble().is_some() && self.trouble.is_none();
+            let changed = trouble || !more || self.link.busy() != busy;
+            if changed || !came.is_empty() || self.link.now() >= until {
+                break came;
+            }
+        };
+        self.look(came);
         self.tell();
-        more
+        !self.trouble.as_ref().is_some_and(Trouble::stops_the_line)
     }
 
     fn attend(&mut self, ring: usize, at: Instant) {
@@ -130,20 +249,22 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
     }
 
     fn trouble(&self) -> Option<&Trouble> {
-        self.link.trouble()
+        self.trouble.as_ref()
     }
 
     fn pause_due(&self) -> Option<Instant> {
-        self.link.pause_due()
+        let known = self.known.as_ref();
+        known.map_or_else(|| self.link.pause_due(), |known| known.pause)
     }
 
     fn pause(&mut self) {
         self.link.pause();
-        self.tell();
+        self.look_now();
     }
 
     fn lead(&self) -> Lead {
-        self.link.lead()
+        let known = self.known.as_ref();
+        known.map_or_else(|| self.link.lead(), |known| known.lead)
     }
 }
 
@@ -159,6 +280,10 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
             self.scenario = rings.map(|ring| self.link.trace(ring)).collect();
         }
         self.link.begin();
+        if let Some(known) = &mut self.known {
+            known.came = Default::default();
+        }
+        self.look_now();
     }
 
     fn step(&mut self, place: usize) {
@@ -169,13 +294,15 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
     }
 
     fn busy(&self) -> bool {
-        self.link.busy()
+        let known = self.known.as_ref();
+        known.map_or_else(|| self.link.busy(), |known| known.busy)
     }
 
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
-        let at = self.link.now();
+        let at = self.now();
         self.sink.take(&Event::Fault(ring, at, fault, moment));
         self.link.inject(ring, fault, moment);
+        self.tell();
     }
 
     fn reaches(&self, ring: usize, link: usize) -> bool {
@@ -187,10 +314,11 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
     }
 
     fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        let at = self.link.now();
+        let at = self.now();
         let bytes = self.link.probe(ring, count);
         self.sink
             .take(&Event::Probe(ring, at, count, bytes.clone()));
+        self.look_now();
         bytes
     }
 

@@ -1,9 +1,12 @@
 //! A link that gives again what was recorded.
 //!
-//! The record's order decides: a byte comes where it came before, behind the same bytes sent. Who sends something
-//! else than was sent then finds the link in trouble. Time is that of the record.
+//! The order of the record decides: a byte comes where it came before, behind the same bytes sent. Time is that of the record. A caller
+//! that sends something else finds the link in trouble.
+//!
+//! A record of a ring with ports holds every [`Look`], so that the caller sees the same at each call and must do the same. Records of
+//! schema 1 have no looks: of these only the order is repeated, and a driver that depends on the time may send something else.
 
-use super::{Capability, Event, Line, Link, Moment, PlacedFault, Trouble};
+use super::{Capability, Event, Lead, Line, Link, LinkFault, Look, Moment, PlacedFault, Trouble};
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
@@ -20,6 +23,34 @@ pub struct Replay {
     capabilities: Vec<Capability>,
     reaches: Vec<(usize, usize)>,
     trouble: Option<Trouble>,
+    /// The state as of the last look; `None` where the record has no looks.
+    known: Option<Known>,
+}
+
+/// What the caller knows of a link in real time.
+#[derive(Clone, Debug)]
+struct Known {
+    busy: bool,
+    lead: Lead,
+    pause: Option<Instant>,
+    came: [VecDeque<(Instant, Received)>; 2],
+    /// When each line is free.
+    free: [Instant; 2],
+    /// For how long faults of this conversation may hold bytes.
+    held: Span,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            busy: false,
+            lead: Lead::NONE,
+            pause: None,
+            came: Default::default(),
+            free: [Instant::START; 2],
+            held: Span::ZERO,
+        }
+    }
 }
 
 impl Replay {
@@ -36,12 +67,13 @@ impl Replay {
             Event::Fault(ring, _, PlacedFault::Link(link, _), _) => Some((*ring, *link)),
             _ => None,
         });
+        let looks = events.iter().any(|event| matches!(event, Event::Look(_)));
         Self {
             reaches: reached.collect(),
-            // Which step came when is of no matter here.
+            // Without looks it is not known which step came when.
             events: events
                 .into_iter()
-                .filter(|event| !matches!(event, Event::Step(_)))
+                .filter(|event| looks || !matches!(event, Event::Step(_)))
                 .collect(),
             now: Instant::START,
             rate,
@@ -49,29 +81,52 @@ impl Replay {
             drives,
             capabilities,
             trouble: None,
+            known: looks.then(Known::default),
         }
     }
 
-    /// The first thing that was recorded and not played back; `None` where all was. Bytes that nobody fetched and trouble that nobody
-    /// ran into are no matter.
+    /// Lets faults be asked for on more links than the record has faults on.
+    #[must_use]
+    pub fn reaching(mut self, links: impl IntoIterator<Item = (usize, usize)>) -> Self {
+        self.reaches.extend(links);
+        self
+    }
+
+    /// Whether the record holds all that the caller saw, so that it must do the same again.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.known.is_some()
+    }
+
+    /// The first thing that was recorded and not played back; `None` where all was. Without looks, bytes that were not fetched do not
+    /// count. Behind trouble the caller asks for nothing.
     #[must_use]
     pub fn left(&self) -> Option<String> {
+        let exact = self.known.is_some();
         let words = |event: &Event| match event {
-            Event::Received(..) | Event::Trouble(_) | Event::Step(_) => None,
+            Event::Trouble(_) => None,
+            Event::Received(..) | Event::Step(_) | Event::Look(_) if !exact => None,
+            Event::Received(_, at, byte) => Some(format!("{:02X} received at {at}", byte.byte)),
+            Event::Step(place) => Some(format!("a step at byte {place} of the scenario")),
+            Event::Look(look) => Some(format!("a look at {}", look.at)),
             Event::Begin(_) => Some("another conversation".to_owned()),
             Event::Sent(_, at, bytes) => Some(format!("sending {} bytes until {at}", bytes.len())),
             Event::Fault(_, at, ..) => Some(format!("a fault at {at}")),
             Event::Probe(_, at, count, _) => Some(format!("{count} SYNCO from {at} on")),
         };
         match &self.trouble {
-            // Behind trouble nothing is asked for.
-            Some(_) => None,
-            None => self.events.iter().find_map(words),
+            Some(_) if !exact => None,
+            _ => self.events.iter().find_map(words),
         }
     }
 
-    fn otherwise(&mut self, what: &str) {
-        let text = format!("the record holds something else than {what}: the scenario was changed");
+    fn differs(&mut self, what: &str) {
+        self.fails(format!(
+            "the record holds something else than {what}: the scenario was changed"
+        ));
+    }
+
+    fn fails(&mut self, text: String) {
         self.trouble.get_or_insert(Trouble::Garbled(text));
     }
 
@@ -83,8 +138,82 @@ impl Replay {
 
     fn trouble_comes(&mut self) {
         if let Some(Event::Trouble(trouble)) = self.events.front() {
-            self.trouble = Some(trouble.clone());
+            self.trouble.get_or_insert(trouble.clone());
             self.events.pop_front();
+        }
+    }
+
+    /// The time of the next look; `None` where there is none.
+    fn next_look(&self) -> Option<Instant> {
+        self.events.iter().find_map(|event| match event {
+            Event::Look(look) => Some(look.at),
+            _ => None,
+        })
+    }
+
+    /// Takes the look that stands next, with what had come; `until` is when a wait was to end.
+    fn look(&mut self, until: Option<Instant>) {
+        let Some(known) = &mut self.known else {
+            return;
+        };
+        let Some(Event::Look(look)) = self.events.front() else {
+            return self.differs("a look at the ports");
+        };
+        let Look {
+            at,
+            busy,
+            lead,
+            pause,
+        } = *look;
+        self.events.pop_front();
+        let before = (self.now, known.busy);
+        self.now = at;
+        known.busy = busy;
+        known.lead = lead.unwrap_or(known.lead);
+        known.pause = pause;
+        let held = known.held;
+        let mut came = 0;
+        let mut wrong = (at < before.0).then(|| format!("{at} stands behind {}", before.0));
+        while let Some(Event::Received(ring, arrived, byte)) = self.events.front() {
+            let (ring, arrived, byte) = (*ring, *arrived, *byte);
+            let known_times = before.0..=at;
+            if held == Span::ZERO && !known_times.contains(&arrived) {
+                wrong.get_or_insert(format!(
+                    "{:02X} came at {arrived}, between looks at {} and {at}",
+                    byte.byte, before.0
+                ));
+            }
+            self.events.pop_front();
+            came += 1;
+            known.came[ring.min(1)].push_back((arrived, byte));
+        }
+        let trouble = matches!(self.events.front(), Some(Event::Trouble(_)));
+        let stopped = self.trouble.as_ref().is_some_and(Trouble::stops_the_line);
+        let news = came > 0 || trouble || stopped || busy != before.1;
+        if let Some(until) = until.filter(|until| at < *until && !news) {
+            wrong.get_or_insert(format!("nothing ends the wait until {until} at {at}"));
+        }
+        self.trouble_comes();
+        if let Some(wrong) = wrong {
+            self.fails(format!("the times of the record cannot be: {wrong}"));
+        }
+    }
+
+    /// Whether bytes that were sent now can have left at `end`.
+    fn can_leave(&mut self, ring: usize, count: usize, end: Instant) {
+        let next = self.next_look();
+        let took = self.rate.byte_time() * count as u64;
+        let now = self.now;
+        let Some(known) = &mut self.known else {
+            return;
+        };
+        let free = std::mem::replace(&mut known.free[ring.min(1)], end);
+        let earliest = free.max(now) + took;
+        let latest = next.map(|next| free.max(next) + took + known.held);
+        if end < earliest || latest.is_some_and(|latest| end > latest) {
+            self.fails(format!(
+                "the times of the record cannot be: {count} bytes sent at {now} have not left at {end}"
+            ));
         }
     }
 }
@@ -99,22 +228,21 @@ impl Line for Replay {
     }
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        if self.trouble.is_some() {
+        if self.trouble.is_some() || bytes.is_empty() {
             return self.now;
         }
         match self.events.front() {
-            Some(Event::Sent(own, end, sent)) if *own == ring && sent == bytes => {
-                let end = *end;
-                self.events.pop_front();
-                self.trouble_comes();
-                end
-            }
             // What was denied was not sent.
             Some(Event::Sent(own, end, sent))
-                if *own == ring && bytes.starts_with(sent) && self.denied_behind() =>
+                if *own == ring
+                    && (sent == bytes || bytes.starts_with(sent) && self.denied_behind()) =>
             {
-                let end = *end;
+                let (end, count) = (*end, sent.len());
                 self.events.pop_front();
+                self.can_leave(ring, count, end);
+                if let Some(known) = &mut self.known {
+                    known.busy = true;
+                }
                 self.trouble_comes();
                 end
             }
@@ -123,14 +251,17 @@ impl Line for Replay {
                 self.now
             }
             _ => {
-                self.otherwise("what is sent");
+                self.differs("what is sent");
                 self.now
             }
         }
     }
 
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        // In real time whoever wanted to wait until a time has waited longer, and fetched what came meanwhile.
+        if let Some(known) = &mut self.known {
+            return known.came.get_mut(ring)?.pop_front();
+        }
+        // In real time a wait until a time may have ended later, and what came meanwhile was fetched.
         let late = self.tolerance > Span::ZERO;
         match self.events.front() {
             Some(Event::Received(own, at, byte)) if *own == ring && (late || *at <= self.now) => {
@@ -144,11 +275,15 @@ impl Line for Replay {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
+        if self.known.is_some() {
+            self.look(Some(until));
+            return !self.trouble.as_ref().is_some_and(Trouble::stops_the_line);
+        }
         self.trouble_comes();
         if self.trouble.is_some() {
             return false;
         }
-        // The next byte that comes, behind those that have come and that nobody has fetched.
+        // The next byte that comes, behind those that have come and are not fetched.
         let mut bytes = self.events.iter().map_while(|event| match event {
             Event::Received(_, at, _) => Some(*at),
             _ => None,
@@ -162,6 +297,19 @@ impl Line for Replay {
     fn trouble(&self) -> Option<&Trouble> {
         self.trouble.as_ref()
     }
+
+    fn pause_due(&self) -> Option<Instant> {
+        self.known.as_ref().and_then(|known| known.pause)
+    }
+
+    fn pause(&mut self) {
+        self.look(None);
+    }
+
+    fn lead(&self) -> Lead {
+        let known = self.known.as_ref();
+        known.map_or(Lead::NONE, |known| known.lead)
+    }
 }
 
 impl Link for Replay {
@@ -170,31 +318,67 @@ impl Link for Replay {
     }
 
     fn begin(&mut self) {
-        while matches!(self.events.front(), Some(Event::Received(..))) {
+        while self.known.is_none() && matches!(self.events.front(), Some(Event::Received(..))) {
             self.events.pop_front();
         }
         match self.events.pop_front() {
-            Some(Event::Begin(_)) => self.now = Instant::START,
+            Some(Event::Begin(at)) => {
+                if self.known.is_some() && at < self.now {
+                    self.fails(format!(
+                        "the times of the record cannot be: a conversation begins at {at}, the one before lasted until {}",
+                        self.now
+                    ));
+                }
+                self.now = Instant::START;
+                if let Some(known) = &mut self.known {
+                    let lead = known.lead;
+                    *known = Known {
+                        lead,
+                        ..Known::default()
+                    };
+                    self.look(None);
+                }
+                self.trouble_comes();
+            }
             Some(other) => {
                 self.events.push_front(other);
-                self.otherwise("the beginning of a conversation");
+                self.differs("the beginning of a conversation");
             }
-            None => self.otherwise("the beginning of a conversation"),
+            None => self.differs("the beginning of a conversation"),
+        }
+    }
+
+    fn step(&mut self, place: usize) {
+        if self.known.is_none() {
+            return;
+        }
+        match self.events.front() {
+            Some(Event::Step(own)) if *own == place => {
+                self.events.pop_front();
+            }
+            _ => self.differs("the steps of the scenario"),
         }
     }
 
     fn busy(&self) -> bool {
-        matches!(self.events.front(), Some(Event::Received(..)))
+        let byte = || matches!(self.events.front(), Some(Event::Received(..)));
+        let known = self.known.as_ref();
+        known.map_or_else(byte, |known| known.busy)
     }
 
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
         match self.events.front() {
-            Some(Event::Fault(own, _, known, then))
-                if (*own, *known, *then) == (ring, fault, moment) =>
+            Some(Event::Fault(own, at, what, then))
+                if (*own, *what, *then) == (ring, fault, moment)
+                    && (self.known.is_none() || *at == self.now) =>
             {
                 self.events.pop_front();
+                if let (Some(known), PlacedFault::Link(_, what)) = (&mut self.known, fault) {
+                    known.held = known.held + held_by(what, self.rate.byte_time());
+                }
+                self.trouble_comes();
             }
-            _ => self.otherwise("the fault that is asked for"),
+            _ => self.differs("the fault that is asked for"),
         }
     }
 
@@ -208,15 +392,18 @@ impl Link for Replay {
 
     fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
         match self.events.pop_front() {
-            Some(Event::Probe(own, at, known, bytes)) if (own, known) == (ring, count) => {
+            Some(Event::Probe(own, at, known, bytes))
+                if (own, known) == (ring, count) && (self.known.is_none() || at == self.now) =>
+            {
                 self.now = self.now.max(at);
+                self.look(None);
                 bytes
             }
             other => {
                 if let Some(other) = other {
                     self.events.push_front(other);
                 }
-                self.otherwise("SYNCO that let the ring spell out its address");
+                self.differs("SYNCO that let the ring spell out its address");
                 Vec::new()
             }
         }
@@ -240,6 +427,16 @@ impl Link for Replay {
             links: Vec::new(),
             marks: Vec::new(),
         }
+    }
+}
+
+/// How long a fault may hold the bytes of a line.
+fn held_by(fault: LinkFault, byte_time: Span) -> Span {
+    match fault {
+        LinkFault::Delay(span) | LinkFault::Break(span) => span + byte_time,
+        // One byte more goes out.
+        LinkFault::Duplicate | LinkFault::Insert(_) => byte_time,
+        _ => Span::ZERO,
     }
 }
 

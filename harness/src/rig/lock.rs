@@ -6,6 +6,7 @@
 
 use super::check::Rig;
 use super::state::{self, Holder};
+use crate::regular::{self, Links};
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use serde::{Deserialize, Serialize};
@@ -133,6 +134,8 @@ fn open(folder: &Path, id: &str) -> io::Result<File> {
     let path = folder.join(format!("{id}.lock"));
     let mut options = OpenOptions::new();
     options.read(true).write(true).mode(0o666);
+    // In a folder for all users a link could lead to a file that this user must not change.
+    options.custom_flags(Links::Refuse.flags());
     // In a folder for all users the kernel may refuse O_CREAT on the file of another user.
     match options.open(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -197,7 +200,7 @@ fn same(one: &Holder, other: &Holder) -> bool {
 /// # Errors
 /// The lock file cannot be read.
 pub fn standing(folder: &Path, id: &str) -> io::Result<Standing> {
-    let mut file = match File::open(folder.join(format!("{id}.lock"))) {
+    let mut file = match regular::open(&folder.join(format!("{id}.lock")), Links::Refuse) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Standing::Free),
         Err(error) => return Err(error),

@@ -6,11 +6,12 @@
 
 use super::check::Rig;
 use super::file::Quarantine;
+use crate::regular::{self, Links};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::fs::{DirBuilder, File, Permissions};
 use std::io::{self, Read, Write};
-use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -175,17 +176,21 @@ fn rest_file(folder: &Path, id: &str) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn left_at_rest(folder: &Path, id: &str) -> io::Result<()> {
-    std::fs::write(rest_file(folder, id), boot())
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).create(true).truncate(true);
+    options.custom_flags(Links::Refuse.flags());
+    let mut file = options.open(rest_file(folder, id))?;
+    file.write_all(boot().as_bytes())
 }
 
 /// Whether a rig was left so since the machine was started. It is asked once: whoever asks is about to send something.
 pub fn take_rest(folder: &Path, id: &str) -> bool {
     let path = rest_file(folder, id);
-    let kept = std::fs::read_to_string(&path);
+    let kept = regular::read(&path, Links::Refuse, MAX_SIZE);
     // What cannot be removed would be believed again later.
     let taken = std::fs::remove_file(path).is_ok();
     let boot = boot();
-    taken && !boot.is_empty() && kept.is_ok_and(|kept| kept == boot)
+    taken && !boot.is_empty() && kept.is_ok_and(|kept| kept == boot.as_bytes())
 }
 
 fn quarantine_file(folder: &Path, id: &str) -> PathBuf {
@@ -210,7 +215,7 @@ impl Rig {
 /// # Errors
 /// The file cannot be read, or is not ours.
 pub fn quarantine(folder: &Path, id: &str) -> io::Result<Option<Quarantine>> {
-    let file = match File::open(quarantine_file(folder, id)) {
+    let file = match regular::open(&quarantine_file(folder, id), Links::Refuse) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error),
@@ -236,6 +241,6 @@ pub fn set_quarantine(folder: &Path, id: &str, reason: Option<&str>) -> io::Resu
     };
     // Beside it first: nobody reads half a file.
     let new = path.with_extension(format!("quarantine.{}", std::process::id()));
-    File::create(&new)?.write_all(&serde_json::to_vec(&quarantine)?)?;
+    File::create_new(&new)?.write_all(&serde_json::to_vec(&quarantine)?)?;
     std::fs::rename(new, path)
 }

@@ -1,6 +1,6 @@
 //! A scenario's text, from a file or from the binary itself.
 
-use std::fs::File;
+use crate::regular;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
@@ -31,8 +31,10 @@ pub enum SourceError {
         /// What the system said.
         error: std::io::Error,
     },
-    /// It is a device, a pipe or the like.
-    #[error("{name} is not a regular file; a scenario is a text file (*.scn)")]
+    /// It is a folder, a device, a FIFO or the like.
+    #[error(
+        "{name} is not a regular file; a scenario is a text file (*.scn) or the pipe of a shell substitution"
+    )]
     NotAFile {
         /// The file.
         name: String,
@@ -66,7 +68,7 @@ pub enum SourceError {
 }
 
 impl Source {
-    /// Reads a scenario from a file.
+    /// Reads a scenario from a file, or from the pipe of a shell substitution.
     ///
     /// # Errors
     /// The file cannot be read, is too large or is no text.
@@ -76,18 +78,18 @@ impl Source {
             name: name.clone(),
             error,
         };
-        let metadata = std::fs::metadata(path).map_err(unreadable)?;
-        if !metadata.is_file() {
-            return Err(SourceError::NotAFile { name });
-        }
-        if metadata.len() > MAX_SIZE {
-            return Err(SourceError::TooLarge { name });
-        }
+        let not_a_file = |error: &std::io::Error| {
+            use std::io::ErrorKind::{InvalidInput, WouldBlock};
+            matches!(error.kind(), InvalidInput | WouldBlock)
+        };
         let mut bytes = Vec::new();
-        let file = File::open(path).map_err(unreadable)?;
-        file.take(MAX_SIZE + 1)
-            .read_to_end(&mut bytes)
-            .map_err(unreadable)?;
+        let opened = regular::open_input(path);
+        let read = opened.and_then(|file| file.take(MAX_SIZE + 1).read_to_end(&mut bytes));
+        match read {
+            Ok(_) => {}
+            Err(error) if not_a_file(&error) => return Err(SourceError::NotAFile { name }),
+            Err(error) => return Err(unreadable(error)),
+        }
         if bytes.len() as u64 > MAX_SIZE {
             return Err(SourceError::TooLarge { name });
         }

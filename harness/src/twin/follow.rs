@@ -80,7 +80,7 @@ impl Conversation {
                     let received = bytes.iter().map(|byte| (*ring, start, *byte));
                     open.received.extend(received);
                 }
-                Event::Probe(..) | Event::Trouble(_) => {}
+                Event::Probe(..) | Event::Trouble(_) | Event::Look(_) => {}
             }
         }
         all.push(open);

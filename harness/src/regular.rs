@@ -1,0 +1,115 @@
+//! Regular files, opened so that a FIFO, a device or a symbolic link in their place is refused and never waited for.
+
+use rustix::fs::OFlags;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::Path;
+
+/// What to do about a symbolic link as the last part of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Links {
+    /// Open what it points to: for a path that the user has given.
+    Follow,
+    /// Refuse it: for a file at a place that another user or program may have prepared.
+    Refuse,
+}
+
+impl Links {
+    /// Flags for opening: nothing blocks, and no terminal becomes that of this process.
+    pub(crate) fn flags(self) -> i32 {
+        let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
+        let flags = match self {
+            Self::Follow => flags,
+            Self::Refuse => flags | OFlags::NOFOLLOW,
+        };
+        flags.bits().cast_signed()
+    }
+}
+
+/// Opens a regular file for reading.
+///
+/// # Errors
+/// It cannot be opened, or is a folder, a FIFO, a device or the like.
+pub(crate) fn open(path: &Path, links: Links) -> io::Result<File> {
+    if links == Links::Refuse && path.symlink_metadata()?.is_symlink() {
+        return Err(refused("it is a symbolic link, which could lead anywhere"));
+    }
+    let file = OpenOptions::new()
+        .read(true)
+        .custom_flags(links.flags())
+        .open(path)?;
+    match file.metadata()?.is_file() {
+        true => Ok(file),
+        false => Err(refused("it is not a regular file")),
+    }
+}
+
+/// Opens a regular file, or the pipe of a shell substitution `<(...)`, which this process has open already.
+///
+/// # Errors
+/// As of [`open`].
+pub(crate) fn open_input(path: &Path) -> io::Result<File> {
+    let descriptors = ["/dev/fd", "/proc/self/fd"].map(Path::new);
+    let listed = path.parent().is_some_and(|own| descriptors.contains(&own));
+    let pipe = |path: &Path| std::fs::metadata(path).is_ok_and(|own| own.file_type().is_fifo());
+    match (listed || path == Path::new("/dev/stdin")) && pipe(path) {
+        true => File::open(path),
+        false => open(path, Links::Follow),
+    }
+}
+
+/// Reads a regular file of at most this many bytes.
+///
+/// # Errors
+/// As of [`open`]; it is longer, or reading it would block, as with some files of the kernel.
+pub(crate) fn read(path: &Path, links: Links, most: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let done = open(path, links)?.take(most + 1).read_to_end(&mut bytes);
+    match done {
+        Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+            Err(refused("reading it would wait: it is not a regular file"))
+        }
+        Err(error) => Err(error),
+        Ok(_) if bytes.len() as u64 > most => Err(io::Error::other(format!(
+            "it has more than {} KiB",
+            most >> 10
+        ))),
+        Ok(_) => Ok(bytes),
+    }
+}
+
+fn refused(why: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, why)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_regular_files_are_opened() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("file"), "text").expect("room");
+        std::os::unix::fs::symlink("file", path("link")).expect("a link");
+        let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+        rustix::fs::mkfifoat(rustix::fs::CWD, path("fifo"), mode).expect("a FIFO");
+        let read = |name: &str, links, most| {
+            read(&path(name), links, most).map_err(|error| error.to_string())
+        };
+        assert_eq!(read("file", Links::Refuse, 4), Ok(b"text".to_vec()));
+        assert_eq!(read("link", Links::Follow, 4), Ok(b"text".to_vec()));
+        for (name, links, most, why) in [
+            ("link", Links::Refuse, 4, "symbolic link"),
+            ("fifo", Links::Refuse, 4, "not a regular file"),
+            ("fifo", Links::Follow, 4, "not a regular file"),
+            (".", Links::Follow, 4, "not a regular file"),
+            ("/dev/zero", Links::Follow, 4, "not a regular file"),
+            ("file", Links::Refuse, 3, "more than"),
+        ] {
+            let error = read(name, links, most).expect_err(name);
+            assert!(error.contains(why), "{name}: {error}");
+        }
+    }
+}
