@@ -24,5 +24,6 @@ pub mod report;
 pub mod rig;
 pub mod scenario;
 pub mod serve;
+mod signals;
 pub mod top;
 pub mod twin;

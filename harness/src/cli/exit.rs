@@ -26,7 +26,7 @@ pub enum Exit {
     NotSafe = 7,
     /// Somebody else holds the bench.
     Busy = 75,
-    /// Interrupted (Ctrl-C, SIGTERM); the safe state was reached.
+    /// Interrupted (Ctrl-C, SIGTERM, SIGHUP, SIGQUIT); the safe state was reached.
     Interrupted = 130,
 }
 
@@ -46,6 +46,16 @@ Exit codes:
   7  the safe state could not be confirmed: look at the machine
   75 somebody else holds the bench
   130 interrupted; the safe state was reached";
+
+    /// The code where, beside what it stands for, the bench itself failed: a rig error is graver than a verdict, and not graver than a
+    /// tripped interlock, an interruption or a safe state that is not confirmed.
+    #[must_use]
+    pub const fn with_rig_error(self) -> Self {
+        match self {
+            Self::Interlock | Self::NotSafe | Self::Busy | Self::Interrupted => self,
+            _ => Self::RigError,
+        }
+    }
 
     /// The code for the verdicts of a run; `require_all` counts skipped scenarios as missing.
     #[must_use]

@@ -39,6 +39,7 @@ use std::process::ExitCode;
 /// Runs the program with the arguments of the process.
 #[must_use]
 pub fn main() -> ExitCode {
+    crate::signals::fail_beyond_file_size_limit();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -58,10 +59,7 @@ pub fn main() -> ExitCode {
         .unwrap_or_else(|| Command::Run(RunArguments::default()));
     match dispatch(command, &mut output) {
         Ok(exit) => exit.into(),
-        Err(error) => {
-            output.complain(&format!("failed to write: {error}"));
-            Exit::RigError.into()
-        }
+        Err(error) => output.unwritable(&error).into(),
     }
 }
 

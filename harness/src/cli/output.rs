@@ -1,6 +1,7 @@
 //! The two streams of the program, and how mistakes are shown on the second.
 
 use super::args::{Progress, When};
+use super::exit::Exit;
 use crate::library::LibraryError;
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
@@ -53,6 +54,12 @@ impl Output {
     pub(super) fn complain(&mut self, text: &str) {
         let label = paint("error", "1;31", self.colour_err);
         self.say(&format!("{label}: {text}\n"));
+    }
+
+    /// Says that standard output or a file cannot be written to, and gives the exit code for it.
+    pub(super) fn unwritable(&mut self, error: &std::io::Error) -> Exit {
+        self.complain(&format!("failed to write: {error}"));
+        Exit::RigError
     }
 
     /// Writes to standard error; where that is closed, nobody wants to read it.

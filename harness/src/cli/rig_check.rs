@@ -3,12 +3,13 @@
 use super::exit::Exit;
 use super::output::Output;
 use super::rig::ListFormat;
-use super::rig_failure::{alarm, exit_of, find_rig, interrupt_flag, tell_end};
+use super::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use super::run::progress_bar;
 use crate::bus::Error;
 use crate::link::Trouble;
 use crate::rig::figures::{Figures, RingFigures, measure};
 use crate::rig::{Options, Rig, Session};
+use crate::signals::interrupt_flag;
 use clap::Args;
 use harness_proto::time::Span;
 use serde_json::json;
@@ -74,8 +75,10 @@ pub(super) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::
         ListFormat::Text => text(&rig, &figures),
         ListFormat::Json => format!("{:#}\n", object(&rig, &figures)),
     };
-    output.result(&text)?;
-    let mut exit = Exit::Passed;
+    let mut exit = match output.result(&text) {
+        Ok(()) => Exit::Passed,
+        Err(error) => output.unwritable(&error),
+    };
     for ring in figures.rings.iter().filter(|ring| ring.lost > 0) {
         output.complain(&format!(
             "{} of {} SYNCO did not come back as they were sent (ND21 9.2)",

@@ -9,8 +9,6 @@ use crate::rig::lock::LockError;
 use crate::rig::{Alarm, End, FindError, Rig, Session, SessionError, find};
 use crate::top::screen;
 use std::io::Write;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// The rig of this name; what is wrong with it is told.
@@ -26,16 +24,6 @@ pub(super) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
             None
         }
     }
-}
-
-/// A flag that SIGINT and SIGTERM set: what is under way ends in the rig's safe state.
-pub(super) fn interrupt_flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // Where a signal cannot be caught, it ends the program as it always did.
-        let _as_before = signal_hook::flag::register(signal, Arc::clone(&flag));
-    }
-    flag
 }
 
 /// What a program does that hangs: it says so, and ends with the exit code for drives that nobody knows to stand.
@@ -59,6 +47,8 @@ pub(super) fn alarm() -> Alarm {
 pub(super) fn exit_of(error: &SessionError) -> Exit {
     match error {
         SessionError::Lock(LockError::Busy { .. }) => Exit::Busy,
+        SessionError::Interrupted { end: Some(end), .. } if end.is_unsafe() => Exit::NotSafe,
+        SessionError::Interrupted { .. } => Exit::Interrupted,
         SessionError::Lock(LockError::Io { .. })
         | SessionError::Quarantine { .. }
         | SessionError::State(_)
@@ -95,20 +85,16 @@ pub(super) fn tell_end(end: &End, exit: Exit, output: &mut Output) -> Exit {
     for power in &end.power {
         output.complain(power);
     }
-    let exit = if end.power.is_empty() {
-        exit
-    } else {
-        Exit::NotSafe
-    };
     match &end.safe {
-        Some(safe @ SafeState::NotConfirmed(_)) => {
-            output.complain(&safe.to_string());
-            Exit::NotSafe
-        }
-        Some(safe @ SafeState::Confirmed(_)) => {
-            output.say(&format!("{safe}\n"));
-            exit
-        }
-        None => exit,
+        Some(safe @ SafeState::NotConfirmed(_)) => output.complain(&safe.to_string()),
+        Some(safe @ SafeState::Confirmed(_)) => output.say(&format!("{safe}\n")),
+        None => {}
+    }
+    if end.is_unsafe() {
+        return Exit::NotSafe;
+    }
+    match end.remarks.is_empty() {
+        true => exit,
+        false => exit.with_rig_error(),
     }
 }

@@ -5,7 +5,7 @@ use super::junit::Cases;
 use super::output::Output;
 use super::page::{Page, write};
 use super::qualify::{Findings, settle};
-use super::rig_failure::{alarm, exit_of, give_back, interrupt_flag};
+use super::rig_failure::{alarm, exit_of, give_back};
 use super::run::{details, drives, line, progress_bar, summary};
 use crate::evidence::{About, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
@@ -15,6 +15,7 @@ use crate::report::plot::plot;
 use crate::rig::{Options, Played, Rig, Run, Session, SessionError};
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
+use crate::signals::interrupt_flag;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use std::path::PathBuf;
@@ -100,16 +101,13 @@ pub(super) fn work(
             folder = None;
             Exit::Usage
         }
-        Err(Stop::Output(error)) => {
-            let _end = session.close();
-            return Err(error);
-        }
+        Err(Stop::Output(error)) => output.unwritable(&error),
     };
     let (end, exit) = give_back(session, exit, output);
     let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
     Ok(match reports(rig, folder, page, safe, output) {
         true => exit,
-        false => exit.max(Exit::RigError),
+        false => exit.with_rig_error(),
     })
 }
 

@@ -16,6 +16,8 @@ use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A line or a link that sends nothing that the limits do not allow. After a denial it is in
 /// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
@@ -30,6 +32,8 @@ pub struct Guarded<L> {
     origin: Instant,
     refused: usize,
     watch: Option<Box<dyn Watch>>,
+    /// Set when the program is to end; only looked at where the link behind the guard does not look itself.
+    interrupt: Arc<AtomicBool>,
     /// A fault has been put on a link in the present conversation.
     faulty: bool,
 }
@@ -74,6 +78,7 @@ impl<L: Line> Guarded<L> {
             origin: Instant::START,
             refused: 0,
             watch: None,
+            interrupt: Arc::default(),
             faulty: false,
         }
     }
@@ -130,6 +135,11 @@ impl<L: Line> Guarded<L> {
         if matches!(self.trouble, Some(Trouble::Interlock(_))) {
             self.trouble = None;
         }
+    }
+
+    /// Ends the conversation in [trouble](Trouble::Interrupted) once this is set, for a link that does not look at it itself.
+    pub(crate) fn set_interrupt(&mut self, interrupt: Arc<AtomicBool>) {
+        self.interrupt = interrupt;
     }
 
     /// Looks now, and puts the link in [trouble](Trouble::Interlock) where something must not go on.
@@ -317,7 +327,10 @@ impl<L: Line> Line for Guarded<L> {
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        self.inner.wait(until)
+        if self.interrupt.load(Ordering::Relaxed) && self.trouble.is_none() {
+            self.trouble = Some(Trouble::Interrupted);
+        }
+        self.trouble != Some(Trouble::Interrupted) && self.inner.wait(until)
     }
 
     fn attend(&mut self, ring: usize, at: Instant) {

@@ -15,6 +15,7 @@ use std::io::{self, Seek, Write};
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// How often a busy lock is tried again.
@@ -81,14 +82,19 @@ pub struct RigLock {
 }
 
 impl RigLock {
-    /// Takes a rig, and waits for it at most so long. Simulated rigs need no lock: everyone has a copy.
+    /// Takes a rig, and waits for it at most so long, or until `interrupt` is set. Simulated rigs need no lock: everyone has a copy.
     ///
     /// # Errors
     /// Somebody else has it, or its lock file cannot be used.
-    pub fn acquire(rig: &Rig, purpose: &str, wait: Duration) -> Result<Self, LockError> {
+    pub fn acquire(
+        rig: &Rig,
+        purpose: &str,
+        wait: Duration,
+        interrupt: &AtomicBool,
+    ) -> Result<Self, LockError> {
         let folder = state::folder()
             .map_err(|error| io_error(rig.id(), Path::new("the state folder"), error))?;
-        Self::acquire_in(&folder, rig.id(), &Holder::me(purpose), wait)
+        Self::acquire_unless(interrupt, &folder, rig.id(), &Holder::me(purpose), wait)
     }
 
     /// The same in a given folder, for a given holder.
@@ -101,11 +107,23 @@ impl RigLock {
         me: &Holder,
         wait: Duration,
     ) -> Result<Self, LockError> {
+        Self::acquire_unless(&AtomicBool::default(), folder, id, me, wait)
+    }
+
+    fn acquire_unless(
+        interrupt: &AtomicBool,
+        folder: &Path,
+        id: &str,
+        me: &Holder,
+        wait: Duration,
+    ) -> Result<Self, LockError> {
         let begun = Instant::now();
         let wait = wait.max(AT_LEAST);
         loop {
             match attempt(folder, id, me) {
-                Err(LockError::Busy { .. }) if begun.elapsed() < wait => {
+                Err(LockError::Busy { .. })
+                    if begun.elapsed() < wait && !interrupt.load(Ordering::Relaxed) =>
+                {
                     std::thread::sleep(AGAIN.min(wait.saturating_sub(begun.elapsed())));
                 }
                 other => return other,

@@ -14,11 +14,12 @@ use super::state;
 use super::watchdog::{Alarm, Watchdog};
 use crate::bus::{Axis, count_behind};
 use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, blind_stop, safe_state};
-use crate::link::{Line, Link, StreamLink};
+use crate::link::{Line, Link, StreamLink, Trouble};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -44,6 +45,19 @@ pub struct Options {
     pub interrupt: Arc<AtomicBool>,
     /// What is done when the program shows no sign of life and the drives have been told to stop.
     pub alarm: Alarm,
+}
+
+impl Options {
+    /// An error once the program was told to end.
+    fn unless_interrupted(&self, rig: &Rig) -> Result<(), SessionError> {
+        match self.interrupt.load(Ordering::Relaxed) {
+            false => Ok(()),
+            true => Err(SessionError::Interrupted {
+                rig: rig.id().to_owned(),
+                end: None,
+            }),
+        }
+    }
 }
 
 /// Why a rig cannot be used.
@@ -86,6 +100,14 @@ pub enum SessionError {
         /// Why.
         error: Box<HookError>,
     },
+    /// The program was told to end while the rig was being opened.
+    #[error("rig {rig}: interrupted{}", .end.as_ref().map_or(" before anything was sent".to_owned(), |end| format!("; {end}")))]
+    Interrupted {
+        /// Which.
+        rig: String,
+        /// How it was given back; `None` where nothing had been sent to its drives.
+        end: Option<Box<End>>,
+    },
     /// It is not healthy.
     #[error("rig {rig}, ring {ring}: {ill}{}", likely(cause.as_ref()))]
     Ill {
@@ -113,6 +135,22 @@ pub struct End {
     pub power: Vec<String>,
     /// What else went wrong on the way out, in sentences.
     pub remarks: Vec<String>,
+}
+
+impl End {
+    /// Whether the drives or their power may not be in the safe state.
+    #[must_use]
+    pub fn is_unsafe(&self) -> bool {
+        !self.power.is_empty() || matches!(self.safe, Some(SafeState::NotConfirmed(_)))
+    }
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let safe = self.safe.iter().map(SafeState::to_string);
+        let others = self.power.iter().chain(&self.remarks).cloned();
+        f.write_str(&safe.chain(others).collect::<Vec<_>>().join("; "))
+    }
 }
 
 /// A rig in use.
@@ -204,12 +242,15 @@ impl Session {
             if let Some(quarantine) = kept {
                 return Err(own(&quarantine));
             }
-            Some(RigLock::acquire(rig, &options.purpose, options.wait)?)
+            let lock = RigLock::acquire(rig, &options.purpose, options.wait, &options.interrupt);
+            options.unless_interrupted(rig)?;
+            Some(lock?)
         };
         let around = Around::begin(rig).map_err(|error| SessionError::Hook {
             rig: rig.id().to_owned(),
             error,
         })?;
+        options.unless_interrupted(rig)?;
         let opened = open(rig, options.interrupt.clone()).map_err(|error| SessionError::Open {
             rig: rig.id().to_owned(),
             error: Box::new(error),
@@ -233,15 +274,20 @@ impl Session {
             _ports: opened.locks,
             _lock: lock,
         };
+        if rig.is_simulated() {
+            session.link.set_interrupt(options.interrupt.clone());
+        }
         session.listen()?;
-        if !session.opens_quietly() && (rig.file.health.before || !rig.is_simulated()) {
-            match session.health() {
-                Err(SessionError::Ill { ill, .. })
-                    if options.ill_as_well && !matches!(ill, Unhealthy::Trouble(_)) => {}
-                Err(error) => return Err(session.with_cause(error)),
-                Ok(health) => session.opening = Some(health),
+        let ready = options.unless_interrupted(rig);
+        match ready.and_then(|()| session.make_ready()) {
+            Err(_) if options.interrupt.load(Ordering::Relaxed) => {
+                session.ended = false;
+                return Err(SessionError::Interrupted {
+                    rig: rig.id().to_owned(),
+                    end: Some(Box::new(session.end(false))),
+                });
             }
-            session.runs_at_its_rate()?;
+            other => other?,
         }
         session.ended = rig.is_simulated();
         let watch = Interlocks::of(rig).map(|watch| Box::new(watch) as Box<dyn Watch>);
@@ -315,7 +361,16 @@ impl Session {
         let mut heard = vec![Vec::new(); self.rings.len()];
         let end = self.link.now() + LONGEST_ROUND;
         let mut silent = self.link.now() + LISTEN;
-        while self.link.now() < silent && self.link.wait(silent) {
+        while self.link.now() < silent {
+            if !self.link.wait(silent) {
+                // An interrupted program listens to the end too: the safe state needs the line.
+                if self.link.trouble() != Some(&Trouble::Interrupted) {
+                    break;
+                }
+                if let Some(ports) = self.link.inner_mut().ports_mut() {
+                    ports.resume();
+                }
+            }
             for (ring, heard) in heard.iter_mut().enumerate() {
                 let before = heard.len();
                 heard.extend(self.take(ring));
@@ -340,6 +395,20 @@ impl Session {
             }),
             None => Ok(()),
         }
+    }
+
+    /// Examines its rings, unless it was left at rest.
+    fn make_ready(&mut self) -> Result<(), SessionError> {
+        if self.opens_quietly() || self.rig.is_simulated() && !self.rig.file.health.before {
+            return Ok(());
+        }
+        match self.health() {
+            Err(SessionError::Ill { ill, .. })
+                if self.ill_as_well && !matches!(ill, Unhealthy::Trouble(_)) => {}
+            Err(error) => return Err(self.with_cause(error)),
+            Ok(health) => self.opening = Some(health),
+        }
+        self.runs_at_its_rate()
     }
 
     /// Adds the likely cause to the error of a ring that did not open.

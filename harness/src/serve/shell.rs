@@ -8,9 +8,9 @@ use super::pty::{Change, Pty};
 use super::server::Server;
 use super::tcp::{Tcp, Visitor};
 use crate::port::wake_on_time;
+use crate::signals;
 use harness_proto::time::{Instant, Span};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use signal_hook::consts::{SIGINT, SIGTERM};
 use std::io::{self, Read};
 use std::net::SocketAddr;
 use std::os::unix::net::UnixStream;
@@ -43,7 +43,7 @@ pub struct Job {
 /// Why serving has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// SIGINT or SIGTERM.
+    /// A signal that ends programs, such as SIGINT, SIGTERM or SIGHUP.
     Interrupted,
     /// The time is over.
     TimeOver,
@@ -170,7 +170,7 @@ impl Signals {
         let (read, write) = UnixStream::pair()?;
         read.set_nonblocking(true)?;
         let mut ids = Vec::new();
-        for signal in [SIGINT, SIGTERM] {
+        for signal in signals::ending() {
             let write = write.try_clone()?;
             ids.push(signal_hook::low_level::pipe::register(signal, write)?);
         }

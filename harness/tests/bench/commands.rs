@@ -8,9 +8,9 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const SAFE: &str = "2 drives are stopped, standing and blocked";
+pub(crate) const SAFE: &str = "2 drives are stopped, standing and blocked";
 
-fn desk(quiet: bool) -> (Served, Desk) {
+pub(crate) fn desk(quiet: bool) -> (Served, Desk) {
     let served = Served::start("nd21", &[2], "tcp", true, &[]);
     let desk = Desk::of(&served);
     if quiet {
@@ -23,7 +23,7 @@ fn desk(quiet: bool) -> (Served, Desk) {
 }
 
 #[track_caller]
-fn shows(desk: &Desk, command: &str, words: &str) {
+pub(crate) fn shows(desk: &Desk, command: &str, words: &str) {
     let arguments: Vec<_> = command.split(' ').collect();
     ended(&desk.run(&arguments), 0, words);
 }

@@ -7,6 +7,7 @@ mod debian;
 #[path = "../served/ring.rs"]
 mod ring;
 mod simulated;
+mod ways_out;
 
 use harness::port::Endpoint;
 use ring::Served;

@@ -36,10 +36,7 @@ impl Failure {
     /// Says what is wrong and gives the exit code for it.
     pub(super) fn tell(&self, output: &mut Output) -> Exit {
         match self {
-            Self::Output(error) => {
-                output.complain(&format!("failed to write: {error}"));
-                Exit::RigError
-            }
+            Self::Output(error) => output.unwritable(error),
             Self::Said(exit, message) => {
                 output.complain(message);
                 *exit

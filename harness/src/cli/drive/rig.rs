@@ -6,7 +6,7 @@ use super::failure::Failure;
 use crate::bus::{Axis, Bus, Options};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::cli::rig_failure::{alarm, exit_of, find_rig, interrupt_flag, tell_end};
+use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use crate::link::{Line, SimulatedLink, Trouble};
 use crate::rig::sim::all_nd21;
 use crate::rig::{self, Rig, Session, Shared};
@@ -14,6 +14,7 @@ use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
+use crate::signals::interrupt_flag;
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{Drive, SpeedRange};
 use harness_proto::novobus::error::BusError;
@@ -180,7 +181,7 @@ pub(super) fn on_after(
         bench.bus.close();
         result
     });
-    give_back(&shared, as_what, result, output)
+    Ok(give_back(&shared, as_what, result, output))
 }
 
 /// Takes a rig for a command.
@@ -221,22 +222,17 @@ fn give_back(
     as_what: Use,
     result: Result<Exit, Failure>,
     output: &mut Output,
-) -> Result<Exit, Failure> {
+) -> Exit {
     let trouble = rig
         .with(|session| session.link().trouble().cloned())
         .flatten();
     let sound = trouble.is_none();
     let interrupted = trouble == Some(Trouble::Interrupted);
-    let mut unwritten = None;
     let (exit, leave) = match result {
         Ok(exit) => (exit, as_what.holds),
         // What cannot be or has no leave was refused before anything was done.
         Err(failure @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
             (failure.tell(output), true)
-        }
-        Err(Failure::Output(error)) => {
-            unwritten = Some(error);
-            (Exit::RigError, false)
         }
         Err(failure) => (failure.tell(output), false),
     };
@@ -246,8 +242,7 @@ fn give_back(
     } else {
         rig.close(matches!(exit, Exit::RigError | Exit::Interlock))
     };
-    let exit = end.map_or(exit, |end| tell_end(&end, exit, output));
-    unwritten.map_or(Ok(exit), |error| Err(Failure::Output(error)))
+    end.map_or(exit, |end| tell_end(&end, exit, output))
 }
 
 /// The simulated drives of a bench, with nothing sent to them. A rig with ports is stood in for by its simulated likeness.

@@ -34,7 +34,7 @@ Links of the second ring are written with `2:` in front, `2:2->1`. Each has its 
 A pseudo terminal carries no parity and no rate, and cannot turn a second program away. Without --marks in-band every
 byte of the client's is a good one, and of a damaged one that comes back only its eight bits are left.
 
-Ends at SIGINT or SIGTERM (exit code 130), after --for, or with --once when the clients have gone.";
+Ends at SIGINT, SIGTERM, SIGHUP or SIGQUIT (exit code 130), after --for, or with --once when the clients have gone.";
 
 /// For `sim`.
 #[derive(Debug, Args)]

@@ -9,8 +9,8 @@ use super::rig::{self, Bench, RigName, Use};
 use crate::bus::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::cli::rig_failure::interrupt_flag;
 use crate::link::Trouble;
+use crate::signals::interrupt_flag;
 use crate::top::screen::{Input, leave};
 use crate::top::{DriveReading, Heading, Press, Reading, RingReading, Screen, Top, view};
 use harness_proto::nd21::ram;
@@ -147,8 +147,6 @@ fn live(
     output: &Output,
 ) -> Result<Exit, Failure> {
     let flag = interrupt_flag();
-    // A terminal that is closed.
-    let _as_before = signal_hook::flag::register(signal_hook::consts::SIGHUP, Arc::clone(&flag));
     let screen = Screen::enter(output.colours())?;
     let (news, readings) = sync_channel(1);
     let (why, asked) = channel();

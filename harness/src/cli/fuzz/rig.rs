@@ -2,12 +2,13 @@
 
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::cli::rig_failure::{alarm, exit_of, give_back, interrupt_flag};
+use crate::cli::rig_failure::{alarm, exit_of, give_back};
 use crate::explore::{ExploreError, RingScope, Scope, Setup, Spice};
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::{Options, Rig, Run, Session};
 use crate::scenario::run::start_anew;
+use crate::signals::interrupt_flag;
 use harness_proto::novobus::guard::Limits;
 use std::time::Duration;
 
@@ -61,13 +62,8 @@ pub(crate) fn on_ports(
         }
     };
     leave_clean(&mut session, output);
-    match worked {
-        Ok(exit) => Ok(give_back(session, exit, output).1),
-        Err(error) => {
-            let _exit = give_back(session, Exit::RigError, output);
-            Err(error)
-        }
-    }
+    let exit = worked.unwrap_or_else(|error| output.unwritable(&error));
+    Ok(give_back(session, exit, output).1)
 }
 
 /// What cases have left in the drives' RAM goes with a reset, where that is allowed.
