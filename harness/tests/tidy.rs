@@ -236,3 +236,22 @@ fn scenarios_are_readable() {
         }
     }
 }
+
+/// The picture of the README is what the program draws from the scenario of the page on concepts.
+#[test]
+fn the_picture_is_drawn_by_the_program() {
+    let page = read(&root().join("harness/docs/concepts.md"));
+    let start = page.find("title   A bit is damaged").expect("the scenario");
+    let text = page[start..].split("```").next().expect("its end");
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenario = folder.path().join("parity.scn");
+    std::fs::write(&scenario, text).expect("room");
+    let drawn = std::process::Command::new(env!("CARGO_BIN_EXE_drivebench"))
+        .args(["trace", "--format", "svg"])
+        .arg(&scenario)
+        .output()
+        .expect("the program");
+    let kept = read(&root().join("harness/docs/ring.svg"));
+    let again = "drivebench trace parity.scn --format svg -o harness/docs/ring.svg";
+    assert!(drawn.stdout == kept.as_bytes(), "draw it again: {again}");
+}

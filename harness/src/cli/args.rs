@@ -19,7 +19,6 @@ use std::time::Duration;
 /// Without a command all built-in scenarios are played on the simulated ring.
 #[derive(Debug, Parser)]
 #[command(name = "drivebench", version, after_help = EXAMPLES, after_long_help = after_long_help())]
-#[command(disable_help_subcommand = true)]
 pub struct Arguments {
     /// What to do; `run` where nothing is said.
     #[command(subcommand)]

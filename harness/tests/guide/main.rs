@@ -65,6 +65,14 @@ fn options(path: &Path) -> datatest_stable::Result<()> {
             }
         }
     }
+    for block in page.blocks.iter().filter(|b| b.info[0] == "text") {
+        for (number, line) in (block.line + 1..).zip(&block.lines) {
+            if line.starts_with("drivebench ") {
+                let (command, _comment) = line.split_once(" # ").unwrap_or((line, ""));
+                check(number, command, true);
+            }
+        }
+    }
     for (line, text) in &page.prose {
         for span in text.split('`').skip(1).step_by(2) {
             check(*line, span, false);
