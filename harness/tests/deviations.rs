@@ -250,7 +250,7 @@ fn every_wrong_master_is_named() {
         let text = format!(
             "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n\
              [sim]\nsetup = [\"master deviates {}\"]\n\
-             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n",
+             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n",
             deviation.name
         );
         let source = Source::from_bytes("desk.toml".to_owned(), text.into_bytes());

@@ -58,7 +58,7 @@ fn a_ring_behind_ser2net() {
     let rig = folder.path().join("rig.toml");
     let text = format!(
         "schema = 1\n[rig]\nid = \"behind-ser2net\"\n[ring.1]\ndrives = {}\ntransport = \"rfc2217\"\nport = \"{address}\"\n\
-         time_tolerance = \"100ms\"\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n",
+         time_tolerance = \"100ms\"\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n",
         served.sizes[0]
     );
     std::fs::write(&rig, text).expect("room");

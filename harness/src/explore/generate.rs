@@ -174,9 +174,10 @@ impl<'s> Generator<'s> {
 
     /// Whether the rig allows a command.
     pub(super) fn allows(&self, command: Command) -> bool {
-        let need = command.act().need();
+        let act = command.act();
+        let need = act.need();
         let eeprom = need.contains(Need::EEPROM) && !need.contains(Need::EVERYTHING);
-        self.scope.limits.missing(need).is_none() && !(eeprom && self.scope.spare_eeprom)
+        act.passes(&self.scope.limits) && !(eeprom && self.scope.spare_eeprom)
     }
 
     /// A command that changes something, where the rig allows one.

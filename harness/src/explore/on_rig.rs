@@ -70,6 +70,7 @@ impl Target for OnRig<'_, '_> {
         let way = self.run.way();
         let mut events: Vec<Event> = Vec::new();
         let mut guarded = Guarded::new(self.model.clone(), self.limits);
+        guarded.know_as(self.run.session().guarded());
         let mut recording = Recording::new(&mut guarded, &mut events);
         let played = play_one(&mut recording, &plan, &way);
         let trace = recording.trace(case.ring());

@@ -1,6 +1,7 @@
 //! A line or a link behind a guard.
 
 use super::Watch;
+use crate::bus::Axis;
 use crate::link::{
     Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus,
     Trouble,
@@ -11,7 +12,7 @@ use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::error::BusError;
-use harness_proto::novobus::guard::{Denial, Guard, Limits};
+use harness_proto::novobus::guard::{Denial, Found, Guard, Limits};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
@@ -86,8 +87,7 @@ impl<L: Line> Guarded<L> {
     /// Sends 17 zeros and the check sequence on every ring (ND21 9.8), waits until they have come round, and takes what came. Behind
     /// it commands pass, as far as they are allowed.
     pub fn synchronise(&mut self) {
-        let sizes: Vec<_> = self.rings.iter().map(|ring| ring.size).collect();
-        for (ring, size) in sizes.into_iter().enumerate() {
+        for (ring, size) in self.sizes().into_iter().enumerate() {
             let sent = self.send(ring, &CHECK_SEQUENCE);
             let end = sent + self.byte_time() * (u64::from(size.drives()) + 8);
             while self.now() < end && self.wait(end) {}
@@ -115,6 +115,33 @@ impl<L: Line> Guarded<L> {
         }
         for ring in &mut self.rings {
             ring.guard.reset_after_denial();
+        }
+    }
+
+    /// What it allows.
+    pub(super) const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// The rings.
+    pub(super) fn sizes(&self) -> Vec<RingSize> {
+        self.rings.iter().map(|ring| ring.size).collect()
+    }
+
+    /// Learns what was read of a drive.
+    pub(super) fn learn_of(&mut self, axis: Axis, found: &Found) {
+        let Some(ring) = self.rings.get_mut(axis.ring()) else {
+            return;
+        };
+        if let Ok(address) = ring.size.address_byte(axis.drive()) {
+            ring.guard.learn(address, found);
+        }
+    }
+
+    /// Knows of the drives what the guard of their likeness knows, for a rehearsal on a model of them.
+    pub fn know_as<M>(&mut self, other: &Guarded<M>) {
+        for (own, other) in self.rings.iter_mut().zip(&other.rings) {
+            own.guard.know_as(&other.guard);
         }
     }
 
@@ -390,6 +417,7 @@ impl<L: Link> Link for Guarded<L> {
                 Verdict::Doubt => {
                     if let Some(ring) = self.rings.get_mut(ring) {
                         ring.guard.doubt();
+                        ring.guard.forget();
                     }
                 }
                 Verdict::Open => {

@@ -519,7 +519,10 @@ pub struct Limits {
     pub allow_reset: bool,
     /// Whether outputs may be switched; default false.
     pub allow_outputs: bool,
-    /// The highest speed that may be demanded; default no limit but the drives' own.
+    /// Whether the watch over silences may be switched on (ND21 14.10.2), behind which a pause of 10 ms stops a ring; default false.
+    pub allow_monitoring: bool,
+    /// The highest speed at which a motor may turn by what the bus says; default no limit but the drives' own. Cells through which
+    /// a motor could turn faster than the speeds written cannot be written then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_speed: Option<Speed>,
     /// The most bytes that are sent in a second, 1 to 100000; default what the line carries.

@@ -189,7 +189,7 @@ fn simulated(sizes: &str) -> Result<String, String> {
     let (rings, setups): (Vec<_>, Vec<_>) = (0..sizes.len()).map(ring).unzip();
     let id: Vec<_> = sizes.iter().map(u8::to_string).collect();
     Ok(format!(
-        "schema = 1\n[rig]\nid = \"sim-{}\"\n{}[sim]\nsetup = [{}]\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n",
+        "schema = 1\n[rig]\nid = \"sim-{}\"\n{}[sim]\nsetup = [{}]\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n",
         id.join("-"),
         rings.concat(),
         setups.join(", ")

@@ -262,6 +262,7 @@ impl<'s> Run<'s> {
         let rig = self.session.rig();
         let model = rig.plan_with(&known(rig)).ok()?;
         let mut guarded = Guarded::new(simulate::bench(&model), self.session.limits());
+        guarded.know_as(self.session.guarded());
         let mut forgotten: Vec<Event> = Vec::new();
         let mut recording = Recording::new(&mut guarded, &mut forgotten);
         let _outcome = play_one(&mut recording, plan, &self.way());

@@ -289,6 +289,9 @@ impl Session {
             }
             other => other?,
         }
+        if rig.is_simulated() && !rig.file.health.before {
+            session.learn();
+        }
         session.ended = rig.is_simulated();
         let watch = Interlocks::of(rig).map(|watch| Box::new(watch) as Box<dyn Watch>);
         session.link.set_watch(watch);
@@ -334,6 +337,12 @@ impl Session {
     #[must_use]
     pub fn opening(&self) -> Option<&Health> {
         self.opening.as_ref()
+    }
+
+    /// Its guarded link, to look at.
+    #[must_use]
+    pub fn guarded(&self) -> &Guarded<Ends> {
+        &self.link
     }
 
     /// Its guarded link.
@@ -515,6 +524,9 @@ impl Session {
             .zip(rings)
             .all(|(ring, size)| counted(self, ring, size));
         self.link.begin();
+        if sound {
+            self.learn();
+        }
         sound
     }
 
@@ -529,7 +541,17 @@ impl Session {
     pub fn health(&mut self) -> Result<Health, SessionError> {
         self.link.reset_after_denial();
         let attempts = self.rig.file.health.attempts;
-        examine(&mut self.link, &self.rings, attempts).map_err(|(ring, ill)| self.ill(ring, ill))
+        let health = examine(&mut self.link, &self.rings, attempts)
+            .map_err(|(ring, ill)| self.ill(ring, ill))?;
+        self.learn();
+        Ok(health)
+    }
+
+    /// Learns how fast the drives would turn, for `max_speed`. What is not learnt is denied when it is needed, with its cell, and a
+    /// lost link is its own trouble.
+    fn learn(&mut self) {
+        let _unlearnt = self.link.learn();
+        self.link.begin();
     }
 
     /// Looks at every interlock; one that does not hold, or whose drive does not answer, is [trouble](crate::link::Trouble::Interlock) of the
@@ -662,6 +684,7 @@ fn limits(rig: &Rig, allow_motion: bool) -> Limits {
         eeprom: own.allow_eeprom,
         reset: own.allow_reset,
         outputs: own.allow_outputs,
+        monitoring: own.allow_monitoring,
         // Cut off below; what is no number is no speed.
         max_speed: slowest.map(|rpm| rpm.clamp(0.0, 65_535.0).floor() as u16),
         bytes_per_second: own.max_bytes_per_second,

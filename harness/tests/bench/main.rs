@@ -31,7 +31,7 @@ impl Desk {
         };
         let text = format!(
             "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = {drives}\ntransport = \"{transport}\"\nport = \"{port}\"\n{marks}\
-             time_tolerance = \"20ms\"\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n"
+             time_tolerance = \"20ms\"\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n"
         );
         std::fs::write(folder.path().join("desk.toml"), text).expect("room");
         Self { folder }
@@ -196,7 +196,7 @@ fn named(names: &[&str]) {
         let desk = Desk::new(3, "tcp", "127.0.0.1:1");
         let text = format!(
             "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = [\"drive 1 deviates {name}\"]\n\
-             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n"
+             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n"
         );
         std::fs::write(desk.path("desk.toml"), text).expect("room");
         let folder = desk.path("evidence");
@@ -219,7 +219,7 @@ fn wrong_masters_are_named() {
         let desk = Desk::new(3, "tcp", "127.0.0.1:1");
         let text = format!(
             "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = [\"master deviates {name}\"]\n\
-             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n"
+             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n"
         );
         std::fs::write(desk.path("desk.toml"), text).expect("room");
         let folder = desk.path("evidence");

@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 fn rig(drives: u8, reset: bool, more: &str, setup: &str) -> String {
     format!(
         "schema = 1\n[rig]\nid = \"sim\"\n{more}\n[ring.1]\ndrives = {drives}\ntransport = \"sim\"\n[limits]\nallow_motion = true\n\
-         allow_eeprom = true\nallow_reset = {reset}\nallow_outputs = true\n[sim]\n\
+         allow_eeprom = true\nallow_reset = {reset}\nallow_outputs = true\nallow_monitoring = true\n[sim]\n\
          setup = [\"drive 0..last input GPIN3 GPIN5 high\"{setup}]\n"
     )
 }

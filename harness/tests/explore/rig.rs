@@ -15,8 +15,7 @@ use std::sync::{Arc, Mutex};
 #[path = "../served/ring.rs"]
 mod ring;
 
-const EVERYTHING: &str =
-    "allow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\n";
+const EVERYTHING: &str = "allow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n";
 
 /// A folder with a rig file for a ring behind a socket.
 struct Desk {

@@ -2,6 +2,7 @@
 
 mod attack;
 mod safe_state;
+mod speed;
 mod traffic;
 
 use harness::bus::{Axis, Bus, Options};

@@ -107,7 +107,7 @@ const CALLS: &[(&str, Call, &str)] = &[
     (
         "BusAddr",
         |bus| bus.write_byte(axis(1), ram::BUS_ADDR, 0),
-        "nobody knows",
+        "the manual does not say",
     ),
 ];
 
@@ -184,6 +184,8 @@ fn the_greatest_speed() {
         (&[0x85, 0xFF, 0x07, 0x60], false),
     ] {
         let mut line = guarded(1, limits);
+        // `DataIn` points at `nsoll`.
+        line.send(0, &[0x8A, 0xFF, 0x82, 0x08, 0x32, 0xFF, 0xBB]);
         line.send(0, bytes);
         assert_eq!(
             line.trouble().is_none(),

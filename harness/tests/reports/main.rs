@@ -43,7 +43,7 @@ impl Bench {
         let folder = tempfile::tempdir().expect("a folder");
         let text = format!(
             "schema = 1 # this one is kept as it is\n[rig]\nid = \"two\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n{OWN}[limits]\nallow_motion = true\n\
-             allow_eeprom = true\nallow_reset = true\nallow_outputs = true\n{more}"
+             allow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n{more}"
         );
         std::fs::write(folder.path().join("two.toml"), text).expect("room");
         std::fs::create_dir(folder.path().join("scn")).expect("room");

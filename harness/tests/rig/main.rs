@@ -131,6 +131,7 @@ fn where_nothing_is_said_nothing_is_allowed() {
             && !limits.allow_eeprom
             && !limits.allow_reset
             && !limits.allow_outputs
+            && !limits.allow_monitoring
     );
 }
 

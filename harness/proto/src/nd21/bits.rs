@@ -55,6 +55,8 @@ pub mod flags2 {
     pub const REFERENCING: u8 = 0b1110_0000;
     /// Bits 7 to 5 = 100.
     pub const START_REFERENCING: u8 = 1 << 7;
+    /// Bits 7 to 5 and 3: what asks for a run (13.1.1, 13.2.2).
+    pub const ORDERS: u8 = REFERENCING | CALCULATE;
 }
 
 /// `ps_status` (ND21 13.3.1).

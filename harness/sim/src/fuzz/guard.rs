@@ -147,12 +147,20 @@ fn denied(command: &[u8], limits: &Limits) -> Option<&'static str> {
         [0xC0 | 0xC1 | 0xC7, ..] => None,
         [0xC8, _] => unless(limits.outputs, "output"),
         [0xDD, _] => unless(limits.reset, "reset"),
-        [0, high, low] => unless(limits.motion, "motion").or_else(|| fast(high, low, limits)),
+        [0, high, low] => unless(limits.motion, "motion")
+            .or_else(|| fast(high, low, limits))
+            .or_else(|| {
+                unless(
+                    limits.max_speed.is_none(),
+                    "process data to an unknown cell",
+                )
+            }),
         // 14.10: block, stop, both; nominal speed 0.
         [0xA5, mask, 0x00] if mask & 0x7E == 0 => None,
         [0x82, 0x81, 0x00, 0xFF] | [0x63, 0, 0, 0x08, 0xFF] => None,
         // 14.10.2.
-        [0xA5, 0x00 | 0x04, 0x57] | [0xA4, 0xFF, 0x00] => None,
+        [0xA5, 0x04, 0x57] => unless(limits.monitoring, "monitoring"),
+        [0xA5, 0x00, 0x57] | [0xA4, 0xFF, 0x00] => None,
         [0x82, data, low, high] => {
             cell(low, high, data, true, limits).or_else(|| half_of_a_speed(&[[high, low]], limits))
         }
@@ -188,6 +196,13 @@ const SPEEDS: [[u8; 2]; 7] = [
     [0xFD, 0x94],
 ];
 
+/// Cells that are no speeds, through which a motor could turn faster: inputs, their scale, the resolver, the mode, regulators,
+/// positions (14.7.2, 14.7.3, 14.6.6, 14.3, 14.6, 14.5.5).
+const FASTER: [u16; 23] = [
+    0xFD80, 0xFD98, 0xFD99, 0xFD9C, 0xFF01, 0xFF02, 0xFF0A, 0xFF0C, 0xFF0D, 0xFF12, 0xFF14, 0xFF16,
+    0xFF18, 0xFF22, 0xFF60, 0xFF61, 0xFF62, 0xFF63, 0xFF70, 0xFF74, 0xFF78, 0xFF79, 0xFF7F,
+];
+
 fn half_of_a_speed(touched: &[[u8; 2]], limits: &Limits) -> Option<&'static str> {
     let is_half = |[high, low]: &[u8; 2]| SPEEDS.contains(&[*high, low & 0xFE]);
     (limits.max_speed.is_some() && touched.iter().any(is_half)).then_some("half of a speed")
@@ -206,6 +221,9 @@ fn cell(low: u8, high: u8, data: u8, whole: bool, limits: &Limits) -> Option<&'s
     if limits.allow_everything() {
         return None;
     }
+    if limits.max_speed.is_some() && FASTER.contains(&u16::from_be_bytes([high, low])) {
+        return Some("a motor may turn faster");
+    }
     match (high, low) {
         (0xFD, 0x88 | 0x89) => None,
         (0xFD, 0x8A) => match data {
@@ -215,6 +233,13 @@ fn cell(low: u8, high: u8, data: u8, whole: bool, limits: &Limits) -> Option<&'s
         },
         (0xFF, 0x38..=0x3C | 0x3E..=0x41) => None,
         (0xFF, 0x34) if whole && data < 0x80 => None,
+        // 14.10.2.
+        (0xFF, 0x57) if data & 0x04 != 0 && !limits.monitoring && (whole || data != 0) => {
+            Some("monitoring")
+        }
+        // 13.1.1, 13.2.2: a run at speeds of which nothing is known.
+        (0xFF, 0x57) if limits.max_speed.is_some() && data & 0xE8 != 0 => Some("a run"),
+        (0xFF, 0x43) if limits.max_speed.is_some() && data & 0x7E != 0 => Some("a positioning"),
         // 14.4.3: teach-in.
         (0xFF, 0x57) if data & 0x10 != 0 => {
             unless(limits.eeprom && limits.motion, "EEPROM by teach-in")

@@ -130,6 +130,9 @@ const fn why(cause: &Cause) -> &'static str {
     match cause {
         Cause::NotAllowed { .. } => "not allowed",
         Cause::TooFast { .. } => "too fast",
+        Cause::HalfSpeed { .. } => "half of a speed",
+        Cause::Faster { .. } => "turns faster",
+        Cause::NotKnown { .. } => "not known to be slow",
         Cause::InDoubt => "in doubt",
         Cause::NoAddress => "no address is known",
         Cause::CheckSequence => "a check sequence",
@@ -162,6 +165,7 @@ fn needs(missing: Need) -> impl Iterator<Item = &'static str> {
         (Need::EEPROM, "needs EEPROM"),
         (Need::RESET, "needs reset"),
         (Need::OUTPUTS, "needs outputs"),
+        (Need::MONITORING, "needs monitoring"),
     ];
     let unknown = missing.contains(Need::EVERYTHING);
     let one = move |(need, _): &(Need, &str)| {

@@ -192,6 +192,7 @@ fn on_simulated(
         eeprom: own.allow_eeprom,
         reset: own.allow_reset,
         outputs: own.allow_outputs,
+        monitoring: own.allow_monitoring,
         ..Limits::default()
     };
     let scope = simulated(rig, limits, &setup);

@@ -1,8 +1,10 @@
 //! Why a byte did not pass.
 
 use super::effect::Act;
+use super::known::Facts;
 use super::limits::Need;
 use crate::nd21::cells::cell_at;
+use crate::nd21::units::SpeedRange;
 use crate::novobus::address::RingSize;
 use core::fmt;
 
@@ -31,12 +33,41 @@ pub enum Cause {
         /// What leave is missing.
         missing: Need,
     },
-    /// With it a speed would be written that is above the rig's, or a part of a speed.
+    /// It writes a speed above `max_speed`.
     TooFast {
         /// What.
         act: Act,
-        /// The highest speed in rpm.
+        /// `max_speed` in rpm.
         most: u16,
+        /// The drive's range of speeds; `None` where it was not read, and a bit counts as in the range to 12000 rpm.
+        range: Option<SpeedRange>,
+    },
+    /// It writes a part of a speed, so that the whole one is not known.
+    HalfSpeed {
+        /// What.
+        act: Act,
+        /// `max_speed` in rpm.
+        most: u16,
+    },
+    /// A motor could turn faster than `max_speed` by it.
+    Faster {
+        /// What.
+        act: Act,
+        /// `max_speed` in rpm.
+        most: u16,
+        /// The section of the manual.
+        section: &'static str,
+        /// Why.
+        why: &'static str,
+    },
+    /// A motor would turn at a speed that the drive holds, and it is not known that this is within `max_speed`.
+    NotKnown {
+        /// What.
+        act: Act,
+        /// `max_speed` in rpm.
+        most: u16,
+        /// What would have to be known.
+        missing: Facts,
     },
     /// It is not known what the drives would make of it.
     InDoubt,
@@ -81,13 +112,52 @@ impl fmt::Display for Denial {
                 whom(f)?;
                 write!(f, " needs {missing}")
             }
-            Cause::TooFast { act, most } => {
+            Cause::TooFast { act, most, range } => {
+                write!(f, "{act}")?;
+                whom(f)?;
+                write!(f, " is above `max_speed` = {most} rpm in the rig's [limits]: ")?;
+                match range {
+                    Some(SpeedRange::To8000) => f.write_str(
+                        "a bit is 0.2649 rpm in the drive's range to 8000 rpm (SwVersion2 bit 7 = 1, ND21 14.5.3.1)",
+                    ),
+                    Some(SpeedRange::To12000) => f.write_str(
+                        "a bit is 0.5298 rpm in the drive's range to 12000 rpm (SwVersion2 bit 7 = 0, ND21 14.5.3.1)",
+                    ),
+                    None => f.write_str(
+                        "the drive's range is not known (SwVersion2 bit 7 was not read), so a bit counts 0.5298 rpm, as \
+                         in the range to 12000 rpm (ND21 14.5.3.1)",
+                    ),
+                }
+            }
+            Cause::HalfSpeed { act, most } => {
                 write!(f, "{act}")?;
                 whom(f)?;
                 write!(
                     f,
-                    " is, or may become, more than the {most} rpm of `max_speed` in the rig's [limits]; write the \
-                     whole word of a lower speed"
+                    " changes a part of a speed, of which the rest is not known; `max_speed` = {most} rpm in the rig's \
+                     [limits] lets whole words pass: use WriteWord at the cell's own address"
+                )
+            }
+            Cause::Faster {
+                act,
+                most,
+                section,
+                why,
+            } => {
+                write!(f, "{act}")?;
+                whom(f)?;
+                write!(
+                    f,
+                    " does not pass while the rig's [limits] have `max_speed` (= {most} rpm): {why} (ND21 {section})"
+                )
+            }
+            Cause::NotKnown { act, most, missing } => {
+                write!(f, "{act}")?;
+                whom(f)?;
+                write!(
+                    f,
+                    " can make the motor turn, and for `max_speed` = {most} rpm in the rig's [limits] it must be known \
+                     {missing}"
                 )
             }
             Cause::InDoubt => f.write_str(

@@ -1,11 +1,13 @@
-//! What a command does to a machine: one table, by the cells that it writes.
+//! What a command does to a machine: judged by the cells that it writes ([`table`](super::table)).
 
 use super::denial::Cause;
+use super::known::{Facts, Known, within};
 use super::limits::{Limits, Need};
-use crate::nd21::bits::{flags2, status};
+use super::table::{Pace, of_cell, of_stored};
+use crate::nd21::bits::{flags2, ps_status, selftest, status};
 use crate::nd21::cells::cell_at;
-use crate::nd21::units::{Ratio, Scale, SpeedRange, speed_from_raw};
-use crate::nd21::{CONFIRM_ERROR, ram};
+use crate::nd21::units::SpeedRange;
+use crate::nd21::{CONFIRM_ERROR, ee, ram};
 use crate::novobus::command::PAGE;
 use crate::novobus::memory::RAM;
 use crate::novobus::output::OutputChange;
@@ -35,110 +37,243 @@ pub enum Act {
     Unknown(u8),
 }
 
-/// First and last address, and what writing there needs. What is not in here needs everything. In order of addresses (ND21 14.2.1).
-#[rustfmt::skip]
-pub(super) const CELLS: &[(u16, u16, Need)] = &[
-    (ram::POLE_JUMP, ram::POLE_JUMP + 1, Need::MOTION),
-    (ram::I2, ram::I2 + 3, Need::MOTION),
-    // Address and byte of the EEPROM controller; nothing happens before its command (14.10.5).
-    (ram::EEPROM_BUFFER, ram::EEPROM_BUFFER + 1, Need::NONE),
-    (ram::REF_V1, ram::AS_COMMAND, Need::MOTION),
-    // The recording; also the way that this project gives the S-ramp's points to a simulated drive (13.5.3).
-    (ram::REF_LAGE, ram::SCOPE_PUFFER + 255, Need::MOTION),
-    (ram::MMAX, ram::LAGE0 + 1, Need::MOTION),
-    (ram::ICRA, ram::VCO_OFFSET + 1, Need::MOTION),
-    (ram::TEMP_KK, ram::TEMP_MOT, Need::MOTION),
-    // The oscilloscope only looks on (14.10.6).
-    (ram::SCOPE_STATUS, ram::SCOPE_DELAY, Need::NONE),
-    (ram::SCOPE_TRIGGER, ram::SCOPE_SIGNAL2, Need::NONE),
-    (ram::PS_STATUS, ram::PS_DELTA, Need::MOTION),
-    (ram::FLAGS2, ram::CNT2, Need::MOTION),
-    (ram::UP, ram::CNT_REVERS, Need::MOTION),
-    // GPO2's meaning, the analogue output (14.3.3, 14.3.4).
-    (ram::HW_VERSION, ram::HW_VERSION2, Need::MOTION.and(Need::OUTPUTS)),
-    (ram::SW_VERSION, ram::N_MAX + 1, Need::MOTION),
-    (ram::N_RAMPE_PLUS, ram::EMK0, Need::MOTION),
-    // "In position" may stand at GPO2 (14.7.5).
-    (ram::WINDOW, ram::WINDOW, Need::MOTION.and(Need::OUTPUTS)),
-    (ram::AN_OUT, ram::AN_OUT_OFFSET, Need::OUTPUTS),
-    (ram::REVERS_TAKT, ram::VCO_LIN_L, Need::MOTION),
-];
-
-fn of_cell(address: u16) -> Need {
-    let row = CELLS
-        .iter()
-        .find(|(first, last, _)| (*first..=*last).contains(&address));
-    row.map_or(Need::EVERYTHING, |row| row.2)
+/// What becomes of a byte of a cell.
+#[derive(Clone, Copy)]
+enum Change {
+    /// It is written whole.
+    Set(u8),
+    /// It keeps the bits of a mask.
+    And(u8),
+    /// It gets the bits of a mask.
+    Or(u8),
 }
 
-/// A byte written whole.
-fn of_byte(address: u16, data: u8) -> Need {
-    const BOTH: u8 = status::BLOCK | status::STOP;
+impl Change {
+    /// The byte, where it is written whole.
+    const fn whole(self) -> Option<u8> {
+        match self {
+            Self::Set(byte) => Some(byte),
+            Self::And(_) | Self::Or(_) => None,
+        }
+    }
+}
+
+/// What a change needs of the rig, and what it does to the speed of a motor.
+#[derive(Clone, Copy)]
+struct Effect {
+    need: Need,
+    pace: Pace,
+}
+
+const fn effect(need: Need, pace: Pace) -> Effect {
+    Effect { need, pace }
+}
+
+/// The effect of a changed byte; cells whose meaning depends on the data come first, the table has the others.
+fn of_byte(address: u16, change: Change, known: &Known) -> Effect {
     match address {
-        // 14.10: block and stop together stop in every case; one alone takes the other away.
-        ram::STATUS if data == BOTH => Need::NONE,
-        ram::STATUS => Need::MOTION,
+        ram::STATUS => of_status(change),
+        ram::FLAGS2 => of_flags2(change),
+        ram::PS_STATUS => of_ps_status(change),
         // 14.10.1: a confirmed error no longer blocks.
-        ram::ERRORCODE if data == CONFIRM_ERROR => Need::MOTION,
-        // 14.10.5: read a byte, and the end of it; write a byte, ProgParam.
-        ram::EEPROM_CONTROL => match data {
-            0x81 | 0x10 => Need::NONE,
-            0x82 | 0x84 => Need::EEPROM,
-            _ => Need::EVERYTHING,
+        ram::ERRORCODE if matches!(change, Change::Set(CONFIRM_ERROR)) => {
+            effect(Need::MOTION, Pace::Knowing(Facts::RELEASE))
+        }
+        ram::EEPROM_CONTROL => match change {
+            Change::Set(command) => of_eeprom(command, known),
+            _ => effect(Need::EVERYTHING, Pace::Same),
         },
         // 14.10.3.
-        ram::DATA_IN if u16::from(data) == ram::NSOLL & 0xFF => Need::MOTION,
-        ram::DATA_OUT if data < 0x7F => Need::NONE,
-        // 14.4.3: teach-in stores the place in the EEPROM.
-        ram::FLAGS2 if data & flags2::TEACH_IN != 0 => Need::MOTION.and(Need::EEPROM),
-        _ => of_cell(address),
+        ram::DATA_IN => match change {
+            Change::Set(data) if u16::from(data) == ram::NSOLL & 0xFF => {
+                effect(Need::MOTION, Pace::Same)
+            }
+            _ => effect(Need::EVERYTHING, Pace::Same),
+        },
+        ram::DATA_OUT => match change {
+            Change::Set(data) if data < 0x7F => effect(Need::NONE, Pace::Same),
+            _ => effect(Need::EVERYTHING, Pace::Same),
+        },
+        _ => {
+            let (need, pace) = of_cell(address);
+            effect(need, pace)
+        }
     }
 }
 
-fn of_or(address: u16, mask: u8) -> Need {
-    match address {
-        // 14.10: what blocks and what stops.
-        ram::STATUS if mask & !(status::BLOCK | status::STOP) == 0 => Need::NONE,
-        ram::STATUS => Need::MOTION,
-        // 14.10.2: watching for silence only ever stops a drive.
-        ram::FLAGS2 if mask & !flags2::MONITORING == 0 => Need::NONE,
-        ram::FLAGS2 if mask & flags2::TEACH_IN != 0 => Need::MOTION.and(Need::EEPROM),
-        _ => of_cell(address),
+/// `Status` (14.10): block and stop together stop in every case; one written alone takes the other away.
+fn of_status(change: Change) -> Effect {
+    const BOTH: u8 = status::BLOCK | status::STOP;
+    match change {
+        Change::Set(BOTH) | Change::And(0xFF) => effect(Need::NONE, Pace::Same),
+        Change::Or(mask) if mask & !BOTH == 0 => effect(Need::NONE, Pace::Same),
+        _ => effect(Need::MOTION, Pace::Knowing(Facts::RELEASE)),
     }
 }
 
-fn of_and(address: u16, mask: u8) -> Need {
-    match address {
-        ram::STATUS if mask == 0xFF => Need::NONE,
-        ram::STATUS => Need::MOTION,
-        _ => of_cell(address),
+/// `Flags2` (14.4.3).
+fn of_flags2(change: Change) -> Effect {
+    let (set, mut facts) = match change {
+        Change::Set(data) | Change::Or(data) => (data, Facts::NONE),
+        // A mask that leaves bit 7 and takes bit 6 or 5 away makes 100 of the step of a run (13.1.1).
+        Change::And(mask) => {
+            let run = mask & flags2::REFERENCING;
+            let starts = run & flags2::START_REFERENCING != 0 && run != flags2::REFERENCING;
+            (
+                0,
+                if starts {
+                    Facts::REFERENCING
+                } else {
+                    Facts::NONE
+                },
+            )
+        }
+    };
+    if set & flags2::REFERENCING != 0 {
+        facts = facts.and(Facts::REFERENCING);
+    }
+    // 13.2.2: the speed of the positioning is worked out now.
+    if set & flags2::CALCULATE != 0 {
+        facts = facts.and(Facts::POSITIONING);
+    }
+    let mut need = match change {
+        // 14.10.2: nothing but the watch over silences.
+        Change::Or(mask) if mask & !flags2::MONITORING == 0 => Need::NONE,
+        _ => Need::MOTION,
+    };
+    if set & flags2::MONITORING != 0 {
+        need = need.and(Need::MONITORING);
+    }
+    // 14.4.3: teach-in stores the place in the EEPROM.
+    if set & flags2::TEACH_IN != 0 {
+        need = need.and(Need::EEPROM);
+    }
+    effect(need, Pace::Knowing(facts))
+}
+
+/// `ps_status` (13.3.1).
+fn of_ps_status(change: Change) -> Effect {
+    const ORDERS: u8 = ps_status::CALCULATE | ps_status::START;
+    const MAY_BE_WRITTEN: u8 = ORDERS | ps_status::NEGATIVE | ps_status::FINISHED;
+    let pace = match change {
+        Change::Set(data) | Change::Or(data) if data & !MAY_BE_WRITTEN != 0 => Pace::Faster(
+            "13.3.1",
+            "these bits are the drive's own: they say in which phase a positioning is",
+        ),
+        Change::Set(data) | Change::Or(data) if data & ORDERS != 0 => {
+            Pace::Knowing(Facts::POSITIONING)
+        }
+        _ => Pace::Same,
+    };
+    effect(Need::MOTION, pace)
+}
+
+/// A command to the EEPROM controller (14.10.5).
+fn of_eeprom(command: u8, known: &Known) -> Effect {
+    match command {
+        // Read a byte, and the end of it.
+        0x81 | 0x10 => effect(Need::NONE, Pace::Same),
+        // ProgParam stores what the drive works with.
+        0x84 => effect(Need::EEPROM, Pace::Knowing(Facts::SOURCE)),
+        0x82 => {
+            let [address, data] = known.buffer();
+            let monitors = address.is_none_or(|address| address == ee::SELFTEST)
+                && data.is_none_or(|data| data & selftest::MONITORING != 0);
+            let need = match monitors {
+                true => Need::EEPROM.and(Need::MONITORING),
+                false => Need::EEPROM,
+            };
+            effect(need, of_stored(address))
+        }
+        _ => effect(Need::EVERYTHING, Pace::Same),
+    }
+}
+
+/// What is known of a drive behind a changed byte.
+fn note_byte(address: u16, change: Change, known: &mut Known) {
+    match (address, change) {
+        (ram::DATA_IN, Change::Set(_)) => known.note(Facts::DATA_IN),
+        (ram::PS_STATUS, Change::Set(0 | ps_status::FINISHED)) => known.note(Facts::PS_IDLE),
+        (ram::FLAGS2, Change::And(mask) | Change::Set(mask)) if mask & flags2::ORDERS == 0 => {
+            known.note(Facts::FLAGS2_IDLE);
+        }
+        (ram::EEPROM_BUFFER, change) => known.note_buffer(0, change.whole()),
+        (address, change) if address == ram::EEPROM_BUFFER + 1 => {
+            known.note_buffer(1, change.whole());
+        }
+        // 14.10.5.2: the byte that is read stands in the buffer then.
+        (ram::EEPROM_CONTROL, Change::Set(0x81)) => {
+            known.note_buffer(0, None);
+            known.note_buffer(1, None);
+        }
+        _ => {}
     }
 }
 
 impl Act {
-    /// What it needs.
+    /// What it needs of a rig, where nothing is known of the drives.
     #[must_use]
     pub fn need(self) -> Need {
+        self.effects(&Known::default())
+            .iter()
+            .flatten()
+            .fold(self.own_need(), |need, effect| need.and(effect.need))
+    }
+
+    /// Whether these limits let it pass, where nothing is known of the drives.
+    #[must_use]
+    pub fn passes(self, limits: &Limits) -> bool {
+        self.judge(limits, &Known::default()).is_ok()
+    }
+
+    /// What it needs beside what the cells need that it writes.
+    fn own_need(self) -> Need {
         match self {
-            Self::Read => Need::NONE,
             Self::WriteByte(address, _) | Self::WriteWord(address, _)
                 if !RAM.contains(&address) =>
             {
                 Need::EVERYTHING
             }
-            // 14.5.3.1: the nominal speed 0.
-            Self::WriteWord(ram::NSOLL, 0) => Need::NONE,
-            Self::WriteWord(address, data) => {
-                let [high, low] = data.to_be_bytes();
-                of_byte(address, high).and(of_byte(address.wrapping_add(1), low))
-            }
-            Self::WriteByte(address, data) => of_byte(address, data),
-            Self::Or(address, mask) => of_or(address, mask),
-            Self::And(address, mask) => of_and(address, mask),
             Self::WriteIo(code) if OutputChange::from_code(code).is_some() => Need::OUTPUTS,
             Self::WriteIo(_) | Self::Unknown(_) => Need::EVERYTHING,
             Self::Reset => Need::RESET.and(Need::MOTION),
             Self::ProcessDataToCome | Self::ProcessData(_) => Need::MOTION,
+            _ => Need::NONE,
+        }
+    }
+
+    /// The bytes of cells that it changes.
+    fn changes(self) -> [Option<(u16, Change)>; 2] {
+        match self {
+            Self::WriteByte(address, data) => [Some((address, Change::Set(data))), None],
+            Self::WriteWord(address, data) => {
+                let [high, low] = data.to_be_bytes();
+                [
+                    Some((address, Change::Set(high))),
+                    Some((address.wrapping_add(1), Change::Set(low))),
+                ]
+            }
+            Self::And(address, mask) => [Some((address, Change::And(mask))), None],
+            Self::Or(address, mask) => [Some((address, Change::Or(mask))), None],
+            _ => [None, None],
+        }
+    }
+
+    /// The effect of each byte that it changes.
+    fn effects(self, known: &Known) -> [Option<Effect>; 2] {
+        match self {
+            // 14.5.3.1: the nominal speed 0.
+            Self::WriteWord(ram::NSOLL, 0) => [None, None],
+            _ => {
+                // The bytes of a word are written in the order of their addresses.
+                let mut known = *known;
+                self.changes().map(|change| {
+                    let (address, change) = change?;
+                    let effect = of_byte(address, change, &known);
+                    note_byte(address, change, &mut known);
+                    Some(effect)
+                })
+            }
         }
     }
 
@@ -155,45 +290,90 @@ impl Act {
         }
     }
 
-    /// Whether it may be.
-    pub(super) fn judge(self, limits: &Limits) -> Result<(), Cause> {
-        let missing = limits.missing(self.need());
+    /// Whether a drive of which this is known may be given it.
+    pub(super) fn judge(self, limits: &Limits, known: &Known) -> Result<(), Cause> {
+        let effects = self.effects(known);
+        let need = effects.iter().flatten();
+        let need = need.fold(self.own_need(), |need, effect| need.and(effect.need));
+        let missing = limits.missing(need);
         if !missing.is_none() {
             return Err(Cause::NotAllowed { act: self, missing });
         }
-        match limits.max_speed {
-            Some(most) if self.too_fast(most) => Err(Cause::TooFast { act: self, most }),
-            _ => Ok(()),
+        let Some(most) = limits.max_speed else {
+            return Ok(());
+        };
+        let act = self;
+        if let Some(raw) = self.speed() {
+            let range = known.range();
+            if !within(raw, range.unwrap_or(SpeedRange::To12000), most) {
+                return Err(Cause::TooFast { act, most, range });
+            }
+        }
+        let mut facts = match self {
+            Self::ProcessData(_) => Facts::DATA_IN,
+            Self::Reset => Facts::AFTER_RESET,
+            _ => Facts::NONE,
+        };
+        for effect in effects.iter().flatten() {
+            match effect.pace {
+                Pace::Same => {}
+                Pace::Knowing(needed) => facts = facts.and(needed),
+                Pace::Speed if self.speed().is_some() => {}
+                Pace::Speed => return Err(Cause::HalfSpeed { act, most }),
+                Pace::Faster(section, why) => {
+                    return Err(Cause::Faster {
+                        act,
+                        most,
+                        section,
+                        why,
+                    });
+                }
+            }
+        }
+        let missing = known.knows(facts);
+        if missing.is_none() {
+            Ok(())
+        } else {
+            Err(Cause::NotKnown { act, most, missing })
         }
     }
 
-    /// Whether it writes a speed above `most`, or a part of a speed, of which nobody knows the rest.
-    fn too_fast(self, most: u16) -> bool {
-        let is_speed = |address| {
-            cell_at(address)
-                .is_some_and(|cell| matches!(cell.scale, Some(Scale::Speed | Scale::MaxSpeed)))
-        };
-        let above = |raw: u16, signed: bool| {
-            // A word without a sign that is too large for one has no speed in the manual.
-            let raw = raw.cast_signed();
-            if !signed && raw < 0 {
-                return true;
-            }
-            let rpm = speed_from_raw(raw, SpeedRange::To12000);
-            rpm > Ratio::whole(most.into()) || rpm < Ratio::whole(-i32::from(most))
-        };
+    /// The raw speed that it writes whole; a number without a sign that is too large for one has no speed in the manual and
+    /// counts as the highest (14.5.3.2).
+    fn speed(self) -> Option<u16> {
         match self {
-            Self::ProcessData(raw) => above(raw, true),
-            Self::WriteWord(address, raw) => match cell_at(address) {
-                Some(cell) if is_speed(address) && cell.address == address => {
-                    above(raw, cell.signed)
-                }
-                _ => is_speed(address) || is_speed(address.wrapping_add(1)),
-            },
-            Self::WriteByte(address, _) | Self::And(address, _) | Self::Or(address, _) => {
-                is_speed(address)
+            Self::ProcessData(raw) => Some(raw),
+            Self::WriteWord(address, raw) => {
+                let cell = cell_at(address).filter(|cell| cell.address == address)?;
+                let (_, Pace::Speed) = of_cell(address) else {
+                    return None;
+                };
+                Some(if cell.signed || raw < 0x8000 {
+                    raw
+                } else {
+                    0x7FFF
+                })
             }
-            _ => false,
+            _ => None,
+        }
+    }
+
+    /// What is known of a drive behind it.
+    pub(super) fn note(self, known: &mut Known) {
+        if let (Self::WriteWord(address, _), Some(_)) = (self, self.speed()) {
+            known.note(match address {
+                ram::NSOLL => Facts::NSOLL,
+                ram::PS_V0 => Facts::PS_V0,
+                ram::REF_V1 => Facts::REF_V1,
+                ram::REF_V2 => Facts::REF_V2,
+                _ => Facts::NONE,
+            });
+        }
+        for (address, change) in self.changes().into_iter().flatten() {
+            note_byte(address, change, known);
+        }
+        if self == Self::Reset {
+            known.reset();
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::denial::{Cause, Denial};
 use super::effect::Act;
+use super::known::{Found, Known};
 use super::limits::Limits;
 use super::stage::Stage;
 use crate::novobus::address::RingSize;
@@ -25,6 +26,8 @@ pub struct Guard {
     state: State,
     /// Commands received in part, by the address byte that means their drive.
     halves: Box<[Half; 256]>,
+    /// What is known of each drive, by the address byte that means it.
+    known: Box<[Known; 256]>,
     /// The last address byte, counted up by "next"; `None` where no short address is valid.
     kept: Option<u8>,
     /// The last bytes, and the last ones without PAUSE, which drives swallow.
@@ -104,6 +107,7 @@ impl Guard {
             limits,
             state: State::Doubt(Doubt::default()),
             halves: Box::new([Half::default(); 256]),
+            known: Box::new([Known::default(); 256]),
             kept: None,
             tails: [Tail::default(); 2],
             zeros: 0,
@@ -117,6 +121,21 @@ impl Guard {
     /// of no machine.
     pub fn assume_fresh(&mut self) {
         self.state = State::Sync;
+    }
+
+    /// Learns what was read of the drive that this address byte means; what was known of it is forgotten.
+    pub fn learn(&mut self, address: u8, found: &Found) {
+        self.known[usize::from(address)] = Known::of(found, &self.limits);
+    }
+
+    /// Forgets everything about the drives: one may have been switched off and on.
+    pub fn forget(&mut self) {
+        self.known.fill(Known::default());
+    }
+
+    /// Knows of the drives what another guard of the same ring knows.
+    pub fn know_as(&mut self, other: &Self) {
+        self.known.clone_from(&other.known);
     }
 
     /// What it allows.
@@ -186,6 +205,16 @@ impl Guard {
     pub fn doubt(&mut self) {
         self.state = State::Doubt(Doubt::default());
         self.kept = None;
+        self.doubt_commands();
+    }
+
+    /// It is not known which of the last commands were executed.
+    fn doubt_commands(&mut self) {
+        self.known.iter_mut().for_each(Known::doubt);
+    }
+
+    fn known(&self, key: u8) -> &Known {
+        &self.known[usize::from(key)]
     }
 
     /// After a denial: lets the bytes of the recovery pass, and what is allowed behind them. The zeros end what was sent in half, and
@@ -295,6 +324,10 @@ impl Guard {
         if let Some(kept) = next.kept {
             self.kept = kept;
         }
+        if let Some((key, act)) = next.act {
+            act.note(&mut self.known[usize::from(key)]);
+        }
+        let certain = !matches!(self.state, State::Doubt(_));
         self.state = match (self.state, next.state) {
             // Where no drive can be in the middle of a telegram, a bad byte does not bring one there.
             (State::Doubt(doubt), _) if line_error => State::Doubt(Doubt {
@@ -311,6 +344,9 @@ impl Guard {
             }
             (_, state) => state,
         };
+        if certain && matches!(self.state, State::Doubt(_)) {
+            self.doubt_commands();
+        }
     }
 
     /// What follows behind a byte.
@@ -318,20 +354,24 @@ impl Guard {
         match self.state {
             State::Doubt(doubt) => doubt.follow(byte),
             State::Sync => self.sync_byte(byte),
-            State::Address(header) => Ok(Next {
-                kept: Some(Some(byte)),
-                ..Next::to(net(header, byte))
-            }),
+            State::Address(header) => {
+                self.may_have_process_data(header, byte)?;
+                Ok(Next {
+                    kept: Some(Some(byte)),
+                    ..Next::to(net(header, byte))
+                })
+            }
             State::Net { key, left, process } => {
                 let (process, next) = match process {
                     Process::High => {
                         // If zeros must end this telegram, the low byte is one of them.
-                        Act::ProcessData(u16::from(byte) << 8).judge(&self.limits)?;
+                        let data = u16::from(byte) << 8;
+                        Act::ProcessData(data).judge(&self.limits, self.known(key))?;
                         (Process::Low(byte), None)
                     }
                     Process::Low(high) => {
                         let data = u16::from_be_bytes([high, byte]);
-                        Act::ProcessData(data).judge(&self.limits)?;
+                        Act::ProcessData(data).judge(&self.limits, self.known(key))?;
                         (Process::None, None)
                     }
                     Process::None if key < FIRST_ADDRESS => (Process::None, None),
@@ -349,11 +389,14 @@ impl Guard {
                         half: Some((key, half)),
                         ..Next::to(state)
                     },
-                    Some(Parameter::Complete(Act::Reset) | Parameter::Error) => {
-                        Next::to(in_doubt(byte))
-                    }
-                    Some(Parameter::Complete(_)) => Next {
+                    Some(Parameter::Error) => Next::to(in_doubt(byte)),
+                    Some(Parameter::Complete(Act::Reset)) => Next {
+                        act: Some((key, Act::Reset)),
+                        ..Next::to(in_doubt(byte))
+                    },
+                    Some(Parameter::Complete(act)) => Next {
                         half: Some((key, Half::default())),
+                        act: Some((key, act)),
                         ..Next::to(state)
                     },
                 })
@@ -378,7 +421,7 @@ impl Guard {
             Err(_) => return Ok(Next::to(in_doubt(byte))),
         };
         if header.process_data() {
-            Act::ProcessDataToCome.judge(&self.limits)?;
+            Act::ProcessDataToCome.judge(&self.limits, &Known::default())?;
         }
         let key = match (header.addressing(), self.kept) {
             (Addressing::AddressFollows, _) => return Ok(Next::to(State::Address(header))),
@@ -387,10 +430,19 @@ impl Guard {
             _ if header.net_length() == 0 => return Ok(Next::to(State::Sync)),
             (_, None) => return Err(Cause::NoAddress),
         };
+        self.may_have_process_data(header, key)?;
         Ok(Next {
             kept: Some(Some(key)),
             ..Next::to(net(header, key))
         })
+    }
+
+    /// Whether the addressed drive may be given process data: judged before the first of them, with the nominal speed 0.
+    fn may_have_process_data(&self, header: Header, key: u8) -> Result<(), Cause> {
+        if header.process_data() && key >= FIRST_ADDRESS {
+            Act::ProcessData(0).judge(&self.limits, self.known(key))?;
+        }
+        Ok(())
     }
 
     /// ND21 9.5, 9.6, chapter 10.
@@ -401,7 +453,7 @@ impl Guard {
             return Ok(Parameter::Error);
         }
         let Some(length) = length(sent.first().copied().unwrap_or(byte)) else {
-            Act::Unknown(byte).judge(&self.limits)?;
+            Act::Unknown(byte).judge(&self.limits, self.known(key))?;
             return Ok(Parameter::Error);
         };
         if sent.len() < length {
@@ -411,13 +463,13 @@ impl Guard {
                 && Checksum::over(half.sent()) == Checksum::EMPTY
                 && let Some(act) = Act::of(half.sent())
             {
-                act.judge(&self.limits)?;
+                act.judge(&self.limits, self.known(key))?;
             }
             return Ok(Parameter::Half(half));
         }
         match Act::of(sent) {
             Some(act) if Checksum::over(sent).plus() == byte => {
-                act.judge(&self.limits)?;
+                act.judge(&self.limits, self.known(key))?;
                 Ok(Parameter::Complete(act))
             }
             _ => Ok(Parameter::Error),
@@ -430,6 +482,8 @@ struct Next {
     state: State,
     half: Option<(u8, Half)>,
     kept: Option<Option<u8>>,
+    /// A command that the drive of this address byte executes.
+    act: Option<(u8, Act)>,
     recovered: bool,
 }
 
@@ -439,6 +493,7 @@ impl Next {
             state,
             half: None,
             kept: None,
+            act: None,
             recovered: false,
         }
     }

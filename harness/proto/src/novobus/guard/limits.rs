@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// What a rig allows. Reading, and what stops a machine, needs no leave.
+/// What a rig allows. Reading and stopping need no permission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Motors may start, change their speed or their place; parameters of the regulators may be written.
@@ -13,8 +13,10 @@ pub struct Limits {
     pub reset: bool,
     /// Digital and analogue outputs may be changed (ND21 10.4, 14.7).
     pub outputs: bool,
-    /// The highest speed that may be written, in rpm; `None` for any. Counted in the range of 12000 rpm, in which
-    /// a bit is worth most (ND21 14.5.3.1): a drive of the range of 8000 rpm is held to half of it.
+    /// The watch over silences may be switched on (ND21 14.10.2): behind it a pause of 10 ms stops a ring.
+    pub monitoring: bool,
+    /// The highest speed of a motor that the bus may cause, in rpm; `None` for any. A raw speed counts in the range of its
+    /// drive (ND21 14.3.2, 14.5.3.1), and where that is not known in the one to 12000 rpm, in which a bit is worth most.
     pub max_speed: Option<u16>,
     /// The most bytes that may begin within a second on the link's clock; `None`: as many as the line carries. Bytes queued
     /// at one time count at that time.
@@ -31,6 +33,7 @@ impl Default for Limits {
             eeprom: false,
             reset: false,
             outputs: false,
+            monitoring: false,
             max_speed: None,
             bytes_per_second: None,
             most_bytes: 1_000_000_000,
@@ -47,6 +50,7 @@ impl Limits {
             eeprom: true,
             reset: true,
             outputs: true,
+            monitoring: true,
             ..Self::default()
         }
     }
@@ -54,7 +58,12 @@ impl Limits {
     /// Whether every act is allowed, with any value.
     #[must_use]
     pub const fn allow_everything(&self) -> bool {
-        self.motion && self.eeprom && self.reset && self.outputs && self.max_speed.is_none()
+        self.motion
+            && self.eeprom
+            && self.reset
+            && self.outputs
+            && self.monitoring
+            && self.max_speed.is_none()
     }
 
     /// What of `need` is not allowed.
@@ -73,6 +82,9 @@ impl Limits {
         if self.outputs {
             has |= Need::OUTPUTS.0;
         }
+        if self.monitoring {
+            has |= Need::MONITORING.0;
+        }
         if self.allow_everything() {
             has |= Need::EVERYTHING.0;
         }
@@ -80,7 +92,7 @@ impl Limits {
     }
 }
 
-/// What an act needs the rig's leave for.
+/// What an act needs the rig's permission for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Need(u8);
 
@@ -95,8 +107,10 @@ impl Need {
     pub const RESET: Self = Self(1 << 2);
     /// [`Limits::outputs`].
     pub const OUTPUTS: Self = Self(1 << 3);
-    /// All of them and no greatest speed: nobody knows what it does, or it changes what this guard relies on.
-    pub const EVERYTHING: Self = Self(0b1_1111);
+    /// [`Limits::monitoring`].
+    pub const MONITORING: Self = Self(1 << 5);
+    /// All of them and no `max_speed`: the manual does not say what it does, or it changes what this guard relies on.
+    pub const EVERYTHING: Self = Self(0b11_1111);
 
     /// Both.
     #[must_use]
@@ -127,6 +141,7 @@ impl fmt::Display for Need {
             (Self::EEPROM, "`allow_eeprom` in the rig's [limits]"),
             (Self::RESET, "`allow_reset` in the rig's [limits]"),
             (Self::OUTPUTS, "`allow_outputs` in the rig's [limits]"),
+            (Self::MONITORING, "`allow_monitoring` in the rig's [limits]"),
         ];
         let mut first = true;
         for (need, name) in names {
@@ -138,7 +153,10 @@ impl fmt::Display for Need {
         }
         if self.0 & (1 << 4) != 0 {
             let and = if first { "" } else { ", " };
-            write!(f, "{and}no `max_speed`, as nobody knows what it does")?;
+            write!(
+                f,
+                "{and}no `max_speed`, as the manual does not say what it does"
+            )?;
         }
         Ok(())
     }

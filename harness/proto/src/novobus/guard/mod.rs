@@ -22,6 +22,11 @@
 //! counted up would wake drives behind such a drive, and everything would reach them counted up. So this sequence, plus any number,
 //! passes nowhere but behind 17 zeros, and then only as printed.
 //!
+//! Where a rig has a `max_speed`, a command passes only if no motor turns faster by it. Each cell stands in one table (`table`) as
+//! harmless, as a speed, or as a way to turn faster, with its section. A speed passes as a whole word within the limit, counted in the drive's own
+//! range. An order that makes a drive turn at a speed which it holds already, such as a release or a positioning, passes if the guard
+//! knows that speed (`known`).
+//!
 //! What cannot be promised:
 //!
 //! * A bit error on a wire that nobody sees turns one command into another: the parity bit catches an odd number of wrong bits in a
@@ -29,19 +34,23 @@
 //!   out of step for the rest of a telegram.
 //! * A command that another program has left half-sent may end with a 01 that a drive before it makes of a zero. Process data
 //!   that it has left half-sent end with the next byte, whichever that is (9.4), so with the first zero of the recovery.
-//! * `DataIn` (FF32) is believed to point at `nsoll` (14.10.3), as this guard lets nothing else be written there.
-//! * What a drive does by itself: by its switches, its cycle control, its EEPROM after switching on.
+//! * Without a `max_speed`, `DataIn` (FF32) is believed to point at `nsoll` (14.10.3), as this guard lets nothing else be written there.
+//! * What a drive does by itself: by its switches, its cycle control, its EEPROM after switching on. Only the bus is judged.
+//! * That a regulator does not overshoot the nominal speed.
 
 mod denial;
 mod effect;
 mod gate;
+mod known;
 mod limits;
 mod stage;
+mod table;
 #[cfg(test)]
 mod tests;
 
 pub use denial::{Cause, Denial};
 pub use effect::Act;
 pub use gate::Guard;
+pub use known::{Configuration, Facts, Found};
 pub use limits::{Limits, Need};
 pub use stage::Stage;

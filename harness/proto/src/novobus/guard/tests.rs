@@ -1,10 +1,13 @@
 //! Tests of the table and of the gate: what is denied, and where doubt begins, each seen by itself. What drives would make of
 //! all of it is the property's business (`harness/tests/guard`).
 
-use super::{Cause, Guard, Limits};
+use super::{Cause, Guard, Limits, Need};
+use crate::nd21::ram;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::CHECK_SEQUENCE;
 use crate::time::Instant;
+use alloc::vec;
+use alloc::vec::Vec;
 
 /// A guard behind the recovery and these bytes, of which the last one may be damaged; or why one of them did not pass.
 fn behind(limits: Limits, bytes: &[u8], damaged: bool) -> Result<Guard, Cause> {
@@ -30,22 +33,99 @@ fn doubt(limits: Limits, bytes: &[u8], damaged: bool) -> bool {
     behind(limits, bytes, damaged).expect("all pass").in_doubt()
 }
 
-/// ND21 14.10.5: what reads a byte passes, what writes one and programs all does not, in each form that could write it.
+/// A telegram to the drive of a ring of one: `WriteByte`.
+fn write(address: u16, data: u8) -> [u8; 7] {
+    let [high, low] = address.to_be_bytes();
+    let sum = 0x82_u8
+        .wrapping_add(data)
+        .wrapping_add(low)
+        .wrapping_add(high);
+    [0x8A, 0xFF, 0x82, data, low, high, sum.max(1)]
+}
+
+/// The steps that write a byte of the EEPROM (ND21 14.10.5.3).
+fn write_eeprom(address: u8, data: u8) -> Vec<u8> {
+    let steps = [
+        (ram::EEPROM_BUFFER, address),
+        (ram::EEPROM_BUFFER + 1, data),
+        (ram::EEPROM_CONTROL, 0x82),
+    ];
+    steps.map(|(cell, byte)| write(cell, byte)).concat()
+}
+
+/// ND21 14.10.5: what reads a byte passes, what writes one and programs all does not.
 #[test]
 fn the_eeprom_controller() {
-    assert!(passes(&[0x8A, 0xFF, 0x82, 0x81, 0x8A, 0xFD, 0x8A]));
-    let motion = Limits {
-        motion: true,
+    assert!(passes(&write(ram::EEPROM_CONTROL, 0x81)));
+    let [motion, eeprom] = [(true, false), (false, true)].map(|(motion, eeprom)| Limits {
+        motion,
+        eeprom,
         ..Limits::default()
+    });
+    for bytes in [
+        write_eeprom(0x60, 0x82),
+        write(ram::EEPROM_CONTROL, 0x84).to_vec(),
+    ] {
+        assert!(behind(motion, &bytes, false).is_err(), "{bytes:02X?}");
+        assert!(behind(eeprom, &bytes, false).is_ok(), "{bytes:02X?}");
+    }
+}
+
+/// ND21 14.10.2: what switches the watch over silences on needs a permission of its own, by whichever way.
+#[test]
+fn monitoring_needs_its_own_permission() {
+    let other = Limits {
+        monitoring: false,
+        ..Limits::unlimited()
     };
-    for command in [0x82, 0x84] {
-        let bytes: [u8; 7] = [0x8A, 0xFF, 0x82, command, 0x8A, 0xFD, command + 9];
-        assert!(behind(motion, &bytes, false).is_err(), "{command:02X}");
-        let eeprom = Limits {
-            eeprom: true,
-            ..Limits::default()
+    let own = Limits {
+        monitoring: true,
+        ..other
+    };
+    // Flags2 bit 2: Or, WriteByte, a word over it and its neighbours.
+    let words = [(0x56_u8, 0x0004_u16), (0x57, 0x0400)].map(|(low, data)| {
+        let [upper, lower] = data.to_be_bytes();
+        let sum = [0x63, lower, upper, low, 0xFF]
+            .iter()
+            .fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+        vec![0x8C, 0xFF, 0x63, lower, upper, low, 0xFF, sum]
+    });
+    let [over, from] = words;
+    let cases = [
+        vec![0x88, 0xFF, 0xA5, 0x04, 0x57, 0x01],
+        write(ram::FLAGS2, 0x04).to_vec(),
+        over,
+        from,
+        // EEPROM 47 bit 7, and a cell that may be it, with data that may be it.
+        write_eeprom(0x47, 0x80),
+        write(ram::EEPROM_CONTROL, 0x82).to_vec(),
+        [
+            &write(ram::EEPROM_BUFFER, 0x47)[..],
+            &write(ram::EEPROM_CONTROL, 0x82),
+        ]
+        .concat(),
+        // The byte that was read stands in the buffer.
+        [
+            &write_eeprom(0x60, 0)[..14],
+            &write(ram::EEPROM_CONTROL, 0x81),
+            &write(ram::EEPROM_CONTROL, 0x82),
+        ]
+        .concat(),
+    ];
+    for bytes in cases {
+        let denied = behind(other, &bytes, false);
+        let Err(Cause::NotAllowed { missing, .. }) = denied else {
+            panic!("{bytes:02X?}");
         };
-        assert!(behind(eeprom, &bytes, false).is_ok(), "{command:02X}");
+        assert!(missing.contains(Need::MONITORING), "{bytes:02X?}");
+        assert!(behind(own, &bytes, false).is_ok(), "{bytes:02X?}");
+    }
+    for bytes in [
+        write_eeprom(0x47, 0x7F),
+        write_eeprom(0x46, 0xFF),
+        write(ram::FLAGS2, 0xFB).to_vec(),
+    ] {
+        assert!(behind(other, &bytes, false).is_ok(), "{bytes:02X?}");
     }
 }
 
