@@ -128,6 +128,44 @@ fn drives_deviate() {
     );
 }
 
+/// The lines of a loop are played for each number, upwards and downwards; its counter stands in every arithmetic.
+#[test]
+fn loops_are_played_for_each_number() {
+    let text = "for k in last..0\n for i in 0..3\n  write-byte k FE10+i = (16*k+i)\n end\n read-byte k FE12 = (16*k+2)\nend\n\
+                read-word 2 FE12 = 2223\nread-word 1 FE10 = 1011\n? sent 116 bytes";
+    passes(&steps(text));
+    // Down to one turn, and bit by bit.
+    let text = "for a in 7..7\n> 88 (0-N) A4 (a&12|1^3) 00*0\n< 88 00 A4 06\nend";
+    passes(&steps(text));
+    fails(
+        &steps("for k in 0..last\nread-byte k FE13 = (k)\nend"),
+        "the master received",
+    );
+    let wrong = [
+        ("for k in 0..last\n> 80", "the loop has no end"),
+        ("> 80\nend", "no loop ends here"),
+        ("> (k)", "`k` stands outside a loop that counts with it"),
+        (
+            "for i in 0..9\n> 80\nend\nread-byte i FE13",
+            "`i` stands outside",
+        ),
+        ("for i in 0..1000000\nend\n> 80", "more than 200000 steps"),
+        (
+            "for i in 0..9\nread-byte i FE13\nend",
+            "there is no drive 3 in a ring of 3",
+        ),
+        ("for i in 0..1\nread-byte 0 FFFF+i\nend", "is no address"),
+    ];
+    for (text, message) in wrong {
+        let problems = entry(&steps(text)).expect_err(text);
+        assert_eq!(problems.len(), 1, "{text}: {problems:#?}");
+        assert!(
+            problems[0].message.contains(message),
+            "{text}: {problems:#?}"
+        );
+    }
+}
+
 #[test]
 fn near_misses_get_a_suggestion() {
     refused(

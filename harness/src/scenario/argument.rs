@@ -1,13 +1,14 @@
 //! Cells, values and numbers that stand outside a scenario, on a command line or in a file of parameters:
 //! in the same words.
 
+use super::expression::{self, Scope};
 use super::parse::{assigned, eeprom_place, place, value};
 use super::plan::{in_memory, number_bytes};
 use super::problem::{Problem, Problems, Span};
 use super::quantity::{self, Dimension, Quantity};
 use super::scanner::Scanner;
 use super::syntax::{Place, Written};
-use super::{expression, times};
+use super::times;
 use harness_proto::nd21::cells::{Access, Cell};
 use harness_proto::nd21::units::{self, Scale};
 use harness_proto::time;
@@ -47,6 +48,7 @@ impl Location {
             place: Place {
                 name: cell.printed.to_owned(),
                 address: cell.address,
+                offset: None,
                 cell: Some(cell),
                 named: true,
                 span: Span::default(),
@@ -122,7 +124,7 @@ impl Location {
         let Written::Bytes(pattern) = value else {
             return number_bytes(self.scale, value, units);
         };
-        let bytes = pattern.expand_known(0, usize::from(self.size) + 1)?;
+        let bytes = pattern.expand_known(Scope::default(), usize::from(self.size) + 1)?;
         // The word of the whole turns can be written without the angle behind it.
         let cell = self.cell().map_or(0, |cell| usize::from(cell.size));
         if bytes.len() == usize::from(self.size) || bytes.len() == cell {

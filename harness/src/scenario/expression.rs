@@ -1,4 +1,4 @@
-//! Arithmetic over the ring's size, so that one file serves rings of any size: `N-1`, `last`, `N/2+1`.
+//! Arithmetic over the ring's size and the counters of loops, so that one file serves rings of any size: `N-1`, `last`, `N/2+1`, `k-N`.
 
 use super::problem::{Problem, Span};
 use super::scanner::Scanner;
@@ -8,7 +8,70 @@ const MAX_DEPTH: u32 = 32;
 /// How many terms a sum, or factors a product, may have.
 const MAX_TERMS: usize = 32;
 
-/// A number that may depend on N, the number of drives in the ring.
+/// The values that an expression can refer to: the ring's size and the counters of the loops around a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Scope {
+    size: i64,
+    counters: [Option<i64>; 26],
+}
+
+impl Scope {
+    /// A ring of `size` drives, outside every loop.
+    #[must_use]
+    pub const fn new(size: i64) -> Self {
+        Self {
+            size,
+            counters: [None; 26],
+        }
+    }
+
+    /// The same with another value of a counter; `None` outside its loop.
+    #[must_use]
+    pub fn with(mut self, counter: Counter, value: Option<i64>) -> Self {
+        if let Some(own) = self.counters.get_mut(counter.place()) {
+            *own = value;
+        }
+        self
+    }
+
+    /// The value of a counter; `None` outside its loop.
+    #[must_use]
+    pub fn counter(&self, counter: Counter) -> Option<i64> {
+        self.counters.get(counter.place()).copied().flatten()
+    }
+
+    /// The same counters beside a ring of another size.
+    #[must_use]
+    pub const fn of_ring(self, size: i64) -> Self {
+        Self { size, ..self }
+    }
+}
+
+/// The counter of a loop: a letter from `a` to `z`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Counter(char);
+
+impl Counter {
+    /// The counter of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let mut letters = name.chars();
+        let letter = letters.next().filter(char::is_ascii_lowercase)?;
+        letters.next().is_none().then_some(Self(letter))
+    }
+
+    fn place(self) -> usize {
+        usize::from(u8::try_from(self.0).unwrap_or(b'a') - b'a')
+    }
+}
+
+impl std::fmt::Display for Counter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.0)
+    }
+}
+
+/// A number that may depend on N, the number of drives in the ring, and on the counters of loops.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Expression {
     /// A number.
@@ -17,6 +80,8 @@ pub enum Expression {
     Size,
     /// `last`: N-1, the highest drive number.
     Last,
+    /// The counter of a loop around the line.
+    Counter(Counter),
     /// Two numbers and what is done with them.
     Operation(Box<Expression>, Operator, Box<Expression>),
 }
@@ -34,6 +99,12 @@ pub enum Operator {
     Divide,
     /// `%`, the rest
     Remainder,
+    /// `&`, bit by bit
+    And,
+    /// `|`, bit by bit
+    Or,
+    /// `^`, bit by bit
+    ExclusiveOr,
 }
 
 /// An expression with its place.
@@ -46,12 +117,20 @@ pub struct Located {
 }
 
 impl Located {
-    /// The value in a ring of `size` drives.
+    /// The value in this scope.
     ///
     /// # Errors
-    /// The number has no value: a division by zero, or too large.
-    pub fn value(&self, size: i64) -> Result<i64, Problem> {
-        self.expression.value(size).ok_or_else(|| {
+    /// The number has no value: a division by zero, too large, or a counter outside its loop.
+    pub fn value(&self, scope: Scope) -> Result<i64, Problem> {
+        if let Some(counter) = self.expression.outside(scope) {
+            return Err(Problem::new(
+                self.span,
+                format!("`{counter}` stands outside a loop that counts with it"),
+                "a number, `N`, `last` or the counter of a loop expected here",
+            )
+            .help(format!("`for {counter} in 0..last` begins such a loop")));
+        }
+        self.expression.value(scope).ok_or_else(|| {
             Problem::new(
                 self.span,
                 "the number has no value: a division by zero, or too large",
@@ -71,19 +150,32 @@ impl Located {
 }
 
 impl Expression {
-    fn value(&self, size: i64) -> Option<i64> {
+    /// A counter that has no value there.
+    fn outside(&self, scope: Scope) -> Option<Counter> {
+        match self {
+            Self::Counter(counter) if scope.counter(*counter).is_none() => Some(*counter),
+            Self::Operation(left, _, right) => left.outside(scope).or_else(|| right.outside(scope)),
+            _ => None,
+        }
+    }
+
+    fn value(&self, scope: Scope) -> Option<i64> {
         match self {
             Self::Number(number) => Some(*number),
-            Self::Size => Some(size),
-            Self::Last => size.checked_sub(1),
+            Self::Size => Some(scope.size),
+            Self::Last => scope.size.checked_sub(1),
+            Self::Counter(counter) => scope.counter(*counter),
             Self::Operation(left, operator, right) => {
-                let (left, right) = (left.value(size)?, right.value(size)?);
+                let (left, right) = (left.value(scope)?, right.value(scope)?);
                 match operator {
                     Operator::Add => left.checked_add(right),
                     Operator::Subtract => left.checked_sub(right),
                     Operator::Multiply => left.checked_mul(right),
                     Operator::Divide => left.checked_div(right),
                     Operator::Remainder => left.checked_rem(right),
+                    Operator::And => Some(left & right),
+                    Operator::Or => Some(left | right),
+                    Operator::ExclusiveOr => Some(left ^ right),
                 }
             }
         }
@@ -123,6 +215,10 @@ fn sum_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Problem> 
             Operator::Add
         } else if scanner.eat("-") {
             Operator::Subtract
+        } else if scanner.eat("|") {
+            Operator::Or
+        } else if scanner.eat("^") {
+            Operator::ExclusiveOr
         } else {
             return Ok(left);
         };
@@ -141,6 +237,8 @@ fn product_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Probl
             Operator::Divide
         } else if scanner.eat("%") {
             Operator::Remainder
+        } else if scanner.eat("&") {
+            Operator::And
         } else {
             return Ok(left);
         };
@@ -177,6 +275,9 @@ fn factor_at(scanner: &mut Scanner<'_>, depth: u32) -> Result<Expression, Proble
             "N" => Ok(Expression::Size),
             "last" => Ok(Expression::Last),
             other => {
+                if let Some(counter) = Counter::named(other) {
+                    return Ok(Expression::Counter(counter));
+                }
                 *scanner = before;
                 Err(scanner
                     .unexpected("a number, `N` or `last`")

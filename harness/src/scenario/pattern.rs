@@ -1,6 +1,6 @@
 //! Bytes in a scenario: `88 FB`, `1234`, `80*12`, `xx`, `(2-N)`, `[EC 63]*3`.
 
-use super::expression::{self, Located};
+use super::expression::{self, Located, Scope};
 use super::problem::{Problem, Span};
 use super::scanner::Scanner;
 
@@ -48,13 +48,13 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The bytes in a ring of `size` drives; `most` of them at most.
+    /// The bytes in this scope; `most` of them at most.
     ///
     /// # Errors
     /// A number is no byte, or the bytes are too many.
-    pub fn expand(&self, size: i64, most: usize) -> Result<Vec<Expected>, Problem> {
+    pub fn expand(&self, scope: Scope, most: usize) -> Result<Vec<Expected>, Problem> {
         let mut bytes = Vec::new();
-        expand(&self.items, size, most, &mut bytes)?;
+        expand(&self.items, scope, most, &mut bytes)?;
         Ok(bytes)
     }
 
@@ -62,8 +62,8 @@ impl Pattern {
     ///
     /// # Errors
     /// As [`Self::expand`], and for `xx`.
-    pub fn expand_known(&self, size: i64, most: usize) -> Result<Vec<u8>, Problem> {
-        self.expand(size, most)?
+    pub fn expand_known(&self, scope: Scope, most: usize) -> Result<Vec<u8>, Problem> {
+        self.expand(scope, most)?
             .into_iter()
             .map(|byte| match byte {
                 Expected::Byte(byte) => Ok(byte),
@@ -79,7 +79,7 @@ impl Pattern {
 
 fn expand(
     items: &[Item],
-    size: i64,
+    scope: Scope,
     most: usize,
     bytes: &mut Vec<Expected>,
 ) -> Result<(), Problem> {
@@ -87,7 +87,7 @@ fn expand(
         let times = match &item.times {
             None => 1,
             Some(times) => {
-                let value = times.value(size)?;
+                let value = times.value(scope)?;
                 usize::try_from(value).map_err(|_| {
                     Problem::new(
                         item.span,
@@ -103,8 +103,8 @@ fn expand(
         let before = bytes.len();
         match &item.what {
             What::Bytes(known) => bytes.extend(known),
-            What::Number(number) => bytes.push(Expected::Byte(low_byte(number, size)?)),
-            What::Group(items) => expand(items, size, most, bytes)?,
+            What::Number(number) => bytes.push(Expected::Byte(low_byte(number, scope)?)),
+            What::Group(items) => expand(items, scope, most, bytes)?,
         }
         let one = bytes.len() - before;
         if one.saturating_mul(times).saturating_add(before) > most {
@@ -123,8 +123,8 @@ fn expand(
 }
 
 /// `(2-N)` is a byte mod 256, as address bytes are (ND21 9.3).
-fn low_byte(number: &Located, size: i64) -> Result<u8, Problem> {
-    let value = number.value(size)?;
+fn low_byte(number: &Located, scope: Scope) -> Result<u8, Problem> {
+    let value = number.value(scope)?;
     if !(-255..=255).contains(&value) {
         return Err(Problem::new(
             number.span,

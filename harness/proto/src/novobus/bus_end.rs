@@ -182,6 +182,16 @@ impl BusEnd {
         self.leave_error_mode();
     }
 
+    /// Forgets a command that has been received in part; for wrong drives.
+    pub fn forget_command(&mut self) {
+        self.channel = ParameterChannel::default();
+    }
+
+    /// Takes over the command that `other` has received in part; for wrong drives.
+    pub fn keep_command_of(&mut self, other: &Self) {
+        self.channel = other.channel.clone();
+    }
+
     /// Whether the drive is in the error mode.
     #[must_use]
     #[inline]

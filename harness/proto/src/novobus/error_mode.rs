@@ -29,6 +29,31 @@ pub struct Rules {
     pub upstream_zeros: u8,
     /// Zeros that a drive has sent when it begins to increment (ND21 9.7).
     pub sent_zeros: u8,
+    /// Whether the byte in error is one of the zeros in a row.
+    pub offending_zero: OffendingZero,
+    /// Whether another byte starts the count of zeros again (ND21 9.7).
+    pub zeros_in_a_row: bool,
+}
+
+/// Whether the byte in error counts as the first of the zeros in a row (ND21 9.7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OffendingZero {
+    /// Where it is a good 00: the manual's rule.
+    GoodZero,
+    /// Never.
+    Never,
+    /// Whatever it is.
+    AnyByte,
+}
+
+impl OffendingZero {
+    fn counts(self, offending: Received) -> bool {
+        match self {
+            Self::GoodZero => offending.is(0),
+            Self::Never => false,
+            Self::AnyByte => true,
+        }
+    }
 }
 
 impl Rules {
@@ -36,6 +61,8 @@ impl Rules {
     pub const MANUAL: Self = Self {
         upstream_zeros: UPSTREAM_ZEROS,
         sent_zeros: ZEROS,
+        offending_zero: OffendingZero::GoodZero,
+        zeros_in_a_row: true,
     };
 }
 
@@ -108,7 +135,7 @@ impl ErrorMode {
     pub fn enter(offending: Received, rules: Rules) -> Self {
         Self {
             rules,
-            zeros_received: u8::from(offending.is(0)),
+            zeros_received: u8::from(rules.offending_zero.counts(offending)),
             zeros_sent: 1,
             upstream: false,
             after_time_out: false,
@@ -231,7 +258,11 @@ impl ErrorMode {
     #[inline]
     fn count(&mut self, good_zero: bool) -> Marks {
         // Without a branch on the byte: any byte is as likely as another.
-        self.zeros_received = u8::from(good_zero) * self.zeros_received.saturating_add(1);
+        self.zeros_received = match good_zero {
+            true => self.zeros_received.saturating_add(1),
+            false if self.rules.zeros_in_a_row => 0,
+            false => return Marks::NONE,
+        };
         if self.zeros_received == self.rules.upstream_zeros && !self.upstream {
             self.upstream = true;
             return Marks::UPSTREAM;

@@ -1,13 +1,15 @@
 //! A drive that deviates.
 
 use super::how::{Deviation, How, Moment};
-use super::proxy::{Proxy, monitors, seen};
+use super::proxy::{Counts, Proxy, monitors, seen};
 use crate::device::Device;
 use crate::drive::Drive;
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{BusEnd, Deadline, Place, Step};
-use harness_proto::novobus::check_sequence::{Progress, Watch};
+use harness_proto::novobus::check_sequence::{Progress, SEQUENCE, Watch};
+use harness_proto::novobus::command::Field;
 use harness_proto::novobus::error::BusError;
+use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
 
@@ -24,6 +26,11 @@ pub struct Deviant {
     nth: u64,
     zeros: u8,
     watch: Watch,
+    /// How many bytes of a check sequence have come in their order since the drive went into the error mode.
+    in_order: usize,
+    counts: Counts,
+    /// The bus end as it was before the byte for which it went into the error mode.
+    before_the_error: Option<Box<BusEnd>>,
 }
 
 impl Deviant {
@@ -37,6 +44,9 @@ impl Deviant {
             nth: 0,
             zeros: 0,
             watch: Watch::default(),
+            in_order: 0,
+            counts: Counts::default(),
+            before_the_error: None,
         };
         deviant.amend();
         deviant
@@ -72,10 +82,13 @@ impl Deviant {
     /// Lets the bus end work on the memory as the deviations show it.
     fn with<T>(&mut self, place: Place, work: impl FnOnce(&mut BusEnd, &mut Proxy<'_>) -> T) -> T {
         let (bus_end, memory) = self.drive.parts();
+        let left = bus_end.remaining().map_or(0, |left| left.net_bytes);
         let mut proxy = Proxy {
             memory,
             deviations: &self.deviations,
             place,
+            last: left <= 1,
+            counts: self.counts,
         };
         let done = work(bus_end, &mut proxy);
         self.drive.bus_has_worked();
@@ -116,16 +129,47 @@ impl Deviant {
     fn act(&mut self, moment: &Moment) {
         for i in 0..self.deviations.len() {
             match self.deviations[i].how {
-                How::Acts(acts) => acts(moment, self.drive.parts().1),
+                How::Acts(acts) => {
+                    acts(moment, self.drive.parts().1);
+                    self.drive.bus_has_worked();
+                }
                 How::Leaves(leaves) => {
                     let (bus_end, _) = self.drive.parts();
                     if bus_end.in_error() && leaves(moment) {
                         bus_end.recover();
                     }
                 }
+                How::Forgets(forgets) if forgets(moment) => self.drive.parts().0.forget_command(),
+                How::Keeps if moment.step.marks.contains(Marks::RECOVERED) => {
+                    if let Some(before) = self.before_the_error.take() {
+                        self.drive.parts().0.keep_command_of(&before);
+                    }
+                }
                 _ => {}
             }
         }
+    }
+
+    /// Counts a command that has been executed.
+    fn count(&mut self, moment: &Moment) {
+        let Some(command) = moment.parameter() else {
+            return;
+        };
+        let executed =
+            command.field == Field::Check && !moment.step.marks.contains(Marks::DETECTED);
+        self.counts.reads += u64::from(executed && command.kind.reads());
+        self.counts.writes +=
+            u64::from(executed && !command.kind.reads() && command.kind.width() > 0);
+    }
+
+    /// What it says after a look at its cells.
+    fn told(&mut self, moment: &Moment, mut byte: Option<u8>) -> Option<u8> {
+        for deviation in &self.deviations {
+            if let (How::Tells(tells), Some(said)) = (&deviation.how, byte) {
+                byte = Some(tells(moment, self.drive.parts().1, said));
+            }
+        }
+        byte
     }
 
     /// Puts a byte behind those that are held back, or lets it go where there is nothing to wait for.
@@ -187,26 +231,44 @@ fn write(cells: &mut crate::cells::Cells, address: u16, word: bool, value: u16) 
 impl Device for Deviant {
     fn receive(&mut self, now: Instant, received: Received) -> Step {
         self.nth += 1;
+        let zeros_before = self.zeros;
         self.zeros = if received.is(0) {
             self.zeros.saturating_add(1)
         } else {
             0
         };
+        let matched = self.watch.matched();
         let progress = self.watch.see(received.byte, received.error.is_none());
+        let begun = self.in_order;
+        if !self.drive.in_error() {
+            self.in_order = 0;
+        } else if SEQUENCE.get(begun).is_some_and(|due| received.is(*due)) {
+            self.in_order += 1;
+        }
         let mut moment = Moment {
             place: self.place(),
             received,
             nth: self.nth,
             zeros: self.zeros,
+            zeros_before,
+            matched,
+            in_order: begun < self.in_order && self.in_order == SEQUENCE.len(),
             sequence: progress == Progress::Complete,
             step: Step::default(),
         };
         let heard = self.heard(&moment);
+        let keeps = self.deviations.iter().any(|d| matches!(d.how, How::Keeps));
+        let before = keeps.then(|| Box::new(self.drive.parts().0.clone()));
         moment.step = self.with(moment.place, |bus_end, memory| {
             bus_end.receive(now, heard, memory)
         });
+        if moment.step.marks.contains(Marks::DETECTED) {
+            self.before_the_error = before;
+        }
         self.act(&moment);
+        self.count(&moment);
         let (byte, twice) = self.said(&moment);
+        let byte = self.told(&moment, byte);
         Step {
             byte: self.send(now, byte, twice),
             marks: moment.step.marks,
@@ -277,6 +339,9 @@ impl Device for Deviant {
         self.nth = 0;
         self.zeros = 0;
         self.watch = Watch::default();
+        self.in_order = 0;
+        self.counts = Counts::default();
+        self.before_the_error = None;
     }
 
     fn in_error(&self) -> bool {

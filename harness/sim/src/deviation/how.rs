@@ -1,6 +1,6 @@
 //! What a deviation is, and the ways to inject one.
 
-use super::{behind, channel, errors, telegram};
+use super::{behind, cells, channel, errors, recovery, telegram};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::bus_end::{Deadline, Parameter, Place, Step};
 use harness_proto::novobus::checksum::Checksum;
@@ -39,6 +39,8 @@ pub fn deviations() -> impl Iterator<Item = &'static Deviation> {
         telegram::DEVIATIONS,
         channel::DEVIATIONS,
         errors::DEVIATIONS,
+        recovery::DEVIATIONS,
+        cells::DEVIATIONS,
         behind::DEVIATIONS,
     ];
     tables.into_iter().flatten()
@@ -61,6 +63,13 @@ pub(super) struct Moment {
     pub(super) nth: u64,
     /// How many good zeros, this one included, have come in a row.
     pub(super) zeros: u8,
+    /// How many had come in a row before it.
+    pub(super) zeros_before: u8,
+    /// How many bytes of a check sequence stand directly before it, 0 to 4.
+    pub(super) matched: u8,
+    /// Whether it is the last of the five bytes of a check sequence that have come in their order since the drive
+    /// went into the error mode, with others between them.
+    pub(super) in_order: bool,
     /// Whether it completes the five bytes of a check sequence.
     pub(super) sequence: bool,
     /// What the drive made of it; nothing while it is only heard.
@@ -142,6 +151,12 @@ pub(super) struct Write {
     pub(super) data: u8,
     /// What is there now.
     pub(super) old: u8,
+    /// Whether no byte of the telegram stands behind the one in hand.
+    pub(super) last: bool,
+    /// Whether a command writes it.
+    pub(super) of_a_command: bool,
+    /// Which command that writes it is, counted from 1 since power-up; the one to come where no command writes.
+    pub(super) nth: u64,
 }
 
 /// Reads a cell as it is.
@@ -167,6 +182,14 @@ pub(super) enum How {
     Says(fn(&Moment, u8) -> Option<u8>),
     /// Both: what it hears, what it says.
     Mistakes(fn(&Moment) -> Received, fn(&Moment, u8) -> Option<u8>),
+    /// It says another byte, after a look at its cells.
+    Tells(fn(&Moment, &mut dyn Memory, u8) -> u8),
+    /// It forgets a command that it has received in part.
+    Forgets(fn(&Moment) -> bool),
+    /// It keeps a command that it had received in part when it went into the error mode.
+    Keeps,
+    /// It reads something else for a command: which command that reads it is, the address and what is there.
+    Misreads(fn(u64, u16, u8) -> u8),
     /// It says a byte twice.
     Repeats(fn(&Moment) -> bool),
     /// It says everything so much later.

@@ -8,12 +8,14 @@
 //! [`DeviantMaster`] and [`master_deviations`] are the same for the other end of the ring: the bench's own master.
 
 mod behind;
+mod cells;
 mod channel;
 mod deviant;
 mod errors;
 mod how;
 mod master;
 mod proxy;
+mod recovery;
 mod telegram;
 
 pub use deviant::Deviant;

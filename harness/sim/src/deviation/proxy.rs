@@ -1,7 +1,7 @@
 //! The memory as a deviant drive's bus end finds it.
 
 use super::how::{Deviation, How, Write};
-use harness_proto::novobus::bus_end::Place;
+use harness_proto::novobus::bus_end::{Parameter, Place};
 use harness_proto::novobus::command::Kind;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
@@ -13,6 +13,17 @@ pub(super) struct Proxy<'a> {
     pub(super) deviations: &'a [&'static Deviation],
     /// What the byte in hand is taken for.
     pub(super) place: Place,
+    /// Whether no byte of its telegram stands behind it.
+    pub(super) last: bool,
+    /// The commands that have been executed.
+    pub(super) counts: Counts,
+}
+
+/// How many commands a drive has executed since power-up.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Counts {
+    pub(super) writes: u64,
+    pub(super) reads: u64,
 }
 
 impl Memory for Proxy<'_> {
@@ -23,7 +34,16 @@ impl Memory for Proxy<'_> {
                 from = other(self.place, from);
             }
         }
-        seen(self.deviations, &mut |a| self.memory.read(a), from)
+        let mut data = seen(self.deviations, &mut |a| self.memory.read(a), from);
+        for deviation in self.deviations {
+            if let (How::Misreads(other), Place::Parameter(Parameter { kind, .. })) =
+                (&deviation.how, self.place)
+                && kind.reads()
+            {
+                data = other(self.counts.reads + 1, address, data);
+            }
+        }
+        data
     }
 
     fn write(&mut self, address: u16, data: u8) {
@@ -32,6 +52,9 @@ impl Memory for Proxy<'_> {
             address,
             data,
             old: self.memory.read(address),
+            last: self.last,
+            of_a_command: matches!(self.place, Place::Parameter(_)),
+            nth: self.counts.writes + 1,
         };
         for deviation in self.deviations {
             if let How::Writes(other) = deviation.how {

@@ -7,7 +7,9 @@ use crate::link::Capability;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Bus, Citation, RingRange, Scenario, Setup, SetupKind, Step, When};
+use crate::scenario::syntax::{
+    Action, Bus, Citation, RingRange, Scenario, Setup, SetupKind, Step, When,
+};
 use crate::scenario::times;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
@@ -254,6 +256,7 @@ impl Reader {
             let help = "add a line such as `> 80`: the master sends SYNCO";
             self.problems.push(problem.help(help));
         }
+        self.problems.extend(broken_loop(&self.steps));
         if !self.problems.is_empty() {
             return Err(self.problems);
         }
@@ -271,6 +274,28 @@ impl Reader {
             steps: self.steps,
         })
     }
+}
+
+/// The loop that has no `end`, or the `end` that has no loop.
+fn broken_loop(steps: &[Step]) -> Option<Problem> {
+    let mut open = Vec::new();
+    for step in steps {
+        match step.action {
+            Action::For(..) => open.push(step.span),
+            Action::End if open.pop().is_none() => {
+                let problem = Problem::new(step.span, "no loop ends here", "a step expected here");
+                return Some(problem.help("`for k in 0..last` begins a loop"));
+            }
+            _ => {}
+        }
+    }
+    let begin = open.pop()?;
+    let problem = Problem::new(
+        begin,
+        "the loop has no end",
+        "an `end` line expected behind it",
+    );
+    Some(problem.help("the lines up to `end` are played for each number"))
 }
 
 fn once<T>(place: &mut Option<T>, value: T, word: &Spanned<&str>) -> Result<(), Problem> {

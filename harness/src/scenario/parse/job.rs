@@ -3,6 +3,7 @@
 use super::master;
 use super::value::{assigned, place, tolerance};
 use super::words::{drives, equals};
+use crate::scenario::expression;
 use crate::scenario::pattern::{self, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
@@ -121,7 +122,12 @@ fn operands(
     scanner: &mut Scanner<'_>,
 ) -> Result<(Option<Place>, Option<Written>), Problem> {
     let place = if form.cell {
-        Some(place(scanner)?)
+        let place = place(scanner)?;
+        let offset = match scanner.eat("+") {
+            true => Some(Box::new(expression::sum(scanner)?)),
+            false => None,
+        };
+        Some(Place { offset, ..place })
     } else {
         None
     };

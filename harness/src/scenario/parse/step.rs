@@ -5,7 +5,7 @@ use super::drive::{self, Line};
 use super::job;
 use super::value::place as cell;
 use super::words::{drives, named, required, ring_prefix};
-use crate::scenario::expression::{self, Located};
+use crate::scenario::expression::{self, Counter, Located};
 use crate::scenario::pattern;
 use crate::scenario::problem::{Problem, Span, nearest};
 use crate::scenario::scanner::Scanner;
@@ -88,6 +88,8 @@ fn word_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
     let action = match word {
         "until" => until(&mut ahead)?,
         "wait" => Action::Wait(times::duration(&mut ahead)?),
+        "for" => begin_loop(&mut ahead)?,
+        "end" => Action::End,
         "record" => Action::Record(record(&mut ahead)?),
         word if drive::WORDS.contains(&word) => {
             let (drives, line) = drive::line(&mut ahead)?;
@@ -97,6 +99,22 @@ fn word_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
     };
     *scanner = ahead;
     Ok(action)
+}
+
+/// `k in 0..last`
+fn begin_loop(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
+    let before = scanner.clone();
+    let name = scanner.take_while(|c| c.is_ascii_alphanumeric());
+    let Some(counter) = name.and_then(|name| Counter::named(name.value)) else {
+        *scanner = before;
+        return Err(scanner.unexpected("the counter of the loop, a letter from `a` to `z`"));
+    };
+    required(scanner, &["in"])?;
+    let from = expression::sum(scanner)?;
+    if !scanner.eat("..") {
+        return Err(scanner.unexpected("`..` and the last number, as in `for k in 0..last`"));
+    }
+    Ok(Action::For(counter, from, expression::sum(scanner)?))
 }
 
 /// A line that begins with `drive`, as a step.
@@ -175,7 +193,7 @@ fn job_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
             let mut known = job::names();
             known.extend([
                 "title", "source", "bus", "ring", "drive", "needs", "line", "strict", "deadline",
-                "until", "wait", "record",
+                "until", "wait", "record", "for", "end",
             ]);
             let problem = scanner.unexpected(expected);
             Err(match nearest(name.value, &known) {

@@ -49,6 +49,7 @@ fn named(
     Some(Place {
         name: name.to_owned(),
         address: cell.address,
+        offset: None,
         cell: Some(cell),
         named: true,
         span: scanner.since(here),
@@ -68,6 +69,7 @@ pub(in crate::scenario) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Pro
         Ok(address) if word.value.len() == 4 => Ok(Place {
             name: word.value.to_owned(),
             address,
+            offset: None,
             cell: cells::cell_at(address).filter(|cell| cell.address == address),
             named: false,
             span: word.span,
@@ -115,6 +117,7 @@ pub(in crate::scenario) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Pla
             Ok(Place {
                 name: format!("{address:02X}"),
                 address: u16::from(address),
+                offset: None,
                 cell: cell.filter(|cell| cell.address == u16::from(address)),
                 named: false,
                 span: scanner.since(before.clone().here()),

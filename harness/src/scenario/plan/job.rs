@@ -7,6 +7,7 @@ use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::syntax::{Job, JobKind, Place, Relation, Written};
 use harness_proto::nd21;
+use harness_proto::nd21::cells::cell_at;
 use harness_proto::nd21::units::Scale;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, Kind, PAGE, Reply};
@@ -57,6 +58,10 @@ impl Planner {
                 tolerance,
             } => {
                 let (ring, k) = self.one(drive)?;
+                let place = &place
+                    .as_ref()
+                    .map(|place| self.moved(place, ring))
+                    .transpose()?;
                 let command = self.command(*kind, (ring, k), place.as_ref(), data.as_ref())?;
                 if let Some(place) = place {
                     reaches(&command, place)?;
@@ -171,6 +176,29 @@ impl Planner {
                 address: nd21::ram::ERRORCODE,
                 data: nd21::CONFIRM_ERROR,
             },
+        })
+    }
+
+    /// A cell with what is added to its address.
+    pub(super) fn moved(&self, place: &Place, ring: usize) -> Result<Place, Problem> {
+        let Some(offset) = &place.offset else {
+            return Ok(place.clone());
+        };
+        let address = i64::from(place.address) + offset.value(self.size(ring))?;
+        let address = u16::try_from(address).map_err(|_| {
+            Problem::new(
+                offset.span,
+                format!("{address} is no address"),
+                "0000 to FFFF expected here",
+            )
+        })?;
+        Ok(Place {
+            name: format!("{address:04X}"),
+            address,
+            cell: cell_at(address).filter(|cell| cell.address == address),
+            offset: None,
+            named: false,
+            span: place.span,
         })
     }
 

@@ -29,7 +29,13 @@ impl Planner {
         let ring = drive.0;
         Ok(match call {
             MasterCall::Command(kind, place, data) => {
-                return self.driver_command(drive, *kind, place.as_ref(), data.as_ref());
+                let moved = place.as_ref().map(|place| self.moved(place, drive.0));
+                return self.driver_command(
+                    drive,
+                    *kind,
+                    moved.transpose()?.as_ref(),
+                    data.as_ref(),
+                );
             }
             MasterCall::ReadEeprom(place, data) => {
                 let expected = match data {

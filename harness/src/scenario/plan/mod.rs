@@ -7,6 +7,7 @@ mod master;
 mod planner;
 mod setup;
 mod types;
+mod unroll;
 
 pub(super) use drive::{MAX_LOOKS, number};
 pub(crate) use job::Exchange;

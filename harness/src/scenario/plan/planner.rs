@@ -5,8 +5,9 @@ use super::setup::model_unless_said;
 use super::types::{
     Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedStep, PlannedWhen, PlannedWindow,
 };
+use super::unroll::Unroll;
 use crate::link::{Capability, Moment, PlacedFault, Stimulus, needs_line_errors, only_simulated};
-use crate::scenario::expression::Located;
+use crate::scenario::expression::{Located, Scope};
 use crate::scenario::pattern::MAX_BYTES;
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
@@ -45,6 +46,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         units: Vec::new(),
         model: model_unless_said(scenario),
         models: Vec::new(),
+        scope: Scope::default(),
     };
     let mut found = planner.set_up(&scenario.setups);
     let mut running = Running::default();
@@ -57,7 +59,18 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         .map(|ring| u64::from(ring.drives()) + 1)
         .sum();
     let room = MAX_BYTES.min(usize::try_from(MAX_CARRIED / links.max(1)).unwrap_or(MAX_BYTES));
-    for step in &scenario.steps {
+    let mut unroll = Unroll::new(&scenario.steps, planner.size(0));
+    while let Some(next) = unroll.next() {
+        let step = match next {
+            Ok((step, scope)) => {
+                planner.scope = scope;
+                step
+            }
+            Err(problem) => {
+                found.push(problem);
+                break;
+            }
+        };
         let action = planner.action(step, &mut needs);
         let action = action.and_then(|action| match &action {
             PlannedAction::Record(record) => running.take(record).map(|()| action),
@@ -89,7 +102,13 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
                     span: step.span,
                 });
             }
-            Err(problem) => found.push(problem),
+            Err(problem) => {
+                found.push(problem);
+                // Another turn would tell the same again.
+                if unroll.in_loop() {
+                    break;
+                }
+            }
         }
     }
     if !found.is_empty() {
@@ -133,6 +152,7 @@ pub fn plan_step(plan: &Plan, step: &Step, source: &Source) -> Result<PlannedSte
         // The model of every drive is settled.
         model: Model::default(),
         models: plan.models.clone(),
+        scope: Scope::default(),
     };
     let action = planner
         .action(step, &mut Vec::new())
@@ -191,6 +211,8 @@ pub(super) struct Planner {
     pub(super) model: Model,
     /// The model of each ring's drives.
     pub(super) models: Vec<Vec<Model>>,
+    /// The counters of the loops around the step in hand.
+    pub(super) scope: Scope,
 }
 
 impl Planner {
@@ -205,13 +227,15 @@ impl Planner {
         })
     }
 
-    pub(super) fn size(&self, ring: usize) -> i64 {
-        self.rings.get(ring).map_or(0, |r| i64::from(r.drives()))
+    /// What the expressions of a line for this ring can refer to.
+    pub(super) fn size(&self, ring: usize) -> Scope {
+        let drives = self.rings.get(ring).map_or(0, |r| i64::from(r.drives()));
+        self.scope.of_ring(drives)
     }
 
     fn drive(&self, ring: usize, number: &Located) -> Result<u8, Problem> {
         let size = self.ring(ring, number.span)?;
-        let value = number.value(i64::from(size.drives()))?;
+        let value = number.value(self.size(ring))?;
         match u8::try_from(value) {
             Ok(drive) if drive < size.drives() => Ok(drive),
             _ => Err(Problem::new(
@@ -294,16 +318,22 @@ impl Planner {
                 ))
             }
             Action::Record(recording) => Ok(PlannedAction::Record(self.record(recording)?)),
+            Action::For(..) | Action::End => Err(Problem::new(
+                step.span,
+                "a loop stands where one step is expected",
+                "a step expected here",
+            )),
         }
     }
 
     fn fault(&self, fault: &Fault, needs: &mut Vec<Capability>) -> Result<PlannedAction, Problem> {
         let size = self.size(fault.ring);
+        let last = self.rings.get(fault.ring);
+        let last = last.map_or(0, |ring| usize::from(ring.drives()));
         let placed = match &fault.what {
             FaultKind::Link(place, ends, kind) => {
                 let link = self.link(fault.ring, place.span, ends)?;
                 let fault = self.link_fault(*kind)?;
-                let last = usize::try_from(size).unwrap_or(usize::MAX);
                 // The master's own two links begin and end in the bench.
                 if link > 0 && link < last {
                     needs.push(Capability::Interposer);

@@ -1,5 +1,6 @@
 //! Cells as a scenario names them, and the values that it gives them.
 
+use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
@@ -13,6 +14,8 @@ pub struct Place {
     pub name: String,
     /// The address.
     pub address: u16,
+    /// How much higher the address is, as in `FE10+i`.
+    pub offset: Option<Box<Located>>,
     /// The cell that begins there, if one does.
     pub cell: Option<&'static Cell>,
     /// Whether it was written by its name.

@@ -4,7 +4,7 @@ use super::cell::{Place, Written};
 use super::check::{Check, DriveCheck};
 use super::job::Job;
 use crate::link::{Capability, Stimulus};
-use crate::scenario::expression::Located;
+use crate::scenario::expression::{Counter, Located};
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::{Span, Spanned};
 use crate::scenario::times::{Duration, Window};
@@ -211,6 +211,10 @@ pub enum Action {
     Record(Recording),
     /// A job of the master.
     Job(Job),
+    /// `for k in 0..last`: what stands up to its `end` is played for each number, in this order.
+    For(Counter, Located, Located),
+    /// `end`: of the loop that began last.
+    End,
 }
 
 /// A fault as written.
