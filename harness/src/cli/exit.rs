@@ -18,7 +18,7 @@ pub enum Exit {
     RigError = 3,
     /// Nothing was selected.
     NothingSelected = 4,
-    /// Everything passed, but not everything could be shown.
+    /// Nothing failed, but not everything could be shown.
     Incomplete = 5,
     /// An interlock tripped; the safe state was reached.
     Interlock = 6,
@@ -41,7 +41,8 @@ Exit codes:
      that needs --move or --yes
   3  the bench itself failed
   4  nothing was selected
-  5  passed but incomplete (skipped scenarios under --require-all, or inconclusive or flaky ones)
+  5  passed but incomplete: nothing was judged (every scenario was skipped), the run ended early, a scenario
+     was inconclusive or flaky, or one was skipped under --require-all
   6  an interlock of the bench tripped; the safe state was reached
   7  the safe state could not be confirmed: look at the machine
   75 somebody else holds the bench
@@ -57,7 +58,8 @@ Exit codes:
         }
     }
 
-    /// The code for the verdicts of a run; `require_all` counts skipped scenarios as missing.
+    /// The code for the verdicts of a run; `require_all` counts skipped scenarios as missing. A run that has judged nothing has shown
+    /// nothing: it is incomplete.
     #[must_use]
     pub fn of(verdicts: &[Verdict], require_all: bool) -> Self {
         let any = |verdict| verdicts.contains(&verdict);
@@ -72,6 +74,7 @@ Exit codes:
         } else if any(Verdict::Inconclusive)
             || any(Verdict::Flaky)
             || require_all && any(Verdict::Skipped)
+            || verdicts.iter().all(|own| *own == Verdict::Skipped)
         {
             Self::Incomplete
         } else {

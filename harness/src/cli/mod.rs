@@ -25,6 +25,7 @@ mod run;
 mod run_rig;
 mod schema;
 mod shrink;
+mod tally;
 mod trace;
 mod verify;
 

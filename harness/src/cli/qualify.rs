@@ -130,12 +130,8 @@ pub(super) fn settle(
             output.result(&line(&entry, &played.outcome, output))?;
             output.say(&details(&entry, &played.outcome, traces));
             findings.note(&played, tolerance);
-            open += usize::from(match played.outcome.verdict {
-                // Drives could not be made ready.
-                Verdict::Skipped => !played.attempts.is_empty(),
-                Verdict::Flaky | Verdict::Inconclusive => true,
-                _ => false,
-            });
+            let settles_nothing = [Verdict::Flaky, Verdict::Inconclusive];
+            open += usize::from(settles_nothing.contains(&played.outcome.verdict));
             if over(run, output) {
                 break;
             }
@@ -321,8 +317,7 @@ fn ask(
         last.clear();
         for entry in &probe.entries {
             let played = play(run, entry, folder.as_deref_mut())?;
-            let was_played = played.outcome.verdict != Verdict::Skipped;
-            let Some(attempt) = played.last_played().filter(|_| was_played) else {
+            let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
                 findings.note(&played, exactness.tolerance);
                 return Ok(Asking::Not(played.outcome.remarks.join("; ")));
             };

@@ -67,7 +67,9 @@ pub(super) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -
             output.complain(why);
             Exit::Interlock
         }
-        _ => exit,
+        // It may have come behind the last scenario, which has judged everything by then; the bench has failed all the same.
+        Some(Trouble::Lost(_) | Trouble::Garbled(_)) => Exit::RigError,
+        Some(Trouble::Denied(_)) | None => exit,
     };
     let end = match exit {
         Exit::RigError | Exit::Interlock => session.close_with_error(),

@@ -7,20 +7,19 @@ use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run_rig::{Job, reports, work};
+use super::tally::Tally;
 use crate::evidence::{About, EvidenceError, Folder};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::{Link, Recording, SimulatedLink};
 use crate::report::html::Head;
 use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
-use crate::rig::{Attempt, Keeper, Rig};
+use crate::rig::{Attempt, Keeper, Rig, other_size};
 use crate::scenario::parse::parse;
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
 use crate::scenario::syntax::{Bus, Scenario};
-use crate::scenario::verdict::Verdict;
-use harness_proto::time::Span;
 use harness_sim::trace::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
@@ -115,8 +114,7 @@ fn on_simulated(
         }
     };
     let bar = progress_bar(entries.len(), output.progress);
-    let mut verdicts = Vec::new();
-    let mut took = Span::ZERO;
+    let mut tally = Tally::default();
     let name = rig.map_or("sim", |rig| rig.id());
     let mut cases = Cases::new(name, arguments.junit.as_deref());
     for entry in entries {
@@ -129,8 +127,7 @@ fn on_simulated(
             }
         };
         let outcome = &played.outcome;
-        took = took + outcome.took;
-        verdicts.push(outcome.verdict);
+        tally.note(outcome);
         cases.note(entry, outcome);
         let mut line = line(entry, outcome, output);
         if arguments.records || entries.len() == 1 {
@@ -145,7 +142,7 @@ fn on_simulated(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    output.result(&summary(&verdicts, took))?;
+    output.result(&tally.summary())?;
     let head = Head {
         title: "drivebench: scenarios on simulated rings",
         facts: Vec::new(),
@@ -157,7 +154,7 @@ fn on_simulated(
     if !written {
         return Ok(Exit::RigError);
     }
-    Ok(cases.write(Exit::of(&verdicts, arguments.require_all), output))
+    Ok(cases.write(tally.exit(arguments.require_all), output))
 }
 
 /// Plays a scenario on simulated rings of its own, into the folder where there is one.
@@ -224,7 +221,7 @@ fn too_large(entry: &Entry, rig: &Rig) -> Option<String> {
     let plan = entry.plan.as_ref()?;
     let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
     let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
-    (own != sizes).then(|| format!("it is for {own:?} drives, the rig has {sizes:?}"))
+    (own != sizes).then(|| other_size(&own, &sizes))
 }
 
 /// Plays a scenario on simulated rings.
@@ -325,22 +322,6 @@ fn place(entry: &Entry, finding: &Finding) -> String {
     let line = before.matches('\n').count() + 1;
     let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
     format!("{}:{line}:{column}", entry.name)
-}
-
-pub(super) fn summary(verdicts: &[Verdict], took: Span) -> String {
-    let count = |wanted: Verdict| verdicts.iter().filter(|v| **v == wanted).count();
-    let mut text = format!(
-        "{} passed, {} failed",
-        count(Verdict::Passed),
-        count(Verdict::Failed)
-    );
-    for verdict in Verdict::REST {
-        if count(verdict) > 0 {
-            let _infallible = write!(text, ", {} {verdict}", count(verdict));
-        }
-    }
-    let _infallible = writeln!(text, " ({} scenarios, {took} on the line)", verdicts.len());
-    text
 }
 
 pub(super) fn progress_bar(length: usize, shown: bool) -> ProgressBar {

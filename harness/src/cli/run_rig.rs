@@ -6,7 +6,8 @@ use super::output::Output;
 use super::page::{Page, write};
 use super::qualify::{Findings, settle};
 use super::rig_failure::{alarm, exit_of, give_back};
-use super::run::{details, drives, line, progress_bar, summary};
+use super::run::{details, drives, line, progress_bar};
+use super::tally::Tally;
 use crate::evidence::{About, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
 use crate::link::{Line, Trouble};
@@ -17,7 +18,6 @@ use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use crate::signals::interrupt_flag;
 use harness_proto::line::Rate;
-use harness_proto::time::Span;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -172,10 +172,10 @@ fn all(
     let tolerance = run.exactness().tolerance;
     let name = run.session().rig().id().to_owned();
     let mut cases = Cases::new(&name, job.junit.as_deref());
-    let mut verdicts = Vec::new();
+    let mut tally = Tally::default();
     let mut ill = false;
-    let mut took = Span::ZERO;
-    for entry in entries {
+    let mut left = entries.iter();
+    for entry in left.by_ref() {
         bar.set_message(entry.short_name().to_owned());
         let played = match play(&mut run, entry, folder.as_mut()) {
             Err(Stop::Session(error)) => {
@@ -186,8 +186,7 @@ fn all(
             played => played?,
         };
         let outcome = &played.outcome;
-        took = took + outcome.took;
-        verdicts.push(outcome.verdict);
+        tally.note(outcome);
         cases.note(entry, outcome);
         let mut text = line(entry, outcome, output);
         if job.records || entries.len() == 1 {
@@ -212,8 +211,13 @@ fn all(
         }
     }
     bar.finish_and_clear();
-    output.result(&summary(&verdicts, took))?;
-    let mut exit = cases.write(Exit::of(&verdicts, job.require_all), output);
+    for entry in left {
+        let outcome = Outcome::skipped("the run ended before it".to_owned());
+        tally.not_reached(&outcome);
+        cases.note(entry, &outcome);
+    }
+    output.result(&tally.summary())?;
+    let mut exit = cases.write(tally.exit(job.require_all), output);
     if job.qualify && !over(&mut run, output) {
         match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
             // What a drive does wrong is the drive's fault, whatever came of it.

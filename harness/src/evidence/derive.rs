@@ -233,6 +233,7 @@ fn show(
         remarks: case.remarks.clone(),
         took: case.took,
         records: judged.map_or_else(Vec::new, |outcome| outcome.records.clone()),
+        unready: None,
     };
     let again = match attempt {
         Some(attempt) => format!(

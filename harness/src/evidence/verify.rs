@@ -505,7 +505,8 @@ impl Recalled {
             ));
         }
         // An attempt that was given up may have been so at any byte, and shows nothing.
-        if matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError) {
+        let given_up = outcome.unready.is_some();
+        if given_up || matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError) {
             return None;
         }
         if let Some(left) = &again.left {

@@ -76,7 +76,9 @@ impl Target for OnRig<'_, '_> {
         let trace = recording.trace(case.ring());
         rehearsal.denied = match (&played, guarded.trouble()) {
             (_, Some(trouble)) => Some(trouble.to_string()),
-            (Ok(outcome), _) if outcome.verdict == Verdict::Skipped => {
+            (Ok(outcome), _)
+                if outcome.verdict == Verdict::Skipped || outcome.unready.is_some() =>
+            {
                 Some(outcome.remarks.join("; "))
             }
             (Err((_, ill)), _) => Some(ill.to_string()),
@@ -128,10 +130,8 @@ impl Target for OnRig<'_, '_> {
         };
         let began = std::time::Instant::now();
         let mut played = self.run.play(&plan, None)?;
-        if played.outcome.verdict == Verdict::Skipped
-            && !played.attempts.is_empty()
-            && self.run.session().link().trouble().is_none()
-        {
+        let unready = played.last_played().is_some_and(|own| !own.was_played());
+        if unready && self.run.session().link().trouble().is_none() {
             // A drive does not answer ResetH8 as it should: the case itself is played without.
             self.run.leave_as_they_are();
             played = self.run.play(&plan, None)?;
@@ -160,7 +160,8 @@ impl Target for OnRig<'_, '_> {
         tried.difference = match verdict {
             // A known deviation of the rig's file explains it.
             Verdict::Passed => None,
-            Verdict::Skipped => {
+            // What the manual leaves to the drive has kept it from being played.
+            Verdict::Skipped | Verdict::Inconclusive if !last.was_played() => {
                 tried.not_played = Some(last.outcome.remarks.join("; "));
                 None
             }

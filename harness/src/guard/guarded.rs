@@ -438,8 +438,12 @@ impl<L: Link> Link for Guarded<L> {
         let Some(state) = self.rings.get_mut(ring) else {
             return Vec::new();
         };
+        if self.trouble.is_some() {
+            return Vec::new();
+        }
         let mut guard = state.guard.clone();
-        if self.trouble.is_some() || (0..count).any(|_| guard.admit(now, SYNCO, false).is_err()) {
+        if let Err(denial) = (0..count).try_for_each(|_| guard.admit(now, SYNCO, false)) {
+            self.deny(format!("ring {}: {denial}", ring + 1));
             return Vec::new();
         }
         // A simulated link probes a copy of itself.

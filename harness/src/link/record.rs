@@ -198,6 +198,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
     }
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        self.tell();
         if self.trouble.is_some() {
             return self.now();
         }
@@ -220,6 +221,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         }
         let (at, byte) = self.link.receive(ring)?;
         self.sink.take(&Event::Received(ring, at, byte));
+        self.tell();
         Some((at, byte))
     }
 

@@ -246,7 +246,8 @@ impl Line for Replay {
                 self.trouble_comes();
                 end
             }
-            Some(Event::Trouble(Trouble::Denied(_))) => {
+            // With trouble nothing is carried, and what was sent all the same is not in the record.
+            Some(Event::Trouble(_)) => {
                 self.trouble_comes();
                 self.now
             }
@@ -295,7 +296,13 @@ impl Line for Replay {
     }
 
     fn trouble(&self) -> Option<&Trouble> {
-        self.trouble.as_ref()
+        // Nothing was done on the link between the event before and the trouble, so it may show at once: the last step of a scenario
+        // may let no time pass behind it.
+        let next = match self.events.front() {
+            Some(Event::Trouble(trouble)) => Some(trouble),
+            _ => None,
+        };
+        self.trouble.as_ref().or(next)
     }
 
     fn pause_due(&self) -> Option<Instant> {
@@ -378,6 +385,7 @@ impl Link for Replay {
                 }
                 self.trouble_comes();
             }
+            Some(Event::Trouble(_)) => self.trouble_comes(),
             _ => self.differs("the fault that is asked for"),
         }
     }

@@ -46,6 +46,7 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) {
     let divergence = comparisons().find_map(|c| c.divergence.as_ref());
     let untimely = comparisons().find_map(|c| c.untimely.as_ref());
     match (outcome.verdict, divergence, untimely) {
+        _ if outcome.unready.is_some() => not_ready(outcome, divergence, heard),
         (
             Verdict::Passed | Verdict::Failed | Verdict::Marginal | Verdict::Inconclusive,
             Some(divergence),
@@ -69,6 +70,25 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) {
             "{} line errors were told of without their bytes: the transport could not have shown them",
             heard.unplaced
         ));
+    }
+}
+
+/// A drive could not be made ready. No step was played, so nothing makes it pass: not a known deviation, and not a twin that could not
+/// be made ready either.
+fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, heard: &Heard<'_>) {
+    match divergence {
+        Some(divergence) => diverged(outcome, divergence, heard),
+        None if outcome.verdict == Verdict::Failed => {
+            outcome.verdict = Verdict::Inconclusive;
+            let known = heard.rig.file.deviation.iter();
+            outcome.remarks.extend(known.map(told));
+            let why = "the model of the manual could not be made ready either";
+            outcome.remarks.push(why.to_owned());
+        }
+        None => {}
+    }
+    if outcome.verdict == Verdict::Passed {
+        outcome.verdict = Verdict::Inconclusive;
     }
 }
 

@@ -40,6 +40,7 @@ pub use line_test::Cause;
 pub use open::OpenRigError;
 pub use played::{Attempt, Played};
 pub use profile::{KnownProfile, Profile, ProfileError, Settled};
+pub(crate) use run::other_size;
 pub use run::{Keeper, Run, Way, play_one};
 pub use schema::schema;
 pub use session::{End, Options, Session, SessionError};

@@ -1,7 +1,7 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
 use super::driven::Driven;
-use crate::scenario::run::Outcome;
+use crate::scenario::run::{Outcome, Unready};
 use crate::scenario::verdict::Verdict;
 use crate::twin::{Comparison, Conversation, Divergence};
 use harness_proto::time::Span;
@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 /// How often a scenario is played whose bytes are right and come at other times than the model says.
 const MOST_UNTIMELY: usize = 3;
 
-/// How often drives are made ready before a scenario is skipped.
+/// How often drives are made ready before one that gives no answer has failed.
 const MOST_UNREADY: usize = 3;
 
 /// One attempt at a scenario.
@@ -48,16 +48,22 @@ impl Attempt {
         }
     }
 
-    /// Why the drives could not be made ready for it, if they could not.
-    fn unready(&self) -> Option<&str> {
-        let why = self.outcome.remarks.first().map(String::as_str);
-        why.filter(|_| self.outcome.verdict == Verdict::Skipped)
+    /// Whether its steps were played: the drives were ready for them.
+    #[must_use]
+    pub fn was_played(&self) -> bool {
+        self.outcome.unready.is_none()
     }
 
-    /// Whether it was played and something was otherwise than late.
+    /// Why the drives could not be made ready, where a drive gave no answer: the computer may have been the cause.
+    fn unanswered(&self) -> Option<&str> {
+        let why = self.outcome.remarks.first().map(String::as_str);
+        why.filter(|_| self.outcome.unready == Some(Unready::NoAnswer))
+    }
+
+    /// Whether something differed in it, apart from times.
     fn failed(&self) -> bool {
         let right = [Verdict::Passed, Verdict::Marginal, Verdict::Skipped];
-        !right.contains(&self.outcome.verdict)
+        !right.contains(&self.outcome.verdict) && self.unanswered().is_none()
     }
 
     /// The first byte that came at another time than the model says.
@@ -83,7 +89,8 @@ impl Played {
         }
     }
 
-    /// The last attempt that was played speaks for all; one whose bytes are right behind one that failed is flaky.
+    /// The last attempt that was played speaks for all; one whose bytes are right is flaky where another one failed. Where none was
+    /// played and each time another drive gave no answer, it may have been the computer.
     pub(super) fn of(attempts: Vec<Attempt>) -> Self {
         let mut played = Self {
             outcome: Outcome::skipped("it was not played".to_owned()),
@@ -101,13 +108,18 @@ impl Played {
                 .collect();
             let remark = format!("{} attempts: {}", attempts.len(), verdicts.join(", "));
             outcome.remarks.push(remark);
-            let before = &attempts[..attempts.len() - 1];
-            let why = before.iter().find_map(Attempt::unready).map(str::to_owned);
+            let why = attempts.iter().find_map(Attempt::unanswered);
+            let why = why.map(str::to_owned);
             let why = why.filter(|why| !outcome.remarks.contains(why));
             outcome.remarks.extend(why);
             let right = matches!(outcome.verdict, Verdict::Passed | Verdict::Marginal);
-            if right && before.iter().any(Attempt::failed) {
+            if right && attempts.iter().any(Attempt::failed) {
                 outcome.verdict = Verdict::Flaky;
+            }
+            let differing = outcome.unready == Some(Unready::NoAnswer)
+                && unanswered_each_time(attempts).is_none();
+            if differing && outcome.verdict == Verdict::Failed {
+                outcome.verdict = Verdict::Inconclusive;
             }
         }
         played
@@ -121,7 +133,6 @@ impl Played {
         let last = self.last_played()?;
         let divergences: Vec<_> = match self.outcome.verdict {
             Verdict::Passed | Verdict::Flaky | Verdict::Inconclusive => Vec::new(),
-            Verdict::Skipped if unready_each_time(&self.attempts).is_none() => Vec::new(),
             Verdict::Marginal => {
                 let late = last.untimely().into_iter();
                 late.filter(|late| self.comes_each_time(late, tolerance))
@@ -138,16 +149,13 @@ impl Played {
     /// The last attempt that was played; the last one at all where none was.
     #[must_use]
     pub fn last_played(&self) -> Option<&Attempt> {
-        let was_played = |attempt: &&Attempt| attempt.unready().is_none();
-        self.attempts
-            .iter()
-            .rfind(was_played)
-            .or(self.attempts.last())
+        let played = self.attempts.iter().rfind(|own| own.was_played());
+        played.or(self.attempts.last())
     }
 
     /// Whether a byte came as late at every attempt.
     fn comes_each_time(&self, late: &Divergence, tolerance: Span) -> bool {
-        let mut played = self.attempts.iter().filter(|own| own.unready().is_none());
+        let mut played = self.attempts.iter().filter(|own| own.was_played());
         played.all(|attempt| {
             let there = attempt.untimely();
             there.is_some_and(|there| there.is_like(late, tolerance))
@@ -155,19 +163,19 @@ impl Played {
     }
 }
 
-/// Why drives could not be made ready, where it was the same at every attempt.
-fn unready_each_time(attempts: &[Attempt]) -> Option<&str> {
-    let why = attempts.first()?.unready()?;
-    let same = |attempt: &Attempt| attempt.unready() == Some(why);
+/// Which drive gave no answer, where it was the same at every attempt.
+fn unanswered_each_time(attempts: &[Attempt]) -> Option<&str> {
+    let why = attempts.first()?.unanswered()?;
+    let same = |attempt: &Attempt| attempt.unanswered() == Some(why);
     attempts.iter().all(same).then_some(why)
 }
 
 /// When a scenario is played once more.
 #[derive(Clone, Debug)]
 pub(super) struct Again {
-    /// How often drives are made ready.
+    /// How often drives are made ready where one gives no answer.
     unready: usize,
-    /// Why drives could not be made ready, as often as it was tried: it is the drives, then, and not the computer.
+    /// Which drives gave no answer at every attempt at a scenario: it is the drive, then, and not the computer.
     hopeless: BTreeSet<String>,
 }
 
@@ -188,13 +196,13 @@ impl Again {
         let played = attempts.len();
         match last.outcome.verdict {
             Verdict::Passed | Verdict::RigError => false,
-            // Drives that could not be made ready: what disturbed them may have been the computer.
-            Verdict::Skipped if played < self.unready => {
+            // What disturbed a drive that gave no answer may have been the computer.
+            _ if played < self.unready && last.unanswered().is_some() => {
                 let hopeless = |why| self.hopeless.contains(why);
-                !last.unready().is_some_and(hopeless)
+                !last.unanswered().is_some_and(hopeless)
             }
-            Verdict::Skipped => {
-                let why = unready_each_time(attempts);
+            _ if last.unanswered().is_some() => {
+                let why = unanswered_each_time(attempts);
                 self.hopeless.extend(why.map(str::to_owned));
                 false
             }
@@ -209,20 +217,27 @@ impl Again {
 mod tests {
     use super::*;
     use crate::twin::What;
-    use Verdict::{Failed, Flaky, Marginal, Passed, Skipped};
+    use Verdict::{Failed, Flaky, Inconclusive, Marginal, Passed};
     use harness_proto::line::Received;
     use harness_proto::novobus::role::Role;
     use harness_proto::time::Instant;
 
     const SILENT: &str = "cell FF00 of drive 1: it does not answer ResetH8";
-    const OWN_CELL: &str = "cell FF18 of drive 0: 56 was written, 00 is read";
+    const OTHER: &str = "cell FF00 of drive 0: it does not answer ResetH8";
+    const DIFFERS: &str = "cell FE20 of drive 0: 56 was written, 00 is read";
 
+    /// An attempt that ended like this; with one of the remarks above, before its first step.
     fn attempt(verdict: Verdict, remark: &str) -> Attempt {
         Attempt {
             driven: None,
             master_is_right: true,
             outcome: Outcome {
                 verdict,
+                unready: match remark {
+                    SILENT | OTHER => Some(Unready::NoAnswer),
+                    DIFFERS => Some(Unready::Differs),
+                    _ => None,
+                },
                 ..Outcome::skipped(remark.to_owned())
             },
             conversations: Vec::new(),
@@ -232,23 +247,31 @@ mod tests {
         }
     }
 
-    fn of(verdicts: &[Verdict]) -> Verdict {
-        let attempts = verdicts.iter().map(|verdict| attempt(*verdict, SILENT));
+    fn of(ends: &[(Verdict, &str)]) -> Verdict {
+        let attempts = ends.iter().map(|(verdict, why)| attempt(*verdict, why));
         Played::of(attempts.collect()).outcome.verdict
     }
 
     #[test]
     fn attempts_together() {
-        assert_eq!(of(&[Passed]), Passed);
-        assert_eq!(of(&[Failed, Passed]), Flaky);
-        assert_eq!(of(&[Failed, Marginal]), Flaky);
-        assert_eq!(of(&[Marginal, Failed, Failed]), Failed);
-        assert_eq!(of(&[Marginal, Passed]), Passed);
-        assert_eq!(of(&[Failed, Skipped]), Failed);
-        assert_eq!(of(&[Marginal, Skipped]), Marginal);
-        assert_eq!(of(&[Skipped]), Skipped);
-        assert_eq!(of(&[Skipped, Passed]), Passed);
-        assert_eq!(of(&[Skipped, Failed]), Failed);
+        let (passed, failed, late) = ((Passed, ""), (Failed, ""), (Marginal, ""));
+        let (silent, other, differs) = ((Failed, SILENT), (Failed, OTHER), (Failed, DIFFERS));
+        assert_eq!(of(&[passed]), Passed);
+        assert_eq!(of(&[failed, passed]), Flaky);
+        assert_eq!(of(&[failed, late]), Flaky);
+        assert_eq!(of(&[late, failed, failed]), Failed);
+        assert_eq!(of(&[late, passed]), Passed);
+        assert_eq!(of(&[failed, silent]), Failed);
+        assert_eq!(of(&[late, silent]), Marginal);
+        assert_eq!(of(&[silent]), Failed);
+        assert_eq!(of(&[silent, silent]), Failed);
+        assert_eq!(of(&[silent, other, silent]), Inconclusive);
+        assert_eq!(of(&[silent, passed]), Passed);
+        assert_eq!(of(&[silent, failed]), Failed);
+        // No computer makes a cell hold another value.
+        assert_eq!(of(&[differs]), Failed);
+        assert_eq!(of(&[differs, passed]), Flaky);
+        assert_eq!(of(&[late, differs]), Flaky);
     }
 
     /// How many attempts there are where each ends like this, the last over and over.
@@ -280,20 +303,21 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_is_never_ready_takes_no_attempt_from_one_that_was_disturbed() {
+    fn a_silent_drive_is_made_ready_again_as_the_computer_may_have_disturbed_it() {
         let again = &mut Again::new(true);
-        assert_eq!(attempts(again, 1, &[(Skipped, OWN_CELL)]), MOST_UNREADY);
-        assert_eq!(attempts(again, 1, &[(Skipped, OWN_CELL)]), 1);
-        let disturbed = [(Skipped, SILENT), (Passed, "")];
+        assert_eq!(attempts(again, 1, &[(Failed, DIFFERS)]), 1);
+        let disturbed = [(Failed, SILENT), (Passed, "")];
         assert_eq!(attempts(again, 1, &disturbed), 2);
-        assert_eq!(attempts(again, 1, &disturbed), 2);
-        let mixed = [(Skipped, SILENT), (Skipped, "another"), (Skipped, SILENT)];
+        let mixed = [(Failed, SILENT), (Failed, OTHER), (Failed, SILENT)];
         assert_eq!(attempts(again, 1, &mixed), MOST_UNREADY);
         assert_eq!(attempts(again, 1, &disturbed), 2);
+        assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), MOST_UNREADY);
+        // It has been silent at every attempt at a scenario: it is the drive.
+        assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), 1);
     }
 
     /// An attempt in which a byte at a place of the scenario is otherwise: late by so many milliseconds, or of another value.
-    fn differing(verdict: Verdict, step: usize, late: Option<u64>) -> Attempt {
+    fn differing(attempt: Attempt, step: usize, late: Option<u64>) -> Attempt {
         let byte = |at| Some((Instant::START + Span::from_millis(at), Received::good(0x80)));
         let divergence = Divergence {
             ring: 0,
@@ -312,7 +336,7 @@ mod tests {
         };
         Attempt {
             comparisons: vec![comparison],
-            ..attempt(verdict, SILENT)
+            ..attempt
         }
     }
 
@@ -324,46 +348,47 @@ mod tests {
     #[test]
     fn nothing_disturbs_a_drive_where_time_is_virtual() {
         let again = &mut Again::new(false);
-        assert_eq!(attempts(again, 1, &[(Skipped, SILENT)]), 1);
+        assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), 1);
     }
 
     #[test]
     fn a_reason_is_told_once() {
-        let same = vec![attempt(Skipped, SILENT), attempt(Skipped, SILENT)];
-        let told = ["2 attempts: skipped, skipped", SILENT];
+        let same = vec![attempt(Failed, SILENT), attempt(Failed, SILENT)];
+        let told = ["2 attempts: failed, failed", SILENT];
         let mut remarks = Played::of(same).outcome.remarks;
         remarks.sort_unstable();
         assert_eq!(remarks, told);
-        let passed = vec![attempt(Skipped, SILENT), attempt(Passed, "well")];
-        let told = ["well", "2 attempts: skipped, passed", SILENT];
+        let passed = vec![attempt(Failed, SILENT), attempt(Passed, "well")];
+        let told = ["well", "2 attempts: failed, passed", SILENT];
         assert_eq!(Played::of(passed).outcome.remarks, told);
     }
 
     #[test]
     fn what_did_not_come_again_tells_nothing_of_the_drives() {
-        let failed = || differing(Failed, 3, None);
+        let failed = || differing(attempt(Failed, ""), 3, None);
         assert!(tells(vec![failed()]));
         assert!(tells(vec![failed(), failed()]));
         assert!(!tells(vec![failed(), attempt(Passed, "")]));
         assert!(!tells(vec![attempt(Failed, "")]));
-        assert!(!tells(vec![differing(Verdict::Inconclusive, 3, None)]));
-        let unready = || differing(Skipped, 0, None);
+        assert!(!tells(vec![differing(attempt(Inconclusive, ""), 3, None)]));
+        let unready = || differing(attempt(Failed, SILENT), 0, None);
         assert!(tells(vec![unready(), unready(), unready()]));
         assert!(!tells(vec![unready(), attempt(Passed, "")]));
-        assert!(!tells(vec![unready(), attempt(Skipped, OWN_CELL)]));
+        assert!(!tells(vec![unready(), attempt(Failed, OTHER)]));
         assert!(tells(vec![unready(), failed()]));
+        assert!(tells(vec![differing(attempt(Failed, DIFFERS), 0, None)]));
     }
 
     #[test]
     fn a_drive_is_as_late_each_time_and_a_computer_is_not() {
-        let late = |step, by| differing(Marginal, step, Some(by));
+        let late = |step, by| differing(attempt(Marginal, ""), step, Some(by));
         assert!(tells(vec![late(3, 40), late(3, 45), late(3, 25)]));
         assert!(!tells(vec![late(3, 40), late(3, 90), late(3, 40)]));
         assert!(!tells(vec![late(3, 40), late(5, 40), late(3, 40)]));
         assert!(!tells(vec![late(3, 40), late(3, 40), attempt(Passed, "")]));
         assert!(tells(vec![
             late(3, 40),
-            differing(Skipped, 0, None),
+            differing(attempt(Failed, SILENT), 0, None),
             late(3, 40)
         ]));
     }

@@ -127,11 +127,10 @@ impl<'s> Run<'s> {
             return Ok(Played::skipped(lacks));
         }
         if !rings {
-            return Ok(Played::skipped(format!(
-                "it is for {}, the rig has {}",
-                sizes(&plan.rings),
-                sizes(self.session.rings())
-            )));
+            let sizes =
+                |rings: &[RingSize]| -> Vec<u8> { rings.iter().map(|r| r.drives()).collect() };
+            let why = other_size(&sizes(&plan.rings), &sizes(self.session.rings()));
+            return Ok(Played::skipped(why));
         }
         if self.rehearses
             && let Some(why) = self.denied(plan)
@@ -335,13 +334,12 @@ pub fn play_one(
         true => start_anew(link, &way.rings),
         false => Ok(()),
     };
-    Ok(match (ready, link.trouble()) {
-        (Ok(()), _) => {
+    Ok(match ready {
+        Ok(()) => {
             link.begin();
             play_over_bus(plan, link, AtFinding::Stop)
         }
-        (Err(why), None | Some(Trouble::Denied(_))) => Outcome::skipped(why),
-        (Err(_), Some(trouble)) => Outcome::rig_error(trouble.to_string()),
+        Err(not_ready) => not_ready.judged(link),
     })
 }
 
@@ -387,10 +385,12 @@ pub(crate) fn twin(rig: &Rig, lines: &[String]) -> Result<Twin, Problems> {
     Ok(twin)
 }
 
-fn sizes(rings: &[RingSize]) -> String {
-    let sizes: Vec<_> = rings.iter().map(|ring| ring.drives().to_string()).collect();
-    match sizes.len() {
-        1 => format!("a ring of {}", sizes[0]),
-        _ => format!("rings of {}", sizes.join(" and ")),
-    }
+/// Why a scenario for rings of these sizes does not fit a rig.
+pub(crate) fn other_size(own: &[u8], rig: &[u8]) -> String {
+    let sizes = |rings: &[u8]| {
+        let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();
+        sizes.join(" and ")
+    };
+    let (own, rig) = (sizes(own), sizes(rig));
+    format!("it is for rings of another size ({own} drives, the rig has {rig})")
 }

@@ -4,7 +4,7 @@ use super::check::Rig;
 use super::file::{DriveEntry, Hooks, RigFile};
 use super::profile::KnownProfile;
 use crate::scenario::expression::{Expression, Located};
-use crate::scenario::parse::parse_setup;
+use crate::scenario::parse::parse_header;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::{Problems, Span};
 use crate::scenario::source::Source;
@@ -79,7 +79,7 @@ pub(super) fn settle(name: &str, file: &RigFile, lines: &[String]) -> Result<Pla
         name: name.to_owned(),
         text: lines.join("\n").into(),
     };
-    let mut scenario = parse_setup(&source, &sizes)?;
+    let mut scenario = parse_header(&source, &sizes)?;
     all_nd21(&mut scenario);
     plan(&scenario, &source, None)
 }

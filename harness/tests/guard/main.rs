@@ -4,6 +4,7 @@ mod attack;
 mod safe_state;
 mod speed;
 mod traffic;
+mod trouble;
 
 use harness::bus::{Axis, Bus, Options};
 use harness::guard::{Guarded, Limits};

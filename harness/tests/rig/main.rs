@@ -199,6 +199,16 @@ fn mistakes_are_shown_with_line_and_column() {
             format!("{sim}[sim]\nsetup = [\"drive 0 modle nd21\"]"),
         ),
         (
+            "a step for a setup line",
+            format!(
+                "{sim}[sim]\nsetup = [\n  \"drive 0 input GPIN3 high\",\n  \"> 80\",\n  \"wait 5ms\",\n]"
+            ),
+        ),
+        (
+            "a setup line for a ring of another size",
+            format!("{sim}[sim]\nsetup = [\"drive 0 input GPIN3 high\", \"ring 5\"]"),
+        ),
+        (
             "a setup of a drive that is not there",
             format!("{sim}[sim]\nsetup = [\"drive 2:0 input GPIN3 high\"]"),
         ),

@@ -38,7 +38,7 @@ pub(super) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Ex
             .map(|axis| (axis.ring(), axis.drive()))
             .collect();
         // Behind a reset nobody knows where drives are: the check sequence (9.8) follows, which is not the master's to send.
-        reset_drives(session.link(), &drives).map_err(|why| denied(session, why))
+        reset_drives(session.link(), &drives).map_err(|why| denied(session, why.to_string()))
     };
     let what = leave_to(arguments, "reset");
     rig::on_after(

@@ -75,7 +75,7 @@ fn leave_clean(session: &mut Session, output: &mut Output) {
     }
     let rings = session.rings().to_vec();
     let done = match session.health() {
-        Ok(_) => start_anew(session.link(), &rings),
+        Ok(_) => start_anew(session.link(), &rings).map_err(|why| why.to_string()),
         Err(error) => Err(error.to_string()),
     };
     if let Err(why) = done {

@@ -39,18 +39,41 @@ pub fn parse(source: &Source) -> Result<Scenario, Problems> {
 /// # Errors
 /// As of [`parse`].
 pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
-    let range = |drives: &u8| RingRange {
-        smallest: *drives,
-        largest: *drives,
-        default: *drives,
-        span: Span::default(),
-    };
-    let reader = Reader {
-        setup: Some(rings.iter().map(range).collect()),
-        ..Reader::default()
-    };
-    let mut scenario = read(source, reader)?;
+    let mut scenario = read(source, Reader::for_rings(rings))?;
     scenario.steps.clear();
+    Ok(scenario)
+}
+
+/// Reads the header of rings of these sizes, where no step may stand.
+///
+/// # Errors
+/// Every line that cannot be understood, every step, and a `ring` line for other sizes.
+pub fn parse_header(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
+    let mut scenario = read(source, Reader::for_rings(rings))?;
+    let mut problems = Vec::new();
+    for step in scenario.steps.drain(..) {
+        let what = "this is a step, and nothing is played here";
+        let expected = "a line of a header expected here, such as `drive 1 input GPIN3 high`";
+        problems.push(Problem::new(step.span, what, expected));
+    }
+    let fits = |(range, size): (&RingRange, &u8)| (range.smallest..=range.largest).contains(size);
+    let same = scenario.rings.len() == rings.len();
+    if !same || !scenario.rings.iter().zip(rings).all(fits) {
+        let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();
+        let what = format!("the rig has {} drives", sizes.join(" and "));
+        let span = scenario.rings.first().map_or(Span::default(), |r| r.span);
+        problems.push(Problem::new(
+            span,
+            what,
+            "no `ring` line, or its sizes, expected here",
+        ));
+    }
+    if !problems.is_empty() {
+        return Err(Problems::new(&source.name, source.text.clone(), problems));
+    }
+    for (range, size) in scenario.rings.iter_mut().zip(rings) {
+        range.default = *size;
+    }
     Ok(scenario)
 }
 
@@ -107,6 +130,20 @@ struct Reader {
 }
 
 impl Reader {
+    /// Of a header whose rings have these sizes where it does not say.
+    fn for_rings(rings: &[u8]) -> Self {
+        let range = |drives: &u8| RingRange {
+            smallest: *drives,
+            largest: *drives,
+            default: *drives,
+            span: Span::default(),
+        };
+        Self {
+            setup: Some(rings.iter().map(range).collect()),
+            ..Self::default()
+        }
+    }
+
     fn line(&mut self, mut scanner: Scanner<'_>) -> Result<(), Problem> {
         if scanner.at_end() {
             return Ok(());

@@ -9,5 +9,5 @@ mod step;
 mod value;
 mod words;
 
-pub use header::{parse, parse_setup, parse_step};
+pub use header::{parse, parse_header, parse_setup, parse_step};
 pub(super) use value::{assigned, eeprom_place, place, value};

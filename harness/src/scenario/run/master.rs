@@ -1,8 +1,9 @@
 //! The driver's part of a scenario: calls over the same line that the scenario plays on, so that what is
 //! recorded, limited and shown is all the same.
 
+use super::halt::Halt;
 use super::outcome::Stop;
-use super::player::{Halt, Runner};
+use super::player::Runner;
 use crate::bus::{Axis, Bus, Error, Options, conduct, count_drives};
 use crate::link::{Lead, Line, Trouble};
 use crate::scenario::pattern::Expected;

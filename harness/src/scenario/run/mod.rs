@@ -3,6 +3,7 @@
 mod bytes;
 mod check;
 mod drives;
+mod halt;
 mod look;
 mod master;
 mod now;
@@ -13,8 +14,8 @@ mod record;
 
 pub use bytes::{Shown, show};
 pub use now::{Now, now};
-pub use outcome::{Difference, Finding, Outcome};
+pub use outcome::{Difference, Finding, Outcome, Unready};
 pub(crate) use over_bus::read_byte;
-pub use over_bus::{play_over_bus, reset_drives, start_anew};
+pub use over_bus::{NotReady, play_over_bus, reset_drives, start_anew};
 pub use player::{AtFinding, lacks, needs, play, run};
 pub use record::{MAX_SAMPLES, Record, Sample};

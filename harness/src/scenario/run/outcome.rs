@@ -21,6 +21,18 @@ pub struct Outcome {
     pub took: time::Span,
     /// The cells that it recorded.
     pub records: Vec<Record>,
+    /// Why no step was played although the rig has all that the scenario needs: a drive could not be made ready.
+    pub unready: Option<Unready>,
+}
+
+/// How a drive could not be made ready for a scenario: reset, or set to hold what the header says. The first remark of the
+/// [outcome](Outcome) says which drive and which cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unready {
+    /// It gave no right answer. Where time is real, a computer that stood still may be the cause.
+    NoAnswer,
+    /// A cell holds something else than was written to it.
+    Differs,
 }
 
 impl Outcome {
@@ -36,6 +48,46 @@ impl Outcome {
         Self::not_played(Verdict::RigError, remark)
     }
 
+    /// A scenario that trouble of the link has ended before its first step.
+    #[must_use]
+    pub fn trouble(trouble: &Trouble) -> Self {
+        Self::not_played(trouble.verdict(), trouble.to_string())
+    }
+
+    /// The same where trouble of the link has come behind its last step: what was judged before is a remark.
+    #[must_use]
+    pub(super) fn ended_by(self, trouble: &Trouble) -> Self {
+        let before = format!("before that: {}", self.verdict);
+        let found = self.finding.map(|finding| finding.message);
+        let own = [trouble.to_string(), before];
+        Self {
+            verdict: trouble.verdict(),
+            finding: None,
+            remarks: own.into_iter().chain(found).chain(self.remarks).collect(),
+            ..self
+        }
+    }
+
+    /// A scenario that a drive could not be made ready for, and what of it was wrong.
+    #[must_use]
+    pub(super) fn not_ready(verdict: Verdict, unready: Unready, remark: String) -> Self {
+        Self {
+            unready: Some(unready),
+            ..Self::not_played(verdict, remark)
+        }
+    }
+
+    /// Why it was skipped, without the place and other details, so that skipped scenarios can be counted by reason; `None` where it
+    /// was not skipped.
+    #[must_use]
+    pub fn reason_to_skip(&self) -> Option<&str> {
+        let why = self.remarks.first()?;
+        let details = [" at ", " (", ": "];
+        let end = details.iter().filter_map(|detail| why.find(detail)).min();
+        let reason = &why[..end.unwrap_or(why.len())];
+        (self.verdict == Verdict::Skipped).then_some(reason)
+    }
+
     fn not_played(verdict: Verdict, remark: String) -> Self {
         Self {
             verdict,
@@ -43,6 +95,17 @@ impl Outcome {
             remarks: vec![remark],
             took: time::Span::ZERO,
             records: Vec::new(),
+            unready: None,
+        }
+    }
+}
+
+impl Trouble {
+    /// What an attempt comes to that this trouble ends: the bench's fault, but a denied command and an interruption are nobody's.
+    pub(super) fn verdict(&self) -> Verdict {
+        match self {
+            Self::Lost(_) | Self::Garbled(_) | Self::Interlock(_) => Verdict::RigError,
+            Self::Denied(_) | Self::Interrupted => Verdict::Aborted,
         }
     }
 }
@@ -117,14 +180,10 @@ impl Stop {
         }
     }
 
-    /// The bench's fault; a denied command and an interruption are nobody's.
+    /// Trouble of the link.
     pub(super) fn trouble(span: Span, trouble: &Trouble) -> Self {
-        let verdict = match trouble {
-            Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interlock(_) => Verdict::RigError,
-            Trouble::Denied(_) | Trouble::Interrupted => Verdict::Aborted,
-        };
         Self {
-            verdict,
+            verdict: trouble.verdict(),
             ..Self::failed(span, trouble.to_string())
         }
     }

@@ -4,11 +4,13 @@
 //! them.
 
 use super::bytes::{matches, resolve};
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Unready};
 use super::player::{AtFinding, Runner, lacks, play};
 use crate::link::{Line, Link};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
+use crate::scenario::verdict::Verdict;
+use crate::twin::unknowable;
 use harness_proto::line::Received;
 use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
@@ -179,23 +181,70 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) ->
             link.begin();
             play(plan, link, at_finding)
         }
-        Err(why) => match link.trouble() {
-            Some(trouble) => Outcome::rig_error(trouble.to_string()),
-            None => Outcome::skipped(why),
-        },
+        Err(not_ready) => not_ready.judged(link),
     };
     if before.is_empty() || link.trouble().is_some() {
         return outcome;
     }
     link.begin();
     let restored = restore(link, &before).or_else(|_| restore(link, &before));
-    match restored {
-        Ok(()) => outcome,
-        Err(why) => Outcome {
-            remarks: [outcome.remarks, vec![format!("not set back: {why}")]].concat(),
-            ..outcome
-        },
+    let remark = restored.err().map(|why| format!("not set back: {why}"));
+    let outcome = Outcome {
+        remarks: outcome.remarks.into_iter().chain(remark).collect(),
+        ..outcome
+    };
+    match link.trouble() {
+        // What was judged before it is kept as a remark: the drives may be left in any state.
+        Some(trouble) => outcome.ended_by(trouble),
+        None => outcome,
     }
+}
+
+/// Why a drive is not ready: which of its cells, and what of it is wrong.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct NotReady {
+    /// In what way.
+    pub unready: Unready,
+    /// The manual lets the drive change the cell by itself, or leaves open whether it does.
+    pub own_cell: bool,
+    message: String,
+}
+
+impl NotReady {
+    fn new(cell: Before, unready: Unready, why: &str) -> Self {
+        let prefix = if cell.ring == 0 { "" } else { "2:" };
+        let Before { address, drive, .. } = cell;
+        Self {
+            unready,
+            own_cell: is_own(address),
+            message: format!("cell {address:04X} of drive {prefix}{drive}: {why}"),
+        }
+    }
+
+    /// What a scenario comes to whose drives were not made ready. A drive must answer, and hold what was written to it; the manual
+    /// leaves open only what a cell holds that the drive writes by itself.
+    pub fn judged(self, link: &dyn Link) -> Outcome {
+        if let Some(trouble) = link.trouble() {
+            return Outcome::trouble(trouble);
+        }
+        let message = format!("the drive could not be made ready: {}", self.message);
+        match (self.unready, self.own_cell) {
+            (Unready::Differs, true) => Outcome::not_ready(
+                Verdict::Inconclusive,
+                self.unready,
+                format!("{message} (a drive may change this cell by itself, ND21 14.2)"),
+            ),
+            _ => Outcome::not_ready(Verdict::Failed, self.unready, message),
+        }
+    }
+}
+
+/// Whether the manual lets a drive change a cell by itself, or leaves open whether it does (14.2). The recording of the oscilloscope is
+/// plain memory as long as no measurement is started (14.10.6.5).
+fn is_own(address: u16) -> bool {
+    const RECORDING: std::ops::Range<u16> = nd21::ram::SCOPE_PUFFER..nd21::ram::STACK;
+    !RECORDING.contains(&address) && (cell_at(address).is_none() || unknowable(address))
 }
 
 /// How long drives may test themselves after a reset.
@@ -205,7 +254,7 @@ const SELF_TEST: Span = Span::from_millis(10_000);
 ///
 /// # Errors
 /// The first drive that does not come back, in a sentence.
-pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String> {
+pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), NotReady> {
     let drives = |(ring, size): (usize, &RingSize)| (0..size.drives()).map(move |k| (ring, k));
     let all: Vec<_> = rings.iter().enumerate().flat_map(drives).collect();
     reset_drives(link, &all)
@@ -215,7 +264,7 @@ pub fn start_anew(link: &mut dyn Link, rings: &[RingSize]) -> Result<(), String>
 ///
 /// # Errors
 /// The first drive that does not come back, in a sentence.
-pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), String> {
+pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotReady> {
     link.begin();
     let cell = |&(ring, drive): &(usize, u8)| Before {
         ring,
@@ -233,7 +282,7 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), Stri
     let mut waiting = cells;
     loop {
         let status = read_all(link, &waiting);
-        let back = |status: &Result<u8, String>| {
+        let back = |status: &Result<u8, NotReady>| {
             let status = status.as_ref();
             status.is_ok_and(|status| status & nd21::bits::status::RESET == 0)
         };
@@ -245,7 +294,8 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), Stri
         match waiting.first() {
             None => return Ok(()),
             Some(cell) if link.now() >= end || link.trouble().is_some() => {
-                return Err(wrong(link, *cell, "it does not come back from its reset"));
+                let why = "it does not come back from its reset";
+                return Err(NotReady::new(*cell, Unready::NoAnswer, why));
             }
             Some(_) => {}
         }
@@ -269,10 +319,11 @@ fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
 }
 
 /// Where a ring does not stand that, or a drive does not answer.
-fn reset_one_by_one(link: &mut dyn Link, cells: &[Before]) -> Result<(), String> {
+fn reset_one_by_one(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
     for cell in cells {
         if exchange(link, cell.ring, cell.drive, Command::ResetH8).is_none() {
-            return Err(wrong(link, *cell, "it does not answer ResetH8"));
+            let why = "it does not answer ResetH8";
+            return Err(NotReady::new(*cell, Unready::NoAnswer, why));
         }
         let left = link.send(cell.ring, &CHECK_SEQUENCE);
         settle(link, left);
@@ -313,7 +364,7 @@ impl Before {
 ///
 /// # Errors
 /// The first cell that does not hold what it must, in a sentence.
-fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), String> {
+fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<(), NotReady> {
     for (ring, drives, address, bytes) in plan.memory_setups() {
         let mut cells = Vec::new();
         for drive in drives {
@@ -357,7 +408,7 @@ fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<
 ///
 /// # Errors
 /// The first cell that does not hold it, in a sentence.
-fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), String> {
+fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), NotReady> {
     for ring in 0..2 {
         let mut bytes = CHECK_SEQUENCE.to_vec();
         for cell in before.iter().rev().filter(|cell| cell.ring == ring) {
@@ -383,15 +434,15 @@ fn own_bits(address: u16) -> u8 {
     cell_at(address).map_or(0, |known| known.read_only_bits)
 }
 
-fn read(link: &mut dyn Link, cell: Before) -> Result<u8, String> {
+fn read(link: &mut dyn Link, cell: Before) -> Result<u8, NotReady> {
     match exchange(link, cell.ring, cell.drive, cell.read()).as_deref() {
         Some([byte]) => Ok(*byte),
-        _ => Err(wrong(link, cell, "no answer")),
+        _ => Err(NotReady::new(cell, Unready::NoAnswer, "no answer")),
     }
 }
 
 /// What each of these cells holds, those of a ring together. Where not all answer it is each for itself, and a sentence for those that do not.
-fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, String>> {
+fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, NotReady>> {
     let mut held = Vec::new();
     for own in cells.chunk_by(|one, other| one.ring == other.ring) {
         match together(link, own, Before::read) {
@@ -406,14 +457,14 @@ fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, String>> {
 ///
 /// # Errors
 /// The first one that does not answer, in a sentence.
-fn write_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), String> {
+fn write_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
     for own in cells.chunk_by(|one, other| one.ring == other.ring) {
         if together(link, own, Before::write).is_some() {
             continue;
         }
         for cell in own {
             if exchange(link, cell.ring, cell.drive, cell.write()).is_none() {
-                return Err(wrong(link, *cell, "no answer"));
+                return Err(NotReady::new(*cell, Unready::NoAnswer, "no answer"));
             }
         }
     }
@@ -437,24 +488,13 @@ fn together(
 ///
 /// # Errors
 /// The first one that does not, in a sentence.
-fn holds_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), String> {
+fn holds_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
     for (cell, held) in cells.iter().zip(read_all(link, cells)) {
         let held = held?;
         if (held ^ cell.data) & !own_bits(cell.address) != 0 {
             let why = format!("{:02X} was written, {held:02X} is read", cell.data);
-            return Err(wrong(link, *cell, &why));
+            return Err(NotReady::new(*cell, Unready::Differs, &why));
         }
     }
     Ok(())
-}
-
-fn wrong(link: &dyn Link, cell: Before, why: &str) -> String {
-    if let Some(trouble) = link.trouble() {
-        return trouble.to_string();
-    }
-    let prefix = if cell.ring == 0 { "" } else { "2:" };
-    format!(
-        "cell {:04X} of drive {prefix}{}: {why}",
-        cell.address, cell.drive
-    )
 }

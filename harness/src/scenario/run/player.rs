@@ -1,13 +1,12 @@
 //! Step by step.
 
 use super::bytes::{Shown, matches, resolve, show};
-use super::outcome::{Difference, Finding, Outcome, Stop};
+use super::halt::Halt;
+use super::outcome::{Difference, Outcome, Stop};
 use super::record::Recorder;
-use crate::link::{Capability, Link, Moment, Trouble};
+use crate::link::{Capability, Link, Moment};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{
-    MAX_CARRIED, Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow,
-};
+use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
 use crate::scenario::problem::Span;
 use crate::scenario::syntax::Ending;
 use crate::scenario::verdict::Verdict;
@@ -20,16 +19,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
-const MAX_ROUND: time::Span = time::Span::from_millis(3_600_000);
+pub(super) const MAX_ROUND: time::Span = time::Span::from_millis(3_600_000);
 
 /// How long a link may need for a pause.
 const PAUSE: time::Span = time::Span::from_millis(50);
 
 /// Bytes that no line asks for shown at most.
 const UNASKED: usize = 16;
-
-/// Drives in the error mode named at most.
-const NAMED: usize = 6;
 
 /// What to do at a line that is not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,17 +69,8 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         return Outcome::skipped(lacks);
     }
     let mut runner = Runner::new(plan, link, at_finding);
-    let mut result = runner.play();
-    if let (Ok(()), Some(unseen)) = (&result, runner.unseen.take()) {
-        result = Err(unseen);
-    }
-    if let Err(stop) = &mut result {
-        // What is under way still tells something, and nothing more is sent.
-        stop.finding.in_error = runner.in_error();
-        runner.settle();
-        runner.come_home();
-        runner.complete(&mut stop.finding);
-    }
+    let result = runner.play();
+    let result = runner.wind_up(result);
     let remarks = runner
         .link
         .unused_faults()
@@ -101,16 +88,8 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         remarks,
         took,
         records: runner.recorder.records,
+        unready: None,
     }
-}
-
-/// Why a scenario cannot go on.
-#[derive(Clone, Debug)]
-pub(super) enum Halt {
-    /// It has grown too long.
-    Full(String),
-    /// The link carries nothing more.
-    Trouble(Trouble),
 }
 
 /// What the master has received from one ring.
@@ -155,6 +134,8 @@ pub(super) struct Runner<'a> {
     pub(super) sent: u64,
     pub(super) sent_from: Instant,
     pub(super) sent_to: Instant,
+    /// The step that is under way, or the last one.
+    pub(super) place: Span,
 }
 
 impl<'a> Runner<'a> {
@@ -180,6 +161,7 @@ impl<'a> Runner<'a> {
             recorder: Recorder::default(),
             seen: BTreeMap::new(),
             answers: BTreeSet::new(),
+            place: Span::default(),
         }
     }
 }
@@ -187,6 +169,8 @@ impl<'a> Runner<'a> {
 impl Runner<'_> {
     fn play(&mut self) -> Result<(), Stop> {
         let plan = self.plan;
+        self.place = plan.steps.first().map_or(Span::default(), |step| step.span);
+        self.halted()?;
         for (ring, drives, influence) in plan.influences() {
             influence.act(self.link, ring, drives);
         }
@@ -196,32 +180,23 @@ impl Runner<'_> {
             if let PlannedAction::Fault(ring, fault, moment @ (Moment::Byte(_) | Moment::At(_))) =
                 step.action
             {
+                self.place = step.span;
                 self.link.inject(ring, fault, moment);
+                self.halted()?;
             }
         }
         let mut first = Ok(());
         for step in &plan.steps {
+            self.place = step.span;
             let result = self.step(step);
-            let result = self.room(step.span).and(result);
-            if result.is_err() && self.at_finding == AtFinding::Stop || self.full.is_some() {
-                return first.and(result);
-            }
+            self.halted()?;
             first = first.and(result);
+            if first.is_err() && self.at_finding == AtFinding::Stop {
+                return first;
+            }
         }
         self.settle();
-        let last = plan.steps.last().map_or(Span::default(), |step| step.span);
-        first
-            .and(self.room(last))
-            .and_then(|()| self.nothing_unasked(last))
-    }
-
-    /// Whether the record has room for more.
-    fn room(&self, span: Span) -> Result<(), Stop> {
-        match &self.full {
-            Some(Halt::Full(why)) => Err(Stop::aborted(span, why.clone())),
-            Some(Halt::Trouble(trouble)) => Err(Stop::trouble(span, trouble)),
-            None => Ok(()),
-        }
+        first.and_then(|()| self.nothing_unasked(self.place))
     }
 
     fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
@@ -360,23 +335,10 @@ impl Runner<'_> {
         self.fetch();
     }
 
-    /// The same where the link is in trouble of a kind that lets what was sent before come round: a denial, an interlock.
-    fn come_home(&mut self) {
-        let end = self.link.now() + MAX_ROUND;
-        while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
-        self.fetch();
-    }
-
     /// Lets time pass until something happens. False where nothing will, or where the record is full.
     pub(super) fn wait(&mut self, until: Instant) -> bool {
         loop {
-            if self.link.carried() > MAX_CARRIED {
-                let why = format!("more than {MAX_CARRIED} bytes on the ring's links: too long");
-                self.full = Some(Halt::Full(why));
-            }
-            let too_much = || self.recorder.too_much().map(Halt::Full);
-            let trouble = || self.link.trouble().cloned().map(Halt::Trouble);
-            self.full = self.full.take().or_else(too_much).or_else(trouble);
+            self.notice();
             if self.full.is_some() {
                 self.fetch();
                 return false;
@@ -391,7 +353,7 @@ impl Runner<'_> {
         }
     }
 
-    fn fetch(&mut self) {
+    pub(super) fn fetch(&mut self) {
         for (index, record) in self.rings.iter_mut().enumerate() {
             while let Some(byte) = self.link.receive(index) {
                 record.received.push(byte);
@@ -531,35 +493,6 @@ impl Runner<'_> {
             span,
             "the check sequence FF 44 72 4C 41 did not come back (ND21 9.8)",
         ))
-    }
-
-    /// The drives in the error mode, in ring order.
-    fn in_error(&self) -> String {
-        let mut named = Vec::new();
-        for ring in 0..self.rings.len() {
-            for drive in (0..self.link.drives(ring)).rev() {
-                if let Some(Some(error)) = self.link.error_of(ring, drive) {
-                    let prefix = if ring == 0 { "" } else { "2:" };
-                    named.push(format!("{prefix}{drive} ({error})"));
-                }
-            }
-        }
-        let more = named.len().saturating_sub(NAMED);
-        named.truncate(NAMED);
-        if more > 0 {
-            named.push(format!("and {more} more"));
-        }
-        named.join(", ")
-    }
-
-    /// Adds to a finding what has been received meanwhile.
-    fn complete(&self, finding: &mut Finding) {
-        if let Some(difference) = &mut finding.difference {
-            let first = difference.byte - 1 - difference.index;
-            let wanted = difference.expected.len().max(1);
-            let received = self.rings[difference.ring].received.iter();
-            difference.received = received.skip(first).take(wanted).map(|(_, b)| *b).collect();
-        }
     }
 
     /// A strict scenario asks for every byte.

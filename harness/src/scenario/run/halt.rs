@@ -1,0 +1,105 @@
+//! How a conversation ends: at its last step, at a finding, or where it cannot go on.
+
+use super::outcome::{Finding, Stop};
+use super::player::{MAX_ROUND, Runner};
+use crate::link::Trouble;
+use crate::scenario::plan::MAX_CARRIED;
+
+/// Maximum number of drives in the error mode that are named.
+const NAMED: usize = 6;
+
+/// Why a scenario cannot go on.
+#[derive(Clone, Debug)]
+pub(super) enum Halt {
+    /// It has grown too long.
+    Full(String),
+    /// The link carries nothing more.
+    Trouble(Trouble),
+}
+
+impl Runner<'_> {
+    /// Ends the conversation: nothing more is sent, and what is under way comes back. Trouble of the
+    /// link outweighs every finding, as a finding may be its effect.
+    pub(super) fn wind_up(&mut self, result: Result<(), Stop>) -> Result<(), Stop> {
+        let mut result = match (result, self.unseen.take()) {
+            (Ok(()), Some(unseen)) => Err(unseen),
+            (result, _) => result,
+        };
+        if let Err(stop) = &mut result {
+            stop.finding.in_error = self.in_error();
+        }
+        if result.is_err() {
+            self.settle();
+            self.come_home();
+        }
+        let halted = self.halted();
+        let mut result = match (&self.full, result) {
+            (Some(Halt::Full(_)), Err(stop)) => Err(stop),
+            (_, result) => halted.and(result),
+        };
+        if let Err(stop) = &mut result {
+            self.complete(&mut stop.finding);
+        }
+        result
+    }
+
+    /// Whether the conversation has to end here: the link is in trouble, or there is no room for more in the record. Looked at behind
+    /// every step and behind the last bytes, since no later step may follow.
+    pub(super) fn halted(&mut self) -> Result<(), Stop> {
+        self.notice();
+        match &self.full {
+            Some(Halt::Full(why)) => Err(Stop::aborted(self.place, why.clone())),
+            Some(Halt::Trouble(trouble)) => Err(Stop::trouble(self.place, trouble)),
+            None => Ok(()),
+        }
+    }
+
+    /// Notes the first reason for which the conversation has to end.
+    pub(super) fn notice(&mut self) {
+        if self.full.is_some() {
+            return;
+        }
+        let carried = self.link.carried() > MAX_CARRIED;
+        let carried =
+            carried.then(|| format!("more than {MAX_CARRIED} bytes on the ring's links: too long"));
+        let too_much = carried.or_else(|| self.recorder.too_much());
+        let trouble = || self.link.trouble().cloned().map(Halt::Trouble);
+        self.full = too_much.map(Halt::Full).or_else(trouble);
+    }
+
+    /// Waits for what was sent before the trouble: a denial or an interlock stops only what is sent behind it.
+    fn come_home(&mut self) {
+        let end = self.link.now() + MAX_ROUND;
+        while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
+        self.fetch();
+    }
+
+    /// The drives in the error mode, in ring order.
+    fn in_error(&self) -> String {
+        let mut named = Vec::new();
+        for ring in 0..self.rings.len() {
+            for drive in (0..self.link.drives(ring)).rev() {
+                if let Some(Some(error)) = self.link.error_of(ring, drive) {
+                    let prefix = if ring == 0 { "" } else { "2:" };
+                    named.push(format!("{prefix}{drive} ({error})"));
+                }
+            }
+        }
+        let more = named.len().saturating_sub(NAMED);
+        named.truncate(NAMED);
+        if more > 0 {
+            named.push(format!("and {more} more"));
+        }
+        named.join(", ")
+    }
+
+    /// Adds to a finding what has been received meanwhile.
+    fn complete(&self, finding: &mut Finding) {
+        if let Some(difference) = &mut finding.difference {
+            let first = difference.byte - 1 - difference.index;
+            let wanted = difference.expected.len().max(1);
+            let received = self.rings[difference.ring].received.iter();
+            difference.received = received.skip(first).take(wanted).map(|(_, b)| *b).collect();
+        }
+    }
+}
