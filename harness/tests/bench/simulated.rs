@@ -107,7 +107,7 @@ fn evidence_changes_no_verdict() {
     let wrong = folder.path().join("wrong.scn");
     std::fs::write(&wrong, WRONG).expect("room");
     let wrong = wrong.to_str().expect("a name");
-    for (number, (what, size, code)) in [(wrong, 4, 1), ("9", 3, 0), ("10", 4, 0), ("14", 3, 0)]
+    for (number, (what, size, code)) in [(wrong, 4, 1), ("9", 3, 0), ("10", 4, 5), ("14", 3, 0)]
         .into_iter()
         .enumerate()
     {
@@ -158,4 +158,95 @@ fn a_rig_with_drives_of_its_own_fails_alike() {
         ended(&output, 1, "→    7      80  80  80   80  [80]");
     }
     ended(&verify(&folder.path().join("kept")), 0, "0 things wrong");
+}
+
+fn run(folder: &Path, rig: &str, more: &[&str]) -> Output {
+    let path = folder.join("rig.toml");
+    std::fs::write(&path, rig).expect("room");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    command.arg("run").arg("--rig").arg(path).args(more);
+    command.output().expect("the program")
+}
+
+/// ND21 10.2: a drive that cannot be made to hold what a header says has failed, whether evidence is kept or not. It is never skipped.
+#[test]
+fn a_drive_that_cannot_be_made_ready_has_failed() {
+    let names = ["10.2-write-byte", "10.2-write-word", "10.1-read-long"];
+    for (name, words) in [
+        ("writes-ignored", "was written, 00 is read"),
+        ("read-long-reversed", "ReadLong"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let text = rig(3, true, "", &format!(", \"drive 1 deviates {name}\""));
+        let kept = folder.path().join("kept");
+        let evidence = ["--evidence", kept.to_str().expect("a name")];
+        for more in [&[][..], &evidence] {
+            let arguments = [&["--allow-motion"], &names[..], more].concat();
+            let output = run(folder.path(), &text, &arguments);
+            ended(&output, 1, words);
+            assert!(!said(&output).contains("skipped"), "{}", said(&output));
+        }
+        ended(&verify(&kept), 0, "0 things wrong");
+    }
+    // The drive writes this cell itself (14.5.5): nothing is known of the drive then.
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = folder.path().join("own.scn");
+    let scenario = "title x\nring 3\ndrive 1 memory FF18 = 12 34\n> 80\n< 80\n";
+    std::fs::write(&own, scenario).expect("room");
+    let text = rig(3, true, "", ", \"drive 0 memory FE97 = 00\"");
+    let own = own.to_str().expect("a name");
+    let output = run(folder.path(), &text, &["--allow-motion", own]);
+    let words =
+        "cell FF18 of drive 1: 12 was written, 00 is read (a drive may change this cell by itself";
+    ended(&output, 5, words);
+    ended(&output, 5, "1 inconclusive");
+}
+
+/// Exit code 0 says that something was judged and nothing differed.
+#[test]
+fn a_run_that_judges_nothing_is_incomplete() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kept = folder.path().join("kept");
+    let evidence = ["--evidence", kept.to_str().expect("a name")];
+    let other = ["10.2-write-byte", "8.2-exchange-4"];
+    let bare = rig(2, true, "", "");
+    let own = rig(2, true, "", ", \"drive 0 memory FE97 = 00\"");
+    for text in [bare, own] {
+        for more in [&[][..], &evidence] {
+            let _none_yet = std::fs::remove_dir_all(&kept);
+            let output = run(folder.path(), &text, &[&other[..], more].concat());
+            ended(&output, 5, "0 passed, 0 failed, 2 skipped");
+            ended(
+                &output,
+                5,
+                "not played: 2 (it is for rings of another size)",
+            );
+        }
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    command.args(["qualify", "--filter", "8.2-exchange-4", "--rig"]);
+    command.arg(folder.path().join("rig.toml"));
+    command
+        .arg("--evidence")
+        .arg(folder.path().join("qualified"));
+    ended(&command.output().expect("the program"), 5, "1 skipped");
+}
+
+/// What the guard keeps back was not played, wherever it stands, and the record says so too.
+#[test]
+fn what_is_kept_back_is_no_pass() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kept = folder.path().join("kept");
+    let path = folder.path().join("back.scn");
+    let text = rig(2, false, "", ", \"drive 0 memory FE97 = 00\"").replace("= true", "= false");
+    for steps in ["> 85 FF 0F A0\n? sent 4 bytes\n", "> 80\n! 1->0: drop\n"] {
+        let _none_yet = std::fs::remove_dir_all(&kept);
+        std::fs::write(&path, format!("title x\nring 2\n{steps}")).expect("room");
+        let names = [&path, &kept].map(|path| path.to_str().expect("a name"));
+        let output = run(folder.path(), &text, &[names[0], "--evidence", names[1]]);
+        ended(&output, 2, "1 aborted");
+        let again = verify(&kept);
+        ended(&again, 0, "aborted");
+        assert!(!said(&again).contains("passed"), "{}", said(&again));
+    }
 }

@@ -312,6 +312,10 @@ const RUBBISH: &[(&str, &str)] = &[
         "a short address before any address",
     ),
     (
+        "9.7-first-link-two-errors",
+        "goes on without a recovery behind a damaged byte",
+    ),
+    (
         "9.8-power-cycle",
         "goes on without a recovery behind a drive that was switched on",
     ),
