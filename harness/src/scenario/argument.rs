@@ -2,7 +2,7 @@
 //! in the same words.
 
 use super::expression::{self, Scope};
-use super::parse::{assigned, eeprom_place, place, value};
+use super::parse::{bytes, eeprom_place, equals, place, value};
 use super::plan::{in_memory, number_bytes};
 use super::problem::{Problem, Problems, Span};
 use super::quantity::{self, Dimension, Quantity};
@@ -153,17 +153,56 @@ pub fn cells(texts: &[String]) -> Result<Vec<Location>, Problems> {
     each(texts, location)
 }
 
-/// Cells with the values that they are to get: `nsoll=1500rpm`, `FF08=0652`.
+/// Cells with the values that they are to get: `nsoll=1500rpm`, `nsoll=0x161E`, `Status=80`. A cell with a unit takes a number with a
+/// unit, or bytes that are marked as such; any other cell takes hexadecimal bytes.
 ///
 /// # Errors
 /// All that are none, or that cannot be written.
 pub fn assignments(texts: &[String]) -> Result<Vec<(Location, Written)>, Problems> {
     each(texts, |scanner| {
+        let text = scanner.rest();
         let location = location(scanner)?;
+        let name = text.strip_suffix(scanner.rest()).unwrap_or_default();
         location.writable()?;
-        let value = assigned(scanner, &location.place)?;
+        equals(scanner)?;
+        let value = own_value(scanner, location.place.scale(), (&location, name))?;
         Ok((location, value))
     })
+}
+
+/// The value of a cell outside a scenario, where `1500` could be meant as a number and would be read as bytes.
+fn own_value(
+    scanner: &mut Scanner<'_>,
+    scale: Option<Scale>,
+    (location, name): (&Location, &str),
+) -> Result<Written, Problem> {
+    let start = scanner.here();
+    if scanner.eat("0x") {
+        return bytes(scanner).map(Written::Bytes);
+    }
+    let digits = scanner.clone().chunk().value.to_owned();
+    let bare = !digits.is_empty()
+        && digits.bytes().all(|digit| digit.is_ascii_hexdigit())
+        && !quantity::ahead(scanner)
+        && quantity::ambiguous(scanner).is_none();
+    let cell = location.cell().and_then(|cell| cell.number());
+    let unit = location.scale.or(cell).and_then(Dimension::of);
+    let Some(unit) = unit.filter(|_| bare).map(Dimension::unit) else {
+        return value(scanner, scale, &location.place);
+    };
+    let number = match digits.bytes().all(|digit| digit.is_ascii_digit()) {
+        true => format!("{digits}{unit}"),
+        false => format!("100{unit}"),
+    };
+    scanner.chunk();
+    let problem = Problem::new(
+        scanner.since(start),
+        format!("`{digits}` has no unit, and `{name}` has one"),
+        "a number with its unit, or bytes behind 0x, expected here",
+    );
+    Err(problem.help(format!(
+        "write `{name}={number}` for a number with its unit, `{name}=0x{digits}` for the bytes"
+    )))
 }
 
 /// The bytes of all these values.
@@ -187,7 +226,7 @@ pub fn encode(
 /// It is none.
 pub fn value_at(text: &str, offset: usize, location: &Location) -> Result<Written, Problem> {
     let mut scanner = Scanner::new(text, offset);
-    let value = value(&mut scanner, location.scale, &location.place)?;
+    let value = own_value(&mut scanner, location.scale, (location, &location.name()))?;
     scanner.expect_end()?;
     Ok(value)
 }

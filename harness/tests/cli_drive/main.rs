@@ -101,7 +101,7 @@ fn all_mistakes_in_cells_are_shown_at_once() {
         ],
     );
     refused(
-        "write 0 nist=5rpm Flags=00 EE_BetriebStd=0000 FF80=00 nsoll=07 nMax=99999rpm nMax=5A",
+        "write 0 nist=5rpm Flags=00 EE_BetriebStd=0000 FF80=00 nsoll=0x07 nMax=99999rpm nMax=0x5A",
         2,
         &[
             "`nist` is read only (ND21 14.5.3.1)",
@@ -112,7 +112,7 @@ fn all_mistakes_in_cells_are_shown_at_once() {
         ],
     );
     refused(
-        "write 0 nsoll=07 nMax=99999rpm",
+        "write 0 nsoll=0x07 nMax=99999rpm",
         2,
         &[
             "1 byte where `nsoll` has 2",
@@ -152,7 +152,7 @@ fn benches_and_drives_that_are_not_there_are_refused() {
 #[test]
 fn write_shows_before_and_after() {
     assert_eq!(
-        shown("write 0..1 nRampe+=off VCOlin=44 EE_pole=08 Status=80"),
+        shown("write 0..1 nRampe+=off VCOlin=4080rpm EE_pole=08 Status=80"),
         "\
 drive 0 nRampe+: 0010 (9811.5 rpm/s) -> 7FFF (off)
 drive 0 VCOlin: 32 (3000 rpm) -> 44 (4080 rpm)
@@ -169,6 +169,44 @@ drive 1 Status: 00 -> 80 (stop)
     assert_eq!(code, 0, "{stdout}{stderr}");
 }
 
+/// A cell with a unit takes a number with its unit or marked bytes: `1500` alone would be read as the bytes 15 00.
+#[test]
+fn a_cell_with_a_unit_needs_one() {
+    for (line, digits, both) in [
+        (
+            "write 0 nsoll=1500",
+            "1500",
+            "`nsoll=1500rpm` for a number with its unit, `nsoll=0x1500` for the bytes",
+        ),
+        (
+            "write 0 nsoll=05DC",
+            "05DC",
+            "`nsoll=100rpm` for a number with its unit, `nsoll=0x05DC` for the bytes",
+        ),
+        ("write 0 VCOlin=44", "44", "`VCOlin=44rpm`"),
+        ("write 0 FF08:2=1500", "1500", "`FF08:2=0x1500`"),
+        ("write 0 FF08=1500", "1500", "`FF08=0x1500`"),
+        ("write 0 ee:nMax=1500", "1500", "`ee:nMax=0x1500`"),
+        ("write 0 EE_RefV1=0100", "0100", "`EE_RefV1=0x0100`"),
+        ("scope 0 nist --then nsoll=1500", "1500", "`nsoll=1500rpm`"),
+    ] {
+        refused(line, 2, &[&format!("`{digits}` has no unit"), both]);
+    }
+    let blocked = "write 0 Status=81 nsoll=0x161E ps_v0=[1000] nsoll=1500rpm VCOlin=0x44 EE_pole=06 HwVersion=0xC4 --move";
+    assert_eq!(
+        drivebench(blocked).1,
+        "\
+drive 0 Status: 00 -> 81 (stop, block)
+drive 0 nsoll: 0000 (0 rpm) -> 161E (1499.9 rpm)
+drive 0 ps_v0: 2C3D (3000.1 rpm) -> 1000 (1085.1 rpm)
+drive 0 nsoll: 161E (1499.9 rpm) -> 161E (1499.9 rpm)
+drive 0 VCOlin: 32 (3000 rpm) -> 44 (4080 rpm)
+drive 0 EE_pole: 06 (6) -> 06 (6)
+drive 0 HwVersion: C4 -> C4
+"
+    );
+}
+
 #[test]
 fn what_can_turn_a_motor_needs_leave_and_says_so_first() {
     for (line, part) in [
@@ -176,7 +214,7 @@ fn what_can_turn_a_motor_needs_leave_and_says_so_first() {
             "write 2 nsoll=1500rpm",
             "drive 2 is in go, and nsoll orders a motion",
         ),
-        ("write 2 FF08:2=1000", "FF08 orders a motion"),
+        ("write 2 FF08:2=0x1000", "FF08 orders a motion"),
         ("write 2 Flags2=80", "Flags2 orders a motion"),
         ("write 2 umdrsoll=10turns", "umdrsoll orders a motion"),
         ("write 2 Status=00", "Status releases it"),

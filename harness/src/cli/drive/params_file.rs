@@ -42,8 +42,10 @@ pub(super) fn value(found: &Found<'_>) -> String {
     let same = written.and_then(|written| found.location.bytes(&written, found.units));
     if same.is_ok_and(|bytes| bytes == found.bytes) {
         text.to_owned()
-    } else {
+    } else if value_at(&hex(&found.bytes), 0, found.location).is_ok() {
         hex(&found.bytes)
+    } else {
+        format!("0x{}", hex(&found.bytes))
     }
 }
 

@@ -10,4 +10,5 @@ mod value;
 mod words;
 
 pub use header::{parse, parse_header, parse_setup, parse_step};
-pub(super) use value::{assigned, eeprom_place, place, value};
+pub(super) use value::{bytes, eeprom_place, place, value};
+pub(super) use words::equals;

@@ -143,16 +143,13 @@ pub(in crate::scenario) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Pla
 }
 
 /// `= VALUE`
-pub(in crate::scenario) fn assigned(
-    scanner: &mut Scanner<'_>,
-    place: &Place,
-) -> Result<Written, Problem> {
+pub(super) fn assigned(scanner: &mut Scanner<'_>, place: &Place) -> Result<Written, Problem> {
     equals(scanner)?;
     value(scanner, place.scale(), place)
 }
 
 /// Bytes up to what may stand behind a value.
-pub(super) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
+pub(in crate::scenario) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
     let mut part = scanner.before(&BEHIND);
     let bytes = pattern::pattern(&mut part)?;
     scanner.go_on(&part);

@@ -101,7 +101,7 @@ pub(super) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
     0
 }
 
-pub(super) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
+pub(in crate::scenario) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
     if scanner.eat("=") {
         Ok(())
     } else {
