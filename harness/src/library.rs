@@ -87,10 +87,29 @@ impl Entry {
         })
     }
 
+    /// Reads and settles a scenario, for a ring of this many drives where it is for several sizes and that is one of them.
+    ///
+    /// # Errors
+    /// Its mistakes.
+    pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
+        let scenario = parse(&source)?;
+        let range = scenario.rings.first();
+        let fits = |n: &u8| range.is_some_and(|own| (own.smallest..=own.largest).contains(n));
+        Self::new(source, drives.filter(fits))
+    }
+
     /// The name without folders and ending.
     #[must_use]
     pub fn short_name(&self) -> &str {
         bare(&self.name).rsplit('/').next().unwrap_or(&self.name)
+    }
+
+    /// How many drives its rings have, as `3+1`; empty for a bus that is not built yet.
+    #[must_use]
+    pub fn drives(&self) -> String {
+        let rings = self.plan.iter().flat_map(|plan| &plan.rings);
+        let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
+        drives.join("+")
     }
 
     /// Whether the text occurs in the name, the title or a source.

@@ -76,10 +76,7 @@ pub enum Command {
     /// Play everything that fits a rig, settle what the manual leaves open, name deviations, and keep the evidence.
     Qualify(QualifyArguments),
     /// Judge every verdict of a folder of evidence again, from its record.
-    Verify {
-        /// The folder.
-        folder: PathBuf,
-    },
+    Verify(VerifyArguments),
     /// Make the reports of a run's folder again, from its record and captures: the same bytes as the run wrote.
     Report(ReportArguments),
     /// Print a JSON schema (draft 2020-12).
@@ -155,6 +152,9 @@ pub struct RunArguments {
     /// Keep the evidence of a run on a rig in this folder, which is not there or is empty; `verify` judges it again.
     #[arg(long, value_name = "FOLDER", requires = "rig")]
     pub evidence: Option<PathBuf>,
+    /// Sign the evidence with this key of `ssh-keygen`; `verify --allowed-signers` checks the signature.
+    #[arg(long, value_name = "KEY", requires = "evidence")]
+    pub sign: Option<PathBuf>,
     /// Write the verdicts into this file too, as JUnit's XML.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
@@ -187,12 +187,28 @@ pub struct QualifyArguments {
     /// Where the evidence goes: a folder that is not there or is empty; evidence-RIG-DATE where nothing is said.
     #[arg(long, value_name = "FOLDER")]
     pub evidence: Option<PathBuf>,
+    /// Sign the evidence with this key of `ssh-keygen`; `verify --allowed-signers` checks the signature.
+    #[arg(long, value_name = "KEY")]
+    pub sign: Option<PathBuf>,
     /// Write the report as one page of HTML into this file, which is there whole or not at all.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
     /// Count a skipped scenario as missing (exit code 5).
     #[arg(long)]
     pub require_all: bool,
+}
+
+/// For `verify`.
+#[derive(Clone, Debug, Args)]
+pub struct VerifyArguments {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Check the signature of the folder against this file of allowed signers (see `ssh-keygen(1)`).
+    #[arg(long, value_name = "FILE", requires = "identity")]
+    pub allowed_signers: Option<PathBuf>,
+    /// Whose signature it must be, as the file of allowed signers names them.
+    #[arg(long, value_name = "ID", requires = "allowed_signers")]
+    pub identity: Option<String>,
 }
 
 /// For `report`.

@@ -76,7 +76,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
-        Command::Verify { folder } => verify::verify(&folder, output),
+        Command::Verify(arguments) => verify::verify(&arguments, output),
         Command::Report(arguments) => report::report(&arguments, output),
         Command::Schema { of } => schema::schema(of, output),
         Command::Fuzz { command } => fuzz::fuzz(&command, output),

@@ -104,6 +104,7 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         require_all: arguments.require_all,
         junit: None,
         qualify: true,
+        sign: arguments.sign.clone(),
     };
     work(&rig, &entries, &job, page, output)
 }

@@ -8,18 +8,16 @@ use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run_rig::{Job, reports, work};
 use super::tally::Tally;
-use crate::evidence::{About, EvidenceError, Folder};
+use crate::evidence::{About, EvidenceError, Folder, no_bus, too_large};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::{Link, Recording, SimulatedLink};
 use crate::report::html::Head;
 use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
-use crate::rig::{Attempt, Keeper, Rig, other_size};
-use crate::scenario::parse::parse;
+use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
-use crate::scenario::syntax::{Bus, Scenario};
 use harness_sim::trace::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
@@ -36,15 +34,9 @@ pub(super) fn select(
     let mut entries = Vec::new();
     let mut errors: Vec<LibraryError> = Vec::new();
     for source in sources {
-        let size = |scenario: &Scenario| {
-            let range = scenario.rings.first();
-            ring.filter(|n| range.is_some_and(|r| (r.smallest..=r.largest).contains(n)))
-        };
-        let entry = parse(&source)
-            .and_then(|scenario| Entry::new(source, size(&scenario)).map_err(|problems| *problems));
-        match entry {
+        match Entry::fitting(source, ring) {
             Ok(entry) => entries.push(entry),
-            Err(problems) => errors.push(Box::new(problems).into()),
+            Err(problems) => errors.push(problems.into()),
         }
     }
     if !errors.is_empty() {
@@ -90,6 +82,7 @@ pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             require_all: arguments.require_all,
             junit: arguments.junit.clone(),
             qualify: false,
+            sign: arguments.sign.clone(),
         };
         return work(rig, &entries, &job, page, output);
     }
@@ -105,7 +98,13 @@ fn on_simulated(
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let folder = rig.zip(arguments.evidence.as_deref());
-    let folder = folder.map(|(rig, path)| Folder::create(path, &About::own_rings(rig)));
+    let folder = folder.map(|(rig, path)| {
+        let about = About {
+            sign: arguments.sign.as_deref(),
+            ..About::own_rings(rig)
+        };
+        Folder::create(path, &about)
+    });
     let mut folder = match folder.transpose() {
         Ok(folder) => folder,
         Err(error) => {
@@ -216,23 +215,11 @@ pub(super) struct Played {
     pub(super) traces: Vec<Trace>,
 }
 
-/// Why a scenario does not fit a simulated rig.
-fn too_large(entry: &Entry, rig: &Rig) -> Option<String> {
-    let plan = entry.plan.as_ref()?;
-    let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
-    let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
-    (own != sizes).then(|| other_size(&own, &sizes))
-}
-
 /// Plays a scenario on simulated rings.
 pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
     let Some(plan) = &entry.plan else {
-        let name = Bus::NAMES
-            .iter()
-            .find(|(_, bus)| *bus == entry.scenario.bus);
-        let bus = name.map_or("", |(name, _)| name);
         return Played {
-            outcome: Outcome::skipped(format!("the bench has no bus `{bus}` yet")),
+            outcome: Outcome::skipped(no_bus(entry)),
             traces: Vec::new(),
         };
     };
@@ -252,9 +239,7 @@ fn records(outcome: &Outcome) -> String {
 
 /// How many drives the rings of a scenario have: `3+1`.
 pub(super) fn drives(entry: &Entry) -> String {
-    let rings = entry.plan.iter().flat_map(|plan| &plan.rings);
-    let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
-    drives.join("+")
+    entry.drives()
 }
 
 pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {

@@ -33,6 +33,8 @@ pub(super) struct Job {
     pub(super) junit: Option<PathBuf>,
     /// Also settle what the manual leaves open, and name the deviations.
     pub(super) qualify: bool,
+    /// The key to sign the evidence with.
+    pub(super) sign: Option<PathBuf>,
 }
 
 /// Why work ends early.
@@ -165,7 +167,7 @@ fn all(
         run.repeat();
     }
     if let Some(path) = &job.evidence {
-        *folder = Some(Folder::create(path, &about(&mut run))?);
+        *folder = Some(Folder::create(path, &about(&mut run, job))?);
     }
     let bar = progress_bar(entries.len(), output.progress);
     let mut findings = Findings::default();
@@ -275,7 +277,7 @@ pub(super) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
 }
 
 /// What a record begins with.
-fn about<'r>(run: &'r mut Run<'_>) -> About<'r> {
+fn about<'r>(run: &'r mut Run<'_>, job: &'r Job) -> About<'r> {
     let exactness = run.exactness();
     let way = run.way();
     let byte_time = run.session().link().byte_time();
@@ -289,6 +291,8 @@ fn about<'r>(run: &'r mut Run<'_>) -> About<'r> {
         capabilities,
         anew: way.anew,
         own_rings: false,
+        purpose: job.purpose,
+        sign: job.sign.as_deref(),
         rig: run.session().rig(),
     }
 }

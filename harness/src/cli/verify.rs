@@ -1,13 +1,18 @@
 //! `drivebench verify`: every verdict of a folder of evidence, judged again.
 
+use super::args::VerifyArguments;
 use super::exit::Exit;
 use super::output::Output;
-use crate::evidence::verify as judge_again;
-use std::path::Path;
+use crate::evidence::{Signer, verify as judge_again};
 
 /// Judges a folder again.
-pub(super) fn verify(folder: &Path, output: &mut Output) -> std::io::Result<Exit> {
-    let verified = match judge_again(folder) {
+pub(super) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::io::Result<Exit> {
+    let signer = arguments
+        .allowed_signers
+        .as_deref()
+        .zip(arguments.identity.as_deref());
+    let signer = signer.map(|(allowed, identity)| Signer { allowed, identity });
+    let verified = match judge_again(&arguments.folder, signer) {
         Ok(verified) => verified,
         Err(error) => {
             output.complain(&error.to_string());
@@ -34,13 +39,19 @@ pub(super) fn verify(folder: &Path, output: &mut Output) -> std::io::Result<Exit
             ))?;
         }
     }
+    for what in &verified.unconfirmed {
+        output.result(&format!("unconfirmed  {what}\n"))?;
+    }
+    if let Some(signer) = signer.filter(|_| wrong == 0) {
+        output.result(&format!("signed by    {}\n", signer.identity))?;
+    }
     let count = verified.attempts.len();
     output.result(&format!(
         "{count} attempts judged again, {wrong} things wrong{}\n",
         if verified.complete {
             ""
         } else {
-            "; incomplete: the run did not come to its end"
+            "; incomplete: the run did not come to its end, or not all of it can be compared"
         }
     ))?;
     Ok(match (wrong, verified.complete) {

@@ -8,7 +8,7 @@ use super::files::{self, CAPTURES, SCENARIOS};
 use super::folder::EvidenceError;
 use super::junit::{Case, junit};
 use super::record::Line;
-use super::verify::{Opened, is_name, scenarios};
+use super::verify::{Judged, Opened, is_name, scenarios};
 use crate::capture::read;
 use crate::library::Entry;
 use crate::report::html::{Head, Played, Shown, run, section};
@@ -39,17 +39,27 @@ pub struct Derived {
 /// It is no folder of evidence, or its record or a capture is damaged; with the place.
 pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
     let opened = Opened::folder(path)?;
+    let judged = opened.judged(&scenarios(path))?;
+    derived(path, &opened, &judged)
+}
+
+/// Makes the reports of a folder whose attempts were played again.
+pub(super) fn derived(
+    path: &Path,
+    opened: &Opened,
+    judged: &[Judged],
+) -> Result<Derived, EvidenceError> {
     let mut attempts: BTreeMap<String, Attempt> = BTreeMap::new();
-    opened.judged(&scenarios(path), |recorded, judged| {
-        let (text, outcome) = judged.map_or((String::new(), None), |(t, a)| (t, Some(a.outcome)));
+    for own in judged {
+        let again = own.again.as_ref().ok();
         // The last attempt is shown.
         let attempt = Attempt {
-            number: recorded.attempt,
-            text,
-            outcome,
+            number: own.recorded.attempt,
+            text: again.map_or_else(String::new, |(text, _)| text.clone()),
+            outcome: again.map(|(_, again)| again.outcome.clone()),
         };
-        attempts.insert(recorded.name, attempt);
-    })?;
+        attempts.insert(own.recorded.name.clone(), attempt);
+    }
     let settled = opened.lines.iter().filter_map(Settled::of);
     let mut settled: Vec<_> = settled.collect();
     for (name, attempt) in &attempts {
@@ -70,7 +80,7 @@ pub fn derive(path: &Path) -> Result<Derived, EvidenceError> {
         shown.push(show(shown.len() + 1, case, attempt, &traces, opened.rate()));
     }
     Ok(Derived {
-        html: run(&head(&opened), shown),
+        html: run(&head(opened), shown),
         junit: xml(path, opened.rig.id(), &settled),
     })
 }
@@ -106,6 +116,7 @@ impl Settled {
             finding,
             remarks,
             took,
+            ..
         } = line
         else {
             return None;
@@ -142,6 +153,21 @@ impl Settled {
     pub(super) fn messages(&self) -> impl Iterator<Item = &String> {
         self.finding.iter().chain(&self.remarks)
     }
+}
+
+/// The verdicts for people, as plain text.
+pub(super) fn plain(rig: &str, settled: &[Settled]) -> String {
+    let mut text = format!("rig {rig}\n\n");
+    for case in settled {
+        text.push_str(&format!(
+            "{:12} {}: {}\n",
+            case.verdict, case.name, case.title
+        ));
+        for line in case.messages() {
+            text.push_str(&format!("             {line}\n"));
+        }
+    }
+    text
 }
 
 /// The verdicts as JUnit, each with the files that it left in a folder.

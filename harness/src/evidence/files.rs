@@ -11,6 +11,8 @@ use std::path::Path;
 
 /// The file of sums.
 pub(super) const SUMS: &str = "SHA256SUMS";
+/// The signature of the sums.
+pub(super) const SIGNATURE: &str = "SHA256SUMS.sig";
 /// The file of the record.
 pub(super) const RECORD: &str = "run.jsonl";
 /// The file of the rig.
@@ -58,6 +60,12 @@ pub(super) fn sums(path: &Path) -> Result<String, EvidenceError> {
         let _infallible = writeln!(lines, "{sum}  {file}");
     }
     Ok(lines)
+}
+
+/// The names of the regular files of a folder, in order.
+pub(super) fn names(path: &Path) -> Vec<String> {
+    let listing = Listing::of(path);
+    listing.map_or_else(|_| Vec::new(), |own| own.sums.into_keys().collect())
 }
 
 /// What is wrong with the files of a folder. Without sums, as of a run that did not end, only that one is no regular file.
@@ -138,7 +146,7 @@ impl Listing {
                 folder => format!("{folder}/{name}"),
             };
             // The sums are read, and the two folders looked at, elsewhere.
-            if [SUMS, SCENARIOS, CAPTURES].contains(&file.as_str()) {
+            if [SUMS, SIGNATURE, SCENARIOS, CAPTURES].contains(&file.as_str()) {
                 continue;
             }
             if !kind.is_file() {

@@ -1,10 +1,11 @@
 //! The folder of a run, written as the run goes on.
 
-use super::derive::{Settled, derive, xml};
+use super::derive::{Settled, derive, plain, xml};
 use super::files::{
     CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS, sum, sums,
 };
 use super::record::{Line, SCHEMA, Writer};
+use super::signature;
 use crate::link::{Capability, Event, SimulatedLink, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
@@ -12,8 +13,8 @@ use crate::scenario::run::Outcome;
 use crate::twin::Exactness;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use harness_sim::trace::Trace;
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -36,6 +37,9 @@ pub enum EvidenceError {
     /// The record is damaged.
     #[error("{RECORD}: {0}")]
     Record(#[from] super::read::RecordError),
+    /// It cannot be signed, or its signature cannot be checked.
+    #[error("failed to use a signature: {0}")]
+    Signature(String),
     /// It is no folder of a run.
     #[error("{0} is no folder of evidence: {1}")]
     Foreign(String, String),
@@ -56,6 +60,10 @@ pub struct About<'r> {
     pub anew: bool,
     /// Whether each scenario is played on simulated rings of its own, as its text describes them.
     pub own_rings: bool,
+    /// The command: `run` or `qualify`.
+    pub purpose: &'static str,
+    /// The key to sign the folder with, a file of `ssh-keygen`; `None` for no signature.
+    pub sign: Option<&'r Path>,
 }
 
 impl<'r> About<'r> {
@@ -74,6 +82,8 @@ impl<'r> About<'r> {
             capabilities: SimulatedLink::CAPABILITIES.to_vec(),
             anew: false,
             own_rings: true,
+            purpose: "run",
+            sign: None,
         }
     }
 }
@@ -86,7 +96,10 @@ pub struct Folder {
     names: BTreeSet<String>,
     cases: Vec<Settled>,
     rig: String,
-    report: String,
+    /// The sum of the text of the last scenario.
+    text: Option<String>,
+    /// The key to sign it with.
+    sign: Option<PathBuf>,
 }
 
 impl Folder {
@@ -95,6 +108,7 @@ impl Folder {
     /// # Errors
     /// [`EvidenceError`].
     pub fn create(path: &Path, about: &About<'_>) -> Result<Self, EvidenceError> {
+        about.sign.map_or(Ok(()), signature::ready)?;
         let failed = |error| EvidenceError::File {
             path: path.display().to_string(),
             error,
@@ -113,7 +127,8 @@ impl Folder {
             names: BTreeSet::new(),
             cases: Vec::new(),
             rig: about.rig.id().to_owned(),
-            report: String::new(),
+            text: None,
+            sign: about.sign.map(Path::to_owned),
         };
         folder.write(RIG, &about.rig.text)?;
         // The profile that it names goes into the folder too, so that it stands for itself.
@@ -136,6 +151,7 @@ impl Folder {
             capabilities: names.collect(),
             anew: about.anew,
             own_rings: about.own_rings,
+            purpose: Some(about.purpose.to_owned()),
         });
         folder.check()?;
         Ok(folder)
@@ -149,33 +165,22 @@ impl Folder {
 
     /// Keeps the attempts at a scenario of this name and text.
     pub fn keep<'f>(&'f mut self, name: &str, text: &'f str) -> Kept<'f> {
+        let name = self.unique(name);
+        let file = format!("{SCENARIOS}/{name}.scn");
+        self.text = Some(sum(text.as_bytes()));
         Kept {
-            name: self.unique(name),
+            error: self.write(&file, text).err(),
+            name,
             text,
             folder: self,
-            error: None,
         }
     }
 
     /// Counts a scenario, all its attempts done.
     pub fn done(&mut self, name: &str, drives: &str, title: &str, outcome: &Outcome) {
-        let case = Line::Case {
-            name: name.to_owned(),
-            title: title.to_owned(),
-            drives: drives.to_owned(),
-            verdict: outcome.verdict.name().to_owned(),
-            finding: outcome.finding.as_ref().map(|found| found.message.clone()),
-            remarks: outcome.remarks.clone(),
-            took: outcome.took.units(),
-        };
+        let case = Line::of_case(name, (title, drives), self.text.clone(), outcome);
         self.writer.line(&case);
-        let settled = Settled::of(&case);
-        // Writing to a String cannot fail.
-        let _infallible = writeln!(self.report, "{:12} {name}: {title}", outcome.verdict);
-        for line in settled.iter().flat_map(Settled::messages) {
-            let _infallible = writeln!(self.report, "             {line}");
-        }
-        self.cases.extend(settled);
+        self.cases.extend(Settled::of(&case));
     }
 
     /// Adds a file of the run's own: a profile, findings.
@@ -196,12 +201,14 @@ impl Folder {
         self.writer.line(&Line::End { verdicts, safe });
         self.check()?;
         self.write(JUNIT, &xml(&self.path, &self.rig, &self.cases))?;
-        let report = format!("rig {}\n\n{}", self.rig, self.report);
-        self.write(REPORT, &report)?;
+        self.write(REPORT, &plain(&self.rig, &self.cases))?;
         // A page that cannot be made is no reason to leave a folder without its sums.
         let page = derive(&self.path).and_then(|derived| self.write(PAGE, &derived.html));
         let sums = sums(&self.path)?;
         self.write(SUMS, &sums)?;
+        if let Some(key) = &self.sign {
+            signature::sign(&self.path, key)?;
+        }
         page.map(|()| self.path)
     }
 
@@ -284,44 +291,32 @@ impl Sink for Kept<'_> {
 
 impl Keeper for Kept<'_> {
     fn begins(&mut self, attempt: usize) {
-        if attempt == 1 {
-            let file = format!("{SCENARIOS}/{}.scn", self.name);
-            let written = self.folder.write(&file, self.text);
-            self.note(written);
-        }
-        self.folder.writer.line(&Line::Scenario {
-            name: self.name.clone(),
-            sha256: sum(self.text.as_bytes()),
-            attempt,
-        });
+        let line = Line::of_scenario(&self.name, self.text, attempt);
+        self.folder.writer.line(&line);
     }
 
     fn ends(&mut self, number: usize, attempt: &Attempt) {
-        let outcome = &attempt.outcome;
-        self.folder.writer.line(&Line::Verdict {
-            verdict: outcome.verdict.name().to_owned(),
-            finding: outcome.finding.as_ref().map(|found| found.message.clone()),
-            remarks: outcome.remarks.clone(),
-            took: outcome.took.units(),
-            unplaced: attempt.unplaced,
-        });
+        self.folder.writer.line(&Line::of_verdict(attempt));
         let file = format!("{CAPTURES}/{}.{number}.json", self.name);
-        let mut capture = Vec::new();
-        let written = json::write(&attempt.traces, &outcome.records, &mut capture)
-            .map_err(|error| EvidenceError::File {
-                path: file.clone(),
-                error,
-            })
-            .and_then(|()| self.folder.write(&file, &String::from_utf8_lossy(&capture)));
+        let capture = capture(&attempt.traces, &attempt.outcome);
+        let written = self.folder.write(&file, &capture);
         self.note(written);
     }
+}
+
+/// What the links carried and what was recorded, as a text.
+pub(super) fn capture(traces: &[Trace], outcome: &Outcome) -> String {
+    let mut capture = Vec::new();
+    // Writing to a Vec cannot fail.
+    let _infallible = json::write(traces, &outcome.records, &mut capture);
+    String::from_utf8_lossy(&capture).into_owned()
 }
 
 fn versions(started: &str) -> String {
     let read = |path| fs::read_to_string(path).unwrap_or_default();
     let kernel = read("/proc/sys/kernel/osrelease");
     let value = serde_json::json!({
-        "schema": SCHEMA,
+        "schema": 1,
         "drivebench": env!("CARGO_PKG_VERSION"),
         "os": std::env::consts::OS,
         "architecture": std::env::consts::ARCH,

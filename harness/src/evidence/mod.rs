@@ -11,22 +11,31 @@
 //! | `report.html` | all of it as a page with pictures; `drivebench report` makes it again |
 //! | `versions.json` | program, system and date |
 //! | `SHA256SUMS` | the sums of all of them, written last: where it is missing, the run did not end |
+//! | `SHA256SUMS.sig` | a signature of the sums, where `--sign` asked for one |
 //!
 //! `drivebench schema record` prints the JSON schema of a line of the record.
 
+mod attempt;
+mod cases;
 mod derive;
 mod files;
 mod folder;
 pub mod fuzz;
+mod header;
 mod junit;
 mod read;
 mod record;
+mod reports;
+mod rerun;
+mod signature;
 mod verify;
 
+pub use cases::{no_bus, too_large};
 pub use derive::{Derived, derive};
 pub use files::{PAGE, RIG};
 pub use folder::{About, EvidenceError, Folder, Kept};
 pub use junit::{Case, junit};
 pub use read::{MAX_SIZE, MAX_TIME, RecordError, read};
 pub use record::{Line, Writer, schema};
+pub use signature::Signer;
 pub use verify::{Beside, Finding, Verified, judge_record, verify};

@@ -153,9 +153,9 @@ impl Order {
     }
 
     fn run(&mut self, schema: u32, rings: &[u8]) -> Result<(), String> {
-        if schema != SCHEMA {
+        if !(1..=SCHEMA).contains(&schema) {
             return Err(format!(
-                "a record of schema {schema}; this program knows {SCHEMA}"
+                "a record of schema {schema}; this program knows 1 to {SCHEMA}"
             ));
         }
         if !(1..=2).contains(&rings.len()) {

@@ -1,6 +1,9 @@
 //! The lines of a record, and events written as such.
 
+use super::files::sum;
 use crate::link::{Capability, Event, Lead, LinkFault, Look, Moment, PlacedFault, Sink, Trouble};
+use crate::rig::Attempt;
+use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
@@ -11,7 +14,7 @@ use std::fs::File;
 use std::io::Write;
 
 /// The version of the form.
-pub(super) const SCHEMA: u32 = 1;
+pub(super) const SCHEMA: u32 = 2;
 
 /// A line of a record. Times are in thirds of a nanosecond since the conversation began (a bit at 38400 bit/s is
 /// 78125 of them); bytes are hexadecimal; rings are counted from 1.
@@ -20,8 +23,8 @@ pub(super) const SCHEMA: u32 = 1;
 pub enum Line {
     /// The first line.
     Run {
-        /// The version of the form: 1.
-        #[schemars(extend("const" = 1))]
+        /// The version of the form: 2. Records of schema 1 have no looks, no purpose, and no sums of skipped scenarios.
+        #[schemars(extend("enum" = [1, 2]))]
         schema: u32,
         /// The program's version.
         drivebench: String,
@@ -49,6 +52,10 @@ pub enum Line {
         /// Whether each scenario was played on simulated rings of its own, as its text describes them.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         own_rings: bool,
+        /// The command: `run` or `qualify`. It decides how often a scenario is played, and which are rehearsed.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("enum" = ["run", "qualify", null]))]
+        purpose: Option<String>,
     },
     /// An attempt at a scenario begins.
     Scenario {
@@ -168,6 +175,9 @@ pub enum Line {
         /// Line errors that the transport told of without their bytes.
         #[serde(default)]
         unplaced: u64,
+        /// How the bytes received before the drives were reset compare with a ring at rest; none where they are judged with the rest.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        opening: Option<String>,
     },
     /// What came of a scenario, all its attempts together.
     Case {
@@ -187,6 +197,10 @@ pub enum Line {
         remarks: Vec<String>,
         /// How long it took.
         took: u64,
+        /// The sum of its text.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
+        sha256: Option<String>,
     },
     /// The last line: what came of all scenarios.
     End {
@@ -473,6 +487,50 @@ impl Line {
             | Self::Case { .. }
             | Self::End { .. } => return None,
         })
+    }
+}
+
+/// Lines of the evidence of a scenario.
+impl Line {
+    /// An attempt at a scenario of this text begins.
+    pub(super) fn of_scenario(name: &str, text: &str, attempt: usize) -> Self {
+        Self::Scenario {
+            name: name.to_owned(),
+            sha256: sum(text.as_bytes()),
+            attempt,
+        }
+    }
+
+    /// What came of an attempt.
+    pub(super) fn of_verdict(attempt: &Attempt) -> Self {
+        let outcome = &attempt.outcome;
+        Self::Verdict {
+            verdict: outcome.verdict.name().to_owned(),
+            finding: outcome.finding.as_ref().map(|found| found.message.clone()),
+            remarks: outcome.remarks.clone(),
+            took: outcome.took.units(),
+            unplaced: attempt.unplaced,
+            opening: attempt.opening.clone(),
+        }
+    }
+
+    /// What came of a scenario with this title on rings of so many drives.
+    pub(super) fn of_case(
+        name: &str,
+        (title, drives): (&str, &str),
+        sha256: Option<String>,
+        outcome: &Outcome,
+    ) -> Self {
+        Self::Case {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            drives: drives.to_owned(),
+            verdict: outcome.verdict.name().to_owned(),
+            finding: outcome.finding.as_ref().map(|found| found.message.clone()),
+            remarks: outcome.remarks.clone(),
+            took: outcome.took.units(),
+            sha256,
+        }
     }
 }
 

@@ -57,6 +57,15 @@ pub(super) struct Opened {
     pub(super) locks: Vec<PortLock>,
 }
 
+/// The rate of a rig's line.
+pub(crate) fn line_rate(rig: &Rig) -> Rate {
+    let simulated = rig.is_simulated().then(|| rig.plan().ok()).flatten();
+    simulated.map_or_else(
+        || Rate::from(rig.file.ring.first.endpoint.line),
+        |plan| plan.rate,
+    )
+}
+
 /// Opens a rig's ends; nothing is sent.
 pub(super) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
     if rig.is_simulated() {

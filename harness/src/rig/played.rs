@@ -31,6 +31,8 @@ pub struct Attempt {
     pub driven: Option<Driven>,
     /// Whether that is what the master of the manual does.
     pub master_is_right: bool,
+    /// How the bytes received before the drives were reset compare with a ring at rest; `None` where they are judged with the rest.
+    pub opening: Option<String>,
 }
 
 impl Attempt {
@@ -45,6 +47,7 @@ impl Attempt {
             unplaced: 0,
             driven: None,
             master_is_right: true,
+            opening: None,
         }
     }
 
@@ -82,7 +85,7 @@ pub struct Played {
 }
 
 impl Played {
-    pub(super) fn skipped(why: String) -> Self {
+    pub(crate) fn skipped(why: String) -> Self {
         Self {
             outcome: Outcome::skipped(why),
             attempts: Vec::new(),
@@ -91,7 +94,7 @@ impl Played {
 
     /// The last attempt that was played speaks for all; one whose bytes are right is flaky where another one failed. Where none was
     /// played and each time another drive gave no answer, it may have been the computer.
-    pub(super) fn of(attempts: Vec<Attempt>) -> Self {
+    pub(crate) fn of(attempts: Vec<Attempt>) -> Self {
         let mut played = Self {
             outcome: Outcome::skipped("it was not played".to_owned()),
             attempts,
@@ -172,7 +175,7 @@ fn unanswered_each_time(attempts: &[Attempt]) -> Option<&str> {
 
 /// When a scenario is played once more.
 #[derive(Clone, Debug)]
-pub(super) struct Again {
+pub(crate) struct Again {
     /// How often drives are made ready where one gives no answer.
     unready: usize,
     /// Which drives gave no answer at every attempt at a scenario: it is the drive, then, and not the computer.
@@ -181,7 +184,7 @@ pub(super) struct Again {
 
 impl Again {
     /// On a rig whose time is real; where it is virtual, no computer is busy, and drives that are not ready never will be.
-    pub(super) fn new(real_time: bool) -> Self {
+    pub(crate) fn new(real_time: bool) -> Self {
         Self {
             unready: if real_time { MOST_UNREADY } else { 1 },
             hopeless: BTreeSet::new(),
@@ -189,7 +192,7 @@ impl Again {
     }
 
     /// Whether there is another attempt behind these; `most` is how often the rig's file has one that does not pass.
-    pub(super) fn after(&mut self, attempts: &[Attempt], most: usize) -> bool {
+    pub(crate) fn after(&mut self, attempts: &[Attempt], most: usize) -> bool {
         let Some(last) = attempts.last() else {
             return true;
         };
@@ -231,6 +234,7 @@ mod tests {
         Attempt {
             driven: None,
             master_is_right: true,
+            opening: None,
             outcome: Outcome {
                 verdict,
                 unready: match remark {

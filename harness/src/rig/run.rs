@@ -121,21 +121,13 @@ impl<'s> Run<'s> {
         mut keeper: Option<&mut dyn Keeper>,
     ) -> Result<Played, SessionError> {
         let mut forgotten: Vec<Event> = Vec::new();
-        let rings = plan.rings == self.session.rings();
+        let way = self.way();
         let recording = Recording::new(self.session.link(), &mut forgotten);
-        if let Some(lacks) = lacks(plan, &recording) {
-            return Ok(Played::skipped(lacks));
-        }
-        if !rings {
-            let sizes =
-                |rings: &[RingSize]| -> Vec<u8> { rings.iter().map(|r| r.drives()).collect() };
-            let why = other_size(&sizes(&plan.rings), &sizes(self.session.rings()));
-            return Ok(Played::skipped(why));
-        }
-        if self.rehearses
-            && let Some(why) = self.denied(plan)
-        {
-            let why = format!("the rig's [limits] do not let it be played to its end: {why}");
+        let why = not_played(plan, &recording, &way.rings).or_else(|| {
+            let why = self.rehearses.then(|| self.denied(plan))??;
+            Some(format!("{DENIED}{why}"))
+        });
+        if let Some(why) = why {
             return Ok(Played::skipped(why));
         }
         let mut attempts = Vec::new();
@@ -199,6 +191,7 @@ impl<'s> Run<'s> {
         let ports = self.session.link().inner_mut().ports_mut();
         let unplaced = ports.map_or(0, crate::link::StreamLink::take_unplaced);
         let all = Conversation::all(&both.events, self.byte_time, simulated);
+        let opening = opening(self.session.rig(), &way, &all, self.exactness);
         let (conversations, fresh) = way.compared(all, self.exactness);
         if fresh && let Ok(twin) = twin(self.session.rig(), &known(self.session.rig())) {
             self.twin = twin;
@@ -227,6 +220,7 @@ impl<'s> Run<'s> {
             comparisons,
             traces,
             unplaced,
+            opening,
         })
     }
 
@@ -308,14 +302,56 @@ impl Way {
         mut all: Vec<Conversation>,
         exactness: Exactness,
     ) -> (Vec<Conversation>, bool) {
+        let before = self.before_the_reset(&all, exactness);
+        all.drain(..before);
+        (all, self.anew && exactness.tolerance > Span::ZERO)
+    }
+
+    /// How many conversations come before the reset of the drives: what was before the first one, and the health check. None where these are
+    /// compared too.
+    fn before_the_reset(&self, all: &[Conversation], exactness: Exactness) -> usize {
         let fresh = self.anew && exactness.tolerance > Span::ZERO;
-        // What was before the first one, and the health check.
         let before = if self.attempts.is_some() { 3 } else { 1 };
         if fresh && all.len() > before {
-            all.drain(..before);
+            before
+        } else {
+            0
         }
-        (all, fresh)
     }
+}
+
+/// How the bytes received before the reset of the drives compare with those of a ring at rest; `None` where these are judged with the
+/// rest. No verdict depends on it: it makes the record of an attempt complete.
+pub(crate) fn opening(
+    rig: &Rig,
+    way: &Way,
+    all: &[Conversation],
+    exactness: Exactness,
+) -> Option<String> {
+    let before = &all[..way.before_the_reset(all, exactness)];
+    if before.is_empty() {
+        return None;
+    }
+    let mut twin = twin(rig, &known(rig)).ok()?;
+    let follow = |conversation| twin.follow(conversation, exactness).divergence;
+    let divergence = before.iter().find_map(follow);
+    let received: usize = before.iter().map(|own| own.received.len()).sum();
+    Some(match divergence {
+        None => format!("{received} bytes as of a ring at rest"),
+        Some(divergence) => format!("{received} bytes; {divergence}"),
+    })
+}
+
+/// What is said of a scenario that the rig's limits do not let be played to its end; why stands behind it.
+pub(crate) const DENIED: &str = "the rig's [limits] do not let it be played to its end: ";
+
+/// Why a scenario is not played on rings of these sizes; `None` where it is, unless the rig's limits deny it.
+pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<String> {
+    let sizes = |rings: &[RingSize]| -> Vec<u8> { rings.iter().map(|r| r.drives()).collect() };
+    lacks(plan, link).or_else(|| {
+        let differs = plan.rings != rings;
+        differs.then(|| other_size(&sizes(&plan.rings), &sizes(rings)))
+    })
 }
 
 /// Plays a scenario once on any link, with what comes before it.

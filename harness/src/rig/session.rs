@@ -671,7 +671,7 @@ fn standing(wanted: &file::SafeState) -> Standing {
 }
 
 /// What a rig's file and the command line allow together.
-fn limits(rig: &Rig, allow_motion: bool) -> Limits {
+pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
     let own = &rig.file.limits;
     let motion = own.allow_motion && (allow_motion || rig.is_simulated());
     let speeds = rig.file.drive.iter().filter_map(|drive| drive.max_speed);

@@ -1,5 +1,6 @@
 //! Folders of evidence: untouched ones verify, changed ones do not.
 
+mod edits;
 #[path = "../served/ring.rs"]
 mod ring;
 mod served;

@@ -1,0 +1,402 @@
+//! An attempt at a scenario, played again from its record and judged again.
+
+use super::folder::capture;
+use super::header::Header;
+use super::record::Line;
+use crate::library::Entry;
+use crate::link::{
+    Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, link_name,
+};
+use crate::rig::judge::{Heard, judge};
+use crate::rig::run::{known, opening, twin};
+use crate::rig::{Driven, Rig, SessionError, play_one};
+use crate::scenario::plan::Plan;
+use crate::scenario::run::{AtFinding, Outcome, play};
+use crate::scenario::simulate::simulated;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use crate::twin::{Conversation, Twin};
+use harness_proto::time::Span;
+
+/// How much longer a busy computer may have waited in one attempt; for records without looks.
+const WAITED: Span = Span::from_millis(1_000);
+
+/// What a remark begins with about a fault that was asked for and never happened.
+pub(super) const UNUSED: &str = "this fault never happened: ";
+
+/// An attempt as it stands in a record.
+#[derive(Clone)]
+pub(super) struct Recorded {
+    pub(super) name: String,
+    pub(super) sha256: String,
+    pub(super) attempt: usize,
+    pub(super) events: Vec<Event>,
+    pub(super) verdict: Option<Recalled>,
+}
+
+/// The verdict of a record.
+#[derive(Clone)]
+pub(super) struct Recalled {
+    pub(super) verdict: String,
+    pub(super) finding: Option<String>,
+    pub(super) remarks: Vec<String>,
+    pub(super) took: Span,
+    pub(super) unplaced: u64,
+    pub(super) opening: Option<String>,
+}
+
+impl Recalled {
+    /// Its remarks about faults that never happened.
+    pub(super) fn unused(&self) -> impl Iterator<Item = &String> {
+        let remarks = self.remarks.iter();
+        remarks.filter(|remark| remark.starts_with(UNUSED))
+    }
+}
+
+/// What came of an attempt that was played again.
+pub(super) struct Again {
+    pub(super) outcome: Outcome,
+    /// The twin found something.
+    pub(super) stale: bool,
+    /// What the record holds behind the end of the attempt.
+    left: Option<String>,
+    /// Where the record differs from what simulated rings of its own do.
+    other: Option<String>,
+    /// What its links carried, as a capture, where that is known.
+    pub(super) capture: Option<String>,
+    /// Whether the outcome must be the same to the last remark and moment.
+    exact: bool,
+    /// How what came before the drives were reset compares with a ring at rest.
+    opening: Option<String>,
+    /// Whether the record ends in trouble.
+    pub(super) trouble: bool,
+    ended: Ended,
+}
+
+/// Plays an attempt again from its record.
+pub(super) fn again(
+    recorded: &Recorded,
+    text: &str,
+    header: &Header,
+    rig: &Rig,
+    twin: &mut Twin,
+) -> Again {
+    let source = Source {
+        name: recorded.name.clone(),
+        text: text.to_owned().into(),
+    };
+    let size = header.rings.first().map(|ring| ring.drives());
+    let entry = Entry::fitting(source, size).map_err(|problems| problems.to_string());
+    let plan = entry.and_then(|entry| entry.plan.ok_or("no scenario of this bus".to_owned()));
+    let mut plan = match plan {
+        Ok(plan) if plan.rings == header.rings => plan,
+        Ok(_) => return Again::impossible("it is for other rings than the rig has".to_owned()),
+        Err(why) => return Again::impossible(why),
+    };
+    if header.own_rings {
+        return simulated_again(recorded, &plan);
+    }
+    let own = rig.plan().ok().and_then(|rig| rig.master);
+    plan.master = own.or(plan.master);
+    let mut replay = Replay::new(
+        recorded.events.clone(),
+        header.rate,
+        header.exactness.tolerance,
+        header.drives.clone(),
+        header.capabilities.clone(),
+    )
+    .reaching(reached(rig, header));
+    let exact = replay.is_exact();
+    let mut outcome = match play_one(&mut replay, &plan, &header.way) {
+        Ok(outcome) => outcome,
+        Err((ring, ill)) => {
+            let rig = rig.id().to_owned();
+            let ring = ring + 1;
+            Outcome::rig_error(
+                SessionError::Ill {
+                    rig,
+                    ring,
+                    ill,
+                    cause: None,
+                }
+                .to_string(),
+            )
+        }
+    };
+    let all = Conversation::all(&recorded.events, header.rate.byte_time(), header.simulated);
+    let opening = opening(rig, &header.way, &all, header.exactness);
+    let (conversations, anew) = header.way.compared(all, header.exactness);
+    if anew && let Ok(fresh) = self::twin(rig, &known(rig)) {
+        *twin = fresh;
+    }
+    let (comparisons, stale) = twin.follow_all(&conversations, header.exactness);
+    let unplaced = recorded
+        .verdict
+        .as_ref()
+        .map_or(0, |recalled| recalled.unplaced);
+    let capabilities = (header.exactness.tolerance, header.capabilities.as_slice());
+    let driven = Driven::new(&plan, &recorded.events, &header.way, capabilities, &outcome);
+    if let Some(driven) = driven.filter(|_| header.simulated) {
+        driven.judge(&mut outcome);
+    }
+    let heard = Heard {
+        rig,
+        plan: &plan,
+        way: &header.way,
+        exactness: header.exactness,
+        conversations: &conversations,
+        comparisons: &comparisons,
+        unplaced,
+    };
+    judge(&mut outcome, &heard);
+    Again {
+        outcome,
+        stale,
+        left: replay.left(),
+        other: None,
+        capture: None,
+        exact,
+        opening,
+        trouble: replay.trouble().is_some(),
+        ended: Ended::of(&recorded.events),
+    }
+}
+
+/// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.
+fn simulated_again(recorded: &Recorded, plan: &Plan) -> Again {
+    let mut link = simulated(plan);
+    let mut events: Vec<Event> = Vec::new();
+    let mut recording = Recording::whole(&mut link, &mut events);
+    let outcome = play(plan, &mut recording, AtFinding::Stop);
+    let written = |events: &[Event]| -> Vec<Line> { events.iter().filter_map(Line::of).collect() };
+    let (theirs, own) = (written(&recorded.events), written(&events));
+    let differs = (0..theirs.len().max(own.len())).find(|at| theirs.get(*at) != own.get(*at));
+    let show = |line: Option<&Line>| match line.map(serde_json::to_string) {
+        Some(Ok(text)) => text,
+        _ => "nothing more".to_owned(),
+    };
+    let traces: Vec<_> = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+    Again {
+        capture: Some(capture(&traces, &outcome)),
+        exact: true,
+        opening: None,
+        trouble: false,
+        outcome,
+        stale: false,
+        left: None,
+        other: differs.map(|at| {
+            format!(
+                "event {}: the record has {}, the simulated rings give {}",
+                at + 1,
+                show(theirs.get(at)),
+                show(own.get(at))
+            )
+        }),
+        ended: Ended::of(&recorded.events),
+    }
+}
+
+impl Again {
+    /// Nothing could be played.
+    fn impossible(why: String) -> Self {
+        Self {
+            outcome: Outcome::rig_error(why),
+            stale: false,
+            left: None,
+            other: None,
+            capture: None,
+            exact: false,
+            opening: None,
+            trouble: false,
+            ended: Ended::of(&[]),
+        }
+    }
+}
+
+/// The inner links at which the bench can put faults; those at its own ends need none.
+pub(super) fn reached(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
+    let rings = (0..).zip(&header.drives);
+    let all = rings.flat_map(|(ring, drives)| (0..=usize::from(*drives)).map(move |k| (ring, k)));
+    let interposed = |(ring, link): &(usize, usize)| {
+        rig.file.interposer.iter().any(|own| {
+            let drives = header.drives.get(*ring).copied().unwrap_or(0);
+            let place = own.link.from.map_or(0, |from| drives.saturating_sub(from));
+            usize::from(own.ring) == ring + 1 && usize::from(place) == *link
+        })
+    };
+    let end = |(ring, link): &(usize, usize)| {
+        *link == 0
+            || header
+                .drives
+                .get(*ring)
+                .is_some_and(|last| usize::from(*last) == *link)
+    };
+    all.filter(|place| header.simulated || end(place) || interposed(place))
+        .collect()
+}
+
+impl Recorded {
+    /// Its name, with the number of the attempt where there are several.
+    pub(super) fn title(&self) -> String {
+        match self.attempt {
+            0 | 1 => self.name.clone(),
+            number => format!("{}, attempt {number}", self.name),
+        }
+    }
+
+    /// What the record says of the attempt and its bytes do not bear out.
+    pub(super) fn differs(&self, again: &Again, header: &Header) -> Option<String> {
+        let own = self.verdict.as_ref()?;
+        own.verdict_differs(again)
+            .or_else(|| self.unplaced_or_unused(own, header))
+            .or_else(|| own.remarks_differ(again))
+            .or_else(|| own.rest_differs(again, header))
+    }
+
+    /// Line errors and unused faults that cannot have been.
+    fn unplaced_or_unused(&self, own: &Recalled, header: &Header) -> Option<String> {
+        if header.simulated && own.unplaced > 0 {
+            return Some("a simulated ring places every line error".to_owned());
+        }
+        let asked_for = self.events.iter().filter_map(|event| match event {
+            Event::Fault(ring, _, PlacedFault::Link(link, fault), Moment::Byte(byte)) => {
+                let drives = header.drives.get(*ring).copied().unwrap_or(0);
+                let place = link_name(*ring, drives, *link);
+                Some(format!("{UNUSED}{place} byte {byte}: {fault}"))
+            }
+            _ => None,
+        });
+        let asked_for: Vec<String> = asked_for.collect();
+        let mut unused = own.unused().filter(|_| !header.simulated);
+        let invented = unused.find(|remark| !asked_for.contains(remark))?;
+        Some(format!(
+            "the record says \"{invented}\", but no such fault was asked for"
+        ))
+    }
+}
+
+impl Recalled {
+    fn verdict_differs(&self, again: &Again) -> Option<String> {
+        if let Some(other) = &again.other {
+            return Some(other.clone());
+        }
+        let outcome = &again.outcome;
+        let judged = outcome.verdict.name();
+        let found = outcome.finding.as_ref().map(|found| found.message.clone());
+        if self.verdict != judged {
+            let why = found.or_else(|| outcome.remarks.first().cloned());
+            let why = why.map_or_else(String::new, |why| format!(": {why}"));
+            let verdict = &self.verdict;
+            return Some(format!(
+                "the record says {verdict}, its bytes say {judged}{why}"
+            ));
+        }
+        (self.finding != found).then(|| {
+            format!(
+                "the record says \"{}\", its bytes say \"{}\"",
+                self.finding.as_deref().unwrap_or("nothing"),
+                found.as_deref().unwrap_or("nothing")
+            )
+        })
+    }
+
+    /// Remarks and what came before the reset. Which faults never happened is not in the bytes that the master received.
+    fn remarks_differ(&self, again: &Again) -> Option<String> {
+        let settled = |remarks: &[String]| -> Vec<String> {
+            let remarks = remarks.iter();
+            let kept = remarks.filter(|own| again.capture.is_some() || !own.starts_with(UNUSED));
+            kept.cloned().collect()
+        };
+        let (stated, own) = (settled(&self.remarks), settled(&again.outcome.remarks));
+        if stated != own {
+            return Some(format!(
+                "the record remarks \"{}\", its bytes give \"{}\"",
+                stated.join("; "),
+                own.join("; ")
+            ));
+        }
+        let differs = again.exact && self.opening != again.opening;
+        differs.then(|| {
+            format!(
+                "the record says of what came before the reset \"{}\", its bytes say \"{}\"",
+                self.opening.as_deref().unwrap_or("nothing"),
+                again.opening.as_deref().unwrap_or("nothing")
+            )
+        })
+    }
+
+    /// What is left over, and the time.
+    fn rest_differs(&self, again: &Again, header: &Header) -> Option<String> {
+        let outcome = &again.outcome;
+        // Without looks, an attempt that was given up may have been so at any byte, and shows nothing.
+        let given_up = outcome.unready.is_some()
+            || matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError);
+        if given_up && !again.exact {
+            return None;
+        }
+        if let Some(left) = &again.left {
+            return Some(format!(
+                "the record goes on where the scenario ends: {left} was not asked for"
+            ));
+        }
+        let (least, most) = match again.exact {
+            true => (outcome.took, outcome.took),
+            false => header.could_take(outcome.took, &again.ended),
+        };
+        let possible = (least..=most).contains(&self.took);
+        (!possible).then(|| {
+            format!(
+                "the record says that it took {}, its bytes say {least} to {most}",
+                self.took
+            )
+        })
+    }
+}
+
+impl Header {
+    /// What an attempt can have taken. What was sent comes round behind its end, and where nobody fetches it the record does not
+    /// say when; where time is real, a wait ends a little later than it was to.
+    fn could_take(&self, took: Span, ended: &Ended) -> (Span, Span) {
+        let real = match self.exactness.tolerance {
+            Span::ZERO => Span::ZERO,
+            tolerance => tolerance + WAITED,
+        };
+        let drives = self.drives.iter().max().copied().unwrap_or(0);
+        let round = self.rate.byte_time() * (u64::from(drives) + 2);
+        let most = took.max(ended.at) + round + ended.held + real;
+        (took.saturating_sub(real), most)
+    }
+}
+
+/// How the last conversation of an attempt ended, as far as its record says.
+struct Ended {
+    /// The time of its last event.
+    at: Span,
+    /// How long faults may have held bytes up.
+    held: Span,
+}
+
+impl Ended {
+    fn of(events: &[Event]) -> Self {
+        let begin = |event: &Event| matches!(event, Event::Begin(_));
+        let last = events.iter().rposition(begin).unwrap_or(0);
+        let mut ended = Self {
+            at: Span::ZERO,
+            held: Span::ZERO,
+        };
+        for event in events.iter().skip(last + 1) {
+            let at = match event {
+                Event::Sent(_, at, _) | Event::Received(_, at, _) | Event::Probe(_, at, ..) => *at,
+                Event::Fault(_, at, PlacedFault::Link(_, what), _) => {
+                    if let LinkFault::Delay(span) | LinkFault::Break(span) = what {
+                        ended.held = ended.held + *span;
+                    }
+                    *at
+                }
+                _ => continue,
+            };
+            ended.at = ended.at.max(at.since_start());
+        }
+        ended
+    }
+}

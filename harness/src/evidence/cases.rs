@@ -1,0 +1,250 @@
+//! What came of each scenario, settled again from its attempts, and whether a scenario was skipped for a reason.
+
+use super::files::{SCENARIOS, sum};
+use super::record::Line;
+use super::verify::{Judged, Opened};
+use crate::library::Entry;
+use crate::link::Replay;
+use crate::rig::run::{DENIED, not_played};
+use crate::rig::{Again as Retries, Attempt, Played, Rig, other_size};
+use crate::scenario::run::Outcome;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Bus;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+
+/// Gives the text of a scenario by its name, or why there is none.
+type Texts<'t> = &'t dyn Fn(&str) -> Result<String, String>;
+
+/// What of the lines `case` and `end` does not follow from the attempts.
+pub(super) fn differences(opened: &Opened, judged: &[Judged], texts: Texts<'_>) -> Vec<String> {
+    let real = opened.header.exactness.tolerance > Span::ZERO;
+    let mut settling = Settling {
+        opened,
+        texts,
+        retries: Retries::new(real),
+        wrong: Vec::new(),
+        verdicts: Vec::new(),
+    };
+    let mut left = judged;
+    let mut pending = 0;
+    for line in &opened.lines {
+        match line {
+            Line::Scenario { .. } => pending += 1,
+            Line::Case { .. } => {
+                let (own, rest) = left.split_at(pending.min(left.len()));
+                settling.case(line, own);
+                (left, pending) = (rest, 0);
+            }
+            Line::End { verdicts, safe } => settling.end(verdicts, *safe, &left[..pending]),
+            _ => {}
+        }
+    }
+    settling.wrong
+}
+
+struct Settling<'s> {
+    opened: &'s Opened,
+    texts: Texts<'s>,
+    retries: Retries,
+    wrong: Vec<String>,
+    verdicts: Vec<String>,
+}
+
+impl Settling<'_> {
+    fn case(&mut self, line: &Line, attempts: &[Judged]) {
+        let Line::Case {
+            name,
+            title,
+            drives,
+            verdict,
+            finding,
+            remarks,
+            took,
+            sha256,
+        } = line
+        else {
+            return;
+        };
+        self.verdicts.push(verdict.clone());
+        let text = match (self.texts)(name) {
+            Ok(text) => text,
+            Err(_) if self.opened.header.schema < 2 && attempts.is_empty() => return,
+            Err(why) => return self.wrong.push(format!("case {name}: {why}")),
+        };
+        let mut must = |what: &str, stated: &str, expected: &str| {
+            if stated != expected {
+                self.wrong.push(format!(
+                    "case {name}: the record has the {what} \"{stated}\", its attempts give \"{expected}\""
+                ));
+            }
+        };
+        if self.opened.header.schema > 1 {
+            let stated = sha256.as_deref().unwrap_or("none");
+            must("sum of its text", stated, &sum(text.as_bytes()));
+        }
+        let entry = match self.opened.entry(name, &text) {
+            Ok(entry) => entry,
+            Err(why) => return self.wrong.push(format!("{SCENARIOS}/{name}.scn: {why}")),
+        };
+        must("title", title, &entry.scenario.title);
+        must("drives", drives, &entry.drives());
+        for own in attempts {
+            must("name", name, &own.recorded.name);
+        }
+        // What is wrong with an attempt has been told.
+        if attempts.iter().any(|own| own.differs.is_some()) {
+            return;
+        }
+        if attempts.iter().any(|own| own.recorded.verdict.is_none()) {
+            return must("verdict", verdict, Verdict::RigError.name());
+        }
+        let outcome = match attempts {
+            [] => self.opened.skipped(&entry, remarks).unwrap_or_else(|| {
+                Outcome::rig_error("nothing keeps it from being played, and it was not".to_owned())
+            }),
+            _ => Played::of(settled(attempts)).outcome,
+        };
+        must("verdict", verdict, outcome.verdict.name());
+        let found = outcome.finding.as_ref().map(|found| found.message.as_str());
+        must(
+            "finding",
+            finding.as_deref().unwrap_or("nothing"),
+            found.unwrap_or("nothing"),
+        );
+        must("remarks", &remarks.join("; "), &outcome.remarks.join("; "));
+        must(
+            "time",
+            &Span::from_units(*took).units().to_string(),
+            &outcome.took.units().to_string(),
+        );
+        self.numbers(name, attempts);
+    }
+
+    /// Attempts are counted from 1, and there are as many as the rig's file asks for.
+    fn numbers(&mut self, name: &str, attempts: &[Judged]) {
+        let header = &self.opened.header;
+        let numbers = attempts.iter().map(|own| own.recorded.attempt);
+        if !numbers.eq(1..=attempts.len()) {
+            self.wrong
+                .push(format!("case {name}: its attempts are not numbered from 1"));
+        }
+        if header.own_rings || header.schema < 2 || attempts.is_empty() {
+            return;
+        }
+        let real = header.exactness.tolerance > Span::ZERO;
+        let least = if header.qualified && real { 2 } else { 1 };
+        let most = usize::from(self.opened.rig.file.retry.attempts.max(least));
+        let all = settled(attempts);
+        let too_many = (1..all.len()).any(|n| !self.retries.after(&all[..n], most));
+        let trouble = attempts.iter().any(|own| match &own.again {
+            Ok((_, again)) => again.trouble,
+            Err(_) => true,
+        });
+        let too_few = self.retries.after(&all, most) && !trouble;
+        if too_many || too_few {
+            let count = attempts.len();
+            self.wrong.push(format!(
+                "case {name}: {count} attempts are not as many as the rig's file asks for"
+            ));
+        }
+    }
+
+    fn end(&mut self, verdicts: &[String], safe: Option<bool>, left: &[Judged]) {
+        if let Some(own) = left.first() {
+            self.wrong.push(format!(
+                "{}: the record has its attempts and no line of what came of them",
+                own.recorded.name
+            ));
+        }
+        if *verdicts != self.verdicts {
+            self.wrong.push(format!(
+                "the last line has the verdicts {}, the scenarios have {}",
+                verdicts.join(", "),
+                self.verdicts.join(", ")
+            ));
+        }
+        if safe.is_some() == self.opened.header.simulated {
+            let kind = match self.opened.header.simulated {
+                true => "simulated rings have no safe state, and the last line tells of one",
+                false => "the last line does not tell of the safe state",
+            };
+            self.wrong.push(kind.to_owned());
+        }
+    }
+}
+
+/// Attempts as they were judged again, with faults that never happened, which only the run knows.
+fn settled(attempts: &[Judged]) -> Vec<Attempt> {
+    let outcome = |own: &Judged| {
+        let (_, again) = own.again.as_ref().ok()?;
+        let stated = own.recorded.verdict.as_ref()?;
+        Some(Outcome {
+            remarks: stated.remarks.clone(),
+            // On a simulated rig the time of what nobody fetched is not in the record; playing it again tells.
+            took: stated.took,
+            ..again.outcome.clone()
+        })
+    };
+    let outcomes = attempts.iter().filter_map(outcome);
+    outcomes
+        .map(|outcome| Attempt::on_own_rings(outcome, Vec::new()))
+        .collect()
+}
+
+impl Opened {
+    /// A scenario of the folder, settled for the rings of the rig.
+    pub(super) fn entry(&self, name: &str, text: &str) -> Result<Entry, String> {
+        let source = Source {
+            name: name.to_owned(),
+            text: text.to_owned().into(),
+        };
+        let drives = self.header.rings.first().map(|ring| ring.drives());
+        Entry::fitting(source, drives).map_err(|problems| problems.to_string())
+    }
+
+    /// Why a scenario is not played on this rig; `None` where it is.
+    fn skipped(&self, entry: &Entry, remarks: &[String]) -> Option<Outcome> {
+        let header = &self.header;
+        let why = match (&entry.plan, header.own_rings) {
+            (None, true) => no_bus(entry),
+            (None, false) => "the rig has no such bus".to_owned(),
+            (Some(_), true) => too_large(entry, &self.rig)?,
+            (Some(plan), false) => {
+                let link = Replay::new(
+                    Vec::new(),
+                    header.rate,
+                    header.exactness.tolerance,
+                    header.drives.clone(),
+                    header.capabilities.clone(),
+                )
+                .reaching(super::attempt::reached(&self.rig, header));
+                // What the guard knew of the drives is not in the record.
+                let limited = header.qualified && !header.limits.allow_everything();
+                let denied = remarks
+                    .first()
+                    .filter(|own| limited && own.starts_with(DENIED));
+                not_played(plan, &link, &header.rings).or_else(|| denied.cloned())?
+            }
+        };
+        Some(Outcome::skipped(why))
+    }
+}
+
+/// Why a scenario does not fit the rings of a rig on which each scenario has rings of its own; `None` where it does.
+#[must_use]
+pub fn too_large(entry: &Entry, rig: &Rig) -> Option<String> {
+    let plan = entry.plan.as_ref()?;
+    let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
+    let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    (own != sizes).then(|| other_size(&own, &sizes))
+}
+
+/// What is said of a scenario for a bus that the bench does not have.
+#[must_use]
+pub fn no_bus(entry: &Entry) -> String {
+    let bus = entry.scenario.bus;
+    let name = Bus::NAMES.iter().find(|(_, known)| *known == bus);
+    let bus = name.map_or("", |(name, _)| name);
+    format!("the bench has no bus `{bus}` yet")
+}

@@ -1,0 +1,209 @@
+//! The first line of a record: all of it but date and version follows from the rig's file.
+
+use super::files::{RIG, sum};
+use super::record::{Line, capabilities};
+use crate::link::{Capability, SimulatedLink};
+use crate::rig::{Rig, Way, limits, line_rate};
+use crate::twin::Exactness;
+use harness_proto::line::Rate;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::guard::Limits;
+use harness_proto::time::Span;
+
+/// What a record is judged by.
+pub(super) struct Header {
+    /// The version of its form.
+    pub(super) schema: u32,
+    /// The version of the program.
+    pub(super) program: String,
+    /// When the run began, in UTC.
+    pub(super) started: String,
+    pub(super) rate: Rate,
+    pub(super) drives: Vec<u8>,
+    pub(super) rings: Vec<RingSize>,
+    pub(super) exactness: Exactness,
+    pub(super) capabilities: Vec<Capability>,
+    pub(super) simulated: bool,
+    /// Whether each scenario had simulated rings of its own.
+    pub(super) own_rings: bool,
+    /// Whether the run was a qualification.
+    pub(super) qualified: bool,
+    pub(super) limits: Limits,
+    pub(super) way: Way,
+}
+
+/// Reads the first line. What the rig's file contradicts is added to `wrong`, and the file's value is used.
+///
+/// # Errors
+/// It is no first line, or of other rings than the rig has.
+pub(super) fn header(lines: &[Line], rig: &Rig, wrong: &mut Vec<String>) -> Result<Header, String> {
+    let Some(Line::Run {
+        schema,
+        drivebench,
+        rig: id,
+        rig_sha256,
+        started,
+        rate: stated_rate,
+        rings: drives,
+        tolerance,
+        simulated,
+        capabilities: names,
+        anew,
+        own_rings,
+        purpose,
+    }) = lines.first()
+    else {
+        return Err("the record of a run expected here".to_owned());
+    };
+    if *rig_sha256 != sum(rig.text.as_bytes()) {
+        wrong.push(format!("{RIG} is not the file that was used"));
+    }
+    let sizes = drives.iter().map(|n| RingSize::new((*n).into()).ok());
+    let rings = sizes.collect::<Option<Vec<_>>>();
+    let rings = rings.ok_or("a ring has 1 to 250 drives (ND21 8.4)")?;
+    let own: Vec<u8> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    if own != *drives {
+        return Err(format!(
+            "the record is of rings of {drives:?} drives, {RIG} has {own:?}"
+        ));
+    }
+    let (capabilities, limits) = match own_rings {
+        true => (SimulatedLink::CAPABILITIES.to_vec(), limits(rig, true)),
+        false => possible(names, rig),
+    };
+    let expected_rate = match own_rings {
+        true => Rate::default(),
+        false => line_rate(rig),
+    };
+    let expected_anew = !own_rings && limits.reset && limits.motion;
+    let mut must = |what: &str, stated: String, expected: String| {
+        if stated != expected {
+            wrong.push(format!(
+                "run.jsonl, line 1: {what} is {stated}, by {RIG} it is {expected}"
+            ));
+        }
+    };
+    let expected_tolerance = tolerance_of(rig);
+    must("the rig", id.clone(), rig.id().to_owned());
+    must(
+        "the rate",
+        stated_rate.to_string(),
+        expected_rate.bits_per_second().to_string(),
+    );
+    must(
+        "the tolerance",
+        tolerance.to_string(),
+        expected_tolerance.units().to_string(),
+    );
+    must(
+        "`simulated`",
+        simulated.to_string(),
+        rig.is_simulated().to_string(),
+    );
+    let listed: Vec<_> = capabilities.iter().map(|own| own.name()).collect();
+    must(
+        "the list of capabilities",
+        names.join(", "),
+        listed.join(", "),
+    );
+    must("`anew`", anew.to_string(), expected_anew.to_string());
+    let purposes = match own_rings {
+        true => &["run"][..],
+        false => &["run", "qualify"],
+    };
+    let stated = purpose.as_deref();
+    if *schema > 1 && !stated.is_some_and(|stated| purposes.contains(&stated)) {
+        must(
+            "the purpose",
+            stated.unwrap_or("nothing").to_owned(),
+            purposes.join(" or "),
+        );
+    }
+    let bare_run = rig.is_bare() && stated == Some("run");
+    if *schema > 1 && *own_rings != bare_run {
+        must("`own_rings`", own_rings.to_string(), bare_run.to_string());
+    }
+    let health = &rig.file.health;
+    Ok(Header {
+        schema: *schema,
+        program: drivebench.clone(),
+        started: started.clone(),
+        rate: expected_rate,
+        drives: drives.clone(),
+        exactness: Exactness {
+            tolerance: expected_tolerance,
+            line_errors: capabilities.contains(&Capability::LineErrors),
+            knows_cells: rig.is_simulated(),
+            looks: None,
+        },
+        capabilities,
+        simulated: rig.is_simulated(),
+        own_rings: *own_rings,
+        qualified: purpose.as_deref() == Some("qualify"),
+        limits,
+        way: Way {
+            rings: rings.clone(),
+            attempts: health.between.then_some(health.attempts),
+            anew: expected_anew,
+        },
+        rings,
+    })
+}
+
+/// How exact the times of a rig are.
+fn tolerance_of(rig: &Rig) -> Span {
+    let of_ring = rig.rings().map(|(_, ring)| ring.time_tolerance.0);
+    let longest = of_ring.max().unwrap_or_default();
+    match rig.is_simulated() {
+        true => Span::ZERO,
+        false => Span::from_nanos(u64::try_from(longest.as_nanos()).unwrap_or(u64::MAX)),
+    }
+}
+
+/// The capabilities that a rig can have had and the limits of the run: those named, where they are possible with or without
+/// `--allow-motion`, and whether or not its ports show line errors.
+fn possible(names: &[String], rig: &Rig) -> (Vec<Capability>, Limits) {
+    let named = capabilities(names);
+    let mut all = Vec::new();
+    for motion in [true, false] {
+        let limits = limits(rig, motion);
+        for line_errors in [true, false] {
+            let able = abilities(rig, limits, line_errors);
+            let listed = able.iter().map(|own| own.name());
+            if able == named && listed.eq(names.iter().map(String::as_str)) {
+                return (able, limits);
+            }
+            all.push((able, limits));
+        }
+    }
+    all.swap_remove(0)
+}
+
+/// What a rig can do within these limits, beside what no record shows.
+fn abilities(rig: &Rig, limits: Limits, line_errors: bool) -> Vec<Capability> {
+    let file = &rig.file;
+    let has = |capability: &Capability| match capability {
+        Capability::Tap | Capability::Power | Capability::Simulator => false,
+        Capability::Motion => limits.motion,
+        Capability::Eeprom => limits.eeprom,
+        // A reset ends block and stop (ND21 11.8).
+        Capability::Reset => limits.reset && limits.motion,
+        Capability::Memory => true,
+        Capability::TwoRings => rig.is_simulated() || rig.rings().count() > 1,
+        Capability::Interposer => rig.is_simulated() || !file.interposer.is_empty(),
+        Capability::LineErrors => rig.is_simulated() || line_errors,
+    };
+    let order = match rig.is_simulated() {
+        true => &SimulatedLink::CAPABILITIES[..],
+        false => &[
+            Capability::Memory,
+            Capability::Motion,
+            Capability::Eeprom,
+            Capability::Reset,
+            Capability::TwoRings,
+            Capability::Interposer,
+            Capability::LineErrors,
+        ],
+    };
+    order.iter().copied().filter(has).collect()
+}

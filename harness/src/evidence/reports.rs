@@ -1,0 +1,254 @@
+//! Files of a folder that follow from its record: made again and compared byte for byte.
+
+use super::attempt::Recorded;
+use super::derive::{Derived, Settled, plain};
+use super::files::{
+    self, CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS,
+};
+use super::folder::capture;
+use super::record::Line;
+use super::verify::{Judged, Opened};
+use crate::capture::read;
+use crate::link::{Event, PlacedFault};
+use harness_proto::line::Received;
+use harness_proto::time::Instant;
+use harness_sim::trace::{LinkTrace, Trace};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// What a mark of an attachment begins with in JUnit's output.
+const ATTACHMENT: &str = "[[ATTACHMENT|";
+
+/// What of the derived files does not follow from the record.
+pub(super) fn differences(
+    path: &Path,
+    opened: &Opened,
+    judged: &[Judged],
+    made: &Derived,
+) -> Vec<String> {
+    let settled: Vec<_> = opened.lines.iter().filter_map(Settled::of).collect();
+    let mut wrong = Vec::new();
+    wrong.extend(file(path, REPORT, |_| plain(opened.rig.id(), &settled)));
+    wrong.extend(file(path, PAGE, |_| made.html.clone()));
+    wrong.extend(file(path, JUNIT, |stated| moved(&made.junit, path, stated)));
+    wrong.extend(versions(path, opened));
+    for own in judged {
+        wrong.extend(of_attempt(path, opened, own));
+    }
+    wrong.extend(foreign(path, opened, judged));
+    wrong
+}
+
+/// Compares a file with what is made of its own text; `None` where they are the same.
+fn file(path: &Path, name: &str, made: impl FnOnce(&str) -> String) -> Option<String> {
+    let stated = match files::read_text(path, name) {
+        Ok(stated) => stated,
+        Err(why) => return Some(why),
+    };
+    let made = made(&stated);
+    if stated == made {
+        return None;
+    }
+    let lines = stated.lines().zip(made.lines());
+    let same = lines.take_while(|(own, other)| own == other).count();
+    Some(format!(
+        "{name}, line {}: the record gives another text",
+        same + 1
+    ))
+}
+
+/// JUnit's output names files by the path that the folder had during the run; everything else follows from the record.
+fn moved(made: &str, path: &Path, stated: &str) -> String {
+    let own = |text: &str| {
+        let from = text.find(ATTACHMENT)? + ATTACHMENT.len();
+        let end = from + text[from..].find(&format!("/{SCENARIOS}/"))?;
+        Some(text[from..end].to_owned())
+    };
+    match (own(made), own(stated)) {
+        (Some(here), Some(there)) => made.replace(
+            &format!("{ATTACHMENT}{here}/"),
+            &format!("{ATTACHMENT}{there}/"),
+        ),
+        // A path that no mark can hold is left out.
+        _ if path.to_string_lossy().contains([']', '\n']) || !stated.contains(ATTACHMENT) => {
+            let marks = made.split(ATTACHMENT).skip(1);
+            let marks: Vec<_> = marks.filter_map(|mark| mark.split("]]").next()).collect();
+            let without =
+                |text: String, mark: &&str| text.replace(&format!("{ATTACHMENT}{mark}]]\n"), "");
+            marks.iter().fold(made.to_owned(), without)
+        }
+        _ => made.to_owned(),
+    }
+}
+
+/// Version and date are those of the first line.
+fn versions(path: &Path, opened: &Opened) -> Option<String> {
+    let text = match files::read_text(path, VERSIONS) {
+        Ok(text) => text,
+        Err(why) => return Some(why),
+    };
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    let header = &opened.header;
+    let same = value["drivebench"] == header.program.as_str()
+        && value["started"] == header.started.as_str()
+        && value["schema"] == 1
+        && format!("{value:#}\n") == text;
+    (!same).then(|| format!("{VERSIONS} does not say what the first line of {RECORD} says"))
+}
+
+/// The capture of an attempt.
+fn of_attempt(path: &Path, opened: &Opened, own: &Judged) -> Option<String> {
+    let (_, again) = own.again.as_ref().ok()?;
+    let name = format!(
+        "{CAPTURES}/{}.{}.json",
+        own.recorded.name, own.recorded.attempt
+    );
+    if let Some(made) = &again.capture {
+        return file(path, &name, |_| made.clone());
+    }
+    let text = match files::read_text(path, &name) {
+        Ok(text) => text,
+        Err(why) => return Some(why),
+    };
+    let capture_read = match read(text.as_bytes(), Some(opened.rate())) {
+        Ok(read) => read,
+        Err(error) => return Some(format!("{name}: {error}")),
+    };
+    if capture(&capture_read.traces, &again.outcome) != text {
+        return Some(format!(
+            "{name} is not as this program writes what it holds"
+        ));
+    }
+    if opened.header.simulated || !opened.rig.file.interlock.is_empty() {
+        return None;
+    }
+    let ends = Ends::of(&own.recorded, opened);
+    let differs = ends.differ(&capture_read.traces)?;
+    Some(format!("{name}: {differs}"))
+}
+
+/// What the record says of the links at the bench's ends in the conversation of a scenario.
+struct Ends {
+    /// Outgoing and incoming bytes ring by ring; `None` where a fault or a probe changed them.
+    rings: Vec<[Option<Vec<Carried>>; 2]>,
+}
+
+/// A byte as it arrived, and when, in nanoseconds.
+type Carried = (u64, Received);
+
+impl Ends {
+    fn of(recorded: &Recorded, opened: &Opened) -> Self {
+        let byte_time = opened.rate().byte_time();
+        let mut ends = Self::new(opened);
+        let conversations = recorded
+            .events
+            .split(|event| matches!(event, Event::Begin(_)));
+        let conversations: Vec<_> = conversations.collect();
+        let has_steps = |own: &&&[Event]| own.iter().any(|event| matches!(event, Event::Step(_)));
+        let played = conversations
+            .iter()
+            .find(has_steps)
+            .or(conversations.last());
+        for event in played.into_iter().flat_map(|own| own.iter()) {
+            match event {
+                Event::Sent(ring, end, bytes) => {
+                    for (left, byte) in (0..bytes.len() as u64).rev().zip(bytes) {
+                        let at = *end - byte_time * left;
+                        ends.carry(*ring, 0, at, Received::good(*byte));
+                    }
+                }
+                Event::Received(ring, at, byte) => ends.carry(*ring, 1, *at, *byte),
+                Event::Fault(ring, _, PlacedFault::Link(link, _), _) => {
+                    let last = opened.header.drives.get(*ring).copied().unwrap_or(0);
+                    match *link {
+                        0 => ends.forget(*ring, 0),
+                        link if link == usize::from(last) => ends.forget(*ring, 1),
+                        _ => {}
+                    }
+                }
+                Event::Probe(ring, ..) => {
+                    ends.forget(*ring, 0);
+                    ends.forget(*ring, 1);
+                }
+                _ => {}
+            }
+        }
+        ends
+    }
+
+    fn new(opened: &Opened) -> Self {
+        let empty = || [Some(Vec::new()), Some(Vec::new())];
+        Self {
+            rings: opened.header.drives.iter().map(|_| empty()).collect(),
+        }
+    }
+
+    fn carry(&mut self, ring: usize, end: usize, at: Instant, byte: Received) {
+        let at = at.since_start().as_nanos();
+        let link = self.rings.get_mut(ring).and_then(|own| own[end].as_mut());
+        link.into_iter().for_each(|bytes| bytes.push((at, byte)));
+    }
+
+    fn forget(&mut self, ring: usize, end: usize) {
+        if let Some(own) = self.rings.get_mut(ring) {
+            own[end] = None;
+        }
+    }
+
+    fn differ(&self, traces: &[Trace]) -> Option<String> {
+        if traces.len() != self.rings.len() {
+            return Some("it has another number of rings than the rig".to_owned());
+        }
+        for (own, trace) in self.rings.iter().zip(traces) {
+            let links = [trace.links.first(), trace.links.last()];
+            for ((expected, link), name) in own.iter().zip(links).zip(["outgoing", "incoming"]) {
+                let carried = |link: &LinkTrace| -> Vec<Carried> {
+                    let arrived = link.bytes.iter().filter_map(|byte| {
+                        Some((byte.at.since_start().as_nanos(), byte.arrival()?))
+                    });
+                    arrived.collect()
+                };
+                let carried = link.map(carried).unwrap_or_default();
+                if expected
+                    .as_ref()
+                    .is_some_and(|expected| *expected != carried)
+                {
+                    return Some(format!(
+                        "the bytes of the bench's {name} link are not those of the record"
+                    ));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// Files that no run leaves.
+fn foreign(path: &Path, opened: &Opened, judged: &[Judged]) -> Vec<String> {
+    let fixed = [RECORD, RIG, JUNIT, REPORT, PAGE, VERSIONS, SUMS];
+    let mut known: BTreeSet<String> = fixed.iter().map(|own| (*own).to_owned()).collect();
+    known.extend(
+        opened
+            .rig
+            .profile
+            .is_some()
+            .then(|| KNOWN_PROFILE.to_owned()),
+    );
+    if opened.header.qualified {
+        known.extend(["profile.toml", "deviations.txt"].map(str::to_owned));
+    }
+    for own in judged {
+        let Recorded { name, attempt, .. } = &own.recorded;
+        known.insert(format!("{CAPTURES}/{name}.{attempt}.json"));
+    }
+    for line in &opened.lines {
+        if let Line::Case { name, .. } = line {
+            known.insert(format!("{SCENARIOS}/{name}.scn"));
+        }
+    }
+    let there = files::names(path);
+    let foreign = there.iter().filter(|file| !known.contains(*file));
+    foreign
+        .map(|file| format!("{file} is no file of this run"))
+        .collect()
+}

@@ -1,0 +1,157 @@
+//! A run on simulated rings, played once more: it is a function of rig and scenarios, so its record and captures come again.
+
+use super::files::{CAPTURES, read_text};
+use super::folder::capture;
+use super::record::Line;
+use super::verify::{Opened, text_of};
+use crate::link::{Event, Sink};
+use crate::rig::{Alarm, Attempt, Keeper, Options, Played, Run, Session};
+use crate::scenario::run::Outcome;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Plays every scenario of a run on a simulated rig again, and says where the record or a capture is not what comes of it. Nothing for
+/// rings with ports, and for scenarios that had rings of their own: these are compared one by one.
+pub(super) fn rerun(
+    path: &Path,
+    opened: &Opened,
+    texts: &dyn Fn(&str) -> Result<String, String>,
+) -> Vec<String> {
+    let header = &opened.header;
+    if !header.simulated || header.own_rings || header.schema < 2 {
+        return Vec::new();
+    }
+    let mut rig = opened.rig.clone();
+    // Nothing outside the folder is touched.
+    rig.file.hooks = Default::default();
+    rig.file.power.clear();
+    rig.file.quarantine = None;
+    let options = Options {
+        purpose: "verify".to_owned(),
+        wait: Duration::ZERO,
+        allow_motion: true,
+        ill_as_well: header.qualified,
+        interrupt: Arc::default(),
+        alarm: Alarm::default(),
+    };
+    let mut session = match Session::open(&rig, &options) {
+        Ok(session) => session,
+        Err(error) => return vec![format!("the run cannot be played again: {error}")],
+    };
+    let mut run = match Run::new(&mut session) {
+        Ok(run) => run,
+        Err(problems) => return vec![format!("the run cannot be played again: {problems}")],
+    };
+    if header.qualified {
+        run.rehearse();
+        run.repeat();
+    }
+    let mut wrong = Vec::new();
+    let mut lines = &opened.lines[1..];
+    while let Some(end) = lines
+        .iter()
+        .position(|line| matches!(line, Line::Case { .. }))
+    {
+        let (own, rest) = lines.split_at(end + 1);
+        match scenario(&mut run, path, opened, own, texts) {
+            Ok(differs) => wrong.extend(differs),
+            Err(why) => {
+                wrong.push(why);
+                break;
+            }
+        }
+        lines = rest;
+    }
+    wrong
+}
+
+/// Plays one scenario again and compares it with its lines.
+fn scenario(
+    run: &mut Run<'_>,
+    path: &Path,
+    opened: &Opened,
+    lines: &[Line],
+    texts: &dyn Fn(&str) -> Result<String, String>,
+) -> Result<Vec<String>, String> {
+    let Some(Line::Case { name, sha256, .. }) = lines.last() else {
+        return Ok(Vec::new());
+    };
+    let text = text_of(name, sha256.as_deref().unwrap_or_default(), texts)?;
+    let entry = opened.entry(name, &text)?;
+    let mut tape = Tape {
+        name,
+        text: &text,
+        lines: Vec::new(),
+        captures: Vec::new(),
+    };
+    let outcome = match &entry.plan {
+        None => Outcome::skipped("the rig has no such bus".to_owned()),
+        Some(plan) => match run.play(plan, Some(&mut tape)) {
+            Ok(Played { outcome, .. }) => outcome,
+            Err(error) => Outcome::rig_error(error.to_string()),
+        },
+    };
+    let title = entry.scenario.title.as_str();
+    tape.lines.push(Line::of_case(
+        name,
+        (title, &entry.drives()),
+        sha256.clone(),
+        &outcome,
+    ));
+    let mut wrong = Vec::new();
+    let differs =
+        (0..lines.len().max(tape.lines.len())).find(|at| lines.get(*at) != tape.lines.get(*at));
+    if let Some(at) = differs {
+        wrong.push(format!(
+            "{name}: played again, line {} of its part of the record is {}, the record has {}",
+            at + 1,
+            shown(tape.lines.get(at)),
+            shown(lines.get(at))
+        ));
+    }
+    for (number, made) in (1..).zip(&tape.captures) {
+        let file = format!("{CAPTURES}/{name}.{number}.json");
+        if read_text(path, &file)? != *made {
+            wrong.push(format!(
+                "{file} is not what comes of the scenario played again"
+            ));
+        }
+    }
+    Ok(wrong)
+}
+
+/// Keeps the lines and captures of a scenario.
+struct Tape<'t> {
+    name: &'t str,
+    text: &'t str,
+    lines: Vec<Line>,
+    captures: Vec<String>,
+}
+
+impl Sink for Tape<'_> {
+    fn take(&mut self, event: &Event) {
+        self.lines.extend(Line::of(event));
+    }
+}
+
+impl Keeper for Tape<'_> {
+    fn begins(&mut self, attempt: usize) {
+        self.lines
+            .push(Line::of_scenario(self.name, self.text, attempt));
+    }
+
+    fn ends(&mut self, _: usize, attempt: &Attempt) {
+        self.lines.push(Line::of_verdict(attempt));
+        self.captures
+            .push(capture(&attempt.traces, &attempt.outcome));
+    }
+}
+
+fn shown(line: Option<&Line>) -> String {
+    let text = line.map(serde_json::to_string);
+    match text {
+        Some(Ok(text)) => text,
+        _ => "missing".to_owned(),
+    }
+}
