@@ -338,7 +338,7 @@ fn one_at_a_time_and_never_in_quarantine() {
     // kill -9: the lock goes with the process, and the ring is brought back by the next.
     signal(&first, "-KILL");
     let _gone = first.wait();
-    let output = desk.run(&["run", "8.2-exchange-2", "9.1-seven-forms", "--allow-motion"]);
+    let output = desk.run(&["run", "8.2-exchange-2", "--allow-motion"]);
     ended(&output, 0, "2 drives are stopped, standing and blocked");
     let path = desk.path("desk.toml");
     let path = path.to_str().expect("a name");

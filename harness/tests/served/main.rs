@@ -111,6 +111,8 @@ fn all_that_fit(transport: &str, marks: bool, largest: u8) -> usize {
                 Verdict::Skipped => {}
                 // It begins with the outputs as they are after power-up, which a reset leaves as they are.
                 Verdict::Failed if entry.short_name() == "10.2-read-back" => {}
+                // The header sets a cell that the drive writes by itself.
+                Verdict::Inconclusive if outcome.unready.is_some() => {}
                 Verdict::Inconclusive if INCONCLUSIVE.contains(&entry.short_name()) => {}
                 verdict => wrong.push(format!("{}: {verdict} {:?}", entry.name, outcome.finding)),
             }
