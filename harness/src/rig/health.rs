@@ -133,6 +133,19 @@ fn examine_once(
     }
 }
 
+/// Whether unasked bytes are those of drives that have missed their master (ND21 9.9): zeros, then for ever the address of the drive behind
+/// the silence.
+pub(super) fn sounds_timed_out(heard: &[Received], ring: Option<RingSize>) -> bool {
+    let Some(last) = heard.last().map(|received| received.byte) else {
+        return false;
+    };
+    let address = heard.iter().map(|received| received.byte);
+    let mut behind = address.skip_while(|byte| *byte == 0);
+    heard.iter().all(|received| received.error.is_none())
+        && ring.is_some_and(|size| last < size.drives())
+        && behind.all(|byte| byte == last)
+}
+
 impl Unhealthy {
     pub(super) fn talking(bytes: &[Received]) -> Self {
         Self::Talking {
@@ -152,4 +165,21 @@ fn shown(bytes: &[Received]) -> String {
         text.push_str("...");
     }
     text.trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ND21 9.9: a ring of three behind a silence sends 00, then 02 for ever; another master sends anything.
+    #[test]
+    fn drives_that_timed_out_are_no_other_master() {
+        let heard = |bytes: &[u8]| {
+            let bytes: Vec<_> = bytes.iter().map(|byte| Received::good(*byte)).collect();
+            sounds_timed_out(&bytes, RingSize::new(3).ok())
+        };
+        assert!(heard(&[0, 0, 0, 2, 2, 2]) && heard(&[2, 2]) && heard(&[0, 0]));
+        assert!(!heard(&[]) && !heard(&[3, 3]) && !heard(&[0, 1, 2]) && !heard(&[2, 2, 0]));
+        assert!(!heard(&[0x88, 0xFF, 0xC0]) && !heard(&[0x80, 0x80]));
+    }
 }

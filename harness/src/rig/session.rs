@@ -4,7 +4,7 @@ use super::Rig;
 use super::around::{self, Around};
 use super::ends::Ends;
 use super::file;
-use super::health::{Health, Unhealthy, examine};
+use super::health::{self, Health, Unhealthy, examine};
 use super::hook::HookError;
 use super::interlock::Interlocks;
 use super::line_test::{self, Cause};
@@ -395,7 +395,12 @@ impl Session {
         if self.link.now() <= end {
             return Ok(());
         }
-        match heard.iter().position(|heard| !heard.is_empty()) {
+        let timed_out = |(ring, heard): (usize, &Vec<Received>)| {
+            health::sounds_timed_out(heard, self.rings.get(ring).copied())
+        };
+        // The zeros of the check sequence, which comes next, end a time-out (ND21 9.9).
+        let talks = |place: &(usize, &Vec<Received>)| !place.1.is_empty() && !timed_out(*place);
+        match heard.iter().enumerate().find(talks).map(|(ring, _)| ring) {
             Some(ring) => Err(SessionError::Ill {
                 rig: self.rig.id().to_owned(),
                 ring: ring + 1,
