@@ -119,7 +119,7 @@ fn words_that_cannot_be_are_refused() {
     let validator = validator();
     let kinds = of_each_kind();
     for (kind, key, value) in [
-        ("run", "schema", json!(2)),
+        ("run", "schema", json!(3)),
         ("run", "rate", json!(115_200)),
         ("run", "rings", json!([])),
         ("run", "rings", json!([251])),
