@@ -176,6 +176,7 @@ fn on_rig(
         if rehearsal.denied.is_some() {
             return Ok(None);
         }
+        target.begin();
         let tried = target.attempt(&subject.case, &rehearsal)?;
         Ok(tried.difference)
     };

@@ -1,6 +1,6 @@
 //! A run: case after case, what is new is kept, what is otherwise is confirmed and written down.
 
-use super::case::Case;
+use super::case::{Act, Case, Talk, To, What};
 use super::dice::Dice;
 use super::error::ExploreError;
 use super::finding::Finding;
@@ -9,8 +9,10 @@ use super::mutate::mutate;
 use super::novelty::Pool;
 use super::oracle::Difference;
 use super::record::{About, Kept, Line, Progress, Record};
+use super::setup::drive_name;
 use super::swarm::Swarm;
 use super::target::{Rehearsal, Target};
+use super::tour::tour;
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 
@@ -64,6 +66,10 @@ pub struct Campaign {
     progress: Progress,
     /// What was found, and how often in vain: what counts is settled.
     known: BTreeMap<String, u8>,
+    /// On a rig with ports, what every ring is asked before anything is left to chance.
+    tour: Vec<Case>,
+    /// Whether the last finding was at another byte when it was seen again.
+    moves: bool,
     /// How many findings count.
     confirmed: usize,
     flaky: usize,
@@ -73,12 +79,17 @@ impl Campaign {
     /// A run that begins.
     #[must_use]
     pub fn new(about: About, scope: Scope) -> Self {
+        let rings = std::iter::once(&scope.first).chain(&scope.second);
+        let rings = rings.filter(|_| about.ports);
+        let tours = rings.map(|ring| tour(&scope, ring, about.seed));
         Self {
+            tour: in_turns(tours.collect()),
             about,
             scope,
             pool: Pool::default(),
             progress: Progress::default(),
             known: BTreeMap::new(),
+            moves: false,
             confirmed: 0,
             flaky: 0,
         }
@@ -125,7 +136,7 @@ impl Campaign {
 
     /// Whether such a thing was found already, or was flaky often enough.
     fn is_settled(&self, difference: &Difference) -> bool {
-        let times = self.known.get(&difference.signature());
+        let times = self.known.get(&difference.key());
         times.is_some_and(|times| *times >= SETTLED)
     }
 
@@ -153,6 +164,14 @@ impl Campaign {
         let ring = usize::from(self.scope.second.is_some() && dice.percent(50));
         let own = self.scope.ring(ring);
         let maker = Generator::new(&self.scope, own, swarm, &mut dice);
+        // Every third case is left to chance.
+        let of_tour = (number % 3 < 2).then_some(number / 3 * 2 + number % 3);
+        let of_tour = of_tour.and_then(|number| self.tour.get(usize::try_from(number).ok()?));
+        if let Some(case) = of_tour {
+            let mut case = case.clone();
+            maker.keep_in_step(&mut case);
+            return case;
+        }
         let old = dice
             .percent(60)
             .then(|| self.pool.pick(ring, &mut dice))
@@ -305,8 +324,8 @@ impl Campaign {
                     setup: self.about.setup.clone(),
                     case: case.clone(),
                 };
-                self.confirm(&mut finding, rehearsal, target)?;
-                let signature = finding.difference.signature();
+                self.confirm(&mut finding, rehearsal, tried.before.as_deref(), target)?;
+                let signature = finding.difference.key();
                 self.note(&signature, finding.confirmed);
                 let file = format!("finding-{number:06}");
                 if let Some(record) = record {
@@ -324,20 +343,72 @@ impl Campaign {
         Ok(())
     }
 
-    /// Tries a case again, until it was otherwise in the same way often enough or cannot be any more.
+    /// Tries a case again with drives made ready for it, then with more and more of what was sent before it. A difference that was seen in
+    /// other cases is seen again too: no wire and no computer makes the same of two.
     fn confirm(
+        &mut self,
+        finding: &mut Finding,
+        rehearsal: &Rehearsal,
+        before: Option<&[Act]>,
+        target: &mut dyn Target,
+    ) -> Result<(), ExploreError> {
+        let alone = finding.case.clone();
+        for most in PREFIXES {
+            let acts = last_acts(before.unwrap_or_default(), alone.drives, most);
+            finding.case.acts = [acts, &alone.acts[..]].concat();
+            self.again(finding, rehearsal, target)?;
+            let longer = before.is_some_and(|before| before.len() > acts.len());
+            if finding.confirmed || !longer || target.over().is_some() {
+                break;
+            }
+        }
+        if finding.confirmed {
+            return self.blame(finding, target);
+        }
+        finding.case = alone;
+        let times = self
+            .known
+            .get(&finding.difference.key())
+            .copied()
+            .unwrap_or(0);
+        if times >= self.about.confirm && !finding.difference.time {
+            (finding.seen_again, finding.of) = (times, times);
+            finding.confirmed = true;
+        }
+        Ok(())
+    }
+
+    /// Tries a case until it was otherwise in the same way often enough or cannot be any more.
+    fn again(
         &mut self,
         finding: &mut Finding,
         rehearsal: &Rehearsal,
         target: &mut dyn Target,
     ) -> Result<(), ExploreError> {
+        (finding.seen_again, finding.of) = (0, 0);
+        self.moves = false;
+        let kind = finding.difference.kind();
         while finding.of < self.about.of && target.over().is_none() {
+            target.begin();
             let tried = target.attempt(&finding.case, rehearsal)?;
             self.use_line(tried.took);
             finding.of += 1;
-            let kind = finding.difference.kind();
-            let again = tried.difference.is_some_and(|other| other.kind() == kind);
-            finding.seen_again += u8::from(again);
+            let Some(other) = tried.difference.filter(|other| other.kind() == kind) else {
+                if self.about.confirm > finding.seen_again + (self.about.of - finding.of) {
+                    return Ok(());
+                }
+                continue;
+            };
+            // A computer that is late is so at another byte the next time, and a drive that counts is wrong there.
+            let moved = other.byte != finding.difference.byte;
+            self.moves |= finding.of > 1 && moved;
+            let late = finding.difference.time && moved;
+            finding.seen_again += u8::from(!late);
+            finding.difference = if late {
+                finding.difference.clone()
+            } else {
+                other
+            };
             if finding.seen_again >= self.about.confirm {
                 finding.confirmed = true;
                 return Ok(());
@@ -345,6 +416,103 @@ impl Campaign {
         }
         Ok(())
     }
+
+    /// Finds out which drive is to blame, where it is that of the telegram: the same conversation with the drives' roles exchanged
+    /// differs at the same byte where it is another one, on whose way the byte is.
+    fn blame(
+        &mut self,
+        finding: &mut Finding,
+        target: &mut dyn Target,
+    ) -> Result<(), ExploreError> {
+        let drives = finding.case.drives;
+        let always = !self.moves && finding.seen_again == finding.of;
+        let Some(meant) = finding
+            .difference
+            .meant
+            .filter(|_| always && finding.difference.drive.is_none())
+        else {
+            return Ok(());
+        };
+        for step in 1..drives.min(MOST_EXCHANGED) {
+            let case = exchanged(&finding.case, step);
+            let rehearsal = target.rehearse(&case)?;
+            if rehearsal.denied.is_some() || target.over().is_some() {
+                return Ok(());
+            }
+            target.begin();
+            let tried = target.attempt(&case, &rehearsal)?;
+            self.use_line(tried.took);
+            if tried.not_played.is_some()
+                || tried
+                    .difference
+                    .is_some_and(|own| own.byte <= finding.difference.byte)
+            {
+                return Ok(());
+            }
+        }
+        // A drive that is wrong now and then may have been right by chance.
+        let rehearsal = target.rehearse(&finding.case)?;
+        target.begin();
+        let tried = target.attempt(&finding.case, &rehearsal)?;
+        self.use_line(tried.took);
+        let again = tried
+            .difference
+            .is_some_and(|own| own.byte == finding.difference.byte);
+        if !again {
+            return Ok(());
+        }
+        finding.difference.drive = Some(meant);
+        let name = drive_name(finding.difference.ring, meant);
+        finding.difference.about = format!("drive {name}, {}", finding.difference.about);
+        Ok(())
+    }
+}
+
+/// The cases of several tours in turns.
+fn in_turns(tours: Vec<Vec<Case>>) -> Vec<Case> {
+    let longest = tours.iter().map(Vec::len).max().unwrap_or(0);
+    let at = |index: usize| {
+        tours
+            .iter()
+            .filter_map(move |tour| tour.get(index).cloned())
+    };
+    (0..longest).flat_map(at).collect()
+}
+
+/// How many bytes are sent again before a case that shows nothing alone.
+const PREFIXES: [usize; 3] = [0, 2_000, 8_000];
+
+/// With how many drives at most the roles are exchanged.
+const MOST_EXCHANGED: u8 = 8;
+
+/// The last acts that fit into so many bytes.
+fn last_acts(acts: &[Act], drives: u8, most: usize) -> &[Act] {
+    let mut left = most;
+    let mut from = acts.len();
+    while let Some(act) = from.checked_sub(1).map(|before| &acts[before]) {
+        match left.checked_sub(act.length(drives)) {
+            Some(rest) if most > 0 => left = rest,
+            _ => break,
+        }
+        from -= 1;
+    }
+    &acts[from..]
+}
+
+/// The same conversation with each telegram to another drive, so many addresses on.
+fn exchanged(case: &Case, step: u8) -> Case {
+    let mut new = case.clone();
+    for act in &mut new.acts {
+        if let What::Talk(Talk {
+            to: To::Drive(drive),
+            ..
+        }) = &mut act.what
+        {
+            let other = (u16::from(*drive) + u16::from(step)) % u16::from(case.drives);
+            *drive = u8::try_from(other).unwrap_or(*drive);
+        }
+    }
+    new
 }
 
 fn write(

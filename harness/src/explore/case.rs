@@ -100,6 +100,9 @@ pub struct Talk {
     /// The most net bytes of each telegram, 2 to 7.
     #[serde(default = "most_net", skip_serializing_if = "is_most_net")]
     pub room: u8,
+    /// Whole telegrams or idle bytes (9.2) between the telegrams of a command that is cut.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub between: Vec<u8>,
 }
 
 const fn most_net() -> u8 {
@@ -178,6 +181,7 @@ impl Talk {
             process_data: None,
             orders: vec![Order::sound(command)],
             room: MOST_NET,
+            between: Vec::new(),
         }
     }
 
@@ -193,7 +197,18 @@ impl Talk {
             let data = self.process_data.filter(|_| first);
             let taken = if data.is_some() { 2 } else { 0 };
             let (now, later) = rest.split_at((room - taken).min(rest.len()));
-            let to = if first { self.to } else { To::Same };
+            // Behind a telegram to another drive the address is needed again.
+            let addressed = self
+                .between
+                .iter()
+                .all(|byte| [SYNCO, PAUSE].contains(byte));
+            let to = match first || !addressed {
+                true => self.to,
+                false => To::Same,
+            };
+            if !first && !self.between.is_empty() {
+                telegrams.push(self.between.clone());
+            }
             telegrams.push(telegram(to, data, now, drives));
             rest = later;
             first = false;
@@ -313,9 +328,19 @@ impl Case {
     /// Whether it stays within the bounds of a case, and its rings within theirs (ND21 8.4).
     #[must_use]
     pub fn is_bounded(&self) -> bool {
+        self.is_within(1)
+    }
+
+    /// The same for a finding, in which more may stand than in a new case: what was sent before.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.is_within(30)
+    }
+
+    fn is_within(&self, times: usize) -> bool {
         let is_ring = |drives: &u8| RingSize::new(u64::from(*drives)).is_ok();
-        self.acts.len() <= MOST_ACTS
-            && self.bytes().len() <= MOST_BYTES
+        self.acts.len() <= MOST_ACTS * times
+            && self.bytes().len() <= MOST_BYTES * times
             && self.sizes().iter().all(is_ring)
     }
 

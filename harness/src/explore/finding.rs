@@ -3,13 +3,13 @@
 use super::case::Case;
 use super::error::ExploreError;
 use super::files::{read_text, write_whole};
-use super::oracle::{Difference, answered, sent};
+use super::judge::Judge;
+use super::oracle::Difference;
 use super::play::Seen;
 use super::setup::Setup;
 use super::text::{Expected, Page, text};
 use crate::manual::tables;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::role::{Role, roles};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -70,7 +70,7 @@ impl Finding {
         let finding: Self = serde_json::from_str(&json).map_err(|error| {
             ExploreError::Usage(format!("{} is no finding: {error}", file.display()))
         })?;
-        let sound = finding.schema == SCHEMA && finding.case.is_bounded();
+        let sound = finding.schema == SCHEMA && finding.case.is_kept();
         if !sound {
             return Err(ExploreError::Usage(format!(
                 "{} is no finding of schema {SCHEMA} within the bounds of a case",
@@ -138,27 +138,12 @@ impl Finding {
     }
 }
 
-/// Bytes that the model cannot know on a real ring: data that a drive measures or changes itself, and the checking bytes over them.
+/// Bytes that drives may answer in more than one way: what they hold and measure, and the checking bytes over it.
 fn unknowable(case: &Case, seen: &Seen) -> Vec<usize> {
     let Ok(size) = RingSize::new(u64::from(case.drives)) else {
         return Vec::new();
     };
-    let sent = sent(case);
-    let mut any = Vec::new();
-    let mut open = false;
-    for (index, role) in answered(&roles(size, &sent), &sent).enumerate() {
-        match role {
-            Role::Data { address, .. } => {
-                let own = crate::twin::unknowable(address);
-                open |= own;
-                if own {
-                    any.push(index);
-                }
-            }
-            Role::Check { .. } if std::mem::take(&mut open) => any.push(index),
-            _ => {}
-        }
-    }
+    let mut any = Judge::new(case.ring(), size, true).foresee(case).open;
     any.retain(|index| *index < seen.received.len());
     any
 }

@@ -261,6 +261,7 @@ impl<'s> Generator<'s> {
                 true => 2 + dice.below(5) as u8,
                 false => MOST_NET,
             },
+            between: Vec::new(),
         }
     }
 

@@ -210,6 +210,7 @@ fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: 
         process_data: None,
         orders: vec![order],
         room: MOST_NET,
+        between: Vec::new(),
     };
     acts.push(Act::sound(What::Talk(one)));
     match cell.filter(|_| dice.percent(50)) {

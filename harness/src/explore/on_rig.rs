@@ -1,30 +1,37 @@
-//! Cases on a rig with ports: what the guard would deny is not sent, every case is followed by the twin, and the ring is brought back and
-//! examined between two of them.
+//! Cases on a rig with ports, one behind the other: what the guard would deny is not sent, and a [`Judge`] sees every byte. The drives are
+//! made ready anew where nobody knows their state any more.
 
-use super::case::Case;
+use super::case::{Act, Beside, Case, Harm, What};
 use super::error::ExploreError;
+use super::judge::{Exchange, Judge, prologue};
 use super::novelty::features;
-use super::oracle::Difference;
+use super::oracle::{Difference, sent};
+use super::order::{Command, Order};
 use super::play::Seen;
 use super::target::{Rehearsal, Target, Tried};
-use super::text::{Page, text};
 use crate::guard::Guarded;
-use crate::library::Entry;
-use crate::link::{Event, Line, Link, Recording, SimulatedLink, Trouble};
-use crate::rig::{Attempt, Run, play_one};
+use crate::link::{Capability, Line as _, Link, Moment, PlacedFault, SimulatedLink, Trouble};
+use crate::rig::{Run, examine};
+use crate::scenario::run::start_anew;
 use crate::scenario::simulate;
-use crate::scenario::source::Source;
-use crate::scenario::verdict::Verdict;
-use crate::twin::unknowable;
+use crate::twin;
+use harness_proto::line::Received;
 use harness_proto::nd21::bits::flags2;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 
 /// How long the drives of the model have been switched on: their self-tests are over (ND21 11.8).
 const WARM: Span = Span::from_millis(200);
+
+/// How many bytes are sent until the drives are made ready anew: what was sent since then is known, and can be sent again.
+const LONGEST_HISTORY: usize = 40_000;
+
+/// How long a byte may be missing before it counts as lost, beside the tolerance of the rig.
+const PATIENCE: Span = Span::from_millis(60);
 
 /// A rig in use.
 pub struct OnRig<'r, 's> {
@@ -32,6 +39,12 @@ pub struct OnRig<'r, 's> {
     /// The model that cases are rehearsed on.
     model: SimulatedLink,
     limits: Limits,
+    /// What each ring was seen to do since its drives were made ready.
+    judges: Vec<Judge>,
+    /// The acts of these cases, ring by ring.
+    history: Vec<Vec<Act>>,
+    /// Whether the drives are in a state that nobody knows.
+    stale: bool,
 }
 
 impl<'r, 's> OnRig<'r, 's> {
@@ -41,135 +54,199 @@ impl<'r, 's> OnRig<'r, 's> {
     /// Its model cannot be made.
     pub fn new(run: &'r mut Run<'s>, limits: Limits) -> Result<Self, ExploreError> {
         let session = run.session();
-        let plan = session.rig().plan_with(&[]).map_err(Box::new)?;
+        let mut rig = session.rig().clone();
+        // What is said of simulated drives is what they are, and not what the manual says.
+        if let Some(sim) = &mut rig.file.sim {
+            sim.setup.clear();
+        }
+        let plan = rig.plan_with(&[]).map_err(Box::new)?;
         let mut model = simulate::bench(&plan);
         model.run_until(Instant::START + WARM);
         model.begin();
-        Ok(Self { run, model, limits })
+        let line_errors = session.link().capabilities();
+        let line_errors = line_errors.contains(&Capability::LineErrors);
+        let rings = session.rings().iter().enumerate();
+        let judges: Vec<_> = rings
+            .map(|(ring, size)| Judge::new(ring, *size, line_errors))
+            .collect();
+        Ok(Self {
+            run,
+            model,
+            limits,
+            history: vec![Vec::new(); judges.len()],
+            judges,
+            stale: true,
+        })
     }
 
-    fn entry(case: &Case) -> Result<Entry, ExploreError> {
-        let page = Page {
-            title: "a case",
-            ..Page::default()
-        };
-        let source = Source {
-            name: "a case".to_owned(),
-            text: text(case, &page).into(),
-        };
-        Ok(Entry::new(source, None)?)
+    /// Makes the drives ready: nothing of what was sent before matters from now on.
+    fn begin_anew(&mut self) -> Result<Span, ExploreError> {
+        let anew = self.run.way().anew;
+        let session = self.run.session();
+        session.health()?;
+        let rings = session.rings().to_vec();
+        // A drive that does not answer `ResetH8` as it should is tried as it is.
+        if anew && start_anew(session.link(), &rings).is_err() {
+            self.run.leave_as_they_are();
+        }
+        let took = self.run.session().link().now().since_start();
+        self.run.session().health()?;
+        for (ring, judge) in self.judges.iter_mut().enumerate() {
+            judge.begin();
+            let case = prologue(rings[ring].drives(), beside_of(&rings, ring));
+            let link = self.run.session().link();
+            let (received, ..) = converse(link, &case, case.bytes().len());
+            let received = received.into_iter().map(|(_, byte)| byte).collect();
+            // What is wrong there is wrong in the first case too.
+            let _again = judge
+                .see(Exchange::of(&case, received))
+                .map(|_| judge.begin());
+        }
+        self.history.iter_mut().for_each(Vec::clear);
+        self.stale = false;
+        Ok(took)
+    }
+
+    /// The first byte of a whole conversation that came at another time than the line gives it (ND21 8.2): every drive takes a byte time.
+    fn untimely(
+        &mut self,
+        case: &Case,
+        received: &[(Instant, Received)],
+        due: &[Instant],
+    ) -> Option<Difference> {
+        let size = RingSize::new(u64::from(case.drives)).ok()?;
+        let all = sent(case);
+        let roles = roles(size, &all);
+        let answered = roles.iter().zip(&all).zip(due);
+        let answered =
+            answered.filter(|((role, (byte, _)), _)| (**role, *byte) != (Role::Idle, PAUSE));
+        let answered: Vec<_> = answered.map(|((role, _), due)| (*role, *due)).collect();
+        if answered.len() != received.len() || !case.faults().is_empty() {
+            return None;
+        }
+        let link = self.run.session().link();
+        let (round, tolerance) = (
+            link.byte_time() * u64::from(case.drives),
+            link.time_tolerance(),
+        );
+        let index = answered
+            .iter()
+            .zip(received)
+            .position(|((_, due), (at, _))| {
+                at.since(*due + round).max((*due + round).since(*at)) > tolerance
+            })?;
+        let (role, due) = answered[index];
+        Some(Difference::from(&twin::Divergence {
+            ring: case.ring(),
+            byte: index + 1,
+            what: twin::What::Time,
+            expected: Some((due + round, received[index].1)),
+            received: Some(received[index]),
+            role,
+            step: None,
+            drive: None,
+        }))
     }
 }
 
 impl Target for OnRig<'_, '_> {
     fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError> {
-        let mut rehearsal = Rehearsal::default();
-        let Some(plan) = Self::entry(case)?.plan else {
-            return Ok(rehearsal);
-        };
+        let mut link = Guarded::new(self.model.clone(), self.limits);
+        link.know_as(self.run.session().guarded());
         let way = self.run.way();
-        let mut events: Vec<Event> = Vec::new();
-        let mut guarded = Guarded::new(self.model.clone(), self.limits);
-        guarded.know_as(self.run.session().guarded());
-        let mut recording = Recording::new(&mut guarded, &mut events);
-        let played = play_one(&mut recording, &plan, &way);
-        let trace = recording.trace(case.ring());
-        rehearsal.denied = match (&played, guarded.trouble()) {
-            (_, Some(trouble)) => Some(trouble.to_string()),
-            (Ok(outcome), _)
-                if outcome.verdict == Verdict::Skipped || outcome.unready.is_some() =>
-            {
-                Some(outcome.remarks.join("; "))
+        if !self.limits.allow_everything() {
+            // The guard lets pass what it has seen the drives ready for.
+            let ready = examine(&mut link, &way.rings, 1).is_ok();
+            if ready && way.anew {
+                let _refused = start_anew(&mut link, &way.rings);
             }
-            (Err((_, ill)), _) => Some(ill.to_string()),
-            (Ok(_), None) => None,
-        };
-        let from = events
-            .iter()
-            .rposition(|event| matches!(event, Event::Begin(_)));
-        let own = &events[from.unwrap_or(0)..];
-        let received = own.iter().filter_map(|event| match event {
-            Event::Received(ring, at, byte) if *ring == case.ring() => Some((*at, *byte)),
-            _ => None,
-        });
-        rehearsal.seen = Seen {
-            received: received.collect(),
-            took: guarded.now().since_start(),
-        };
-        let before = events.iter().filter_map(|event| match event {
-            Event::Begin(at) => Some(at.since_start()),
-            _ => None,
-        });
-        rehearsal.took = before.fold(rehearsal.seen.took, |sum, span| sum + span);
-        rehearsal.features = features(case, &rehearsal.seen, &trace);
-        // A ring that nobody speaks to falls silent too.
-        let monitors = |(ring, drive): (usize, u8)| {
-            guarded.peek(ring, drive, ram::FLAGS2).unwrap_or(0) & flags2::MONITORING != 0
-        };
-        let rings = case.sizes().into_iter().enumerate();
-        let mut drives = rings.flat_map(|(ring, drives)| (0..drives).map(move |k| (ring, k)));
-        let received = own
-            .iter()
-            .filter(|event| matches!(event, Event::Received(..)));
-        let unasked = received.count() > case.bytes().len();
-        if rehearsal.denied.is_none() && (unasked || drives.any(monitors)) {
-            // In real time it is a race how a ring comes out of that.
-            let why = "drives would miss bytes and send unasked (ND21 9.9)";
-            rehearsal.denied = Some(why.to_owned());
         }
-        if rehearsal.denied.is_none() && measures_beside_faults(case) {
-            let why = "what a drive measures cannot be told from what a fault makes of it";
-            rehearsal.denied = Some(why.to_owned());
-        }
-        Ok(rehearsal)
+        let ring = case.ring();
+        let (received, _, took) = converse(&mut link, case, usize::MAX);
+        let trace = link.trace(ring);
+        let denied = match link.trouble() {
+            Some(trouble) => Some(trouble.to_string()),
+            None => beyond(case, &link, received.len()).map(str::to_owned),
+        };
+        let seen = Seen { received, took };
+        Ok(Rehearsal {
+            took,
+            features: features(case, &seen, &trace),
+            denied,
+            seen,
+            of_model: None,
+        })
     }
 
     fn attempt(&mut self, case: &Case, _: &Rehearsal) -> Result<Tried, ExploreError> {
-        let Some(plan) = Self::entry(case)?.plan else {
-            return Ok(Tried::default());
-        };
         let began = std::time::Instant::now();
-        let mut played = self.run.play(&plan, None)?;
-        let unready = played.last_played().is_some_and(|own| !own.was_played());
-        if unready && self.run.session().link().trouble().is_none() {
-            // A drive does not answer ResetH8 as it should: the case itself is played without.
-            self.run.leave_as_they_are();
-            played = self.run.play(&plan, None)?;
+        let mut made_ready = Span::ZERO;
+        let used: usize = self
+            .history
+            .iter()
+            .flatten()
+            .map(|act| act.length(case.drives))
+            .sum();
+        if self.stale || used > LONGEST_HISTORY {
+            made_ready = self.begin_anew()?;
         }
-        let took = u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX);
-        let mut tried = Tried {
-            took: Span::from_nanos(took),
-            ..Tried::default()
-        };
-        let Some(last) = played.last_played() else {
-            tried.not_played = Some(played.outcome.remarks.join("; "));
-            return Ok(tried);
-        };
-        let verdict = last.outcome.verdict;
+        if !self.run.session().rig().file.interlock.is_empty() {
+            let session = self.run.session();
+            session.health()?;
+            session.look_at_interlocks();
+        }
+        let foreseen = self.judges[case.ring()].foresee(case);
+        if foreseen.is_harmful {
+            let why = "it writes cells with which the drive's program works";
+            return Ok(Tried {
+                not_played: Some(why.to_owned()),
+                ..Tried::default()
+            });
+        }
+        let (received, due, took) = converse(self.run.session().link(), case, foreseen.count);
+        let mut tried = Tried::default();
         if let Some(trouble) = self.run.session().link().trouble() {
+            self.stale = true;
             match trouble {
                 Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interlock(_) => {
                     return Err(ExploreError::Lost(trouble.to_string()));
                 }
                 Trouble::Denied(_) | Trouble::Interrupted => {
                     tried.not_played = Some(trouble.to_string());
-                    return Ok(tried);
                 }
             }
-        }
-        tried.difference = match verdict {
-            // A known deviation of the rig's file explains it.
-            Verdict::Passed => None,
-            // What the manual leaves to the drive has kept it from being played.
-            Verdict::Skipped | Verdict::Inconclusive if !last.was_played() => {
-                tried.not_played = Some(last.outcome.remarks.join("; "));
-                None
+        } else {
+            let ring = case.ring();
+            let bytes = received.iter().map(|(_, byte)| *byte).collect();
+            let before = std::mem::take(&mut self.history[ring]);
+            tried.difference = self.judges[ring].see(Exchange::of(case, bytes));
+            if tried.difference.is_none() {
+                tried.difference = self.untimely(case, &received, &due);
             }
-            // A busy computer is late now and then, and not as late again.
-            Verdict::Marginal if played.telling(self.run.exactness().tolerance).is_none() => None,
-            _ => difference(last),
+            // A known deviation of the rig's file explains it.
+            let deviations = &self.run.session().rig().file.deviation;
+            let known = tried.difference.take_if(|found| {
+                let rule = format!("nd21 {}", found.section);
+                deviations.iter().any(|entry| entry.rule == rule)
+            });
+            let mut acts = before.clone();
+            acts.extend(case.acts.iter().cloned());
+            tried.before = (tried.difference.is_some() && !before.is_empty()).then_some(before);
+            self.history[ring] = acts;
+            // For how long a drive tests itself is its choice (ND21 11.8).
+            self.stale = known.is_some() || tried.difference.is_some() || case.orders().any(resets);
+        }
+        tried.took = match self.run.session().rig().is_simulated() {
+            true => made_ready + took,
+            false => {
+                Span::from_nanos(u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX))
+            }
         };
         Ok(tried)
+    }
+
+    fn begin(&mut self) {
+        self.stale = true;
     }
 
     fn over(&mut self) -> Option<String> {
@@ -184,33 +261,87 @@ impl Target for OnRig<'_, '_> {
     }
 }
 
-/// Whether a case has faults, and reads what no model knows of a real drive.
-fn measures_beside_faults(case: &Case) -> bool {
-    let Ok(size) = RingSize::new(u64::from(case.drives)) else {
-        return false;
-    };
-    let all: Vec<_> = case.bytes().into_iter().map(|byte| (byte, true)).collect();
-    let unknown = |role: Role| match role {
-        Role::Data { address, .. } => unknowable(address),
-        _ => false,
-    };
-    !case.faults().is_empty() && roles(size, &all).into_iter().any(unknown)
+/// Sends a case, and gives what came back, when each byte sent was on the line, and how long the line was
+/// used; `count` bytes are awaited.
+fn converse(
+    link: &mut dyn Link,
+    case: &Case,
+    count: usize,
+) -> (Vec<(Instant, Received)>, Vec<Instant>, Span) {
+    let ring = case.ring();
+    link.begin();
+    for (place, byte, harm) in case.faults() {
+        let fault = PlacedFault::Link(usize::from(place), harm.fault());
+        link.inject(ring, fault, Moment::Byte(byte));
+    }
+    let byte_time = link.byte_time();
+    let mut received = Vec::new();
+    let mut due = Vec::new();
+    for act in &case.acts {
+        if let What::Wait(ms) = act.what {
+            let end = link.now() + Span::from_millis(u64::from(ms));
+            await_bytes(link, ring, usize::MAX, end, &mut received);
+        }
+        let parts = act.parts(case.drives);
+        for part in parts.iter().filter(|part| !part.is_empty()) {
+            let end = link.send(ring, part);
+            let length = part.len() as u64;
+            due.extend((0..length).rev().map(|left| end - byte_time * left));
+        }
+    }
+    let round = byte_time * (u64::from(case.drives) + 2) + link.time_tolerance() + PATIENCE;
+    let end = due.last().copied().unwrap_or(link.now()) + round;
+    await_bytes(link, ring, count, end, &mut received);
+    (received, due, link.now().since_start())
 }
 
-/// The first divergence of an attempt, that of the case itself before those of what comes before it; without one, the first byte at
-/// another time, as `play` repeats what was late once.
-fn difference(attempt: &Attempt) -> Option<Difference> {
-    let own = attempt.conversations.iter().zip(&attempt.comparisons);
-    let own = || {
-        own.clone()
-            .filter(|(one, _)| one.has_steps())
-            .map(|(_, c)| c)
+/// Takes what comes in until so many bytes have come, or until `end`.
+fn await_bytes(
+    link: &mut dyn Link,
+    ring: usize,
+    count: usize,
+    end: Instant,
+    received: &mut Vec<(Instant, Received)>,
+) {
+    loop {
+        received.extend(std::iter::from_fn(|| link.receive(ring)));
+        if received.len() >= count || link.now() >= end || link.trouble().is_some() {
+            return;
+        }
+        link.wait(end);
+    }
+}
+
+/// Why a case cannot be tried on a ring behind a port.
+fn beyond(case: &Case, link: &dyn Link, received: usize) -> Option<&'static str> {
+    // A ring that nobody speaks to falls silent too.
+    let monitors = |(ring, drive): (usize, u8)| {
+        link.peek(ring, drive, ram::FLAGS2).unwrap_or(0) & flags2::MONITORING != 0
     };
-    let all = || attempt.comparisons.iter();
-    let divergence = own()
-        .chain(all())
-        .find_map(|comparison| comparison.divergence.as_ref());
-    let untimely = own().chain(all()).find_map(|own| own.untimely.as_ref());
-    let late = untimely.filter(|_| attempt.outcome.verdict == Verdict::Marginal);
-    divergence.or(late).map(Difference::from)
+    let rings = case.sizes().into_iter().enumerate();
+    let mut drives = rings.flat_map(|(ring, drives)| (0..drives).map(move |k| (ring, k)));
+    let unjudged = |(_, _, harm): &(u8, u64, Harm)| {
+        matches!(harm, Harm::Delay(_) | Harm::Break(_) | Harm::Overrun)
+    };
+    if received > case.bytes().len() && case.faults().is_empty() || drives.any(monitors) {
+        // In real time it is a race how a ring comes out of that.
+        Some("drives would miss bytes and send unasked (ND21 9.9)")
+    } else if case.faults().iter().any(unjudged) {
+        Some("what drives take a broken byte for is their choice")
+    } else {
+        None
+    }
+}
+
+/// The other ring of a bench, as a case with this one names it.
+fn beside_of(rings: &[RingSize], ring: usize) -> Option<Beside> {
+    match (rings, ring) {
+        ([_, second], 0) => Some(Beside::Second(second.drives())),
+        ([first, _], 1) => Some(Beside::First(first.drives())),
+        _ => None,
+    }
+}
+
+fn resets(order: &Order) -> bool {
+    order.command == Command::Reset && order.spoil.is_none()
 }

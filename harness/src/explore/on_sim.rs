@@ -116,14 +116,14 @@ impl Target for OnSim {
             return Ok(Tried {
                 took: rehearsal.took,
                 difference: rehearsal.of_model.clone(),
-                not_played: None,
+                ..Tried::default()
             });
         };
         let seen = play(&mut link, case);
         Ok(Tried {
             took: seen.took,
             difference: against_model(case, &rehearsal.seen, &seen).or_else(|| beside(case, &link)),
-            not_played: None,
+            ..Tried::default()
         })
     }
 }

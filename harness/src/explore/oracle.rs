@@ -33,9 +33,12 @@ pub struct Difference {
     /// In which ring, counted from 0.
     #[serde(default, skip_serializing_if = "is_first")]
     pub ring: usize,
-    /// The drive that is meant, where one is.
+    /// The drive that is to blame, where the bytes or an experiment show which.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<u8>,
+    /// The drive to which the telegram went; another one may have made its bytes what they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub meant: Option<u8>,
     /// Which byte received it is, counted from 1; none where it is no byte at the master.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub byte: Option<usize>,
@@ -53,11 +56,28 @@ impl Difference {
         format!("{} (ND21 {}, {})", self.what, self.section, self.rule)
     }
 
-    /// The same of the same drive.
+    /// What makes two findings of a run one: the same kind in telegrams to the same drive.
+    #[must_use]
+    pub fn key(&self) -> String {
+        match self.meant {
+            Some(drive) => format!(
+                "to drive {}: {}",
+                drive_name(self.ring, drive),
+                self.signature_of(None)
+            ),
+            None => self.signature_of(self.drive),
+        }
+    }
+
+    /// The kind, and the drive that is to blame where that is known.
     #[must_use]
     pub fn signature(&self) -> String {
+        self.signature_of(self.drive)
+    }
+
+    fn signature_of(&self, drive: Option<u8>) -> String {
         let kind = self.kind();
-        match (self.drive, self.ring) {
+        match (drive, self.ring) {
             (Some(drive), ring) => format!("drive {}: {kind}", drive_name(ring, drive)),
             (None, 0) => kind,
             (None, _) => format!("ring 2: {kind}"),
@@ -73,7 +93,8 @@ impl From<&twin::Divergence> for Difference {
             section: section.to_owned(),
             rule: rule.to_owned(),
             ring: found.ring,
-            drive: found.drive,
+            drive: None,
+            meant: found.role.drive(),
             byte: Some(found.byte),
             time: found.what == twin::What::Time,
             about: found.to_string(),
@@ -112,7 +133,7 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
         received: received.get(index).copied(),
         role,
         step: None,
-        drive: role.drive(),
+        drive: None,
     };
     Some(Difference::from(&divergence))
 }
@@ -214,6 +235,7 @@ pub fn against_witnesses(
         rule: found.rule.to_owned(),
         ring,
         drive: Some(drive),
+        meant: None,
         byte: None,
         time: false,
         about: format!("drive {name}, byte {heard} on the link to it, at {at}: {about}"),
@@ -240,6 +262,7 @@ fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
             rule: "answer".to_owned(),
             ring: case.ring(),
             drive: Some(drive),
+            meant: None,
             byte: None,
             time: true,
             about: format!(
@@ -266,6 +289,7 @@ pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
         rule: "two rings".to_owned(),
         ring: other,
         drive: None,
+        meant: None,
         byte: None,
         time: false,
         about: format!(
@@ -312,6 +336,7 @@ fn on_link(
         rule: "ring".to_owned(),
         ring: case.ring(),
         drive: None,
+        meant: None,
         byte: (place == usize::from(case.drives)).then_some(at + 1),
         time: false,
         about: format!(
@@ -331,6 +356,7 @@ fn beside_bus(ring: usize, drive: u8, rule: &str, section: &str, detail: &str) -
         rule: rule.to_owned(),
         ring,
         drive: Some(drive),
+        meant: None,
         byte: None,
         time: false,
         about: format!("drive {name}: {rule}{detail} is otherwise than in the reference model"),

@@ -1,6 +1,6 @@
 //! What cases are tried on.
 
-use super::case::Case;
+use super::case::{Act, Case};
 use super::error::ExploreError;
 use super::oracle::Difference;
 use super::play::Seen;
@@ -29,6 +29,8 @@ pub struct Tried {
     pub took: Span,
     /// How the ring was otherwise than it must be.
     pub difference: Option<Difference>,
+    /// What was sent to the ring before the case, since its drives were made ready, where the difference may come from that.
+    pub before: Option<Vec<Act>>,
     /// Why it was not played after all.
     pub not_played: Option<String>,
 }
@@ -46,6 +48,9 @@ pub trait Target {
     /// # Errors
     /// The rig cannot go on.
     fn attempt(&mut self, case: &Case, rehearsal: &Rehearsal) -> Result<Tried, ExploreError>;
+
+    /// Lets the next attempt begin with drives that were made ready for it.
+    fn begin(&mut self) {}
 
     /// Whether no other case can be tried: somebody wants the program to end, or the rig's file allows no longer run.
     fn over(&mut self) -> Option<String> {

@@ -5,7 +5,7 @@ use super::follow::Conversation;
 use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
-use harness_proto::nd21::ram;
+use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::{Role, roles};
@@ -18,9 +18,6 @@ const LONGEST_RUN: usize = 32;
 
 /// How long before the end of a conversation in real time bytes may be missing.
 const TAIL: Span = Span::from_millis(20);
-
-/// `scope_puffer` (ND21 14.10.6.6).
-const SCOPE_BUFFER: std::ops::RangeInclusive<u16> = ram::SCOPE_PUFFER..=ram::SCOPE_PUFFER + 255;
 
 /// What a ring sent back, beside what its twin received.
 struct Rows<'a> {
@@ -154,6 +151,7 @@ impl Comparer<'_> {
             || index < rows.known
                 && self.may_differ(ring, rows.roles, (wanted.byte, received), index);
         self.note_write(ring, role);
+        self.note_reset(ring, rows.roles, index);
         match (same, wanted_good == found_good) {
             (true, true) => {
                 self.time((ring, index), role, step, ((due, wanted), (at, found)));
@@ -230,9 +228,9 @@ impl Comparer<'_> {
     /// Whether a drive may have written to a cell by itself.
     fn may_write(&self, ring: usize, drive: u8, address: u16) -> bool {
         let status = (ring, drive, ram::SCOPE_STATUS);
-        match SCOPE_BUFFER.contains(&address) {
+        match own::SCOPE_BUFFER.contains(&address) {
             true => self.recording.contains(&(ring, drive)) || self.written.contains(&status),
-            false => changes_by_itself(address),
+            false => unknowable(address),
         }
     }
 
@@ -297,6 +295,27 @@ impl Comparer<'_> {
                 self.written_now.insert(cell);
                 self.held.remove(&cell);
             }
+        }
+    }
+
+    /// Forgets what the cells of a drive hold where a `ResetH8` ends (ND21 10.5): they are loaded from its EEPROM, and how long the drive took
+    /// to write that is its choice (14.10.5).
+    fn note_reset(&mut self, ring: usize, roles: &[Role], index: usize) {
+        let command = index.checked_sub(1).and_then(|before| roles.get(before));
+        if let (
+            Some(Role::Check {
+                drive: Some(drive), ..
+            }),
+            Some(Role::Command {
+                drive: Some(of),
+                section: "10.5",
+            }),
+        ) = (roles.get(index), command)
+            && drive == of
+        {
+            let others = |cell: &(usize, u8, u16)| (cell.0, cell.1) != (ring, *drive);
+            self.written.retain(others);
+            self.held.retain(|cell, _| others(cell));
         }
     }
 
@@ -402,7 +421,7 @@ fn collapsed(bytes: &[(Instant, Received)]) -> Vec<(Instant, Received)> {
 
 /// Whether no model knows what a cell of a real drive holds from one moment to the next.
 pub(crate) fn unknowable(address: u16) -> bool {
-    measured(address) || changes_by_itself(address)
+    own::is_own(address) || changes_by_itself(address)
 }
 
 /// Whether the drive itself writes a cell (14.2: read only), so that no model knows what it holds.

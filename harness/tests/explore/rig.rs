@@ -111,6 +111,41 @@ fn a_deviating_drive_behind_a_socket() {
     ended(&output, 0, "(ND21 9.7, error mode)");
 }
 
+/// ND21 10.1, 14.2, 14.10.3: what ROM holds, where process data come from, and how fast the EEPROM is: the drive's choice, and no finding.
+#[test]
+fn what_the_manual_leaves_to_a_drive_is_no_finding() {
+    let more = [
+        "drive 0..last memory 2F00 = 4E 44 32 31",
+        "drive 0..last property eeprom-write-time = 2ms",
+        "drive 0..last property self-test-time = 40ms",
+        "drive 0..last property read-long = as-printed",
+    ];
+    let served = Served::start_with("nd21", &[2], "tcp", true, &[], &more);
+    let desk = Desk::new(served.sizes[0], &place(&served), EVERYTHING);
+    let out = desk.path("run");
+    let run = [
+        "fuzz",
+        "run",
+        "--allow-motion",
+        "--wire-time",
+        "8s",
+        "--out",
+        name(&out),
+    ];
+    let output = desk.run(&run);
+    let code = output.status.code();
+    assert!(matches!(code, Some(0 | 5)), "{}", said(&output));
+    // More than one case a second: the drives are not reset for each.
+    let cases = std::fs::read_to_string(out.join(RECORD)).expect("a record");
+    assert!(cases.contains("\"cases\":30,"), "{}", said(&output));
+    let output = desk.run(&["run", "12.5-driver-eeprom", "--allow-motion"]);
+    assert!(
+        !matches!(output.status.code(), Some(1)),
+        "{}",
+        said(&output)
+    );
+}
+
 /// Two rings behind ports, and a drive of the second one deviates: it is found there, confirmed, made small, and its scenario runs on
 /// the rig. The run is killed on the way (SIGKILL), the next one brings the rings back and goes on.
 fn two_rings(transport: &str) {

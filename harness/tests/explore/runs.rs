@@ -74,6 +74,7 @@ impl Target for LateOnce {
             rule: "sync byte".to_owned(),
             ring: 0,
             drive: None,
+            meant: None,
             byte: Some(1),
             time: true,
             about: "late".to_owned(),

@@ -10,6 +10,7 @@ pub mod eeprom;
 pub mod errors;
 pub mod functions;
 pub mod io;
+pub mod own;
 pub mod position;
 pub mod s_ramp;
 pub mod units;

@@ -3,7 +3,7 @@
 use super::address::RingSize;
 use super::check_sequence::{Progress, SEQUENCE, Watch};
 use super::command::{Field, Layout, Reply, layout};
-use super::properties::ReadLongAnswer;
+use super::properties::{Properties, ReadLongAnswer, ShortAddress};
 use super::sync::{Addressing, SyncByte};
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -88,11 +88,14 @@ impl Role {
 #[derive(Default)]
 struct Reader {
     ring: u8,
+    read_long: ReadLongAnswer,
     watch: Watch,
     /// Bytes of the present telegram that are still to come.
     net: u8,
     address_next: bool,
     process_data: u8,
+    /// The number of the addressed drive, counted on beyond the ring.
+    number: Option<u8>,
     drive: Option<u8>,
     /// The begun command of each drive.
     commands: BTreeMap<u8, Vec<u8>>,
@@ -102,22 +105,32 @@ struct Reader {
 /// The role of every byte of a conversation; `good` is false for a byte with a line error.
 #[must_use]
 pub fn roles(ring: RingSize, sent: &[(u8, bool)]) -> Vec<Role> {
-    read(ring, sent).0
+    roles_with(ring, sent, &Properties::default())
+}
+
+/// The same for drives with these properties of `ReadLong` (10.1) and of short addresses behind a check sequence (9.2).
+#[must_use]
+pub fn roles_with(ring: RingSize, sent: &[(u8, bool)], properties: &Properties) -> Vec<Role> {
+    read(ring, sent, properties).0
 }
 
 /// Whether a telegram may begin behind these bytes: none is under way, no drive has a begun command (9.5), and
 /// none is in the error mode (9.7) as far as the bytes tell.
 #[must_use]
 pub fn at_rest(ring: RingSize, sent: &[(u8, bool)]) -> bool {
-    let reader = read(ring, sent).1;
+    let reader = read(ring, sent, &Properties::default()).1;
     !reader.foreign && !reader.address_next && reader.net == 0 && reader.commands.is_empty()
 }
 
-fn read(ring: RingSize, sent: &[(u8, bool)]) -> (Vec<Role>, Reader) {
-    let mut reader = Reader {
+fn read(ring: RingSize, sent: &[(u8, bool)], properties: &Properties) -> (Vec<Role>, Reader) {
+    let begun = |number: Option<u8>| Reader {
         ring: ring.drives(),
+        read_long: properties.read_long,
+        drive: number.filter(|number| *number < ring.drives()),
+        number,
         ..Reader::default()
     };
+    let mut reader = begun(None);
     let mut roles: Vec<Role> = Vec::with_capacity(sent.len());
     for (byte, good) in sent {
         let role = reader.read(*byte, *good);
@@ -125,10 +138,8 @@ fn read(ring: RingSize, sent: &[(u8, bool)]) -> (Vec<Role>, Reader) {
         if reader.watch.see(*byte, *good) == Progress::Complete {
             let from = roles.len().saturating_sub(SEQUENCE.len());
             roles[from..].fill(Role::CheckSequence);
-            reader = Reader {
-                ring: reader.ring,
-                ..Reader::default()
-            };
+            let keeps = properties.short_address == ShortAddress::KeptSum;
+            reader = begun(reader.number.filter(|_| keeps));
         }
     }
     (roles, reader)
@@ -142,8 +153,8 @@ impl Reader {
         }
         if self.address_next {
             self.address_next = false;
-            let drive = byte.wrapping_add(self.ring);
-            self.drive = (drive < self.ring).then_some(drive);
+            self.number = Some(byte.wrapping_add(self.ring));
+            self.drive = self.number.filter(|number| *number < self.ring);
             return Role::Address { drive: self.drive };
         }
         if self.net > 0 {
@@ -163,8 +174,9 @@ impl Reader {
                     Addressing::AddressFollows => self.address_next = true,
                     Addressing::SameDrive => {}
                     Addressing::NextDrive => {
-                        let next = self.drive.and_then(|drive| drive.checked_add(1));
-                        self.drive = next.filter(|drive| *drive < self.ring);
+                        // Behind an address that no drive has, the next one may be a drive's (9.2).
+                        self.number = self.number.map(|number| number.wrapping_add(1));
+                        self.drive = self.number.filter(|number| *number < self.ring);
                     }
                 }
                 Role::Sync
@@ -186,7 +198,7 @@ impl Reader {
         };
         let begun = self.commands.entry(drive).or_default();
         begun.push(byte);
-        let Some(layout) = layout(begun[0], ReadLongAnswer::default()) else {
+        let Some(layout) = layout(begun[0], self.read_long) else {
             self.foreign = true;
             return Role::Foreign;
         };

@@ -49,6 +49,9 @@ pub struct FuzzRunArguments {
     /// witness judges each whole drive by what the manual says of the bus, the cells and the invariants of a drive.
     #[arg(long)]
     pub whole: bool,
+    /// Try a simulated rig as a ring behind a port: nothing is known of its drives but what the master receives.
+    #[arg(long, conflicts_with = "whole")]
+    pub behind_port: bool,
     /// A finding counts when it is seen again K of N times, as K/N.
     #[arg(long, value_name = "K/N", default_value = "2/3", value_parser = k_of_n)]
     pub confirm: (u8, u8),
@@ -123,13 +126,20 @@ pub(super) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
     let name = before
         .as_ref()
         .map_or(&arguments.rig, |kept| &kept.about.rig);
-    let Some(rig) = find_rig(name, output) else {
+    let Some(mut rig) = find_rig(name, output) else {
         return Ok(Exit::Usage);
     };
-    if rig.is_simulated() {
+    let behind_port = match &before {
+        Some(kept) => kept.about.ports,
+        None => arguments.behind_port || !rig.is_simulated(),
+    };
+    if !behind_port {
         return on_simulated(arguments, before.as_ref(), &rig, output);
     }
-    if !arguments.deviates.is_empty() || arguments.whole {
+    if let Some(sim) = &mut rig.file.sim {
+        sim.setup
+            .extend(arguments.deviates.iter().map(Planted::line));
+    } else if !arguments.deviates.is_empty() || arguments.whole {
         output.complain("--deviates and --whole are for simulated rings: the drives of this rig are what they are");
         return Ok(Exit::Usage);
     }
@@ -146,8 +156,7 @@ pub(super) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
         };
         let about = about(
             arguments,
-            &rig,
-            Setup::of_ports(rig.rings().count()),
+            (Setup::of_ports(rig.rings().count()), true),
             &scope,
         );
         let bounds = Bounds {
@@ -209,18 +218,18 @@ fn on_simulated(
         findings: arguments.findings.max(1),
         every: EVERY,
     };
-    let about = about(arguments, rig, setup, &scope);
+    let about = about(arguments, (setup, false), &scope);
     explore(arguments, (about, scope), &mut target, &bounds, output)
 }
 
-fn about(arguments: &FuzzRunArguments, rig: &Rig, setup: Setup, scope: &Scope) -> About {
+fn about(arguments: &FuzzRunArguments, (setup, ports): (Setup, bool), scope: &Scope) -> About {
     let names = scope.spices.iter().map(|spice| spice.name().to_owned());
     About {
         schema: About::SCHEMA,
         rig: arguments.rig.clone(),
         drives: scope.first.drives,
         second: scope.second.as_ref().map(|ring| ring.drives),
-        ports: !rig.is_simulated(),
+        ports,
         seed: arguments.seed,
         confirm: arguments.confirm.0,
         of: arguments.confirm.1,

@@ -1,0 +1,120 @@
+//! What the manual leaves to the drive: cells that its own program writes. No model can say what they hold.
+//!
+//! A bench compares a cell that it has written only where no row of [`OWN`] names it. What any other cell holds before the first
+//! write is the drive's choice too, ROM and EEPROM included, but it must not change from one read to the next.
+
+use super::cells::{Access, cell_at};
+use super::{PARAMETERS, ram};
+use core::ops::RangeInclusive;
+
+/// Cells that the drive's program writes, and why a master cannot know their value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Own {
+    /// The addresses, from the first to the last byte.
+    pub cells: RangeInclusive<u16>,
+    /// The section of the ND21 manual.
+    pub section: &'static str,
+    /// Why.
+    pub about: &'static str,
+}
+
+const fn own(first: u16, last: u16, section: &'static str, about: &'static str) -> Own {
+    Own {
+        cells: first..=last,
+        section,
+        about,
+    }
+}
+
+/// Every range of RAM and registers that the drive's program writes by itself, in order of addresses. Cells that 14.2 calls read only
+/// or reserved belong to it too; [`is_own`] knows both. The buffer of the oscilloscope is RAM like any other while the oscilloscope
+/// does not run ([`SCOPE`]).
+#[rustfmt::skip]
+pub const OWN: &[Own] = &[
+    own(ram::ERRORCODE, ram::I2 + 3, "14.10.1", "the code of the last error, the load of the motor"),
+    own(ram::EEPROM_BUFFER, ram::EEPROM_CONTROL, "14.10.5", "the EEPROM controller works in them"),
+    own(ram::I_OFFSET, ram::I_OFFSET + 1, "14.2.1", "a measurement"),
+    own(ram::PZ, ram::AS_COMMAND, "13.1.9.1", "the markers of the cycle control"),
+    own(ram::STACK, ram::STACK + 95, "14.2.1", "the stack of the drive's program"),
+    own(ram::STATUS, ram::STATUS, "14.4.1", "the state of the drive"),
+    own(ram::N_INTEGRATOR, ram::ADCSR, "14.2.1", "regulators, measurements and positions"),
+    own(ram::NOVOBUS, ram::CHECKSUM_OUT, "14.2.1", "the buffers of the bus"),
+    own(ram::DATA_IN_BUFFER, ram::DATA_IN_BUFFER, "14.2.1", "a buffer of the bus"),
+    own(ram::DATA_OUT_BUFFER, ram::BUS_ADDR, "14.2.1", "buffers of the bus; the address goes through BusAddr"),
+    own(ram::SCOPE_STATUS, ram::SCOPE_SIGNAL2, "14.10.6", "the oscilloscope works in them"),
+    own(ram::PS_STATUS, ram::PS_DELTA, "13.3", "the positioning controller works in them"),
+    own(ram::FLAGS, ram::FLAGS2, "14.4", "the state of the drive"),
+    own(ram::CNT2, ram::CNT_REVERS, "14.2.1", "counters"),
+    own(0xFF80, 0xFFFF, "14.7.1", "registers, inputs and outputs"),
+];
+
+/// The cells of the oscilloscope (ND21 14.10.6). It writes its buffer while it runs, and only a master starts it.
+pub const SCOPE: RangeInclusive<u16> = ram::SCOPE_STATUS..=ram::SCOPE_SIGNAL2;
+
+/// The buffer of the oscilloscope (ND21 14.10.6.6).
+pub const SCOPE_BUFFER: RangeInclusive<u16> = ram::SCOPE_PUFFER..=ram::STACK - 1;
+
+/// RAM that no function of the drive uses while the oscilloscope stands, of which tests may write every byte with any value: part of its
+/// buffer.
+pub const SPARE: RangeInclusive<u16> = 0xFE10..=0xFE97;
+
+/// The parameters (ND21 14.2.1): loaded from the EEPROM at a reset, and only read by the drive afterwards.
+pub const PARAMETER_CELLS: RangeInclusive<u16> = PARAMETERS..=ram::VCO_LIN_L;
+
+/// Whether the drive's program may write a cell at any time, so that no model can say what it holds. ROM is not: the drive chooses what
+/// stands there once.
+#[must_use]
+pub fn is_own(address: u16) -> bool {
+    OWN.iter().any(|own| own.cells.contains(&address))
+        || cell_at(address).is_some_and(|cell| cell.access != Access::Write)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cells::{RAM, changes_by_itself};
+    use super::*;
+
+    /// ND21 14.2.1, 14.5: what a drive changes as time goes on is its own, apart from the buffer of an oscilloscope that stands.
+    #[test]
+    fn what_changes_by_itself_is_own() {
+        for address in 0xFD80..=0xFF7F {
+            let changes = changes_by_itself(address) && !SCOPE_BUFFER.contains(&address);
+            assert!(!changes || is_own(address), "{address:04X}");
+        }
+        let read_only = RAM.iter().filter(|cell| cell.access == Access::Read);
+        assert!(
+            read_only
+                .flat_map(super::super::cells::Cell::addresses)
+                .all(is_own)
+        );
+    }
+
+    /// ND21 10.1, 14.2: ROM, spare RAM, and where process data can go (14.10.3) are compared.
+    #[test]
+    fn what_a_master_can_test_is_not_own() {
+        let tested = SPARE.chain(0x2F00..=0x2FDF);
+        assert!(
+            tested
+                .chain([ram::DATA_IN, ram::DATA_OUT])
+                .all(|cell| !is_own(cell))
+        );
+        assert!(SPARE.all(|cell| SCOPE_BUFFER.contains(&cell)));
+        let gains = ram::NKP..=ram::LKD;
+        assert!(
+            gains
+                .chain([ram::N_MAX, ram::VCO_LIN_L])
+                .all(|cell| !is_own(cell))
+        );
+        assert!([ram::MMAX, ram::STATUS, 0xFFB7].into_iter().all(is_own));
+    }
+
+    #[test]
+    fn rows_are_in_order() {
+        let pairs = OWN.windows(2);
+        assert!(
+            pairs
+                .into_iter()
+                .all(|two| two[0].cells.end() < two[1].cells.start())
+        );
+    }
+}

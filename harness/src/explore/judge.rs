@@ -1,0 +1,363 @@
+//! Exchanges with a ring behind a port, one after the other since its drives were made ready, beside the models that it may be.
+
+use super::case::{Act, Beside, Case, Harm, Talk, To, What};
+use super::expect::{Both, Model, Must};
+use super::oracle::{Difference, sent};
+use super::order::Command;
+use crate::twin;
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::properties::{
+    BrokenSequence, EmptyShortTelegram, Properties, ReadLongAnswer, ShortAddress,
+};
+use harness_proto::novobus::role::{Role, roles_with};
+use std::collections::BTreeMap;
+
+/// The first conversation with drives that were made ready: a telegram to nobody, behind which every drive knows its address (ND21 9.3).
+pub(super) fn prologue(drives: u8, beside: Option<Beside>) -> Case {
+    let read = Command::ReadByte { cell: 0xFE13 };
+    Case {
+        drives,
+        beside,
+        acts: vec![Act::sound(What::Talk(Talk::one(To::Nobody(0), read)))],
+    }
+}
+
+/// What the master sent, what met it on links, and what came back.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Exchange {
+    /// Bytes, and whether each went round whole.
+    sent: Vec<(u8, bool)>,
+    /// What happens on links: which link, which byte on it counted from 1.
+    harms: BTreeMap<(usize, u64), Vec<Harm>>,
+    received: Vec<Received>,
+}
+
+impl Exchange {
+    /// A case that was played.
+    pub(super) fn of(case: &Case, received: Vec<Received>) -> Self {
+        let mut harms: BTreeMap<_, Vec<Harm>> = BTreeMap::new();
+        for (link, byte, harm) in case.faults() {
+            let place = (usize::from(link), byte);
+            harms.entry(place).or_default().push(harm);
+        }
+        Self {
+            sent: sent(case),
+            harms,
+            received,
+        }
+    }
+}
+
+/// The first byte that no model explains.
+#[derive(Clone, Debug)]
+struct Mismatch {
+    index: usize,
+    what: twin::What,
+    must: Option<Must>,
+    role: Role,
+    section: &'static str,
+}
+
+/// What a ring was seen to do since its drives were made ready.
+#[derive(Clone, Debug)]
+pub(super) struct Judge {
+    ring: usize,
+    size: RingSize,
+    /// Whether the link shows line errors at their bytes.
+    line_errors: bool,
+    /// What of the manual's open properties the ring can still have; that of the model first.
+    possible: Vec<Properties>,
+    model: Model,
+    log: Vec<Exchange>,
+    /// All bytes of the log.
+    sent: Vec<(u8, bool)>,
+}
+
+impl Judge {
+    /// A ring, counted from 0, of which nothing is known but its size.
+    pub(super) fn new(ring: usize, size: RingSize, line_errors: bool) -> Self {
+        let possible = all_properties();
+        Self {
+            ring,
+            size,
+            line_errors,
+            model: Model::new(size, Properties::default()),
+            possible,
+            log: Vec::new(),
+            sent: Vec::new(),
+        }
+    }
+
+    /// Its drives were made ready: what their cells hold is not known any more. Their kind stays known.
+    pub(super) fn begin(&mut self) {
+        self.log.clear();
+        self.sent.clear();
+        let properties = self.possible.first().copied().unwrap_or_default();
+        self.model = Model::new(self.size, properties);
+    }
+
+    /// How a ring was otherwise than every drive of the manual would be. Behind that [`Self::begin`] is due.
+    pub(super) fn see(&mut self, exchange: Exchange) -> Option<Difference> {
+        let before = self.possible.clone();
+        let mut best: Option<Mismatch> = None;
+        loop {
+            match self.follow(&exchange) {
+                Ok(()) => {
+                    self.sent.extend(&exchange.sent);
+                    self.log.push(exchange);
+                    return None;
+                }
+                // The model that explains most says best what is wrong.
+                Err(found) if best.as_ref().is_none_or(|best| found.index > best.index) => {
+                    best = Some(found);
+                }
+                Err(_) => {}
+            }
+            if !self.next_model() {
+                self.possible = before;
+                return best.map(|found| self.difference(&found, &exchange));
+            }
+        }
+    }
+
+    /// The next model that explains everything so far.
+    fn next_model(&mut self) -> bool {
+        let log = std::mem::take(&mut self.log);
+        while self.possible.len() > 1 {
+            self.possible.remove(0);
+            self.begin();
+            let mut again = log.iter();
+            if again.all(|exchange| {
+                let explained = self.follow(exchange).is_ok();
+                self.sent.extend(&exchange.sent);
+                explained
+            }) {
+                self.log = log;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Lets the model live through an exchange.
+    fn follow(&mut self, exchange: &Exchange) -> Result<(), Mismatch> {
+        let all = [&self.sent[..], &exchange.sent[..]].concat();
+        let roles = roles_with(self.size, &all, &self.model.properties);
+        let mut counts = vec![0; usize::from(self.size.drives()) + 1];
+        let mut index = 0;
+        for ((byte, _), role) in exchange.sent.iter().zip(&roles[self.sent.len()..]) {
+            for out in around(&mut self.model, *byte, &mut counts, &exchange.harms) {
+                let Some(must) = self.model.must(out, *role) else {
+                    continue;
+                };
+                let Some(what) = self.compare(out, must, exchange.received.get(index)) else {
+                    let received = exchange.received.get(index).map_or(0, |own| own.byte);
+                    self.model.take((*byte, *role), must, received);
+                    index += 1;
+                    continue;
+                };
+                if !must.may_be_missing {
+                    let what = match what {
+                        twin::What::Value if self.is_shifted(exchange) => twin::What::Surplus,
+                        other => other,
+                    };
+                    return Err(self.mismatch(index, what, Some(must), *role));
+                }
+            }
+            if self.model.was_reset() {
+                return Ok(());
+            }
+        }
+        match index < exchange.received.len() {
+            true => Err(self.mismatch(index, twin::What::Surplus, None, Role::Foreign)),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether more bytes came than were sent.
+    fn is_shifted(&self, exchange: &Exchange) -> bool {
+        exchange.harms.is_empty() && exchange.received.len() > exchange.sent.len()
+    }
+
+    fn compare(&self, out: Both, must: Must, received: Option<&Received>) -> Option<twin::What> {
+        let Some(received) = received else {
+            return Some(twin::What::Missing);
+        };
+        let noticed = out[0].is_some_and(|own| own.error.is_some());
+        if (received.byte ^ must.byte) & !must.open != 0 {
+            Some(twin::What::Value)
+        } else if self.line_errors && received.error.is_some() != noticed {
+            Some(twin::What::LineStatus)
+        } else {
+            None
+        }
+    }
+
+    fn mismatch(&self, index: usize, what: twin::What, must: Option<Must>, role: Role) -> Mismatch {
+        let section = self.model.section(role);
+        Mismatch {
+            index,
+            what,
+            must,
+            role,
+            section,
+        }
+    }
+
+    fn difference(&self, found: &Mismatch, exchange: &Exchange) -> Difference {
+        let (own, rule) = found.role.rule();
+        let rule = match found.section == own {
+            true => rule,
+            false => "what a cell holds behind it",
+        };
+        let received = match exchange.received.get(found.index) {
+            None => "nothing".to_owned(),
+            Some(Received { byte, error: None }) => format!("{byte:02X}"),
+            Some(Received {
+                byte,
+                error: Some(error),
+            }) => format!("{byte:02X} ({error})"),
+        };
+        let must = match found.must {
+            None => "nothing".to_owned(),
+            Some(Must { byte, open: 0, .. }) => format!("{byte:02X}"),
+            Some(Must { byte, open, .. }) => {
+                format!("{:02X} in the bits {:02X}", byte & !open, !open)
+            }
+        };
+        let ring = if self.ring == 0 { "" } else { " of ring 2" };
+        let (what, number, section) = (found.what.words(), found.index + 1, found.section);
+        Difference {
+            what: what.to_owned(),
+            section: section.to_owned(),
+            rule: rule.to_owned(),
+            ring: self.ring,
+            drive: None,
+            meant: found.role.drive(),
+            byte: Some(number),
+            time: false,
+            about: format!(
+                "byte {number}{ring}: {what}: received {received}, the manual says {must} (ND21 {section}, {rule})"
+            ),
+        }
+    }
+
+    /// What a case will do to the drives, as far as the model knows.
+    pub(super) fn foresee(&self, case: &Case) -> Foreseen {
+        let mut model = self.model.clone();
+        let mut seen = Foreseen::default();
+        let case = Exchange::of(case, Vec::new());
+        let all = [&self.sent[..], &case.sent[..]].concat();
+        let roles = roles_with(self.size, &all, &model.properties);
+        let mut counts = vec![0; usize::from(self.size.drives()) + 1];
+        for ((byte, _), role) in case.sent.iter().zip(&roles[self.sent.len()..]) {
+            for out in around(&mut model, *byte, &mut counts, &case.harms) {
+                let Some(must) = model.must(out, *role) else {
+                    continue;
+                };
+                let check = matches!(role, Role::Check { .. }) && model.awaits_open(*role);
+                if must.open != 0 || check || model.was_reset() {
+                    seen.open.push(seen.count);
+                }
+                model.take((*byte, *role), must, must.byte);
+                seen.count += 1;
+            }
+            seen.is_harmful |= model.writes_what_drives_use();
+        }
+        seen
+    }
+}
+
+/// What a case will do.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Foreseen {
+    /// How many bytes come back.
+    pub(super) count: usize,
+    /// Those of them that drives may answer in more than one way, by their index.
+    pub(super) open: Vec<usize>,
+    /// Whether cells are written with which a drive's program works, or nobody knows which: what comes of that no model says.
+    pub(super) is_harmful: bool,
+}
+
+/// A byte of the master's on its way round.
+fn around(
+    model: &mut Model,
+    byte: u8,
+    counts: &mut [u64],
+    harms: &BTreeMap<(usize, u64), Vec<Harm>>,
+) -> Vec<Both> {
+    let mut bytes: Vec<Both> = vec![[Some(Received::good(byte)); 2]];
+    for (place, count) in counts.iter_mut().enumerate() {
+        let mut next = Vec::with_capacity(bytes.len());
+        for byte in bytes {
+            *count += 1;
+            match harms.get(&(place, *count)) {
+                None => next.push(byte),
+                Some(harms) => next.extend(harmed(byte, harms)),
+            }
+        }
+        bytes = next
+            .into_iter()
+            .map(|byte| model.pass(place, byte))
+            .filter(|byte| *byte != [None; 2])
+            .collect();
+    }
+    bytes
+}
+
+/// What arrives of a byte.
+fn harmed(byte: Both, harms: &[Harm]) -> Vec<Both> {
+    let mut own = byte;
+    let (mut before, mut again, mut lost) = (Vec::new(), false, false);
+    for harm in harms {
+        match *harm {
+            Harm::Flip { data, .. } => {
+                let crate::link::LinkFault::Flip(flips) = harm.fault() else {
+                    continue;
+                };
+                own = own.map(|byte| {
+                    byte.map(|byte| Received {
+                        byte: byte.byte ^ data,
+                        error: byte.error.or(flips.noticed()),
+                    })
+                });
+            }
+            Harm::Replace(new) => own = own.map(|byte| byte.map(|_| Received::good(new))),
+            Harm::Insert(new) => before.push([Some(Received::good(new)); 2]),
+            Harm::Duplicate => again = true,
+            Harm::Drop => lost = true,
+            // `OnRig` has none of these.
+            Harm::Delay(_) | Harm::Break(_) | Harm::Overrun => {}
+        }
+    }
+    if !lost {
+        before.push(own);
+        before.extend(again.then_some(own));
+    }
+    before
+}
+
+/// What the manual leaves open of the bus, the default first. Times of 9.9 are not among it: cases on ports have no time-outs.
+fn all_properties() -> Vec<Properties> {
+    let mut all = Vec::new();
+    for empty_short_telegram in [EmptyShortTelegram::Accepted, EmptyShortTelegram::Error] {
+        for short_address in [ShortAddress::NotAddressed, ShortAddress::KeptSum] {
+            for read_long in [ReadLongAnswer::FourData, ReadLongAnswer::AsPrinted] {
+                for broken_sequence in [BrokenSequence::Answered, BrokenSequence::Forwarded] {
+                    all.push(Properties {
+                        empty_short_telegram,
+                        short_address,
+                        read_long,
+                        broken_sequence,
+                        ..Properties::default()
+                    });
+                }
+            }
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests;
