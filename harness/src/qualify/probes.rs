@@ -73,6 +73,7 @@ const LOOKS: &[(&str, &[Look])] = &[
     ("eeprom-read-time", &[look(ram::EEPROM_CONTROL, 0x20)]),
     ("eeprom-write-time", &[look(ram::EEPROM_CONTROL, 0x10)]),
     ("self-test-time", &[look(ram::STATUS, status::RESET)]),
+    ("self-test-bus", &[]),
     (
         "ps-calculation-time",
         &[look(ram::PS_STATUS, ps_status::CALCULATED)],

@@ -32,6 +32,12 @@ pub struct Step {
 }
 
 impl Step {
+    /// Nothing goes out.
+    pub const SILENCE: Self = Self {
+        byte: None,
+        marks: Marks::NONE,
+    };
+
     const fn plain(byte: u8) -> Self {
         Self {
             byte: Some(byte),

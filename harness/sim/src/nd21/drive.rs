@@ -97,6 +97,9 @@ impl Nd21Drive {
 
 impl Device for Nd21Drive {
     fn receive(&mut self, now: Instant, received: Received) -> Step {
+        if self.program.is_deaf() {
+            return Step::SILENCE;
+        }
         let step = self.bus_end.receive(now, received, &mut self.program);
         self.bus_has_worked();
         step

@@ -12,7 +12,7 @@ use super::motion::{Demand, Motion, Outside};
 use super::outputs;
 use super::plant::Plant;
 use super::positioning::{Positioning, Situation};
-use super::properties::{BusErrors, Nd21Properties, PsPosition};
+use super::properties::{BusErrors, Nd21Properties, PsPosition, SelfTestBus};
 use super::referencing::{Referencing, Run};
 use super::s_ramp::{SRampRun, SRampWire};
 use super::scope::Scope;
@@ -129,6 +129,11 @@ impl Program {
         program.mode = program.work_out_mode();
         program.show_flags(EndSwitches::new(&program.world, &program.cells), 0);
         program
+    }
+
+    /// Whether it tests itself and does not receive bytes meanwhile (property `self-test-bus`, 11.8).
+    pub(crate) fn is_deaf(&self) -> bool {
+        self.mode == Mode::Reset && self.properties.self_test_bus == SelfTestBus::Silent
     }
 
     /// The cells, past all rules of access.

@@ -19,6 +19,8 @@ pub struct Nd21Properties {
     pub eeprom_write_time: Span,
     /// `self-test-time`: how long the reset mode lasts.
     pub self_test_time: Span,
+    /// `self-test-bus`: whether the drive answers the bus while it tests itself.
+    pub self_test_bus: SelfTestBus,
     /// `ps-calculation-time`: how long the positioning controller calculates.
     pub ps_calculation_time: Span,
     /// `i2t-time`: how long the motor may have its peak current.
@@ -39,6 +41,7 @@ impl Default for Nd21Properties {
             eeprom_read_time: Span::from_millis(1),
             eeprom_write_time: Span::from_millis(10),
             self_test_time: Span::from_millis(100),
+            self_test_bus: SelfTestBus::default(),
             ps_calculation_time: Span::from_millis(10),
             i2t_time: Span::from_millis(2_000),
             ps_position: PsPosition::default(),
@@ -56,6 +59,16 @@ pub enum PsPosition {
     ModeBit,
     /// `whole-word`: an absolute position of 32 bits (13.3.2.1).
     WholeWords,
+}
+
+/// What a drive does with bytes from the bus while it tests itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SelfTestBus {
+    /// `answered`: it answers and forwards them.
+    #[default]
+    Answered,
+    /// `silent`: it does not receive them, so the ring is open.
+    Silent,
 }
 
 /// Which errors of the bus put the drive itself into the error mode, which blocks the regulator.
@@ -121,7 +134,7 @@ const fn words(
 }
 
 /// Every property.
-pub const PROPERTIES: [Property; 8] = [
+pub const PROPERTIES: [Property; 9] = [
     time(
         "eeprom-read-time",
         "14.10.5.2",
@@ -142,6 +155,15 @@ pub const PROPERTIES: [Property; 8] = [
         "how long the reset mode lasts",
         60_000,
         |p, t| p.self_test_time = t,
+    ),
+    words(
+        "self-test-bus",
+        "11.8",
+        "whether a drive answers the bus while it tests itself",
+        &[
+            ("answered", |p| p.self_test_bus = SelfTestBus::Answered),
+            ("silent", |p| p.self_test_bus = SelfTestBus::Silent),
+        ],
     ),
     time(
         "ps-calculation-time",
