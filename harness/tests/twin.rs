@@ -7,7 +7,7 @@ use harness::qualify::{
     probes,
 };
 use harness::scenario::plan::Plan;
-use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus};
+use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_anew};
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
@@ -63,6 +63,17 @@ fn a_ring_is_its_own_twin() {
         }
     }
     assert!(compared > 5_000, "{compared}");
+}
+
+/// ND21 11.8: drives that leave the ring open while they test themselves are reset and waited for like others.
+#[test]
+fn drives_that_are_silent_in_their_self_test_are_reset() {
+    let header = "title t\nring 3\ndrive 0..last model nd21\ndrive 0..last property self-test-bus = silent\n\
+                  drive 0..last property self-test-time = 150ms\n> 80\n";
+    let plan = entry(header).plan.expect("novobus");
+    let mut link = bench(&plan);
+    link.run_until(harness_proto::time::Instant::START + Span::from_millis(500));
+    start_anew(&mut link, &plan.rings).expect("they come back");
 }
 
 /// A record is judged as the run was: the same verdict, the same sentence, and nothing is left over.

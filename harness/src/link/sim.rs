@@ -316,6 +316,7 @@ impl Link for SimulatedLink {
                 }
                 fault => self.suffer(ring, fault),
             },
+            Moment::At(at) if self.on_bench(at) <= self.bench.now() => self.suffer(ring, fault),
             Moment::At(at) => {
                 let at = self.on_bench(at);
                 let place = self.scheduled.partition_point(|(other, ..)| *other <= at);

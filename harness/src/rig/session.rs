@@ -5,11 +5,11 @@ use super::around::{self, Around};
 use super::ends::Ends;
 use super::file;
 use super::health::{self, Health, Unhealthy, examine};
-use super::hook::HookError;
 use super::interlock::Interlocks;
 use super::line_test::{self, Cause};
-use super::lock::{LockError, PortLock, RigLock};
-use super::open::{OpenRigError, open};
+use super::lock::{PortLock, RigLock};
+use super::open::open;
+use super::session_error::SessionError;
 use super::state;
 use super::watchdog::{Alarm, Watchdog};
 use crate::bus::{Axis, count_behind};
@@ -58,72 +58,6 @@ impl Options {
             }),
         }
     }
-}
-
-/// Why a rig cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum SessionError {
-    /// Somebody has it, or its lock cannot be used.
-    #[error(transparent)]
-    Lock(#[from] LockError),
-    /// It must not be used.
-    #[error(
-        "rig {rig} is in quarantine since {since}: {reason} (`drivebench rig quarantine {rig} --lift`)"
-    )]
-    Quarantine {
-        /// Which.
-        rig: String,
-        /// Since when.
-        since: String,
-        /// Why.
-        reason: String,
-    },
-    /// The folder of locks.
-    #[error("failed to use the folder of locks: {0}; DRIVEBENCH_STATE names another")]
-    State(std::io::Error),
-    /// The watchdog cannot be started.
-    #[error("failed to start the watchdog: {0}")]
-    Watchdog(std::io::Error),
-    /// A port.
-    #[error("rig {rig}: {error}")]
-    Open {
-        /// Which.
-        rig: String,
-        /// Why not.
-        error: Box<OpenRigError>,
-    },
-    /// A hook.
-    #[error("rig {rig}: {error}")]
-    Hook {
-        /// Which.
-        rig: String,
-        /// Why.
-        error: Box<HookError>,
-    },
-    /// The program was told to end while the rig was being opened.
-    #[error("rig {rig}: interrupted{}", .end.as_ref().map_or(" before anything was sent".to_owned(), |end| format!("; {end}")))]
-    Interrupted {
-        /// Which.
-        rig: String,
-        /// How it was given back; `None` where nothing had been sent to its drives.
-        end: Option<Box<End>>,
-    },
-    /// It is not healthy.
-    #[error("rig {rig}, ring {ring}: {ill}{}", likely(cause.as_ref()))]
-    Ill {
-        /// Which.
-        rig: String,
-        /// Which ring, 1 or 2.
-        ring: usize,
-        /// What is wrong.
-        ill: Unhealthy,
-        /// The likely cause, and what to do next; only known when a rig is opened.
-        cause: Option<Cause>,
-    },
-}
-
-fn likely(cause: Option<&Cause>) -> String {
-    cause.map_or(String::new(), |cause| format!(". Likely cause: {cause}"))
 }
 
 /// How a session ended.

@@ -18,6 +18,7 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::at_rest;
+use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 
 /// How long an answer may take, beside what the ring itself needs.
@@ -250,6 +251,9 @@ fn is_own(address: u16) -> bool {
 /// How long drives may test themselves after a reset.
 const SELF_TEST: Span = Span::from_millis(10_000);
 
+/// How long the ring stays quiet before a drive that did not answer is asked again.
+const QUIET: Span = Span::from_millis(250);
+
 /// Resets every drive (ND21 10.5) and waits until all have tested themselves (11.8): RAM is then as their EEPROMs say.
 ///
 /// # Errors
@@ -282,6 +286,7 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
     let mut waiting = cells;
     loop {
         let status = read_all(link, &waiting);
+        let silent = status.iter().any(Result::is_err);
         let back = |status: &Result<u8, NotReady>| {
             let status = status.as_ref();
             status.is_ok_and(|status| status & nd21::bits::status::RESET == 0)
@@ -297,9 +302,45 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
                 let why = "it does not come back from its reset";
                 return Err(NotReady::new(*cell, Unready::NoAnswer, why));
             }
+            Some(_) if silent => be_quiet(link),
             Some(_) => {}
         }
     }
+}
+
+/// Lets time pass without a byte on the ring: a drive may be silent while it tests itself (property `self-test-bus`, ND21 11.8), and one that
+/// comes back in the middle of a telegram takes its next byte for a sync byte.
+fn be_quiet(link: &mut dyn Link) {
+    let end = link.now() + QUIET;
+    while link.now() < end && link.trouble().is_none() {
+        link.wait(end);
+    }
+}
+
+/// Whether a ring passes SYNCO within the time of a self-test; the drive that was reset before may have opened it.
+fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
+    let end = link.now() + SELF_TEST;
+    while !passes_synco(link, ring) {
+        if link.now() >= end || link.trouble().is_some() {
+            return false;
+        }
+        be_quiet(link);
+    }
+    true
+}
+
+/// Whether anything comes round for a SYNCO (9.2).
+fn passes_synco(link: &mut dyn Link, ring: usize) -> bool {
+    while link.receive(ring).is_some() {}
+    let left = link.send(ring, &[SYNCO]);
+    let end = left + link.byte_time() * (u64::from(link.drives(ring)) + 4) + PATIENCE;
+    while link.now() < end && link.trouble().is_none() {
+        link.wait(end);
+        if link.receive(ring).is_some() {
+            return true;
+        }
+    }
+    false
 }
 
 /// A check sequence stands behind each telegram: whoever was in the middle of something hears the next one whole (9.8).
@@ -321,7 +362,9 @@ fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
 /// Where a ring does not stand that, or a drive does not answer.
 fn reset_one_by_one(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
     for cell in cells {
-        if exchange(link, cell.ring, cell.drive, Command::ResetH8).is_none() {
+        let reset =
+            |link: &mut dyn Link| exchange(link, cell.ring, cell.drive, Command::ResetH8).is_some();
+        if !reset(link) && !(closes_again(link, cell.ring) && reset(link)) {
             let why = "it does not answer ResetH8";
             return Err(NotReady::new(*cell, Unready::NoAnswer, why));
         }

@@ -238,7 +238,12 @@ impl Runner<'_> {
                 Ok(())
             }
             PlannedAction::Fault(ring, fault, Moment::Now) => {
-                self.link.inject(*ring, *fault, Moment::Now);
+                // With a time in front it is the byte at that time, without one the first byte of the lines behind.
+                let moment = match step.when {
+                    PlannedWhen::Now => Moment::Now,
+                    _ => Moment::At(self.link.now()),
+                };
+                self.link.inject(*ring, *fault, moment);
                 Ok(())
             }
             PlannedAction::Fault(..) | PlannedAction::Receive(..) => Ok(()),
