@@ -364,7 +364,7 @@ fn reset_one_by_one(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotRead
     for cell in cells {
         let reset =
             |link: &mut dyn Link| exchange(link, cell.ring, cell.drive, Command::ResetH8).is_some();
-        if !reset(link) && !(closes_again(link, cell.ring) && reset(link)) {
+        if !(reset(link) || closes_again(link, cell.ring) && reset(link)) {
             let why = "it does not answer ResetH8";
             return Err(NotReady::new(*cell, Unready::NoAnswer, why));
         }
