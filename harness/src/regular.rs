@@ -2,9 +2,9 @@
 
 use rustix::fs::OFlags;
 use std::fs::{File, OpenOptions};
-use std::io::{self, Read};
+use std::io::{self, BufWriter, Read, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What to do about a symbolic link as the last part of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,13 +50,18 @@ pub(crate) fn open(path: &Path, links: Links) -> io::Result<File> {
 /// # Errors
 /// As of [`open`].
 pub(crate) fn open_input(path: &Path) -> io::Result<File> {
-    let descriptors = ["/dev/fd", "/proc/self/fd"].map(Path::new);
-    let listed = path.parent().is_some_and(|own| descriptors.contains(&own));
     let pipe = |path: &Path| std::fs::metadata(path).is_ok_and(|own| own.file_type().is_fifo());
-    match (listed || path == Path::new("/dev/stdin")) && pipe(path) {
+    match is_descriptor(path) && pipe(path) {
         true => File::open(path),
         false => open(path, Links::Follow),
     }
+}
+
+/// Whether a path names a file that this process has open already.
+fn is_descriptor(path: &Path) -> bool {
+    let folders = ["/dev/fd", "/proc/self/fd"].map(Path::new);
+    let streams = ["/dev/stdin", "/dev/stdout", "/dev/stderr"].map(Path::new);
+    path.parent().is_some_and(|own| folders.contains(&own)) || streams.contains(&path)
 }
 
 /// Reads a regular file of at most this many bytes.
@@ -77,6 +82,71 @@ pub(crate) fn read(path: &Path, links: Links, most: u64) -> io::Result<Vec<u8>> 
         ))),
         Ok(_) => Ok(bytes),
     }
+}
+
+/// Writes a file beside its place and renames it, so that it is complete or not there at all. A device such as `/dev/null`, or the pipe of a
+/// shell substitution `>(...)`, is written to and stays.
+///
+/// # Errors
+/// It cannot be written, or something else than a file stands there.
+pub(crate) fn write(
+    path: &Path,
+    write: impl FnOnce(BufWriter<&File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let kind = std::fs::metadata(path).map(|own| own.file_type()).ok();
+    if kind.is_some_and(|kind| kind.is_char_device() || kind.is_fifo() && is_descriptor(path)) {
+        let flags = OFlags::NOCTTY.bits().cast_signed();
+        let file = OpenOptions::new()
+            .write(true)
+            .custom_flags(flags)
+            .open(path)?;
+        return write(BufWriter::new(&file));
+    }
+    if kind.is_some_and(|kind| !kind.is_file()) {
+        return Err(refused("it is not a regular file"));
+    }
+    // Not the link is replaced, but the file that it leads to.
+    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut beside = path.clone().into_os_string();
+    beside.push(format!(".{}.part", std::process::id()));
+    let beside = PathBuf::from(beside);
+    let written = File::create_new(&beside)
+        .and_then(|file| write(BufWriter::new(&file)).and_then(|()| file.sync_all()))
+        .and_then(|()| std::fs::rename(&beside, &path));
+    written.inspect_err(|_| {
+        // Where nothing was begun there is nothing to remove.
+        let _gone = std::fs::remove_file(&beside);
+    })
+}
+
+/// Writes a text like [`write`].
+///
+/// # Errors
+/// As of [`write`].
+pub(crate) fn write_text(path: &Path, text: impl AsRef<[u8]>) -> io::Result<()> {
+    write(path, |mut out| {
+        out.write_all(text.as_ref())?;
+        out.flush()
+    })
+}
+
+/// Whether the path that was given is wrong, or the rights to it, and not the disk.
+pub(crate) fn is_wrong_path(error: &io::Error) -> bool {
+    use io::ErrorKind::{
+        AlreadyExists, InvalidFilename, InvalidInput, IsADirectory, NotADirectory, NotFound,
+        PermissionDenied, ReadOnlyFilesystem,
+    };
+    matches!(
+        error.kind(),
+        AlreadyExists
+            | InvalidFilename
+            | InvalidInput
+            | IsADirectory
+            | NotADirectory
+            | NotFound
+            | PermissionDenied
+            | ReadOnlyFilesystem
+    )
 }
 
 fn refused(why: &str) -> io::Error {
@@ -100,6 +170,28 @@ mod tests {
         };
         assert_eq!(read("file", Links::Refuse, 4), Ok(b"text".to_vec()));
         assert_eq!(read("link", Links::Follow, 4), Ok(b"text".to_vec()));
+        // What a command writes replaces a file, or the file that a link leads to, and goes to a device.
+        for name in ["file", "link", "new", "/dev/null"] {
+            write_text(&path(name), "other").expect(name);
+        }
+        assert_eq!(std::fs::read(path("file")).expect("a file"), b"other");
+        assert!(path("link").is_symlink());
+        assert!(
+            std::fs::metadata("/dev/null")
+                .expect("it stays")
+                .file_type()
+                .is_char_device()
+        );
+        for (name, wrong_path) in [
+            ("fifo", true),
+            ("/dev/full", false),
+            ("no/file", true),
+            (".", true),
+        ] {
+            let error = write_text(&path(name), "other").expect_err(name);
+            assert_eq!(is_wrong_path(&error), wrong_path, "{name}: {error}");
+        }
+        std::fs::write(path("file"), "text").expect("room");
         for (name, links, most, why) in [
             ("link", Links::Refuse, 4, "symbolic link"),
             ("fifo", Links::Refuse, 4, "not a regular file"),

@@ -4,6 +4,7 @@ use super::{Axis, Bus, Error};
 use harness_proto::nd21::bits::{flags, flags2, ps_status, status};
 use harness_proto::nd21::position::Position;
 use harness_proto::nd21::ram;
+use harness_proto::novobus::command::Command;
 
 /// How near the actual value must come (13.2.1.2 step 8).
 const NEAR: u32 = 256;
@@ -24,7 +25,7 @@ impl Bus<'_> {
     ///
     /// # Errors
     /// [`Error::InReset`], [`Error::DriveError`]; [`Error::Interrupted`] by a stop or a block, then `ps_v0` is as
-    /// before; others see [`Error`].
+    /// before, where the [line permits it](Self::restore_ps_v0); others see [`Error`].
     #[doc(alias = "NB_Referenzfahrt")]
     pub fn reference(&self, axis: Axis) -> Result<(), Error> {
         self.reference_showing(axis, |_| {})
@@ -50,8 +51,26 @@ impl Bus<'_> {
         self.or(axis, ram::FLAGS2, start)?;
         let end = self.follow_reference(axis, seen);
         // Step 9 (E68), on every way out.
+        let restored = self.restore_ps_v0(axis, speed);
+        end?;
+        restored.map(|_| ())
+    }
+
+    /// Gives `ps_v0` the value that it had before a run. A drive sets it to its maximum speed at a reset (13.1.4), which may be more than
+    /// the `max_speed` of a rig allows to be written: then the cell stays as it is, and this is `false`.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn restore_ps_v0(&self, axis: Axis, speed: u16) -> Result<bool, Error> {
+        let restore = Command::WriteWord {
+            address: ram::PS_V0,
+            data: speed,
+        };
+        if !self.lock().permits(axis.ring(), axis.drive(), restore) {
+            return Ok(false);
+        }
         self.write_word(axis, ram::PS_V0, speed)?;
-        end
+        Ok(true)
     }
 
     fn follow_reference(&self, axis: Axis, mut seen: impl FnMut(u8)) -> Result<(), Error> {

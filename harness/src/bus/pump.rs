@@ -4,6 +4,7 @@ use super::{Error, Options};
 use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{
     self, Counters, Event, Job, JobId, Outcome, Phase, Refused, Stop,
 };
@@ -72,6 +73,10 @@ impl<'l> Pump<'l> {
 
     pub(super) fn now(&self) -> Instant {
         self.link.now()
+    }
+
+    pub(super) fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+        self.link.permits(ring, drive, command)
     }
 
     pub(super) fn sizes(&self) -> Vec<RingSize> {

@@ -1,5 +1,7 @@
 //! Exit codes.
 
+use crate::evidence::EvidenceError;
+use crate::regular::is_wrong_path;
 use crate::scenario::verdict::Verdict;
 use std::process::ExitCode;
 
@@ -47,6 +49,25 @@ Exit codes:
   7  the safe state could not be confirmed: look at the machine
   75 somebody else holds the bench
   130 interrupted; the safe state was reached";
+
+    /// The code where a file could not be used: wrong usage where its path or the rights to it are wrong, a bench that failed where the disk
+    /// is full or broken.
+    #[must_use]
+    pub fn of_file(error: &std::io::Error) -> Self {
+        match is_wrong_path(error) {
+            true => Self::Usage,
+            false => Self::RigError,
+        }
+    }
+
+    /// The code where a folder of evidence could not be used.
+    #[must_use]
+    pub fn of_evidence(error: &EvidenceError) -> Self {
+        match error {
+            EvidenceError::File { error, .. } => Self::of_file(error),
+            _ => Self::Usage,
+        }
+    }
 
     /// The code where, beside what it stands for, the bench itself failed: a rig error is graver than a verdict, and not graver than a
     /// tripped interlock, an interruption or a safe state that is not confirmed.

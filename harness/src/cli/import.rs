@@ -4,12 +4,13 @@ use super::args::{DiffArguments, ImportArguments};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
-use super::trace::{Shown, fits_output, into_file, show};
+use super::trace::{Shown, fits_output, show};
 use crate::capture::{
     Capture, Judged, Options, Run, diff as compare, is_capture, judge, read_file, scenario,
 };
 use crate::library::{Entry, sources};
 use crate::link::link_name;
+use crate::regular;
 use crate::scenario::run::AtFinding;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -114,7 +115,7 @@ fn as_scenario(
         output.result(&text)?;
         return Ok(Exit::Passed);
     };
-    match into_file(path, |mut out| {
+    match regular::write(path, |mut out| {
         out.write_all(text.as_bytes()).and_then(|()| out.flush())
     }) {
         Ok(()) => Ok(Exit::Passed),

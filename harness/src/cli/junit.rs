@@ -5,6 +5,7 @@ use super::output::Output;
 use super::run::drives;
 use crate::evidence::{Case, junit};
 use crate::library::Entry;
+use crate::regular;
 use crate::scenario::run::Outcome;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -50,23 +51,12 @@ impl Cases {
             return exit;
         };
         let xml = junit(&format!("rig {}", self.rig), &self.cases);
-        match whole(path, &xml) {
+        match regular::write_text(path, &xml) {
             Ok(()) => exit,
             Err(error) => {
                 output.complain(&format!("failed to write {}: {error}", path.display()));
-                exit.max(Exit::RigError)
+                exit.with_rig_error()
             }
         }
     }
-}
-
-fn whole(path: &Path, text: &str) -> std::io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let beside = path.with_file_name(name);
-    let written = std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, path));
-    written.inspect_err(|_| {
-        // Where nothing was begun there is nothing to take away.
-        let _gone = std::fs::remove_file(&beside);
-    })
 }

@@ -1,12 +1,11 @@
 //! `--html FILE`: the page of a run, collected while it goes on and written at its end.
 
 use super::output::Output;
-use super::trace::into_file;
 use crate::library::Entry;
+use crate::regular;
 use crate::report::html::{Head, Played, Shown, run, section};
 use crate::scenario::run::Outcome;
 use harness_sim::trace::Trace;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// A page that is being collected.
@@ -91,11 +90,7 @@ pub(super) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> 
 
 /// Writes a page, whole or not at all; false where that failed, which has been said then.
 pub(super) fn write(path: &Path, text: &str, output: &mut Output) -> bool {
-    let written = into_file(path, |mut out| {
-        out.write_all(text.as_bytes())?;
-        out.flush()
-    });
-    match written {
+    match regular::write_text(path, text) {
         Ok(()) => {
             output.say(&format!("the report is in {}\n", path.display()));
             true

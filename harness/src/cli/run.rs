@@ -109,7 +109,7 @@ fn on_simulated(
         Ok(folder) => folder,
         Err(error) => {
             output.complain(&error.to_string());
-            return Ok(Exit::Usage);
+            return Ok(Exit::of_evidence(&error));
         }
     };
     let bar = progress_bar(entries.len(), output.progress);
@@ -122,7 +122,7 @@ fn on_simulated(
             Ok(played) => played,
             Err(error) => {
                 output.complain(&error.to_string());
-                return Ok(Exit::Usage);
+                return Ok(Exit::of_evidence(&error));
             }
         };
         let outcome = &played.outcome;

@@ -101,7 +101,7 @@ pub(super) fn work(
         Err(Stop::Evidence(error)) => {
             output.complain(&error.to_string());
             folder = None;
-            Exit::Usage
+            Exit::of_evidence(&error)
         }
         Err(Stop::Output(error)) => output.unwritable(&error),
     };

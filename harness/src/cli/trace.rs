@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
 use crate::library::{Entry, sources};
+use crate::regular;
 use crate::report::plot::plots;
 use crate::report::svg::{Options, Scale, svg};
 use crate::report::table::{LEGEND, Part, table, wires};
@@ -14,7 +15,6 @@ use crate::scenario::run::{AtFinding, Record};
 use harness_proto::line::Rate;
 use harness_sim::trace::Trace;
 use std::io::{BufWriter, Write};
-use std::path::Path;
 
 /// Lines about damaged bytes shown below a table.
 const WIRES: usize = 20;
@@ -94,31 +94,13 @@ pub(super) fn show(
         unless_closed(write(shown, format, showing, out))?;
         return Ok(true);
     };
-    match into_file(path, |out| write(shown, format, showing, out)) {
+    match regular::write(path, |out| write(shown, format, showing, out)) {
         Ok(()) => Ok(true),
         Err(error) => {
             output.complain(&format!("failed to write {}: {error}", path.display()));
             Ok(false)
         }
     }
-}
-
-/// Written beside and then renamed: a file is there whole or not at all.
-pub(super) fn into_file(
-    path: &Path,
-    write: impl FnOnce(BufWriter<&std::fs::File>) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(format!(".{}.part", std::process::id()));
-    let beside = Path::new(&beside);
-    let written = std::fs::File::create_new(beside)
-        .and_then(|file| write(BufWriter::new(&file)))
-        .and_then(|()| std::fs::rename(beside, path));
-    if written.is_err() {
-        // What is left of it is of no use; where there is nothing, nothing is to be removed.
-        let _gone = std::fs::remove_file(beside);
-    }
-    written
 }
 
 fn write(

@@ -1,5 +1,6 @@
 //! Why exploring ends early.
 
+use crate::regular::is_wrong_path;
 use crate::rig::SessionError;
 use crate::scenario::problem::Problems;
 
@@ -15,6 +16,9 @@ pub enum ExploreError {
     /// A file or a folder; the text names it and says what to do.
     #[error("{0}")]
     File(String),
+    /// A file that cannot be written although its path is right: the disk is full or broken.
+    #[error("{0}")]
+    Unwritable(String),
     /// What was asked for cannot be; the text says what can.
     #[error("{0}")]
     Usage(String),
@@ -27,5 +31,14 @@ impl ExploreError {
     /// A file that could not be used.
     pub(crate) fn file(what: &str, path: &std::path::Path, error: &dyn std::fmt::Display) -> Self {
         Self::File(format!("failed to {what} {}: {error}", path.display()))
+    }
+
+    /// A file that could not be written.
+    pub(crate) fn unwritten(what: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
+        let text = format!("failed to {what} {}: {error}", path.display());
+        match is_wrong_path(error) {
+            true => Self::File(text),
+            false => Self::Unwritable(text),
+        }
     }
 }

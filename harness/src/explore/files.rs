@@ -2,27 +2,14 @@
 
 use super::error::ExploreError;
 use crate::regular::{self, Links};
-use std::io::Write;
 use std::path::Path;
 
 /// The longest file that is read.
 const LONGEST: u64 = 256 * 1024 * 1024;
 
-/// Writes a file under another name first: it is there whole or not at all.
+/// Writes a file as a whole or not at all.
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), ExploreError> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let write = || {
-        let mut file = std::fs::File::create(&part)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        std::fs::rename(&part, path)
-    };
-    write().map_err(|error| {
-        let _gone = std::fs::remove_file(&part);
-        ExploreError::file("write", path, &error)
-    })
+    regular::write_text(path, text).map_err(|error| ExploreError::unwritten("write", path, &error))
 }
 
 /// Reads a text.

@@ -126,7 +126,7 @@ impl Record {
     /// It is there with something in it, or cannot be written.
     pub fn create(folder: &Path, about: &About) -> Result<Self, ExploreError> {
         let unusable =
-            |error: std::io::Error| ExploreError::file("make the folder", folder, &error);
+            |error: std::io::Error| ExploreError::unwritten("make the folder", folder, &error);
         std::fs::create_dir_all(folder).map_err(unusable)?;
         if std::fs::read_dir(folder)
             .map_err(unusable)?
@@ -140,7 +140,8 @@ impl Record {
             )));
         }
         let path = folder.join(RECORD);
-        let file = File::create_new(&path).map_err(|e| ExploreError::file("make", &path, &e))?;
+        let file =
+            File::create_new(&path).map_err(|e| ExploreError::unwritten("make", &path, &e))?;
         hold(&file, folder)?;
         let mut record = Self {
             folder: folder.to_owned(),
@@ -161,11 +162,11 @@ impl Record {
         let file = File::options()
             .append(true)
             .open(&path)
-            .map_err(|error| ExploreError::file("write", &path, &error))?;
+            .map_err(|error| ExploreError::unwritten("write", &path, &error))?;
         hold(&file, folder)?;
         // A record only grows: cut off at its last settled line it is as if the rest had never been written.
         file.set_len(length as u64)
-            .map_err(|error| ExploreError::file("write", &path, &error))?;
+            .map_err(|error| ExploreError::unwritten("write", &path, &error))?;
         let record = Self {
             folder: folder.to_owned(),
             file,
@@ -185,14 +186,14 @@ impl Record {
     /// It cannot be written.
     pub fn line(&mut self, line: &Line) -> Result<(), ExploreError> {
         let path = self.folder.join(RECORD);
-        let failed = |error: &dyn std::fmt::Display| ExploreError::file("write", &path, error);
-        let mut text = serde_json::to_string(line).map_err(|error| failed(&error))?;
+        let failed = |error: std::io::Error| ExploreError::unwritten("write", &path, &error);
+        let mut text = serde_json::to_string(line).map_err(|error| failed(error.into()))?;
         text.push('\n');
         // One write a line: a process that is killed leaves whole lines, or half of the last one.
         self.file
             .write_all(text.as_bytes())
             .and_then(|()| self.file.flush())
-            .map_err(|error| failed(&error))
+            .map_err(failed)
     }
 }
 

@@ -1,6 +1,7 @@
 //! A line or a link behind a guard.
 
 use super::Watch;
+use super::safe_state::telegram;
 use crate::bus::Axis;
 use crate::link::{
     Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus,
@@ -11,6 +12,7 @@ use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::guard::{Denial, Found, Guard, Limits};
 use harness_proto::novobus::sync::SYNCO;
@@ -343,6 +345,16 @@ impl<L: Line> Line for Guarded<L> {
             self.deny(format!("ring {}: {denial}", ring + 1));
         }
         end
+    }
+
+    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+        let Some(ring) = self.rings.get(ring) else {
+            return false;
+        };
+        let mut guard = ring.guard.clone();
+        let now = self.guard_time();
+        let mut bytes = telegram(ring.size, drive, command).into_iter();
+        self.trouble().is_none() && bytes.all(|byte| guard.admit(now, byte, false).is_ok())
     }
 
     fn refused(&self) -> usize {

@@ -305,17 +305,23 @@ pub fn blind_stop(size: RingSize) -> Vec<u8> {
         address_low: ram::STATUS.to_be_bytes()[1],
         data: status::STOP,
     };
-    let net = stop.encode();
-    let length = u8::try_from(net.len()).unwrap_or(u8::MAX);
-    let Ok(header) = Header::new(Addressing::AddressFollows, false, length) else {
-        return bytes;
-    };
     for drive in 0..size.drives() {
-        if let Ok(address) = size.address_byte(drive) {
-            bytes.extend([SyncByte::Telegram(header).encode(), address]);
-            bytes.extend(&net[..]);
-        }
+        bytes.extend(telegram(size, drive, stop));
     }
+    bytes
+}
+
+/// A telegram with a command and nothing else to a drive of a ring, its address spelled out (ND21 9.2); empty for a drive that the ring
+/// does not have.
+pub(super) fn telegram(size: RingSize, drive: u8, command: Command) -> Vec<u8> {
+    let net = command.encode();
+    let length = u8::try_from(net.len()).unwrap_or(u8::MAX);
+    let header = Header::new(Addressing::AddressFollows, false, length);
+    let (Ok(header), Ok(address)) = (header, size.address_byte(drive)) else {
+        return Vec::new();
+    };
+    let mut bytes = vec![SyncByte::Telegram(header).encode(), address];
+    bytes.extend(&net[..]);
     bytes
 }
 

@@ -23,6 +23,7 @@ pub use stream::{StreamLink, TOLERANCE};
 pub use tamper::{needs_line_errors, only_simulated};
 
 use harness_proto::line::Received;
+use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::trace::Trace;
@@ -187,6 +188,12 @@ pub trait Line: Send {
     /// have left.
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant;
 
+    /// Whether a telegram with this command to a drive may be sent now, as far as the line knows: a guarded one knows its limits.
+    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+        let _any = (ring, drive, command);
+        true
+    }
+
     /// How many of the bytes of the last [`Self::send`] were not taken: those from the first that was denied on.
     fn refused(&self) -> usize {
         0
@@ -238,6 +245,10 @@ impl<L: Line + ?Sized> Line for &mut L {
 
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         (**self).send(ring, bytes)
+    }
+
+    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+        (**self).permits(ring, drive, command)
     }
 
     fn refused(&self) -> usize {

@@ -37,8 +37,8 @@ impl Driven {
         (tolerance, capabilities): (Span, &[Capability]),
         outcome: &Outcome,
     ) -> Option<Self> {
-        let played = outcome.unready.is_none()
-            && !matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError);
+        let unplayed = [Verdict::Skipped, Verdict::Aborted, Verdict::RigError];
+        let played = outcome.unready.is_none() && !unplayed.contains(&outcome.verdict);
         (played && plan.asks_the_driver()).then(|| Self {
             plan: plan.clone(),
             events: events.to_vec(),

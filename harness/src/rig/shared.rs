@@ -3,6 +3,7 @@
 use super::session::{End, Session};
 use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Received;
+use harness_proto::novobus::command::Command;
 use harness_proto::time::{Instant, Span};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -104,6 +105,12 @@ impl Line for SharedLine {
 
     fn wait(&mut self, until: Instant) -> bool {
         self.with(false, |line| line.wait(until))
+    }
+
+    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+        lock(&self.session)
+            .as_mut()
+            .is_some_and(|session| session.link().permits(ring, drive, command))
     }
 
     fn attend(&mut self, ring: usize, at: Instant) {

@@ -4,9 +4,9 @@ use super::commands::{SAFE, desk, shows};
 use super::ring::Served;
 use super::{Desk, ended, finish, playing, said, signal};
 use harness::port::Endpoint;
-use std::io::{Read as _, Write as _};
+use std::io::{BufRead as _, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
@@ -23,6 +23,18 @@ fn edit(desk: &Desk, from: &str, to: &str) {
     let text = std::fs::read_to_string(&path).expect("a rig");
     assert!(text.contains(from), "{text}");
     std::fs::write(path, text.replace(from, to)).expect("room");
+}
+
+/// The program with SIGHUP not ignored, whatever the parent of the tests does.
+fn heeding(desk: &Desk, arguments: &[&str]) -> Command {
+    let own = desk.command(arguments);
+    let mut command = Command::new("env");
+    command.arg("--default-signal=HUP");
+    command.arg(own.get_program()).args(own.get_args());
+    command.env("DRIVEBENCH_STATE", desk.path("state"));
+    command.stdin(Stdio::null());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
 }
 
 /// Waits until a program handles SIGHUP, so that the signal does not end it.
@@ -62,9 +74,7 @@ fn between(served: &Served, on_connect: bool, program: Receiver<String>) -> Stri
         std::thread::spawn(move || std::io::copy(&mut from, &mut to));
         let interrupt = || {
             let id = program.recv().expect("its id");
-            let sent = std::process::Command::new("kill")
-                .args(["-HUP", &id])
-                .status();
+            let sent = Command::new("kill").args(["-HUP", &id]).status();
             assert!(sent.expect("kill").success());
         };
         if on_connect {
@@ -88,7 +98,7 @@ fn every_signal_ends_in_the_safe_state() {
     for name in ["-INT", "-TERM", "-HUP", "-QUIT", "-XCPU", "-USR1", "-TSTP"] {
         turn(&desk);
         let watch = ["watch", "0", "nist", "--for", "100s"];
-        let mut child = desk.command(&watch).spawn().expect("the program");
+        let mut child = heeding(&desk, &watch).spawn().expect("the program");
         playing(&mut child);
         signal(&child, name);
         ended(&finish(child), 130, SAFE);
@@ -103,7 +113,8 @@ fn interrupted_before_the_ports_are_open() {
     let hook = "[limits]\n";
     let kill = "[hooks.before]\ncommand = [\"sh\", \"-c\", \"kill -HUP $PPID\"]\n[limits]\n";
     edit(&desk, hook, kill);
-    let output = desk.run(&["read", "0", "nist"]);
+    let child = heeding(&desk, &["read", "0", "nist"]).spawn();
+    let output = finish(child.expect("the program"));
     ended(&output, 130, "interrupted before anything was sent");
     assert!(!said(&output).contains("rpm"), "{}", said(&output));
 }
@@ -120,7 +131,7 @@ fn interrupted_while_the_rig_is_opened() {
             panic!("a socket");
         };
         edit(&desk, ring, &address);
-        let child = desk.command(&["read", "0", "nist"]).spawn();
+        let child = heeding(&desk, &["read", "0", "nist"]).spawn();
         let child = child.expect("the program");
         id.send(child.id().to_string()).expect("the socket waits");
         let output = finish(child);
@@ -137,7 +148,7 @@ fn interrupted_while_it_waits_for_the_rig() {
     let mut holder = desk.command(&watch).spawn().expect("the program");
     playing(&mut holder);
     let wait = ["read", "0", "nist", "--wait-for-rig", "600s"];
-    let waiting = desk.command(&wait).spawn().expect("the program");
+    let waiting = heeding(&desk, &wait).spawn().expect("the program");
     handles_signals(&waiting);
     signal(&waiting, "-HUP");
     ended(
@@ -155,7 +166,7 @@ fn a_signal_that_the_parent_ignores_is_ignored() {
     let (_served, desk) = desk(true);
     let watch = ["watch", "0", "nist", "--for", "100s"];
     let own = desk.command(&watch);
-    let mut command = std::process::Command::new("nohup");
+    let mut command = Command::new("nohup");
     command.arg(own.get_program()).args(own.get_args());
     command.env("DRIVEBENCH_STATE", desk.path("state"));
     command.stdin(Stdio::null());
@@ -199,4 +210,91 @@ fn a_hook_that_fails_shows_in_the_exit_code() {
     );
     ended(&desk.run(&["read", "0", "nist"]), 3, "`false` failed");
     ended(&desk.run(&["run", "9.2-synco"]), 3, "`false` failed");
+}
+
+/// A drive's `ps_v0` after a reset is its maximum speed (ND21 13.1.4), which a rig with `max_speed` does not let be written back.
+#[test]
+fn a_positioning_ends_under_a_maximum_speed() {
+    let (_served, desk) = desk(true);
+    edit(&desk, "[limits]\n", "[limits]\nmax_speed = \"300rpm\"\n");
+    shows(&desk, "delete-error all --move", "drive 0 is in");
+    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    let position = "position 0 --by 1turns --init --speed 100rpm --move";
+    let output = desk.run(&position.split(' ').collect::<Vec<_>>());
+    ended(&output, 0, "drive 0 stands at");
+    ended(&output, 0, "ps_v0 stays at");
+    ended(&output, 0, SAFE);
+}
+
+/// What ends a run early is told once, and the rig says whether its drives stand.
+#[test]
+fn a_positioning_that_is_interrupted_ends_in_the_safe_state() {
+    let (_served, desk) = desk(true);
+    shows(&desk, "delete-error all --move", "drive 0 is in");
+    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    let position = "position 0 --by 1000turns --init --speed 10rpm --move";
+    let words: Vec<_> = position.split(' ').collect();
+    let mut child = desk.command(&words).spawn().expect("the program");
+    let mut said = std::io::BufReader::new(child.stderr.take().expect("its messages"));
+    let mut text = String::new();
+    while !text.contains("will turn") {
+        said.read_line(&mut text).expect("a line");
+    }
+    signal(&child, "-INT");
+    said.read_to_string(&mut text).expect("its messages");
+    assert_eq!(child.wait().expect("an end").code(), Some(130), "{text}");
+    assert!(text.contains(SAFE), "{text}");
+    assert!(!text.contains("could not be stopped"), "{text}");
+}
+
+/// The guard denies what a scenario needs: nobody's fault but that of the call.
+#[test]
+fn a_denied_scenario_is_wrong_usage() {
+    let (_served, desk) = desk(false);
+    edit(&desk, "allow_motion = true", "allow_motion = false");
+    let path = desk.path("denied.scn");
+    for line in [
+        "master write-word 0 nsoll = 100rpm",
+        "write-word 0 nsoll = 100rpm",
+        "drive 0 memory FF6C = 01 00",
+    ] {
+        let text = format!("title Denied\nring 2\n{line}\nwait 1ms\n");
+        std::fs::write(&path, text).expect("room");
+        let output = desk.run(&["run", path.to_str().expect("a name")]);
+        ended(&output, 2, "allow_motion");
+        assert!(!said(&output).contains("own master"), "{}", said(&output));
+    }
+}
+
+/// `ulimit -f 0` lets every write to a file fail, as a full disk does.
+#[test]
+fn a_full_disk_is_the_benchs_fault() {
+    let desk = Desk::new(2, "sim", "");
+    edit(&desk, "port = \"\"\nmarks = \"in-band\"\n", "");
+    edit(&desk, "time_tolerance = \"20ms\"\n", "");
+    for command in [
+        "run 9.2-synco --rig desk.toml --evidence evidence",
+        "qualify --filter 9.2-synco --rig desk.toml --evidence evidence",
+        "run 9.2-synco --junit junit.xml",
+        "run 9.2-synco --html page.html",
+        "trace 9.2-synco --format vcd --output trace.vcd",
+        "fuzz run --seed 5 --cases 10 --out found",
+        "campaign 9.6-single-bits --html page.html",
+        "params save 0 drive.toml",
+        "scope 0 nist --csv recording.csv",
+        "man pages",
+    ] {
+        let fresh = tempfile::tempdir_in(desk.path("")).expect("a folder");
+        std::fs::copy(desk.path("desk.toml"), fresh.path().join("desk.toml")).expect("room");
+        std::fs::create_dir(fresh.path().join("pages")).expect("room");
+        let mut full = Command::new("sh");
+        full.args(["-c", "ulimit -f 0; exec \"$0\" \"$@\""]);
+        full.arg(env!("CARGO_BIN_EXE_drivebench"))
+            .args(command.split(' '));
+        full.current_dir(fresh.path()).stdin(Stdio::null());
+        let output = full.output().expect("a shell");
+        let text = format!("{command}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(3), "{text}");
+        assert!(text.contains("File too large"), "{text}");
+    }
 }

@@ -34,9 +34,44 @@ pub(super) fn analogue(cells: &Cells) -> i32 {
     sum.clamp(-127, 127) * 10_000 / 127
 }
 
-/// Impulses since power-up, `per_turn` to a turn (14.7.1.1).
-pub(super) fn encoder(increments: i64, per_turn: u16) -> i64 {
-    (increments * i64::from(per_turn)).div_euclid(65_536)
+/// The encoder emulation (5.3.6, 14.7.1.1). Another number of impulses a turn counts from the place where it became active: impulses that
+/// were given before stay given.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Encoder {
+    per_turn: u16,
+    /// Impulses given before this number became active, and the place of the motor at which it did, in increments.
+    given: i64,
+    from: i64,
+}
+
+impl Encoder {
+    /// The power comes back at this place: counting starts there.
+    pub(super) fn power_on(&mut self, increments: i64) {
+        *self = Self {
+            per_turn: self.per_turn,
+            given: 0,
+            from: increments,
+        };
+    }
+
+    /// A reset at this place makes the number of impulses a turn active.
+    pub(super) fn start(&mut self, increments: i64, per_turn: u16) {
+        // Outside the range of 14.7.1.1 there is no emulation: a choice.
+        let per_turn = if per_turn <= 0x400 { per_turn } else { 0 };
+        if per_turn != self.per_turn {
+            *self = Self {
+                per_turn,
+                given: self.impulses(increments),
+                from: increments,
+            };
+        }
+    }
+
+    /// Impulses since power-up, backward ones counted down.
+    pub(super) fn impulses(&self, increments: i64) -> i64 {
+        let turned = (increments - self.from) * i64::from(self.per_turn);
+        self.given + turned.div_euclid(65_536)
+    }
 }
 
 /// The ready for operation contact is closed while the drive is neither in reset nor in error (5.3.7).

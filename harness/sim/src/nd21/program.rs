@@ -9,7 +9,7 @@ use super::error_state;
 use super::invariants::{State, Watch};
 use super::monitor::{self, EndSwitches};
 use super::motion::{Demand, Motion, Outside};
-use super::outputs;
+use super::outputs::{self, Encoder};
 use super::plant::Plant;
 use super::positioning::{Positioning, Situation};
 use super::properties::{BusErrors, Nd21Properties, PsPosition, SelfTestBus};
@@ -64,10 +64,8 @@ pub struct Program {
     pub(super) cycle_control: CycleControl,
     eeprom_controller: EepromController,
     clock: Clock,
-    /// Of the power-up: from there the encoder emulation counts.
-    encoder_zero: i64,
-    /// Of the last reset: the impulses of the encoder emulation and half the motor's poles (14.6.7, 14.7.1.1).
-    impulses: u16,
+    encoder: Encoder,
+    /// Half the motor's poles, as of the last reset (14.6.7).
     pole_pairs: u16,
     /// Aeff of one unit of `msoll`.
     amperes: f64,
@@ -106,8 +104,7 @@ impl Program {
             cycle_control: CycleControl::default(),
             eeprom_controller: EepromController::default(),
             clock: Clock::default(),
-            encoder_zero: 0,
-            impulses: 0,
+            encoder: Encoder::default(),
             pole_pairs: 0,
             amperes: torque_from_raw(1_000, properties.device).to_f64() / 1_000.0,
             i2t_cycles: cycles(properties.i2t_time),
@@ -183,7 +180,7 @@ impl Program {
             gpo2: high & GPO2 != 0,
             ready: outputs::ready(self.mode),
             analogue: outputs::analogue(&self.cells),
-            encoder: outputs::encoder(self.plant.increments() - self.encoder_zero, self.impulses),
+            encoder: self.encoder.impulses(self.plant.increments()),
             display: error_state::display(&self.cells),
             mode: self.mode,
         }
@@ -271,11 +268,8 @@ impl Program {
             cells.put(asic, cells.eeprom()[usize::from(eeprom)]);
         }
         let first = usize::from(ee::IMPULSZAHL);
-        self.impulses = u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]]);
-        // Outside the range of 14.7.1.1 there is no emulation: a choice.
-        if !(1..=0x400).contains(&self.impulses) {
-            self.impulses = 0;
-        }
+        let impulses = u16::from_be_bytes([cells.eeprom()[first], cells.eeprom()[first + 1]]);
+        self.encoder.start(self.plant.increments(), impulses);
         self.pole_pairs = u16::from(cells.eeprom()[usize::from(ee::POLE)] / 2);
         let hardware = cells.byte(ram::HW_VERSION);
         self.source = Source::new(hardware & hw_version::ANALOGUE != 0);
@@ -318,7 +312,7 @@ impl Program {
         self.now = now;
         self.next_cycle = now + CYCLE;
         self.due = Instant::START;
-        self.encoder_zero = self.plant.increments();
+        self.encoder.power_on(self.plant.increments());
         self.start();
     }
 

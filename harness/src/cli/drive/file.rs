@@ -2,38 +2,19 @@
 
 use super::failure::Failure;
 use crate::cli::exit::Exit;
+use crate::regular;
 use std::path::Path;
 
-/// Writes a text into a file: first beside its place, then into it.
+/// Writes a text into a file.
 pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let failed = |error: std::io::Error| {
-        let message = format!("failed to write {}: {error}", path.display());
-        Failure::Said(Exit::RigError, message)
-    };
-    let Some(name) = path.file_name() else {
+    if path.file_name().is_none() {
         return Err(Failure::refused(format!(
             "{} is not the name of a file",
             path.display()
         )));
-    };
-    let mut beside = std::ffi::OsString::from(".");
-    beside.push(name);
-    beside.push(format!(".{}.part", std::process::id()));
-    let beside = path.with_file_name(beside);
-    let written = whole(&beside, text).and_then(|()| std::fs::rename(&beside, path));
-    written.map_err(|error| {
-        // Where nothing was begun there is nothing to take away.
-        let _gone = std::fs::remove_file(&beside);
-        failed(error)
+    }
+    regular::write_text(path, text).map_err(|error| {
+        let message = format!("failed to write {}: {error}", path.display());
+        Failure::Said(Exit::RigError, message)
     })
-}
-
-fn whole(path: &Path, text: &str) -> std::io::Result<()> {
-    use std::io::Write as _;
-    let mut file = std::fs::OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(path)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()
 }

@@ -13,7 +13,7 @@ use crate::scenario::quantity::Quantity;
 use harness_proto::nd21::bits::{self, ps_status};
 use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::{Drive, UnitError, speed_to_raw};
+use harness_proto::nd21::units::{Drive, UnitError, speed_from_raw, speed_to_raw};
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
 /// A run, settled before anything moves.
@@ -71,17 +71,23 @@ fn turn(
     output.say(&format!("{warning}\n"));
     let bar = spinner(output.progress);
     let start = bench.bus.now();
-    let end = run.play(bench, &bar);
+    let before = bench.bus.read_word(axis, ram::PS_V0)?;
+    let end = run.play(bench, &bar, before);
     bar.finish_and_clear();
     if let Err(failure) = end {
-        // Whatever it was: nothing may go on turning behind the back of whoever reads this.
-        let stopped = bench.bus.stop(axis);
-        let exit = failure.tell(output);
-        match stopped {
-            Ok(()) => output.say(&format!("drive {axis} was stopped (software stop)\n")),
-            Err(error) => output.complain(&format!("drive {axis} could not be stopped: {error}")),
+        // The motor must not go on turning. Where this stop fails too, the rig is given back in its safe state, which says whether the
+        // drives stand.
+        if bench.bus.stop(axis).is_ok() {
+            output.say(&format!("drive {axis} was stopped (software stop)\n"));
         }
-        return Ok(exit);
+        return Err(failure);
+    }
+    let speed = bench.bus.read_word(axis, ram::PS_V0)?;
+    if speed != before {
+        let [now, before] = [speed, before].map(|raw| run.speed_in_words(raw));
+        output.say(&format!(
+            "drive {axis}: ps_v0 stays at {now}: the rig's [limits] do not let {before} be written back\n"
+        ));
     }
     let took = bench.bus.now().since(start);
     let place = run.cell(bench, "position")?;
@@ -151,7 +157,8 @@ impl Run {
         Ok(())
     }
 
-    fn play(&self, bench: &Bench, bar: &ProgressBar) -> Result<(), Failure> {
+    /// Does it; `before` is `ps_v0`, which another speed is for this run only.
+    fn play(&self, bench: &Bench, bar: &ProgressBar, before: u16) -> Result<(), Failure> {
         let (bus, axis) = (&bench.bus, self.axis);
         if self.reference {
             bus.reference_showing(axis, |flags2| show(bar, ram::FLAGS2, flags2))?;
@@ -162,7 +169,6 @@ impl Run {
         let Some(target) = self.target else {
             return Ok(());
         };
-        let before = bus.read_word(axis, ram::PS_V0)?;
         if let Some(speed) = self.speed {
             bus.write_word(axis, ram::PS_V0, speed)?;
         }
@@ -172,10 +178,17 @@ impl Run {
             .and_then(|()| {
                 bus.wait_for_end_showing(axis, |status| show(bar, ram::PS_STATUS, status))
             });
-        if self.speed.is_some() {
-            bus.write_word(axis, ram::PS_V0, before)?;
-        }
-        Ok(end?)
+        let restored = match self.speed {
+            Some(_) => bus.restore_ps_v0(axis, before).map(|_| ()),
+            None => Ok(()),
+        };
+        Ok(end.and(restored)?)
+    }
+
+    /// A raw `ps_v0` in words.
+    fn speed_in_words(&self, raw: u16) -> String {
+        let rpm = speed_from_raw(raw.cast_signed(), self.units.range).to_f64();
+        format!("{rpm:.2} rpm")
     }
 }
 

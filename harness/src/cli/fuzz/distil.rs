@@ -6,6 +6,7 @@ use crate::fuzz::coverage::{CoverageError, read_folder};
 use crate::fuzz::distil::{Pieces, distil as distilled};
 use crate::fuzz::input::input;
 use crate::fuzz::noting;
+use crate::regular;
 use clap::Args;
 use harness_sim::fuzz::{Feature, features};
 use std::collections::BTreeSet;
@@ -37,6 +38,7 @@ pub(super) fn distil(arguments: &DistilArguments, output: &mut Output) -> std::i
             Ok(match error {
                 CoverageError::Rule { .. } => Exit::Failed,
                 CoverageError::Empty => Exit::NothingSelected,
+                CoverageError::Unwritable { error, .. } => Exit::of_file(&error),
                 _ => Exit::Usage,
             })
         }
@@ -99,13 +101,8 @@ fn inputs(folder: &Path) -> Result<Vec<Vec<u8>>, CoverageError> {
 
 /// Writes a file under another name first: it is there whole or not at all.
 fn write(path: &Path, content: &[u8]) -> Result<(), CoverageError> {
-    let part = path.with_extension("part");
-    let written = std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path));
-    written.map_err(|error| {
-        let _gone = std::fs::remove_file(&part);
-        CoverageError::Unwritable {
-            name: path.display().to_string(),
-            error,
-        }
+    regular::write_text(path, content).map_err(|error| CoverageError::Unwritable {
+        name: path.display().to_string(),
+        error,
     })
 }

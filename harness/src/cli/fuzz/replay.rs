@@ -10,6 +10,7 @@ use crate::explore::{
     About, Act, Bounds, Campaign, Case, ExploreError, Line, MOST_BYTES, OnRig, OnSim, Setup,
     Target, What, by_novelty, read,
 };
+use crate::regular::{self, Links};
 use crate::rig::Rig;
 use clap::Args;
 use harness_proto::novobus::guard::Limits;
@@ -201,13 +202,9 @@ fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
 /// damage lies on links that a rig does not reach.
 fn of_hex(path: &Path) -> Result<Vec<Act>, ExploreError> {
     let wrong = |why: &str| ExploreError::File(format!("{}: {why}", path.display()));
-    let size = std::fs::metadata(path)
-        .map_err(|error| wrong(&error.to_string()))?
-        .len();
-    if size > LARGEST {
-        return Err(wrong("larger than an input of a ring"));
-    }
-    let text = std::fs::read_to_string(path).map_err(|error| wrong(&error.to_string()))?;
+    let read = regular::read(path, Links::Follow, LARGEST);
+    let text = read.and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other));
+    let text = text.map_err(|error| wrong(&error.to_string()))?;
     let lines = text
         .lines()
         .map(|line| line.split('#').next().unwrap_or_default());

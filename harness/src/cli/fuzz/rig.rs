@@ -28,7 +28,7 @@ pub(crate) fn tell(error: &ExploreError, output: &mut Output) -> Exit {
     match error {
         ExploreError::Session(error) => exit_of(error),
         ExploreError::Mistakes(_) | ExploreError::File(_) | ExploreError::Usage(_) => Exit::Usage,
-        ExploreError::Lost(_) => Exit::RigError,
+        ExploreError::Lost(_) | ExploreError::Unwritable(_) => Exit::RigError,
     }
 }
 
