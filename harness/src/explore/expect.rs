@@ -38,6 +38,8 @@ struct Chosen {
     others: Vec<(u16, u8)>,
     /// Where was written for this byte.
     writes: Vec<u16>,
+    /// Whether a command or process data have changed the address that the bus end keeps (ND21 9.2).
+    address_changed: bool,
     /// Whether a `ResetH8` was carried out (ND21 10.5).
     was_reset: bool,
 }
@@ -52,6 +54,7 @@ impl Chosen {
             reads: Vec::new(),
             others: Vec::new(),
             writes: Vec::new(),
+            address_changed: false,
             was_reset: false,
         }
     }
@@ -108,6 +111,7 @@ impl Memory for Chosen {
 
     fn write(&mut self, address: u16, data: u8) {
         self.writes.push(address);
+        self.address_changed |= address == ram::BUS_ADDR && !self.asks_for_address;
         if address >= *RAM_AND_REGISTERS.start()
             && let Some(cell) = self.cell(address)
         {
@@ -257,7 +261,9 @@ impl Model {
     pub(super) fn writes_what_drives_use(&self) -> bool {
         let uses = |drive: &Drive| {
             let [one, other] = &drive.cells;
-            one.writes != other.writes || one.writes.iter().any(|cell| one.is_used(*cell))
+            one.address_changed
+                || one.writes != other.writes
+                || one.writes.iter().any(|cell| one.is_used(*cell))
         };
         self.drives.iter().any(uses)
     }

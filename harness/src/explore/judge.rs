@@ -265,6 +265,8 @@ impl Judge {
             }
             seen.is_harmful |= model.writes_what_drives_use();
         }
+        // What a fault makes of a byte that is the drive's choice may be a sync byte or none.
+        seen.is_harmful |= !case.harms.is_empty() && !seen.open.is_empty();
         seen
     }
 }
@@ -276,7 +278,8 @@ pub(super) struct Foreseen {
     pub(super) count: usize,
     /// Those of them that drives may answer in more than one way, by their index.
     pub(super) open: Vec<usize>,
-    /// Whether cells are written with which a drive's program works, or nobody knows which: what comes of that no model says.
+    /// Whether cells are written with which a drive's program works, or nobody knows which, or a fault meets what is the drive's choice: what
+    /// comes of that no model says.
     pub(super) is_harmful: bool,
 }
 

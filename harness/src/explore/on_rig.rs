@@ -197,7 +197,7 @@ impl Target for OnRig<'_, '_> {
         }
         let foreseen = self.judges[case.ring()].foresee(case);
         if foreseen.is_harmful {
-            let why = "it writes cells with which the drive's program works";
+            let why = "what comes of it is the drive's choice: it writes cells with which the drive's program works, or a fault meets what a drive holds";
             return Ok(Tried {
                 not_played: Some(why.to_owned()),
                 ..Tried::default()

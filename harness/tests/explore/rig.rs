@@ -314,7 +314,10 @@ fn nothing_that_is_not_allowed_leaves() {
             [0xC0 | 0xC1 | 0xC7, ..] => true,
             // The nominal speed 0; block and stop.
             [0x63, 0, 0, low, high] => u16::from_be_bytes([high, low]) == ram::NSOLL,
-            [0x82, 0x81, low, high] => u16::from_be_bytes([high, low]) == ram::STATUS,
+            [0x82, 0x81, low, high] => {
+                // Stop and block; the EEPROM controller reads.
+                [ram::STATUS, ram::EEPROM_CONTROL].contains(&u16::from_be_bytes([high, low]))
+            }
             [0xA5, mask, low] => {
                 low == ram::STATUS as u8 && mask & !0x81 == 0
                     || low == ram::FLAGS2 as u8 && mask & !0x04 == 0
