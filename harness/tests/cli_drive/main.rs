@@ -353,7 +353,7 @@ fn positions() {
         "{stderr}"
     );
     assert!(
-        stderr.ends_with("drive 0 was stopped (software stop)\n"),
+        stderr.contains("drive 0 was stopped (software stop)\nerror: waited"),
         "{stderr}"
     );
     std::fs::write(folder.join("a.scn"), "drive 0 input GPIN3 low\n").expect("a file");
