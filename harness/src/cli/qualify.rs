@@ -145,7 +145,7 @@ pub(super) fn settle(
     let mut named = format!(
         "{}{}",
         name_master(findings, output)?,
-        name(run, findings, output)?
+        name(run, findings, ill, output)?
     );
     if open > 0 {
         let text =
@@ -192,10 +192,19 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
 }
 
 /// The deviations that explain every byte of every attempt that diverged.
-fn name(run: &mut Run<'_>, findings: &Findings, output: &mut Output) -> Result<String, Stop> {
+fn name(
+    run: &mut Run<'_>,
+    findings: &Findings,
+    ill: bool,
+    output: &mut Output,
+) -> Result<String, Stop> {
     if findings.attempts().is_empty() {
         let known = &run.session().rig().file.deviation;
         let text = match known.is_empty() {
+            _ if ill => {
+                "deviations: not known; the run ended with a rig error before its last scenario\n"
+                    .to_owned()
+            }
             true => "deviations: none; every byte is as the model of the manual says\n".to_owned(),
             false => {
                 let names: Vec<_> = known.iter().map(|entry| entry.name.as_str()).collect();

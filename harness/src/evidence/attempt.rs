@@ -5,10 +5,11 @@ use super::header::Header;
 use super::record::Line;
 use crate::library::Entry;
 use crate::link::{
-    Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, link_name,
+    Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,
+    link_name,
 };
 use crate::rig::judge::{Heard, judge};
-use crate::rig::run::{known, opening, twin};
+use crate::rig::run::{Way, known, opening, twin};
 use crate::rig::{Driven, Rig, SessionError, play_one};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtFinding, Outcome, play};
@@ -73,11 +74,11 @@ pub(super) struct Again {
     ended: Ended,
 }
 
-/// Plays an attempt again from its record.
+/// Plays an attempt again from its record, in the way in which it went.
 pub(super) fn again(
     recorded: &Recorded,
     text: &str,
-    header: &Header,
+    (header, way): (&Header, &Way),
     rig: &Rig,
     twin: &mut Twin,
 ) -> Again {
@@ -107,7 +108,7 @@ pub(super) fn again(
     )
     .reaching(reached(rig, header));
     let exact = replay.is_exact();
-    let mut outcome = match play_one(&mut replay, &plan, &header.way) {
+    let mut outcome = match play_one(&mut replay, &plan, way) {
         Ok(outcome) => outcome,
         Err((ring, ill)) => {
             let rig = rig.id().to_owned();
@@ -124,8 +125,8 @@ pub(super) fn again(
         }
     };
     let all = Conversation::all(&recorded.events, header.rate.byte_time(), header.simulated);
-    let opening = opening(rig, &header.way, &all, header.exactness);
-    let (conversations, anew) = header.way.compared(all, header.exactness);
+    let opening = opening(rig, way, &all, header.exactness);
+    let (conversations, anew) = way.compared(all, header.exactness);
     if anew && let Ok(fresh) = self::twin(rig, &known(rig)) {
         *twin = fresh;
     }
@@ -135,14 +136,14 @@ pub(super) fn again(
         .as_ref()
         .map_or(0, |recalled| recalled.unplaced);
     let capabilities = (header.exactness.tolerance, header.capabilities.as_slice());
-    let driven = Driven::new(&plan, &recorded.events, &header.way, capabilities, &outcome);
+    let driven = Driven::new(&plan, &recorded.events, way, capabilities, &outcome);
     if let Some(driven) = driven.filter(|_| header.simulated) {
         driven.judge(&mut outcome);
     }
     let heard = Heard {
         rig,
         plan: &plan,
-        way: &header.way,
+        way,
         exactness: header.exactness,
         conversations: &conversations,
         comparisons: &comparisons,
@@ -236,6 +237,12 @@ pub(super) fn reached(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
 }
 
 impl Recorded {
+    /// Whether the rig's limits denied something in it.
+    pub(super) fn was_denied(&self) -> bool {
+        let denied = |event: &Event| matches!(event, Event::Trouble(Trouble::Denied(_)));
+        self.events.iter().any(denied)
+    }
+
     /// Its name, with the number of the attempt where there are several.
     pub(super) fn title(&self) -> String {
         match self.attempt {

@@ -186,12 +186,17 @@ impl Opened {
         };
         let mut own = fresh()?;
         let mut all = Vec::new();
+        let mut denied = false;
         for recorded in group(&self.lines[1..]) {
+            let mut way = self.header.way.clone();
+            if std::mem::replace(&mut denied, recorded.was_denied()) {
+                way.examine_after_denial(&self.rig);
+            }
             let text = text_of(&recorded.name, &recorded.sha256, scenario);
             let again = match text {
                 Err(why) => Err(why),
                 Ok(text) => {
-                    let again = again(&recorded, &text, &self.header, &self.rig, &mut own);
+                    let again = again(&recorded, &text, (&self.header, &way), &self.rig, &mut own);
                     if again.stale {
                         own = fresh()?;
                     }

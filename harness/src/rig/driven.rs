@@ -77,7 +77,12 @@ impl Driven {
             return false;
         };
         let told = (outcome.verdict, message(&outcome));
-        replay.trouble().is_none()
+        // Trouble of the rig is in the record and comes again; a replay has another one where the master did something else.
+        let recorded = self.events.iter().find_map(|event| match event {
+            Event::Trouble(trouble) => Some(trouble),
+            _ => None,
+        });
+        replay.trouble() == recorded
             && replay.left().is_none()
             && told == (self.verdict, self.finding.clone())
     }

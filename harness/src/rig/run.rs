@@ -12,7 +12,7 @@ use crate::guard::Guarded;
 use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
-use crate::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_anew};
+use crate::scenario::run::{AtFinding, Outcome, come_home, lacks, play_over_bus, start_anew};
 use crate::scenario::simulate;
 use crate::twin::{Comparison, Conversation, Exactness, Twin};
 use harness_proto::novobus::address::RingSize;
@@ -159,15 +159,12 @@ impl<'s> Run<'s> {
         let mut own = plan.clone();
         own.master = self.master.or(plan.master);
         let plan = &own;
-        let way = self.way();
+        let mut way = self.way();
         let capabilities = self.capabilities();
         let simulated = self.session.rig().is_simulated();
         if matches!(self.session.link().trouble(), Some(Trouble::Denied(_))) {
-            // Nobody knows where in a telegram the drives are; where rings are not examined between scenarios, they are now.
             self.session.link().reset_after_denial();
-            if way.attempts.is_none() {
-                self.session.health()?;
-            }
+            way.examine_after_denial(self.session.rig());
         }
         if !self.session.rig().file.interlock.is_empty() {
             // What the scenario before has left may answer nothing.
@@ -256,6 +253,8 @@ impl<'s> Run<'s> {
         let rig = self.session.rig();
         let model = rig.plan_with(&known(rig)).ok()?;
         let mut guarded = Guarded::new(simulate::bench(&model), self.session.limits());
+        // The model's drives have just been made.
+        guarded.assume_fresh();
         guarded.know_as(self.session.guarded());
         let mut forgotten: Vec<Event> = Vec::new();
         let mut recording = Recording::new(&mut guarded, &mut forgotten);
@@ -295,6 +294,12 @@ pub struct Way {
 }
 
 impl Way {
+    /// Examines the rings before an attempt that follows a denial, whatever the rig's file says: the drives may be in the middle of a
+    /// telegram. The attempt's record holds the recovery, so that the twin follows it.
+    pub(crate) fn examine_after_denial(&mut self, rig: &Rig) {
+        self.attempts = Some(rig.file.health.attempts);
+    }
+
     /// The conversations that are compared, and whether with a twin that nobody has spoken to. Where drives are reset, what
     /// real ones did before is no matter, and how a ring comes out of the error mode in real time is a race (9.9).
     #[must_use]
@@ -371,13 +376,17 @@ pub fn play_one(
         true => start_anew(link, &way.rings),
         false => Ok(()),
     };
-    Ok(match ready {
+    let outcome = match ready {
         Ok(()) => {
             link.begin();
             play_over_bus(plan, link, AtFinding::Stop)
         }
         Err(not_ready) => not_ready.judged(link),
-    })
+    };
+    if matches!(link.trouble(), Some(Trouble::Denied(_))) {
+        come_home(link);
+    }
+    Ok(outcome)
 }
 
 /// Keeps events and hands them on.

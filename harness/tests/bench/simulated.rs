@@ -250,3 +250,44 @@ fn what_is_kept_back_is_no_pass() {
         assert!(!said(&again).contains("passed"), "{}", said(&again));
     }
 }
+
+/// A denial ends one scenario: the twin follows the recovery behind it, so that the next scenario is judged as ever, by `verify` too. The
+/// driver's part of a denied scenario is no fault of the bench.
+#[test]
+fn a_denial_ends_one_scenario() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // With a setup of its own the rig is played on as one with ports is.
+    let text = rig(2, false, "", ", \"drive 0 memory FE13 = 88\"");
+    let text = text.replace("allow_motion = true", "allow_motion = false");
+    let file = folder.path().join("rig.toml");
+    std::fs::write(&file, text).expect("room");
+    let read = "> 88 (0-N) C0 13 FE D1\n> 80*4\n< 88 00 C0 13 88 A5\n";
+    for (number, denied) in [
+        "master write-word 0 nsoll = 100rpm",
+        "write-word 0 nsoll = 100rpm",
+        "drive 1 memory FF6C = 01 00",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let scenario = |name: &str, lines: &str| {
+            let path = folder.path().join(format!("{name}.scn"));
+            std::fs::write(&path, format!("title {name}\nring 2\n{lines}\n")).expect("room");
+            path
+        };
+        let denied = scenario("denied", &format!("{denied}\nwait 1ms"));
+        let after = scenario("after", read);
+        let evidence = folder.path().join(format!("evidence-{number}"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.arg("run").arg(denied).arg(after);
+        command.arg("--rig").arg(&file);
+        command.arg("--evidence").arg(&evidence);
+        let output = command.output().expect("the program");
+        let text = said(&output);
+        ended(&output, 2, "allow_motion");
+        assert!(text.contains("aborted denied"), "{text}");
+        assert!(text.contains("passed after"), "{text}");
+        assert!(!text.contains("own master"), "{text}");
+        ended(&verify(&evidence), 0, "0 things wrong");
+    }
+}

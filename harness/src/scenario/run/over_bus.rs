@@ -6,7 +6,7 @@
 use super::bytes::{matches, resolve};
 use super::outcome::{Outcome, Unready};
 use super::player::{AtFinding, Runner, lacks, play};
-use crate::link::{Line, Link};
+use crate::link::{Line, Link, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use crate::scenario::verdict::Verdict;
@@ -189,15 +189,21 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) ->
     }
     link.begin();
     let restored = restore(link, &before).or_else(|_| restore(link, &before));
-    let remark = restored.err().map(|why| format!("not set back: {why}"));
+    // What a drive held is known only when it is read: a denial leaves what was judged as it is.
+    let denied = link
+        .trouble()
+        .filter(|why| matches!(why, Trouble::Denied(_)));
+    let why = denied.map(ToString::to_string);
+    let why = why.or(restored.err().map(|why| why.to_string()));
+    let remark = why.map(|why| format!("not set back: {why}"));
     let outcome = Outcome {
         remarks: outcome.remarks.into_iter().chain(remark).collect(),
         ..outcome
     };
     match link.trouble() {
         // What was judged before it is kept as a remark: the drives may be left in any state.
-        Some(trouble) => outcome.ended_by(trouble),
-        None => outcome,
+        Some(trouble) if !matches!(trouble, Trouble::Denied(_)) => outcome.ended_by(trouble),
+        _ => outcome,
     }
 }
 
@@ -470,6 +476,15 @@ fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), NotReady> {
 fn settle(link: &mut dyn Link, left: Instant) {
     let end = left + PATIENCE;
     while link.busy() && link.now() < end && link.wait(end) {}
+}
+
+/// Takes what was sent before a denial and is still on its way round: it belongs to this conversation and not to the next one.
+pub(crate) fn come_home(link: &mut dyn Link) {
+    let now = link.now();
+    settle(link, now);
+    for ring in 0..2 {
+        while link.receive(ring).is_some() {}
+    }
 }
 
 /// Bits that the drive writes itself (14.2).

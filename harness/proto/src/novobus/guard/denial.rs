@@ -162,7 +162,7 @@ impl fmt::Display for Denial {
             }
             Cause::InDoubt => f.write_str(
                 "it is not known where in a telegram the drives are; 17 zeros and the check sequence come first \
-                 (ND21 9.8)",
+                 (ND21 9.8), unless the rig's [limits] allow everything and have no `max_speed`",
             ),
             Cause::NoAddress => f.write_str(
                 "nobody knows whom a short address means before an address byte has been sent (ND21 9.2)",
