@@ -135,6 +135,12 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
             "{what} of drive {} depends on the drive's own state, which the scenario does not set; set it in the header, or write it first",
             own.drive
         ));
+    } else if in_a_race(finding, heard) {
+        outcome.verdict = Verdict::Inconclusive;
+        outcome.remarks.push(
+            "drives sent bytes unasked (ND21 9.9); their order depends on the drives' clocks, and the model cannot tell it"
+                .to_owned(),
+        );
     } else if let Some(untimely) = untimely
         && finding.difference.is_none()
         && heard.exactness.tolerance > Span::ZERO
@@ -167,6 +173,14 @@ fn explained_by_known(finding: &Finding, heard: &Heard<'_>) -> bool {
     !deviations.is_empty()
         && plays(&[]).is_some_and(|right| right.verdict == Verdict::Passed)
         && plays(&deviations).is_some_and(fails_alike)
+}
+
+/// Whether a finding may be about bytes behind the first one that a drive sent unasked.
+fn in_a_race(finding: &Finding, heard: &Heard<'_>) -> bool {
+    let difference = finding.difference.as_ref();
+    let found = difference.and_then(|difference| difference.at);
+    let mut races = heard.comparisons.iter().filter_map(|c| c.unasked);
+    races.any(|first| found.is_none_or(|at| at >= first))
 }
 
 /// The answer of a drive that a finding is about, if its value depends on the drive's own state: the byte that differs, or else one

@@ -133,3 +133,43 @@ fn a_known_deviation_excuses_nothing_else() {
     check(wrong, &known("odd-sums", 1, "9.6"), reads, Passed);
     check(wrong, &known("odd-sums", 2, "9.6"), reads, Failed);
 }
+
+/// ND21 9.9: how many zeros come unasked, and whose zero is the first, is a race of the drives' clocks.
+#[test]
+fn a_race_of_clocks_accuses_no_drive() {
+    let silent = "drive 0..last memory Flags2 = 04\n> 80*3\n< 80*3\nwait 80ms\n";
+    let late = ["10.2ms", "10.0ms", "10.3ms"];
+    for waits in [["10.0ms"; 3], ["10.3ms", "10.1ms", "10.0ms"]] {
+        let drives = late.iter().zip(waits).enumerate();
+        let lines = drives.map(|(drive, (time_out, wait))| {
+            format!("drive {drive} property time-out = {time_out}\ndrive {drive} property time-out-wait = {wait}\n")
+        });
+        let ring: String = lines.collect();
+        let outcome = judged(&ring, "", silent);
+        assert_eq!(outcome.verdict, Passed, "{outcome:#?}");
+        let located = judged(&ring, "", &format!("{silent}? located last\n"));
+        let right = matches!(located.verdict, Passed | Inconclusive);
+        assert!(right, "{located:#?}");
+    }
+    // What no clock explains is a failure still.
+    check(
+        "drive 1 deviates no-time-out",
+        "",
+        &format!("{silent}? located last\n"),
+        Passed,
+    );
+    let none = "drive 0..last deviates no-zeros-unasked";
+    check(none, "", silent, Failed);
+    let twice = "drive 0..last deviates increments-twice-in-error-mode";
+    check(twice, "", silent, Failed);
+}
+
+/// ND21 10.3, 14.10.6: the settings of an oscilloscope that stands are the master's.
+#[test]
+fn a_written_setting_of_the_oscilloscope_is_known() {
+    let scenario = "write-byte 1 FF3F = 5A\nand 1 FF3F = 0F\nread-byte 1 FF3F = 0A\n";
+    check("", "", scenario, Passed);
+    check("drive 1 deviates and-is-or", "", scenario, Failed);
+    let wrong = "write-byte 1 FF3F = 5A\nread-byte 1 FF3F = 5B\n";
+    check("", "", wrong, Failed);
+}

@@ -2,6 +2,7 @@
 
 use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, What};
 use super::follow::Conversation;
+use super::unasked::Sent;
 use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
@@ -81,7 +82,16 @@ impl Comparer<'_> {
             false => known_places(&sent, (&places, &roles), expected, received),
         };
         let real_time = self.exactness.tolerance > Span::ZERO;
+        let unasked = real_time.then(|| {
+            let all = conversation.sent_at(ring);
+            let answered: Vec<_> = places.iter().map(|place| all[*place]).collect();
+            let (all, answered) = (&all[..], &answered[..]);
+            Sent { answered, all }.judge(size, (expected, received), self.exactness.tolerance)
+        });
+        let unasked = unasked.flatten();
         let (shorter, short);
+        // A race of clocks is compared up to its first byte, and the long runs behind it do not matter.
+        let aligned = aligned || unasked.is_some();
         let (expected, received) = if aligned || !real_time {
             (expected, &received[..])
         } else {
@@ -98,14 +108,33 @@ impl Comparer<'_> {
             received,
         };
         for index in 0..received.len().max(expected.len()) {
-            let step = || {
+            let step_at = |index: usize| {
                 let place = places.get(index).copied().unwrap_or(index);
                 conversation.step_at(ring, place)
             };
-            self.note_own(&rows, index, places.get(index).copied());
-            let what = self.row(&rows, index, step);
-            self.comparison.compared += 1;
-            let Some(what) = what else { continue };
+            let step = || step_at(index);
+            let race = unasked.as_ref().filter(|unasked| unasked.first == index);
+            let compared = race.is_none_or(|race| race.in_both);
+            let mut what = None;
+            if compared {
+                self.note_own(&rows, index, places.get(index).copied());
+                what = self.row(&rows, index, step);
+                self.comparison.compared += 1;
+            }
+            let mut index = index;
+            if let Some(race) = race {
+                let at = received.get(index).or(expected.get(index));
+                self.comparison.unasked = at.map(|(at, _)| *at);
+                if let (None, Some((place, fault))) = (&what, &race.fault) {
+                    (index, what) = (*place, Some(fault.clone()));
+                }
+            }
+            let Some(what) = what else {
+                match race {
+                    Some(_) => return,
+                    None => continue,
+                }
+            };
             if real_time && rows.cut_short(index, &what, tail) {
                 return;
             }
@@ -118,7 +147,7 @@ impl Comparer<'_> {
                 expected: expected.get(index).copied(),
                 received: received.get(index).copied(),
                 role,
-                step: step(),
+                step: step_at(index),
                 drive: role.drive().or_else(|| spelled(heard, size)),
             };
             self.comparison.divergence.get_or_insert(found);
@@ -225,11 +254,14 @@ impl Comparer<'_> {
         }
     }
 
-    /// Whether a drive may have written to a cell by itself.
+    /// Whether a drive may have written to a cell by itself. The oscilloscope changes its buffer and its settings only while it runs.
     fn may_write(&self, ring: usize, drive: u8, address: u16) -> bool {
-        let status = (ring, drive, ram::SCOPE_STATUS);
-        match own::SCOPE_BUFFER.contains(&address) {
-            true => self.recording.contains(&(ring, drive)) || self.written.contains(&status),
+        let of_the_scope = own::SCOPE_BUFFER.contains(&address) || own::SCOPE.contains(&address);
+        match of_the_scope && address != ram::SCOPE_STATUS {
+            true => {
+                let status = (ring, drive, ram::SCOPE_STATUS);
+                self.recording.contains(&(ring, drive)) || self.written.contains(&status)
+            }
             false => unknowable(address),
         }
     }

@@ -167,6 +167,9 @@ pub struct Comparison {
     pub own: Vec<Own>,
     /// The first byte that is otherwise, apart from its time.
     pub divergence: Option<Divergence>,
+    /// In real time, when the first byte came that a drive sent unasked (ND21 9.9). The bytes behind it are a race of clocks: of them only
+    /// what holds for every order is compared.
+    pub unasked: Option<Instant>,
     /// The first byte at another time.
     pub untimely: Option<Divergence>,
     /// All differences of times together.

@@ -111,6 +111,16 @@ impl Conversation {
             .collect()
     }
 
+    /// When each byte sent into a ring began.
+    pub(super) fn sent_at(&self, ring: usize) -> Vec<Instant> {
+        let own = self.done.iter().filter(|(at, _)| *at == ring);
+        let starts = own.filter_map(|(_, done)| match done {
+            Done::Sent(at, _) => Some(*at),
+            _ => None,
+        });
+        starts.collect()
+    }
+
     /// The step that was under way when the `index`-th byte was sent into a ring, counted from 0.
     pub(crate) fn step_at(&self, ring: usize, index: usize) -> Option<usize> {
         let mut step = None;
@@ -224,8 +234,10 @@ impl Twin {
         let mut comparisons = Vec::new();
         self.written_now.clear();
         for conversation in conversations {
-            comparisons.push(self.follow(conversation, exactness));
-            if exactness.tolerance > Span::ZERO && self.is_a_race(conversation) {
+            let comparison = self.follow(conversation, exactness);
+            let race = comparison.unasked.is_some();
+            comparisons.push(comparison);
+            if race {
                 return (comparisons, true);
             }
         }
@@ -242,19 +254,13 @@ impl Twin {
         let mut comparisons = Vec::new();
         for conversation in conversations {
             let comparison = self.follow(conversation, exactness);
-            let otherwise = comparison.divergence.is_some();
+            let last = comparison.divergence.is_some() || comparison.unasked.is_some();
             comparisons.push(comparison);
-            if otherwise || exactness.tolerance > Span::ZERO && self.is_a_race(conversation) {
+            if last {
                 break;
             }
         }
         comparisons
-    }
-
-    /// Whether drives sent unasked in a conversation.
-    fn is_a_race(&self, conversation: &Conversation) -> bool {
-        let mut rings = 0..self.sizes.len();
-        rings.any(|ring| conversation.received_in(ring).len() > conversation.sent_in(ring).len())
     }
 
     /// Lives through a conversation, and `slack` longer, and gives what it received, ring by ring.

@@ -8,6 +8,7 @@
 mod compare;
 mod comparison;
 mod follow;
+mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};
 pub use comparison::{Adopted, Comparison, Divergence, Exactness, Look, Own, What};

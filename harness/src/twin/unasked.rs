@@ -1,0 +1,98 @@
+//! Bytes that drives send unasked in real time (ND21 9.9).
+//!
+//! How many zeros come before another byte, and whose zero comes first, depends on the clocks of the drives. No model knows that. From the
+//! first byte that was sent unasked to the next byte of the master's, only what holds for every order is asked for.
+
+use super::comparison::What;
+use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::{Instant, Span};
+
+/// A silence of the master's behind which a byte may be unasked: shorter than a time-out and the wait behind it (9.9), 10 ms each, also in
+/// drives that are too fast.
+const SILENCE: Span = Span::from_millis(8);
+
+/// A byte and when it came.
+type Heard = (Instant, Received);
+
+/// The first byte that was sent unasked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Unasked {
+    /// Its place among the bytes received.
+    pub(super) first: usize,
+    /// Whether it is unasked both in the ring and in the model: then its value and its time are compared.
+    pub(super) in_both: bool,
+    /// A byte from there on that no order of the clocks explains, and how it differs.
+    pub(super) fault: Option<(usize, What)>,
+}
+
+/// When the bytes of the master's that are answered were sent, in order, and the other bytes.
+pub(super) struct Sent<'a> {
+    /// When each byte that is answered began.
+    pub(super) answered: &'a [Instant],
+    /// When every byte began.
+    pub(super) all: &'a [Instant],
+}
+
+impl Sent<'_> {
+    /// The first byte that came before the byte of the master's that it would answer, and behind a silence of the master's.
+    fn first(&self, bytes: &[Heard]) -> Option<usize> {
+        let unasked = |(index, (at, _)): (usize, &Heard)| {
+            let early = self.answered.get(index).is_none_or(|start| at < start);
+            let before = self.all.partition_point(|start| start <= at);
+            let last = before.checked_sub(1).map(|last| self.all[last]);
+            early && last.is_some_and(|last| at.since(last) >= SILENCE)
+        };
+        bytes.iter().enumerate().position(unasked)
+    }
+
+    /// The first byte that was sent unasked, by the ring or by its model, and what is wrong from there to the next byte of the master's.
+    /// `None` where each byte was asked for.
+    pub(super) fn judge(
+        &self,
+        size: RingSize,
+        (expected, received): (&[Heard], &[Heard]),
+        tolerance: Span,
+    ) -> Option<Unasked> {
+        let model = self.first(expected);
+        let ring = self.first(received);
+        let first = match (model, ring) {
+            (Some(model), Some(ring)) => model.min(ring),
+            (one, other) => one.or(other)?,
+        };
+        let in_both = model == ring;
+        let here = match (expected.get(first), received.get(first)) {
+            (Some(_), None) => Some(What::Missing),
+            (None, Some(_)) => Some(What::Surplus),
+            // A byte of the master's came first in one of them. Close together, that is chance.
+            (Some((due, _)), Some((at, _))) if !in_both && apart(*due, *at) > tolerance => {
+                match model == Some(first) {
+                    true => Some(What::Missing),
+                    false => Some(What::Surplus),
+                }
+            }
+            _ => None,
+        };
+        let foreign = || {
+            let (from, _) = received.get(first).filter(|_| ring == Some(first))?;
+            let until = self
+                .all
+                .get(self.all.partition_point(|start| start <= from));
+            let foreign = |(at, byte): &Heard| {
+                let before = until.is_none_or(|until| at < until);
+                before && (byte.error.is_some() || byte.byte >= size.drives())
+            };
+            let offset = received[first..].iter().position(foreign)?;
+            Some((first + offset, What::Value))
+        };
+        Some(Unasked {
+            first,
+            in_both,
+            fault: here.map(|what| (first, what)).or_else(foreign),
+        })
+    }
+}
+
+fn apart(one: Instant, other: Instant) -> Span {
+    one.since(other).max(other.since(one))
+}
