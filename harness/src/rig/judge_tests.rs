@@ -173,3 +173,15 @@ fn a_written_setting_of_the_oscilloscope_is_known() {
     let wrong = "write-byte 1 FF3F = 5A\nread-byte 1 FF3F = 5B\n";
     check("", "", wrong, Failed);
 }
+
+/// ND21 9.4, 14.10.3: process data that come in write the cells that the master has chosen.
+#[test]
+fn cells_that_process_data_have_written_are_known() {
+    let scenario = "write-byte 1 DataIn = 6C\nexchange 1 0102\nread-byte 1 FF6C = 01\n";
+    let swapped = "drive 1 deviates process-data-in-swapped";
+    check("", "", scenario, Passed);
+    check(swapped, "", scenario, Failed);
+    let noted = judged(swapped, "", scenario);
+    let learned = |remark: &String| remark.contains("did not know");
+    assert!(!noted.remarks.iter().any(learned), "{noted:#?}");
+}

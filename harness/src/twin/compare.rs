@@ -9,6 +9,8 @@ use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
 use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
+use harness_proto::novobus::command::{Field, Kind, PAGE, layout};
+use harness_proto::novobus::properties::ReadLongAnswer;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
@@ -56,6 +58,8 @@ pub(super) struct Comparer<'a> {
     pub(super) written_now: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells taken over.
     pub(super) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
+    /// Where the incoming process data (14.10.3) of a drive go, in page FF, where the master has written it.
+    pub(super) targets: &'a mut BTreeMap<(usize, u8), u8>,
     /// Drives whose outgoing process data (14.10.3) change by themselves.
     pub(super) moving: BTreeSet<(usize, u8)>,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
@@ -179,7 +183,7 @@ impl Comparer<'_> {
         let same = wanted.byte == found.byte
             || index < rows.known
                 && self.may_differ(ring, rows.roles, (wanted.byte, received), index);
-        self.note_write(ring, role);
+        self.note_write(ring, rows, index);
         self.note_reset(ring, rows.roles, index);
         match (same, wanted_good == found_good) {
             (true, true) => {
@@ -314,19 +318,37 @@ impl Comparer<'_> {
         });
     }
 
-    fn note_write(&mut self, ring: usize, role: Role) {
-        if let Role::Check {
-            drive: Some(drive),
-            writes: Some((address, width)),
-            ..
-        } = role
-        {
-            for offset in 0..u16::from(width) {
-                let cell = (ring, drive, address.wrapping_add(offset));
-                self.written.insert(cell);
-                self.written_now.insert(cell);
-                self.held.remove(&cell);
+    /// Notes which cells the master has written, by a command or as process data.
+    fn note_write(&mut self, ring: usize, rows: &Rows<'_>, index: usize) {
+        let before = index.checked_sub(1).map(|before| rows.role(before));
+        let (drive, address, width) = match rows.role(index) {
+            Role::Check {
+                drive: Some(drive),
+                writes: Some((address, width)),
+                length,
+            } => {
+                if (address..address.saturating_add(width.into())).contains(&ram::DATA_IN) {
+                    match data_written(rows, index, drive, length) {
+                        Some(target) => self.targets.insert((ring, drive), target),
+                        None => self.targets.remove(&(ring, drive)),
+                    };
+                }
+                (drive, address, width)
             }
+            // The second of the two bytes.
+            Role::ProcessData { drive: Some(drive) } if before == Some(rows.role(index)) => {
+                match self.targets.get(&(ring, drive)) {
+                    Some(target) => (drive, PAGE | u16::from(*target), 2),
+                    None => return,
+                }
+            }
+            _ => return,
+        };
+        for offset in 0..u16::from(width) {
+            let cell = (ring, drive, address.wrapping_add(offset));
+            self.written.insert(cell);
+            self.written_now.insert(cell);
+            self.held.remove(&cell);
         }
     }
 
@@ -348,6 +370,7 @@ impl Comparer<'_> {
             let others = |cell: &(usize, u8, u16)| (cell.0, cell.1) != (ring, *drive);
             self.written.retain(others);
             self.held.retain(|cell, _| others(cell));
+            self.targets.remove(&(ring, *drive));
         }
     }
 
@@ -387,6 +410,20 @@ fn answer_of(roles: &[Role], drive: u8, length: u8) -> impl Iterator<Item = (usi
     };
     let before = roles.iter().enumerate().rev().filter(own);
     before.take(usize::from(length).saturating_sub(1))
+}
+
+/// The byte that an echoed `WriteByte` (10.2) whose checking byte stands at `index` has written; `None` for any other command.
+fn data_written(rows: &Rows<'_>, index: usize, drive: u8, length: u8) -> Option<u8> {
+    let answer = answer_of(rows.roles.get(..index)?, drive, length);
+    let mut bytes: Vec<u8> = Vec::new();
+    for (place, _) in answer {
+        bytes.insert(0, rows.received.get(place)?.1.byte);
+    }
+    let layout = layout(*bytes.first()?, ReadLongAnswer::default())?;
+    let data = |field: &Field| matches!(field, Field::Data(0));
+    let data = layout.command.iter().position(data)?;
+    let byte = (layout.kind == Kind::WriteByte).then_some(data + 1)?;
+    bytes.get(byte).copied()
 }
 
 /// The drive that a ring spells out with these bytes (9.7).

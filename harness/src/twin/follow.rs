@@ -158,6 +158,7 @@ pub struct Twin {
     /// Of these, those of the present attempt.
     written_now: BTreeSet<(usize, u8, u16)>,
     held: BTreeMap<(usize, u8, u16), u8>,
+    targets: BTreeMap<(usize, u8), u8>,
 }
 
 impl Twin {
@@ -170,6 +171,7 @@ impl Twin {
             written: BTreeSet::new(),
             written_now: BTreeSet::new(),
             held: BTreeMap::new(),
+            targets: BTreeMap::new(),
         }
     }
 
@@ -192,6 +194,7 @@ impl Twin {
             written: &mut self.written,
             written_now: &mut self.written_now,
             held: &mut self.held,
+            targets: &mut self.targets,
             moving,
             recording,
             comparison: Comparison::default(),
