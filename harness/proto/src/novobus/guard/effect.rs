@@ -85,8 +85,13 @@ fn of_byte(address: u16, change: Change, known: &Known) -> Effect {
         },
         // 14.10.3.
         ram::DATA_IN => match change {
-            Change::Set(data) if u16::from(data) == ram::NSOLL & 0xFF => {
-                effect(Need::MOTION, Pace::Same)
+            Change::Set(NSOLL_LOW) => effect(Need::MOTION, Pace::Same),
+            Change::Set(data) => {
+                let need = of_process_data(PAGE | u16::from(data));
+                effect(
+                    need,
+                    Pace::Faster("14.10.3", "process data would not be a speed"),
+                )
             }
             _ => effect(Need::EVERYTHING, Pace::Same),
         },
@@ -98,6 +103,23 @@ fn of_byte(address: u16, change: Change, known: &Known) -> Effect {
             let (need, pace) = of_cell(address);
             effect(need, pace)
         }
+    }
+}
+
+/// The byte of `DataIn` that points at `nsoll` (14.10.3).
+const NSOLL_LOW: u8 = (ram::NSOLL & 0xFF) as u8;
+
+/// What process data need that are written to the word at this address: as much as any word that could be written there (14.10.3).
+fn of_process_data(address: u16) -> Need {
+    let any_byte = |address: u16| {
+        let values =
+            (0..=u8::MAX).map(|data| of_byte(address, Change::Set(data), &Known::default()));
+        values.fold(Need::MOTION, |need, effect| need.and(effect.need))
+    };
+    match [address, address.wrapping_add(1)] {
+        // They would say by themselves where the next ones are written.
+        own if own.contains(&ram::DATA_IN) => Need::EVERYTHING,
+        [first, second] => any_byte(first).and(any_byte(second)),
     }
 }
 
@@ -192,7 +214,7 @@ fn of_eeprom(command: u8, known: &Known) -> Effect {
 /// What is known of a drive behind a changed byte.
 fn note_byte(address: u16, change: Change, known: &mut Known) {
     match (address, change) {
-        (ram::DATA_IN, Change::Set(_)) => known.note(Facts::DATA_IN),
+        (ram::DATA_IN, Change::Set(NSOLL_LOW)) => known.note(Facts::DATA_IN),
         (ram::PS_STATUS, Change::Set(0 | ps_status::FINISHED)) => known.note(Facts::PS_IDLE),
         (ram::FLAGS2, Change::And(mask) | Change::Set(mask)) if mask & flags2::ORDERS == 0 => {
             known.note(Facts::FLAGS2_IDLE);

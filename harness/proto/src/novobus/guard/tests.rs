@@ -1,7 +1,7 @@
 //! Tests of the table and of the gate: what is denied, and where doubt begins, each seen by itself. What drives would make of
 //! all of it is the property's business (`harness/tests/guard`).
 
-use super::{Cause, Guard, Limits, Need};
+use super::{Act, Cause, Guard, Limits, Need};
 use crate::nd21::ram;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::CHECK_SEQUENCE;
@@ -184,4 +184,36 @@ fn where_doubt_begins() {
         ..none
     };
     assert!(doubt(reset, &[0x86, 0xFF, 0xDD, 0x21, 0xFE], false));
+}
+
+/// ND21 14.10.3: `DataIn` may point at a cell where any word may be written, so that a drive can be given back the value that it held.
+#[test]
+fn data_in_needs_what_the_cell_needs_that_it_points_at() {
+    let points_at = |address: u16| Act::WriteByte(ram::DATA_IN, address.to_be_bytes()[1]);
+    let motion = Limits {
+        motion: true,
+        ..Limits::default()
+    };
+    let slow = Limits {
+        max_speed: Some(100),
+        ..motion
+    };
+    for (address, need) in [
+        (ram::NSOLL, Need::MOTION),
+        (ram::STATUS, Need::MOTION),
+        (
+            ram::FLAGS2,
+            Need::MOTION.and(Need::MONITORING).and(Need::EEPROM),
+        ),
+        (ram::DATA_IN, Need::EVERYTHING),
+        (ram::DATA_IN - 1, Need::EVERYTHING),
+        (0xFF6A, Need::EVERYTHING),
+    ] {
+        let act = points_at(address);
+        let needs = act.need();
+        assert!(needs.contains(need), "{act}: {needs}");
+        assert_eq!(act.passes(&motion), need == Need::MOTION, "{act}");
+        assert_eq!(act.passes(&slow), address == ram::NSOLL, "{act}");
+        assert!(!act.passes(&Limits::default()), "{act}");
+    }
 }
