@@ -82,6 +82,8 @@ fn turn(
         }
         return Err(failure);
     }
+    let took = bench.bus.now().since(start);
+    let place = run.cell(bench, "position")?;
     let speed = bench.bus.read_word(axis, ram::PS_V0)?;
     if speed != before {
         let [now, before] = [speed, before].map(|raw| run.speed_in_words(raw));
@@ -89,8 +91,6 @@ fn turn(
             "drive {axis}: ps_v0 stays at {now}: the rig's [limits] do not let {before} be written back\n"
         ));
     }
-    let took = bench.bus.now().since(start);
-    let place = run.cell(bench, "position")?;
     output.result(&format!("drive {axis} stands at {place} after {took}\n"))?;
     Ok(Exit::Passed)
 }
