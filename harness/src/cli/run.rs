@@ -126,7 +126,7 @@ fn on_simulated(
             }
         };
         let outcome = &played.outcome;
-        tally.note(outcome);
+        tally.note(entry, outcome);
         cases.note(entry, outcome);
         let mut line = line(entry, outcome, output);
         if arguments.records || entries.len() == 1 {

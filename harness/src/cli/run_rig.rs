@@ -188,7 +188,7 @@ fn all(
             played => played?,
         };
         let outcome = &played.outcome;
-        tally.note(outcome);
+        tally.note(entry, outcome);
         cases.note(entry, outcome);
         let mut text = line(entry, outcome, output);
         if job.records || entries.len() == 1 {
@@ -215,7 +215,7 @@ fn all(
     bar.finish_and_clear();
     for entry in left {
         let outcome = Outcome::skipped("the run ended before it".to_owned());
-        tally.not_reached(&outcome);
+        tally.not_reached(entry, &outcome);
         cases.note(entry, &outcome);
     }
     output.result(&tally.summary())?;

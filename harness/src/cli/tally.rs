@@ -1,9 +1,12 @@
-//! What a run comes to: how many scenarios of each verdict, what was not played and why, and the exit code.
+//! What a run comes to: how many scenarios of each verdict, which tables of the manual it covered, what was not played and why, and the
+//! exit code.
 
 use super::exit::Exit;
+use crate::library::Entry;
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// The verdicts of a run so far.
@@ -13,13 +16,49 @@ pub(super) struct Tally {
     took: Span,
     /// Why scenarios were skipped, and how many for each reason, in the order in which the reasons came up.
     skipped: Vec<(String, usize)>,
+    /// Tables and examples of the manual that the selected scenarios pin, each with whether a scenario of it was judged.
+    tables: BTreeMap<String, bool>,
+    /// What would let more scenarios be played, and how many each.
+    unlocks: BTreeMap<String, usize>,
     /// Some were selected and not reached.
     ended_early: bool,
 }
 
+/// What would let a scenario be played, from why it was skipped.
+fn unlock(why: &str) -> Option<String> {
+    if let Some(lacks) = why.strip_prefix("the rig has no ") {
+        // Looks into a drive, its plugs and its power need the simulator, whatever else is missing.
+        let place = lacks.strip_prefix("interposer at ");
+        let interposer = place.map(|place| format!("an interposer at {place}"));
+        return Some(interposer.unwrap_or_else(|| match lacks {
+            "interposer" => "interposers".to_owned(),
+            _ => "a simulated rig".to_owned(),
+        }));
+    }
+    let other = [
+        ("it is for", "rings of other sizes"),
+        ("the rig's [limits]", "more permissions in [limits]"),
+    ];
+    let found = other.iter().find(|(start, _)| why.starts_with(start));
+    found.map(|(_, what)| (*what).to_owned())
+}
+
 impl Tally {
-    /// Counts a scenario.
-    pub(super) fn note(&mut self, outcome: &Outcome) {
+    /// Counts a scenario, and the tables that it pins.
+    pub(super) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
+        let judged = outcome.verdict != Verdict::Skipped;
+        for source in &entry.scenario.sources {
+            *self.tables.entry(source.text.clone()).or_default() |= judged;
+        }
+        if let Some(what) = outcome.remarks.first().and_then(|why| unlock(why))
+            && !judged
+        {
+            *self.unlocks.entry(what).or_default() += 1;
+        }
+        self.count(outcome);
+    }
+
+    fn count(&mut self, outcome: &Outcome) {
         self.verdicts.push(outcome.verdict);
         self.took = self.took + outcome.took;
         if let Some(reason) = outcome.reason_to_skip() {
@@ -31,8 +70,8 @@ impl Tally {
     }
 
     /// Counts a scenario that the run did not come to; without it the run is incomplete.
-    pub(super) fn not_reached(&mut self, outcome: &Outcome) {
-        self.note(outcome);
+    pub(super) fn not_reached(&mut self, entry: &Entry, outcome: &Outcome) {
+        self.note(entry, outcome);
         self.ended_early = true;
     }
 
@@ -41,7 +80,27 @@ impl Tally {
         Exit::of(&self.verdicts, require_all || self.ended_early)
     }
 
-    /// The counts in a line, and another one for what was not played.
+    /// Which tables were covered, and what would unlock the rest.
+    fn coverage(&self) -> String {
+        let covered = self.tables.values().filter(|judged| **judged).count();
+        let mut text = format!(
+            "covered: {} of {} tables and examples of the manual that the selected scenarios pin\n",
+            covered,
+            self.tables.len()
+        );
+        let mut unlocks: Vec<_> = self.unlocks.iter().collect();
+        unlocks.sort_by_key(|(what, count)| (std::cmp::Reverse(**count), *what));
+        let unlocks: Vec<_> = unlocks
+            .iter()
+            .map(|(what, count)| format!("{what} ({count})"))
+            .collect();
+        if !unlocks.is_empty() {
+            let _infallible = writeln!(text, "more scenarios with: {}", unlocks.join(", "));
+        }
+        text
+    }
+
+    /// The counts in a line, and others for what was not played and what was covered.
     pub(super) fn summary(&self) -> String {
         let count = |wanted: Verdict| self.verdicts.iter().filter(|v| **v == wanted).count();
         let mut text = format!(
@@ -63,6 +122,7 @@ impl Tally {
             .collect();
         if !reasons.is_empty() {
             let _infallible = writeln!(text, "not played: {}", reasons.join(", "));
+            text.push_str(&self.coverage());
         }
         text
     }
@@ -71,10 +131,18 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::source::Source;
 
     fn of(outcomes: &[Outcome]) -> Tally {
         let mut tally = Tally::default();
-        outcomes.iter().for_each(|outcome| tally.note(outcome));
+        let source = |n: usize| {
+            let text = format!("title t\nsource nd21 9.{n}\nring 1\n> 80\n");
+            Source::from_bytes("t.scn".to_owned(), text.into_bytes()).expect("a text")
+        };
+        for (outcome, n) in outcomes.iter().zip(1..) {
+            let entry = Entry::new(source(n), None).expect("a scenario");
+            tally.note(&entry, outcome);
+        }
         tally
     }
 
@@ -103,7 +171,10 @@ mod tests {
             tally.summary(),
             "1 passed, 0 failed, 5 skipped (6 scenarios, 0.000 ms on the line)\n\
              not played: 2 (the rig has no interposer), 1 (the rig has no power, no tap), \
-             1 (it is for rings of another size), 1 (the rig's [limits] do not let it be played to its end)\n"
+             1 (it is for rings of another size), 1 (the rig's [limits] do not let it be played to its end)\n\
+             covered: 1 of 6 tables and examples of the manual that the selected scenarios pin\n\
+             more scenarios with: a simulated rig (1), an interposer at 1->0 (1), an interposer at 2->1 (1), \
+             more permissions in [limits] (1), rings of other sizes (1)\n"
         );
         assert_eq!(of(&[passed()]).summary().lines().count(), 1);
     }
@@ -113,7 +184,7 @@ mod tests {
         let mut tally = of(&[passed(), skipped("the rig has no tap")]);
         assert_eq!(tally.exit(false), Exit::Passed);
         assert_eq!(tally.exit(true), Exit::Incomplete);
-        tally.not_reached(&skipped("the run ended before it"));
+        tally.ended_early = true;
         assert_eq!(tally.exit(false), Exit::Incomplete);
     }
 }
