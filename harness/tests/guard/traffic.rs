@@ -312,12 +312,20 @@ const RUBBISH: &[(&str, &str)] = &[
         "a short address before any address",
     ),
     (
+        "9.5-every-unknown-command",
+        "goes on without a recovery behind bytes that no drive knows",
+    ),
+    (
         "9.7-first-link-two-errors",
         "goes on without a recovery behind a damaged byte",
     ),
     (
         "9.8-power-cycle",
         "goes on without a recovery behind a drive that was switched on",
+    ),
+    (
+        "9.8-sequence-with-gaps",
+        "other bytes stand inside the check sequence",
     ),
     (
         "9.8-zeros-before-the-sequence",

@@ -40,9 +40,9 @@ fn every_mistake_has_its_place() {
         1,
         1,
         0,
-        "the record of a run expected here, of schema 1",
+        "the record of a run expected here, of schema 2",
     );
-    let other = text.replacen("\"schema\":1", "\"schema\":9", 1);
+    let other = text.replacen("\"schema\":2", "\"schema\":9", 1);
     at(other.as_bytes(), 1, 1, 0, "a record of schema 9");
     let rings = text.replacen("\"rings\":[2]", "\"rings\":[251]", 1);
     assert!(error(rings.as_bytes()).line == 1);

@@ -150,8 +150,8 @@ fn a_run_and_its_attachments() {
         assert!(Path::new(path).is_file(), "{path}");
         named += 1;
     }
-    // Of each that was played the text and what its links carried.
-    assert_eq!(named, 6, "{xml}");
+    // The text of each scenario, and of each that was played what its links carried.
+    assert_eq!(named, 7, "{xml}");
 }
 
 #[test]
