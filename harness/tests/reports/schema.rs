@@ -70,7 +70,16 @@ fn a_changed_line_is_none() {
     ] {
         assert!(names.contains(&kind), "{kind} is not among {names:?}");
     }
-    let optional = ["error", "at", "finding", "safe", "unplaced", "own_rings"];
+    let optional = [
+        "error",
+        "at",
+        "finding",
+        "safe",
+        "unplaced",
+        "own_rings",
+        "purpose",
+        "opening",
+    ];
     for line in kinds.values().chain([&trouble]) {
         let refused = |changed: Value| {
             assert!(!validator.is_valid(&changed), "{changed}");
