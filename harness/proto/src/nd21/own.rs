@@ -98,7 +98,7 @@ mod tests {
                 .chain([ram::DATA_IN, ram::DATA_OUT])
                 .all(|cell| !is_own(cell))
         );
-        assert!(SPARE.all(|cell| SCOPE_BUFFER.contains(&cell)));
+        assert!(SPARE.into_iter().all(|cell| SCOPE_BUFFER.contains(&cell)));
         let gains = ram::NKP..=ram::LKD;
         assert!(
             gains
