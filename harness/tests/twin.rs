@@ -3,8 +3,7 @@
 use harness::library::{Entry, sources};
 use harness::link::{Event, Link, Recording, Replay};
 use harness::qualify::{
-    Answer, Asked, Hypothesis, Probe, answer, deviating, explaining, explaining_most, hypotheses,
-    probes,
+    Answer, Asked, Hypothesis, Probe, Seen, answer, explaining, hypotheses, name, probes,
 };
 use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_anew};
@@ -383,9 +382,15 @@ fn what_the_right_drive_explains_names_no_deviation() {
             let (plan, link) = model(lines);
             Ok(Twin::new(link, &plan.rings))
         };
-        let found = explaining_most(deviating(3, &[1]), &[seen], real, &twin);
-        let names = found.into_iter().map(|found| found.name);
-        names.collect::<Vec<_>>()
+        let seen = Seen {
+            drives: 3,
+            suspects: &[],
+            differing: &[seen],
+            alike: &[],
+            exactness: real,
+        };
+        let found = name(&seen, &twin);
+        found.iter().map(ToString::to_string).collect::<Vec<_>>()
     };
     assert_eq!(names(&[], Span::from_millis(60)), [""; 0]);
     assert_eq!(names(&[], Span::ZERO), [""; 0]);

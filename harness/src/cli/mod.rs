@@ -7,6 +7,7 @@ mod check;
 mod deviations;
 mod drive;
 mod exit;
+mod findings;
 mod fuzz;
 mod import;
 mod junit;

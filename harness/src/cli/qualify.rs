@@ -3,6 +3,7 @@
 
 use super::args::QualifyArguments;
 use super::exit::Exit;
+use super::findings::Findings;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_rig;
@@ -11,68 +12,25 @@ use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
 use crate::link::Link as _;
 use crate::qualify::{
-    Answer, Asked, Probe, Profile, answer, conversations, deviating, deviating_masters,
-    explaining_most, probes,
+    Answer, Asked, Probe, Profile, answer, conversations, deviating_masters, name, probes,
 };
-use crate::rig::{Driven, Played, Run, state};
-use crate::scenario::verdict::Verdict;
-use crate::twin::Conversation;
+use crate::rig::{Run, state};
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::SystemTime;
 
-/// The most attempts that are explained: each is asked of every deviation of every drive.
-const MOST_ATTEMPTS: usize = 12;
-
-/// The most explanations that are told.
+/// The most deviations of the master that are told.
 const MOST_TOLD: usize = 8;
+
+/// The file of a folder of evidence that says what was compared and which deviations explain it.
+pub(super) const DEVIATIONS: &str = "deviations.txt";
+
+/// What is said where a run ended early.
+pub(super) const ENDED: &str = "the run ended before everything was played";
 
 /// How often a probe is played until a value explains it: a busy computer is late now and then.
 const PROBED: usize = 3;
-
-/// What was played and was otherwise than the model.
-#[derive(Default)]
-pub(super) struct Findings {
-    /// The conversations of each attempt that diverged.
-    diverged: Vec<Vec<Conversation>>,
-    /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
-    with_driver: Vec<Vec<Conversation>>,
-    /// The drives that were named.
-    suspects: Vec<u8>,
-    /// What the bench's own master did, and whether it was ever wrong.
-    driven: Vec<Driven>,
-    master_is_wrong: bool,
-}
-
-impl Findings {
-    /// The attempts that are to be explained.
-    fn attempts(&self) -> &[Vec<Conversation>] {
-        match self.diverged.is_empty() {
-            true => &self.with_driver,
-            false => &self.diverged,
-        }
-    }
-
-    /// Notes what came of a scenario on a rig that states this tolerance of times.
-    pub(super) fn note(&mut self, played: &Played, tolerance: Span) {
-        for attempt in &played.attempts {
-            self.driven.extend(attempt.driven.clone());
-            self.master_is_wrong |= !attempt.master_is_right;
-        }
-        if let Some((attempt, divergences)) = played.telling(tolerance) {
-            let own = match attempt.driven {
-                Some(_) => &mut self.with_driver,
-                None => &mut self.diverged,
-            };
-            own.push(attempt.conversations.clone());
-            let drives = divergences.iter().filter_map(|there| there.drive);
-            self.suspects.extend(drives);
-        }
-        self.suspects.sort_unstable();
-        self.suspects.dedup();
-    }
-}
 
 /// Qualifies a rig.
 pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -119,8 +77,10 @@ pub(super) fn settle(
 ) -> Result<Exit, Stop> {
     let drives = run.session().rig().file.ring.first.drives;
     let tolerance = run.exactness().tolerance;
-    let mut open = 0;
-    if !ill {
+    let mut ended = false;
+    if ill {
+        findings.note_open("the ring is ill: nothing more was played".to_owned());
+    } else {
         let reached: Vec<bool> = (0..usize::from(drives))
             .map(|place| place == 0 || run.session().link().reaches(0, place))
             .collect();
@@ -130,10 +90,9 @@ pub(super) fn settle(
             let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
             output.result(&line(&entry, &played.outcome, output))?;
             output.say(&details(&entry, &played.outcome, traces));
-            findings.note(&played, tolerance);
-            let settles_nothing = [Verdict::Flaky, Verdict::Inconclusive];
-            open += usize::from(settles_nothing.contains(&played.outcome.verdict));
+            findings.note(entry.short_name(), &played, tolerance);
             if over(run, output) {
+                ended = true;
                 break;
             }
         }
@@ -142,29 +101,27 @@ pub(super) fn settle(
         true => None,
         false => Some(profile(run, findings, folder.as_deref_mut(), output)?),
     };
-    let mut named = format!(
+    if ended || over(run, output) {
+        findings.note_open(ENDED.to_owned());
+        ended = true;
+    }
+    let named = format!(
         "{}{}",
         name_master(findings, output)?,
-        name(run, findings, ill, output)?
+        name_drives(run, findings, ended, output)?
     );
-    if open > 0 {
-        let text =
-            format!("conversations that settle nothing: {open}; see what is said of them above\n");
-        output.result(&text)?;
-        named.push_str(&text);
-    }
-    let exit = match (findings.master_is_wrong, findings.attempts().is_empty()) {
-        (true, _) => Exit::RigError,
-        (false, true) if open > 0 => Exit::Incomplete,
-        (false, true) => Exit::Passed,
-        (false, false) => Exit::Failed,
+    let exit = match findings.master_is_wrong {
+        true => Exit::RigError,
+        false if findings.differ() => Exit::Failed,
+        false if findings.is_open() => Exit::Incomplete,
+        false => Exit::Passed,
     };
     if let Some(folder) = folder {
         if let Some(profile) = profile {
             let text = toml::to_string(&profile).unwrap_or_default();
             folder.add("profile.toml", &text)?;
         }
-        folder.add("deviations.txt", &named)?;
+        folder.add(DEVIATIONS, &named)?;
     }
     Ok(exit)
 }
@@ -191,53 +148,21 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
     Ok(text)
 }
 
-/// The deviations that explain every byte of every attempt that diverged.
-fn name(
+/// The deviations that explain every byte, and what was compared.
+fn name_drives(
     run: &mut Run<'_>,
     findings: &Findings,
-    ill: bool,
+    ended: bool,
     output: &mut Output,
 ) -> Result<String, Stop> {
-    if findings.attempts().is_empty() {
-        let known = &run.session().rig().file.deviation;
-        let text = match known.is_empty() {
-            _ if ill => {
-                "deviations: not known; the run ended with a rig error before its last scenario\n"
-                    .to_owned()
-            }
-            true => "deviations: none; every byte is as the model of the manual says\n".to_owned(),
-            false => {
-                let names: Vec<_> = known.iter().map(|entry| entry.name.as_str()).collect();
-                format!(
-                    "deviations: none beside the known ones: {}\n",
-                    names.join(", ")
-                )
-            }
-        };
-        output.result(&text)?;
-        return Ok(text);
-    }
-    let drives = run.session().rig().file.ring.first.drives;
-    let exactness = run.exactness();
-    let twin = |lines: &[String]| run.twin_with(lines);
-    let all = deviating(drives, &findings.suspects);
-    let attempts = findings.attempts();
-    let attempts = &attempts[..attempts.len().min(MOST_ATTEMPTS)];
-    let found = explaining_most(all, attempts, exactness, &twin);
-    let mut text = String::new();
-    match found.as_slice() {
-        [] => text.push_str("deviations: the ring is otherwise than the model, and no single known deviation explains it\n"),
-        found => {
-            for hypothesis in found.iter().take(MOST_TOLD) {
-                text.push_str(&format!("deviation: {}\n", hypothesis.name));
-            }
-            if found.len() > MOST_TOLD {
-                text.push_str(&format!("and {} more that explain it as well\n", found.len() - MOST_TOLD));
-            }
-        }
-    }
-    output.result(&text)?;
-    Ok(text)
+    let rig = run.session().rig();
+    let drives = rig.file.ring.first.drives;
+    let known = rig.file.deviation.iter();
+    let known: Vec<_> = known.map(|entry| entry.name.clone()).collect();
+    let seen = findings.seen(drives, run.exactness());
+    let named = (findings.differ() && !ended)
+        .then(|| name(&seen, &|lines: &[String]| run.twin_with(lines)));
+    Ok(findings.tell(named.as_deref(), &known, output)?)
 }
 
 /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus is part of every later
@@ -268,12 +193,13 @@ fn profile(
         }
         let section = format!("nd21 {}", probe.section);
         let property = probe.property;
-        let whose = match probe.asked {
-            Asked::Drive(drive, _) => format!("drive {drive}: "),
-            Asked::Ring => String::new(),
+        let (whose, of) = match probe.asked {
+            Asked::Drive(drive, _) => (format!("drive {drive}: "), format!(" of drive {drive}")),
+            Asked::Ring => (String::new(), String::new()),
         };
         let why = match ask(run, findings, &probe, &known, folder.as_deref_mut(), output)? {
             Asking::Answer(Answer::Settled { value, lines }) => {
+                findings.note_probe();
                 output.result(&format!("{property} ({section}): {whose}{value}\n"))?;
                 if probe.asked == Asked::Ring {
                     known.extend(lines.iter().cloned());
@@ -282,13 +208,18 @@ fn profile(
                 continue;
             }
             Asking::Answer(Answer::NoDifference) => {
+                findings.note_probe();
                 "every value of it gives the bytes that came: the drive was not in a state that shows it".to_owned()
             }
             Asking::Answer(Answer::NotDone(time)) => {
+                findings.note_probe();
                 format!("longer than {time}: it was not done when it was asked for the last time")
             }
             Asking::Answer(Answer::Unexplained) => {
-                "no value of it gives the bytes that came".to_owned()
+                let why = "no value of it gives the bytes that came";
+                findings.note_probe();
+                findings.note_open(format!("the probe of {property}{of}: {why}"));
+                why.to_owned()
             }
             Asking::Not(why) => format!("not asked: {why}"),
         };
@@ -328,7 +259,7 @@ fn ask(
         for entry in &probe.entries {
             let played = play(run, entry, folder.as_deref_mut())?;
             let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
-                findings.note(&played, exactness.tolerance);
+                findings.note_attempts(&played, exactness.tolerance);
                 return Ok(Asking::Not(played.outcome.remarks.join("; ")));
             };
             conversations.push(attempt.conversations.clone());
@@ -345,6 +276,6 @@ fn ask(
         }
     }
     last.iter()
-        .for_each(|played| findings.note(played, exactness.tolerance));
+        .for_each(|played| findings.note_attempts(played, exactness.tolerance));
     Ok(Asking::Answer(Answer::Unexplained))
 }

@@ -1,10 +1,11 @@
 //! Work on a rig in use: `run --rig` on a rig with ports, and `qualify`.
 
 use super::exit::Exit;
+use super::findings::Findings;
 use super::junit::Cases;
 use super::output::Output;
 use super::page::{Page, write};
-use super::qualify::{Findings, settle};
+use super::qualify::{DEVIATIONS, ENDED, settle};
 use super::rig_failure::{alarm, exit_of, give_back};
 use super::run::{details, drives, line, progress_bar};
 use super::tally::Tally;
@@ -202,7 +203,7 @@ fn all(
             page.add(entry, outcome, traces);
         }
         bar.inc(1);
-        findings.note(&played, tolerance);
+        findings.note(entry.short_name(), &played, tolerance);
         ill = played.outcome.verdict == Verdict::RigError
             && played
                 .attempts
@@ -220,10 +221,18 @@ fn all(
     }
     output.result(&tally.summary())?;
     let mut exit = cases.write(tally.exit(job.require_all), output);
-    if job.qualify && !over(&mut run, output) {
+    if job.qualify && over(&mut run, output) {
+        findings.note_open(ENDED.to_owned());
+        let told = findings.tell(None, &[], output)?;
+        if let Some(folder) = folder.as_mut() {
+            folder.add(DEVIATIONS, &told)?;
+        }
+    } else if job.qualify {
         match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
             // What a drive does wrong is the drive's fault, whatever came of it.
             Exit::Failed => exit = Exit::Failed,
+            // What is not settled takes no failure back.
+            Exit::Incomplete if exit == Exit::Failed => {}
             other => exit = exit.max(other),
         }
     }

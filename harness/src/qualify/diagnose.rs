@@ -1,42 +1,182 @@
-//! What a drive that is otherwise is: the known deviations that explain every byte of a run. And what the bench's own master is, where it is the
-//! one that is otherwise.
+//! Which known deviation explains how a ring differed from the model; and which one of the master does, where the bench's own master is wrong.
 
-use super::hypothesis::Hypothesis;
+use super::hypothesis::{Evidence, judge};
 use crate::rig::Driven;
-use harness_sim::deviation::{MasterDeviation, deviations, master_deviations};
+use crate::twin::{Conversation, Exactness, Twin};
+use harness_sim::deviation::{Deviation, MasterDeviation, deviations, master_deviations};
+use std::fmt;
 
-/// Rings up to this size are asked drive by drive; in larger ones the drives that were named and all together.
+/// Largest ring whose drives are all tried one by one; in larger ones only those that telegrams named are.
 const SMALL: u8 = 16;
 
-/// The deviations that a drive of these rings may have: of one drive, then of all.
-#[must_use]
-pub fn deviating(drives: u8, suspects: &[u8]) -> Vec<Hypothesis> {
-    let mut hypotheses = Vec::new();
-    let single: Vec<u8> = match drives <= SMALL {
-        true => (0..drives).collect(),
-        false => suspects.to_vec(),
-    };
-    for deviation in deviations() {
-        for drive in &single {
-            hypotheses.push(Hypothesis {
-                name: format!(
-                    "drive {drive}: {} (ND21 {}): {}",
-                    deviation.name, deviation.section, deviation.about
-                ),
-                lines: vec![format!("drive {drive} deviates {}", deviation.name)],
-            });
-        }
-        if drives > 1 {
-            hypotheses.push(Hypothesis {
-                name: format!(
-                    "every drive: {} (ND21 {}): {}",
-                    deviation.name, deviation.section, deviation.about
-                ),
-                lines: vec![format!("drive 0..last deviates {}", deviation.name)],
-            });
+/// The most attempts on simulated drives that are to be explained.
+const MOST_SIMULATED: usize = 12;
+
+/// The number of attempts for which every candidate is tried on simulated drives, even where it has explained none.
+const ASKED_OF_ALL: usize = 3;
+
+/// A deviation that explains every byte.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// Which.
+    pub deviation: &'static Deviation,
+    /// Whose it is.
+    pub whose: Whose,
+}
+
+/// Which drives have a deviation, as far as the bytes tell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Whose {
+    /// One of these; more than one where the bytes do not tell which.
+    OneOf(Vec<u8>),
+    /// All of them: one alone does not explain the bytes.
+    Every,
+}
+
+impl fmt::Display for Named {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Deviation {
+            name,
+            section,
+            about,
+            ..
+        } = self.deviation;
+        let what = format!("{name} (ND21 {section}): {about}");
+        match &self.whose {
+            Whose::Every => write!(f, "every drive: {what}"),
+            Whose::OneOf(drives) => match drives.as_slice() {
+                [drive] => write!(f, "drive {drive}: {what}"),
+                drives => {
+                    let drives: Vec<_> = drives.iter().map(u8::to_string).collect();
+                    write!(
+                        f,
+                        "{what}; not known which drive: one of {}",
+                        drives.join(", ")
+                    )
+                }
+            },
         }
     }
-    hypotheses
+}
+
+/// What a ring was seen to do, attempt by attempt.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'s> {
+    /// How many drives the ring has.
+    pub drives: u8,
+    /// The drives that are tried one by one in a large ring.
+    pub suspects: &'s [u8],
+    /// The attempts in which a byte differed from the model.
+    pub differing: &'s [Vec<Conversation>],
+    /// Attempts in which none did.
+    pub alike: &'s [Vec<Conversation>],
+    /// How exactly is compared.
+    pub exactness: Exactness,
+}
+
+/// A deviation of one drive, or of every drive, that has explained everything so far.
+struct Candidate {
+    deviation: &'static Deviation,
+    drive: Option<u8>,
+    timely: bool,
+    /// How many attempts it has explained.
+    explained: usize,
+}
+
+impl Candidate {
+    /// The header lines of the scenario language that make it so.
+    fn lines(&self) -> Vec<String> {
+        let drives = self.drive.map_or("0..last".to_owned(), |k| k.to_string());
+        vec![format!("drive {drives} deviates {}", self.deviation.name)]
+    }
+}
+
+/// The deviations that explain every byte of every attempt, those in which nothing differed too; `twin` gives a ring with more lines in
+/// its header. A deviation of one drive is simpler than one of all drives, which is given only where no single drive explains
+/// everything. Attempts that the model of the manual explains from its power-up on refute, and prove nothing.
+///
+/// Simulated drives keep what the scenarios before have left in them, and no twin that starts anew gives every byte then. There, what
+/// explains the most attempts is named.
+pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&[String]) -> Result<Twin, E>) -> Vec<Named> {
+    let explains = |lines: &[String], attempt: &[Conversation]| -> Option<Evidence> {
+        judge(twin(lines).ok()?, attempt, seen.exactness)
+    };
+    let mut candidates = candidates(seen);
+    let (simulated, mut differed) = (seen.exactness.knows_cells, 0);
+    // The shortest first: it refutes most, and costs least.
+    let mut differing: Vec<_> = seen.differing.iter().collect();
+    differing.sort_by_key(|attempt| attempt.iter().map(|own| own.done.len()).sum::<usize>());
+    for attempt in differing {
+        if simulated && differed == MOST_SIMULATED {
+            break;
+        }
+        let right = explains(&[], attempt);
+        let better = |own: &Evidence| right.is_none_or(|right| own.timely && !right.timely);
+        if right.is_some_and(|right| right.timely) {
+            continue;
+        }
+        differed += 1;
+        candidates.retain_mut(|candidate| {
+            let own = explains(&candidate.lines(), attempt).filter(better);
+            candidate.timely &= own.is_none_or(|own| own.timely);
+            candidate.explained += usize::from(own.is_some());
+            candidate.explained == differed || simulated
+        });
+        let whole = candidates.iter().any(|own| own.explained == differed);
+        if whole && differed >= ASKED_OF_ALL {
+            candidates.retain(|own| own.explained > 0);
+        }
+    }
+    let most = candidates.iter().map(|own| own.explained).max();
+    candidates.retain(|own| own.explained > 0 && Some(own.explained) == most);
+    for attempt in seen.alike {
+        if simulated || candidates.is_empty() || explains(&[], attempt).is_none() {
+            continue;
+        }
+        candidates.retain(|candidate| explains(&candidate.lines(), attempt).is_some());
+    }
+    simplest(candidates)
+}
+
+fn candidates(seen: &Seen<'_>) -> Vec<Candidate> {
+    let single: Vec<u8> = match seen.drives <= SMALL {
+        true => (0..seen.drives).collect(),
+        false => seen.suspects.to_vec(),
+    };
+    let every = (seen.drives > 1).then_some(None);
+    let whose: Vec<_> = single.into_iter().map(Some).chain(every).collect();
+    let of = |deviation| {
+        let candidate = move |drive: &Option<u8>| Candidate {
+            deviation,
+            drive: *drive,
+            timely: true,
+            explained: 0,
+        };
+        whose.iter().map(candidate)
+    };
+    deviations().flat_map(of).collect()
+}
+
+/// Those that explain the times too if any does, and of these those of single drives if there are some; one entry for each deviation.
+fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
+    if candidates.iter().any(|own| own.timely) {
+        candidates.retain(|own| own.timely);
+    }
+    if candidates.iter().any(|own| own.drive.is_some()) {
+        candidates.retain(|own| own.drive.is_some());
+    }
+    let of_one = candidates.chunk_by(|one, other| one.deviation.name == other.deviation.name);
+    let named = of_one.map(|own| {
+        let drives: Vec<u8> = own.iter().filter_map(|own| own.drive).collect();
+        Named {
+            deviation: own[0].deviation,
+            whose: match drives.is_empty() {
+                true => Whose::Every,
+                false => Whose::OneOf(drives),
+            },
+        }
+    });
+    named.collect()
 }
 
 /// The deviations of the master under which everything is as it was recorded, in every attempt in which the driver had a part.

@@ -2,7 +2,6 @@
 
 use crate::twin::{Conversation, Exactness, Twin};
 use harness_proto::time::Span;
-use std::collections::BTreeMap;
 
 /// A model with something changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,38 +45,12 @@ pub fn explaining<'h, E>(
     Ok(explaining)
 }
 
-/// How many attempts every hypothesis is asked for.
-const ASKED_OF_ALL: usize = 3;
-
-/// The hypotheses that explain the most of several attempts, in the order given: a drive that a deviation has left in another
-/// state explains what comes behind in its own way. Where one has explained every attempt so far, those that have explained none
-/// are asked no more. What the right drive explains as well is explained by no deviation.
-pub fn explaining_most<E>(
-    mut hypotheses: Vec<Hypothesis>,
-    attempts: &[Vec<Conversation>],
+/// How well a twin explains conversations; none where a byte differs.
+pub(super) fn judge(
+    mut twin: Twin,
+    conversations: &[Conversation],
     exactness: Exactness,
-    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
-) -> Vec<Hypothesis> {
-    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    let most = |counts: &BTreeMap<String, usize>| counts.values().max().copied();
-    for (number, attempt) in attempts.iter().enumerate() {
-        let right = twin(&[]).ok();
-        let right = right.and_then(|twin| judge(twin, attempt, exactness));
-        let better = |own: Evidence| right.is_none_or(|right| own.timely && !right.timely);
-        let found = explaining(&hypotheses, attempt, exactness, twin).unwrap_or_default();
-        for (hypothesis, _) in found.into_iter().filter(|(_, own)| better(*own)) {
-            *counts.entry(hypothesis.name.clone()).or_default() += 1;
-        }
-        if number + 1 >= ASKED_OF_ALL && most(&counts) == Some(number + 1) {
-            hypotheses.retain(|hypothesis| counts.contains_key(&hypothesis.name));
-        }
-    }
-    let most = most(&counts);
-    hypotheses.retain(|hypothesis| most.is_some() && counts.get(&hypothesis.name).copied() == most);
-    hypotheses
-}
-
-fn judge(mut twin: Twin, conversations: &[Conversation], exactness: Exactness) -> Option<Evidence> {
+) -> Option<Evidence> {
     let mut evidence = Evidence {
         timely: true,
         ..Evidence::default()

@@ -9,7 +9,7 @@ mod probes;
 mod settle;
 
 pub use crate::rig::{Profile, ProfileError, Settled};
-pub use diagnose::{deviating, deviating_masters};
-pub use hypothesis::{Evidence, Hypothesis, explaining, explaining_most};
+pub use diagnose::{Named, Seen, Whose, deviating_masters, name};
+pub use hypothesis::{Evidence, Hypothesis, explaining};
 pub use probes::{Asked, Probe, conversations, hypotheses, probes};
 pub use settle::{Answer, answer};

@@ -98,11 +98,11 @@ fn diverged(outcome: &mut Outcome, divergence: &Divergence, heard: &Heard<'_>) {
     let mut known = heard.rig.file.deviation.iter();
     let explains = |entry: &&Deviation| {
         let drives = &entry.drives;
-        let own = |drive: u8| drives.contains(&drive);
+        let may_be = divergence.drive.or(divergence.role.drive());
         entry.rule == rule
             && by_hand(entry)
             && usize::from(entry.ring) == divergence.ring + 1
-            && (drives.is_empty() || divergence.drive.is_some_and(own))
+            && (drives.is_empty() || may_be.is_none_or(|drive| drives.contains(&drive)))
     };
     match known.find(explains) {
         Some(entry) => {
@@ -141,6 +141,18 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
             "drives sent bytes unasked (ND21 9.9); their order depends on the drives' clocks, and the model cannot tell it"
                 .to_owned(),
         );
+    } else if passes_with_defaults(heard) {
+        outcome.verdict = Verdict::Inconclusive;
+        outcome.remarks.push(
+            "it passes on drives with the model's defaults: the rig's drives do otherwise where the manual leaves it open"
+                .to_owned(),
+        );
+    } else if heard.exactness.knows_cells && passes(heard.rig, heard) {
+        outcome.verdict = Verdict::Inconclusive;
+        outcome.remarks.push(
+            "it passes on drives that have just been switched on: what was played before left them in another state"
+                .to_owned(),
+        );
     } else if let Some(untimely) = untimely
         && finding.difference.is_none()
         && heard.exactness.tolerance > Span::ZERO
@@ -157,22 +169,41 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
     }
 }
 
+/// What comes of the scenario on a rig's model, whose drives have just been switched on, with these known deviations.
+fn switched_on(rig: &Rig, lines: &[String], heard: &Heard<'_>) -> Option<Outcome> {
+    let mut link = twin(rig, lines).ok()?.into_link();
+    let mut forgotten: Vec<Event> = Vec::new();
+    let mut recording = Recording::new(&mut link, &mut forgotten);
+    play_one(&mut recording, heard.plan, heard.way).ok()
+}
+
+fn passes(rig: &Rig, heard: &Heard<'_>) -> bool {
+    let outcome = switched_on(rig, &known(rig), heard);
+    outcome.is_some_and(|outcome| outcome.verdict == Verdict::Passed)
+}
+
+/// Whether the rig's file or its profile settles properties that the manual leaves open, and the scenario passes without them.
+fn passes_with_defaults(heard: &Heard<'_>) -> bool {
+    let settles = |line: &String| line.contains(" property ");
+    let mut rig = heard.rig.clone();
+    let mut settled = rig.profile.take().is_some();
+    if let Some(sim) = &mut rig.file.sim {
+        settled |= sim.setup.iter().any(settles);
+        sim.setup.retain(|line| !settles(line));
+    }
+    settled && passes(&rig, heard)
+}
+
 /// Whether the scenario passes on the model of the manual and fails at the same line on the model with the known deviations.
 fn explained_by_known(finding: &Finding, heard: &Heard<'_>) -> bool {
     let deviations = known(heard.rig);
-    let plays = |lines: &[String]| {
-        let mut link = twin(heard.rig, lines).ok()?.into_link();
-        let mut forgotten: Vec<Event> = Vec::new();
-        let mut recording = Recording::new(&mut link, &mut forgotten);
-        play_one(&mut recording, heard.plan, heard.way).ok()
-    };
     let fails_alike = |outcome: Outcome| {
         let found = outcome.finding;
         found.is_some_and(|found| found.span == finding.span)
     };
     !deviations.is_empty()
-        && plays(&[]).is_some_and(|right| right.verdict == Verdict::Passed)
-        && plays(&deviations).is_some_and(fails_alike)
+        && switched_on(heard.rig, &[], heard).is_some_and(|right| right.verdict == Verdict::Passed)
+        && switched_on(heard.rig, &deviations, heard).is_some_and(fails_alike)
 }
 
 /// Whether a finding may be about bytes behind the first one that a drive sent unasked.

@@ -251,8 +251,9 @@ impl<'s> Run<'s> {
     /// What the guard refuses of a plan on the model.
     fn denied(&self, plan: &Plan) -> Option<String> {
         let rig = self.session.rig();
-        let model = rig.plan_with(&known(rig)).ok()?;
-        let mut guarded = Guarded::new(simulate::bench(&model), self.session.limits());
+        // A simulated drive that is wrong on purpose is rehearsed as a right one too.
+        let model = twin(rig, &known(rig)).ok()?.into_link();
+        let mut guarded = Guarded::new(model, self.session.limits());
         // The model's drives have just been made.
         guarded.assume_fresh();
         guarded.know_as(self.session.guarded());

@@ -3,7 +3,6 @@
 use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, What};
 use super::follow::Conversation;
 use super::unasked::Sent;
-use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
 use harness_proto::nd21::{own, ram};
@@ -38,12 +37,11 @@ impl Rows<'_> {
         self.roles.get(index).copied().unwrap_or(Role::Foreign)
     }
 
-    /// Whether a byte is missing or too many because a conversation in real time ended with it under way.
+    /// Whether a byte is missing because a conversation in real time ended with it under way. One that came although the twin does not send
+    /// it, not even later, is never excused.
     fn cut_short(&self, index: usize, what: &What, tail: Instant) -> bool {
         match (what, self.expected.get(index), self.received.get(index)) {
-            (What::Missing, Some((at, _)), None) | (What::Surplus, None, Some((at, _))) => {
-                *at >= tail
-            }
+            (What::Missing, Some((at, _)), None) => *at >= tail,
             _ => false,
         }
     }
@@ -95,8 +93,7 @@ impl Comparer<'_> {
         let unasked = unasked.flatten();
         let (shorter, short);
         // A race of clocks is compared up to its first byte, and the long runs behind it do not matter.
-        let aligned = aligned || unasked.is_some();
-        let (expected, received) = if aligned || !real_time {
+        let (expected, received) = if aligned || unasked.is_some() || !real_time {
             (expected, &received[..])
         } else {
             (shorter, short) = (collapsed(expected), collapsed(received));
@@ -142,8 +139,11 @@ impl Comparer<'_> {
             if real_time && rows.cut_short(index, &what, tail) {
                 return;
             }
-            let heard = &expected[..index.min(expected.len())];
             let role = rows.role(index);
+            let drive = match size.drives() {
+                1 => Some(0),
+                _ => aligned.then(|| self.culprit(&rows, index)).flatten(),
+            };
             let found = Divergence {
                 ring,
                 byte: index + 1,
@@ -152,11 +152,31 @@ impl Comparer<'_> {
                 received: received.get(index).copied(),
                 role,
                 step: step_at(index),
-                drive: role.drive().or_else(|| spelled(heard, size)),
+                drive,
             };
             self.comparison.divergence.get_or_insert(found);
             return;
         }
+    }
+
+    /// The drive whose answers are all that differs from the `first` byte on that does, in a ring that gives a byte for a byte. A drive that
+    /// damages what it forwards leaves the answer's checking byte as it was: of a single byte nothing is known.
+    fn culprit(&mut self, rows: &Rows<'_>, first: usize) -> Option<u8> {
+        let answering = |index: usize| match rows.role(index) {
+            Role::Data { drive, .. } | Role::Check { drive, .. } | Role::ProcessData { drive } => {
+                drive
+            }
+            _ => None,
+        };
+        let drive = answering(first)?;
+        let before = self.comparison.clone();
+        let behind = first + 1..rows.received.len();
+        let differing: Vec<_> = behind
+            .filter(|index| self.row(rows, *index, || None).is_some())
+            .collect();
+        self.comparison = before;
+        let own = |index: &usize| answering(*index) == Some(drive);
+        (!differing.is_empty() && differing.iter().all(own)).then_some(drive)
     }
 
     /// What is otherwise at one place, apart from the time.
@@ -181,8 +201,7 @@ impl Comparer<'_> {
         let found_good = found.error.is_none() || !self.exactness.line_errors;
         let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
         let same = wanted.byte == found.byte
-            || index < rows.known
-                && self.may_differ(ring, rows.roles, (wanted.byte, received), index);
+            || index < rows.known && self.may_differ(rows, (wanted.byte, found.byte), index);
         self.note_write(ring, rows, index);
         self.note_reset(ring, rows.roles, index);
         match (same, wanted_good == found_good) {
@@ -197,14 +216,8 @@ impl Comparer<'_> {
 
     /// Whether a byte may be another one than the model's: it is data that the model cannot know, or their checking
     /// byte.
-    fn may_differ(
-        &mut self,
-        ring: usize,
-        roles: &[Role],
-        (wanted, received): (u8, &[(Instant, Received)]),
-        index: usize,
-    ) -> bool {
-        let value = received[index].1.byte;
+    fn may_differ(&mut self, rows: &Rows<'_>, (wanted, value): (u8, u8), index: usize) -> bool {
+        let Rows { ring, roles, .. } = *rows;
         let looks_at = |drive, address| {
             let (asked, looks) = self.exactness.looks?;
             let mut own = looks.iter().filter(|_| asked == drive);
@@ -249,10 +262,13 @@ impl Comparer<'_> {
                 length,
                 ..
             } => {
-                let bytes = answer_of(&roles[..index], drive, length);
-                let bytes = bytes.map(|(index, _)| received[index].1.byte);
+                // Only over data that differ: to a command that the model refuses (9.6) there is no other answer.
+                let answer = || answer_of(&roles[..index], drive, length).map(|(place, _)| place);
+                let other =
+                    |place: usize| rows.expected[place].1.byte != rows.received[place].1.byte;
+                let bytes = answer().map(|place| rows.received[place].1.byte);
                 let sum = bytes.fold(Checksum::EMPTY, Checksum::with);
-                sum.minus() == value
+                sum.minus() == value && answer().any(other)
             }
             _ => false,
         }
@@ -396,7 +412,7 @@ impl Comparer<'_> {
                 received: Some(received),
                 role,
                 step: step(),
-                drive: role.drive(),
+                drive: None,
             });
         }
     }
@@ -424,12 +440,6 @@ fn data_written(rows: &Rows<'_>, index: usize, drive: u8, length: u8) -> Option<
     let data = layout.command.iter().position(data)?;
     let byte = (layout.kind == Kind::WriteByte).then_some(data + 1)?;
     bytes.get(byte).copied()
-}
-
-/// The drive that a ring spells out with these bytes (9.7).
-fn spelled(heard: &[(Instant, Received)], size: RingSize) -> Option<u8> {
-    let heard: Vec<_> = heard.iter().map(|(_, byte)| *byte).collect();
-    locate(&heard, size.drives()).map(|location| location.drive)
 }
 
 /// The bytes that are answered, by their places among those sent, and their roles: a PAUSE where a sync byte is due is swallowed (9.2).

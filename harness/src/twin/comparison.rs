@@ -73,7 +73,7 @@ pub struct Divergence {
     pub role: Role,
     /// The step of the scenario that was under way when the byte went out, as a place in its text.
     pub step: Option<usize>,
-    /// The drive that is meant by the telegram, or that the ring spells out.
+    /// The drive whose answers are all that differs in the conversation; none where the bytes do not say which drive is wrong.
     pub drive: Option<u8>,
 }
 
@@ -113,8 +113,9 @@ impl fmt::Display for Divergence {
         let what = self.what.words();
         let ring = if self.ring == 0 { "" } else { " of ring 2" };
         write!(f, "byte {}{ring}", self.byte)?;
-        if let Some(drive) = self.drive {
-            write!(f, ", drive {drive}")?;
+        match self.drive {
+            Some(drive) => write!(f, ", drive {drive}")?,
+            None => write!(f, ", not known which drive")?,
         }
         write!(
             f,

@@ -1,0 +1,259 @@
+//! What a qualification compared with the model, and what differed.
+
+use super::output::Output;
+use crate::qualify::{Named, Seen};
+use crate::rig::{Driven, Played};
+use crate::scenario::verdict::Verdict;
+use crate::twin::{Conversation, Exactness};
+use harness_proto::time::Span;
+use std::fmt::Write as _;
+
+/// The most deviations that are told.
+const MOST_TOLD: usize = 8;
+
+/// The most scenarios and probes listed that were not compared, or not equal.
+const MOST_LISTED: usize = 12;
+
+/// What was played, and what of it differed from the model.
+#[derive(Default)]
+pub(super) struct Findings {
+    /// The conversations of each attempt that differed.
+    differing: Vec<Vec<Conversation>>,
+    /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
+    with_driver: Vec<Vec<Conversation>>,
+    /// Those of attempts in which nothing differed.
+    alike: Vec<Vec<Conversation>>,
+    /// The drives that the telegrams around a difference name.
+    suspects: Vec<u8>,
+    /// What the bench's own master did, and whether it was ever wrong.
+    pub(super) driven: Vec<Driven>,
+    pub(super) master_is_wrong: bool,
+    /// Scenarios and conversations that were played, and that were compared to their end and equal.
+    played: usize,
+    equal: usize,
+    /// Those that were not played because the rig cannot, or may not.
+    skipped: usize,
+    /// Bytes compared, and bytes whose values only the drives know.
+    bytes: u64,
+    own: u64,
+    /// How many probes were asked.
+    probes: usize,
+    /// What was not compared, or not equal, with its name.
+    open: Vec<String>,
+}
+
+impl Findings {
+    /// Notes what came of a scenario on a rig that states this tolerance of times.
+    pub(super) fn note(&mut self, name: &str, played: &Played, tolerance: Span) {
+        let verdict = played.outcome.verdict;
+        let Some(last) = played.last_played() else {
+            self.skipped += 1;
+            return;
+        };
+        self.note_attempts(played, tolerance);
+        self.played += 1;
+        for comparison in &last.comparisons {
+            let own = comparison.measured + comparison.adopted.len() as u64;
+            self.bytes += comparison.compared.saturating_sub(own);
+            self.own += own;
+        }
+        let differs = last.comparisons.iter().any(|own| own.divergence.is_some());
+        let whole = last.comparisons.len() == last.conversations.len();
+        let why = match verdict {
+            Verdict::Skipped => "the drives could not be made ready",
+            _ if differs => "a byte differed",
+            Verdict::Failed => "it failed, although every byte is as the model says",
+            Verdict::Inconclusive => "it settles nothing",
+            Verdict::Flaky => "a byte differed once, and not again",
+            Verdict::Aborted => "it was aborted",
+            Verdict::RigError => "the rig failed",
+            Verdict::Passed | Verdict::Marginal if !whole => {
+                "drives sent bytes unasked, and what comes behind is a race (ND21 9.9)"
+            }
+            Verdict::Passed | Verdict::Marginal => {
+                self.equal += 1;
+                self.alike.push(last.conversations.clone());
+                return;
+            }
+        };
+        self.open.push(format!("{name}: {why}"));
+    }
+
+    /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
+    pub(super) fn note_attempts(&mut self, played: &Played, tolerance: Span) {
+        for attempt in &played.attempts {
+            self.driven.extend(attempt.driven.clone());
+            self.master_is_wrong |= !attempt.master_is_right;
+        }
+        let Some((attempt, divergences)) = played.telling(tolerance) else {
+            return;
+        };
+        let own = match attempt.driven {
+            Some(_) => &mut self.with_driver,
+            None => &mut self.differing,
+        };
+        own.push(attempt.conversations.clone());
+        for there in divergences {
+            self.suspects
+                .extend(there.drive.into_iter().chain(there.role.drive()));
+        }
+        self.suspects.sort_unstable();
+        self.suspects.dedup();
+    }
+
+    /// Notes a probe that was asked.
+    pub(super) fn note_probe(&mut self) {
+        self.probes += 1;
+    }
+
+    /// Notes something that was not compared, or not equal.
+    pub(super) fn note_open(&mut self, why: String) {
+        self.open.push(why);
+    }
+
+    /// Whether something differed that a drive is to blame for.
+    pub(super) fn differ(&self) -> bool {
+        !self.differing.is_empty() || !self.with_driver.is_empty()
+    }
+
+    /// Whether something was not compared, or not equal.
+    pub(super) fn is_open(&self) -> bool {
+        !self.open.is_empty()
+    }
+
+    /// What is to be explained. Where the driver's part shows nothing new it is left out.
+    pub(super) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
+        Seen {
+            drives,
+            suspects: &self.suspects,
+            differing: match self.differing.is_empty() {
+                true => &self.with_driver,
+                false => &self.differing,
+            },
+            alike: &self.alike,
+            exactness,
+        }
+    }
+
+    /// Prints the deviations that explain what differed, none where they were not looked for, and what was compared; `known` are those
+    /// that the rig's file names.
+    pub(super) fn tell(
+        &self,
+        named: Option<&[Named]>,
+        known: &[String],
+        output: &mut Output,
+    ) -> std::io::Result<String> {
+        let text = self.text(named, known);
+        output.result(&text)?;
+        Ok(text)
+    }
+
+    fn text(&self, named: Option<&[Named]>, known: &[String]) -> String {
+        let mut text = self.verdict(named, known);
+        if self.is_open() {
+            text.push_str("not compared, or not equal:\n");
+        }
+        // Writing to a String cannot fail.
+        for open in self.open.iter().take(MOST_LISTED) {
+            let _infallible = writeln!(text, "  {open}");
+        }
+        if self.open.len() > MOST_LISTED {
+            let more = self.open.len() - MOST_LISTED;
+            let _infallible = writeln!(text, "  and {more} more");
+        }
+        text
+    }
+
+    /// Which deviations there are, as far as is known.
+    fn verdict(&self, named: Option<&[Named]>, known: &[String]) -> String {
+        let mut text = String::new();
+        let count = self.counts();
+        // Writing to a String cannot fail.
+        if self.differ() && named.is_none() {
+            let _infallible = writeln!(
+                text,
+                "deviations: the drives differ from the model; the run ended before an explanation was looked for: {count}"
+            );
+        } else if let Some(named) = named.filter(|_| self.differ()) {
+            for one in named.iter().take(MOST_TOLD) {
+                let _infallible = writeln!(text, "deviation: {one}");
+            }
+            match named.len() {
+                0 => text.push_str("deviations: the drives differ from the model, and no single known deviation explains every byte; not known which drive\n"),
+                1 => {}
+                2..=MOST_TOLD => text.push_str("each of these explains every byte: the bytes do not say which it is\n"),
+                more => {
+                    let more = more - MOST_TOLD;
+                    let _infallible = writeln!(text, "each of these, and {more} more, explains every byte: the bytes do not say which it is");
+                }
+            }
+            let _infallible = writeln!(text, "compared: {count}");
+        } else if self.is_open() || self.equal == 0 {
+            let _infallible = writeln!(
+                text,
+                "deviations: not settled; no byte is known to differ, but not everything was compared: {count}"
+            );
+        } else if known.is_empty() {
+            let _infallible = writeln!(
+                text,
+                "deviations: none; every byte is as the model of the manual says: {count}"
+            );
+        } else {
+            let known = known.join(", ");
+            let _infallible = writeln!(
+                text,
+                "deviations: none beside the known ones ({known}): {count}"
+            );
+        }
+        text
+    }
+
+    /// How much was compared.
+    fn counts(&self) -> String {
+        format!(
+            "{} of {} scenarios played are equal to their end, {} were skipped; {} bytes compared, {} more have values that only the drives know; {} probes asked",
+            self.equal, self.played, self.skipped, self.bytes, self.own, self.probes
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn played() -> Findings {
+        Findings {
+            played: 3,
+            equal: 3,
+            bytes: 90,
+            ..Findings::default()
+        }
+    }
+
+    #[test]
+    fn none_is_said_only_where_everything_was_compared_and_equal() {
+        let none = "deviations: none; every byte is as the model of the manual says: 3 of 3";
+        assert!(played().text(Some(&[]), &[]).starts_with(none));
+        let nothing = Findings::default().text(Some(&[]), &[]);
+        assert!(!nothing.contains("none"), "{nothing}");
+        let mut ended = played();
+        ended.note_open("the run ended before everything was played".to_owned());
+        for named in [None, Some(&[][..])] {
+            let text = ended.text(named, &["known".to_owned()]);
+            assert!(!text.contains("none"), "{text}");
+            assert!(
+                text.contains("\n  the run ended before everything was played\n"),
+                "{text}"
+            );
+        }
+        let mut differs = played();
+        differs.differing.push(Vec::new());
+        for named in [None, Some(&[][..])] {
+            let text = differs.text(named, &[]);
+            assert!(
+                text.starts_with("deviations: the drives differ from the model"),
+                "{text}"
+            );
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Which deviation is named, for each that the simulator has, planted in a drive of three and seen as through a port: nothing but the
+//! bytes and times at the master, cells that nobody knows, and faults on the master's own link only. The drives are plain ones, which take
+//! a fraction of the time of whole ND21s: what is behind the bus is left out.
+
+use harness::library::{Entry, sources};
+use harness::link::{Capability, Event, Line, Recording, SimulatedLink};
+use harness::qualify::{Named, Seen, Whose, conversations, name};
+use harness::rig::{Way, play_one};
+use harness::scenario::plan::Plan;
+use harness::scenario::run::lacks;
+use harness::scenario::simulate::bench;
+use harness::scenario::source::Source;
+use harness::twin::{Conversation, Exactness, Twin};
+use harness_proto::time::Span;
+use harness_sim::deviation::{Deviation, deviations};
+use std::collections::BTreeMap;
+use std::sync::{Mutex, OnceLock};
+
+const DRIVES: u8 = 3;
+
+/// How long a scenario may take that is played here.
+const SHORT: Span = Span::from_millis(150);
+
+const THROUGH_A_PORT: Exactness = Exactness {
+    tolerance: Span::from_millis(20),
+    line_errors: true,
+    knows_cells: false,
+    looks: None,
+};
+
+fn ring(lines: &[String]) -> Result<(Plan, SimulatedLink), ()> {
+    let text = format!(
+        "title x\nring {DRIVES}\ndrive 0..last model plain\n{}\n> 80\n",
+        lines.join("\n")
+    );
+    let source = Source {
+        name: "ring".to_owned(),
+        text: text.into(),
+    };
+    // A plain drive has no deviation behind its bus.
+    let entry = Entry::new(source, None).map_err(|_| ())?;
+    let plan = entry.plan.expect("novobus");
+    let link = bench(&plan);
+    Ok((plan, link))
+}
+
+/// A twin with more lines in its header. There are many of them, and each is asked for often.
+fn twin(lines: &[String]) -> Result<Twin, ()> {
+    static TWINS: OnceLock<Mutex<BTreeMap<Vec<String>, Result<Twin, ()>>>> = OnceLock::new();
+    let twins = TWINS.get_or_init(Mutex::default);
+    let mut twins = twins.lock().expect("no panic");
+    let twin = twins.entry(lines.to_vec()).or_insert_with(|| {
+        let (plan, link) = ring(lines)?;
+        Ok(Twin::new(link, &plan.rings))
+    });
+    twin.clone()
+}
+
+/// What a qualification plays through a port: its own conversations, and the short ones of the built-in scenarios that need nothing else.
+fn plans() -> &'static [Plan] {
+    static PLANS: OnceLock<Vec<Plan>> = OnceLock::new();
+    PLANS.get_or_init(|| {
+        let own = conversations(DRIVES, &|place| place == 0).expect("no mistakes");
+        let built_in = sources(&[]).expect("built-in scenarios").into_iter();
+        let built_in = built_in.filter_map(|source| Entry::new(source, Some(DRIVES)).ok());
+        let built_in = built_in.filter_map(|entry| entry.plan);
+        let right = twin(&[]).expect("a ring").into_link();
+        let fits = |plan: &Plan| {
+            let mut link = right.clone();
+            let mut events: Vec<Event> = Vec::new();
+            let mut recording = Recording::new(&mut link, &mut events);
+            plan.rings.len() == 1
+                && plan.rings[0].drives() == DRIVES
+                && !plan.needs.contains(&Capability::Interposer)
+                && !plan.asks_the_driver()
+                && lacks(plan, &recording).is_none()
+                && play_one(&mut recording, plan, &as_they_are())
+                    .is_ok_and(|outcome| outcome.took < SHORT)
+        };
+        let built_in = built_in.filter(fits);
+        let own = own.into_iter().filter_map(|entry| entry.plan);
+        own.chain(built_in).collect()
+    })
+}
+
+/// A scenario on drives that have just been switched on.
+fn as_they_are() -> Way {
+    Way {
+        rings: ring(&[]).expect("a ring").0.rings,
+        attempts: None,
+        anew: false,
+    }
+}
+
+/// The names that a qualification gives to a ring with these lines, and whether it differed from the model at all.
+fn names(lines: &[String]) -> (bool, Vec<Named>) {
+    let way = as_they_are();
+    let link = twin(lines).expect("a ring").into_link();
+    let (mut differing, mut alike) = (Vec::new(), Vec::new());
+    for plan in plans() {
+        let mut link = link.clone();
+        let byte_time = link.byte_time();
+        let mut events: Vec<Event> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut events);
+        let _verdict = play_one(&mut recording, plan, &way);
+        let all = Conversation::all(&events, byte_time, true);
+        let (conversations, _) = way.compared(all, THROUGH_A_PORT);
+        let mut right = twin(&[]).expect("a ring");
+        let (comparisons, _) = right.follow_all(&conversations, THROUGH_A_PORT);
+        match comparisons.iter().any(|own| own.divergence.is_some()) {
+            true => differing.push(conversations),
+            false => alike.push(conversations),
+        }
+    }
+    let seen = Seen {
+        drives: DRIVES,
+        suspects: &[],
+        differing: &differing,
+        alike: &alike,
+        exactness: THROUGH_A_PORT,
+    };
+    (!differing.is_empty(), name(&seen, &twin))
+}
+
+/// How a deviation that was planted is named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum End {
+    /// Alone.
+    Alone,
+    /// Among others that explain every byte too.
+    AmongOthers,
+    /// It shows, and nothing is named.
+    NotNamed,
+    /// It does not show.
+    NotSeen,
+    /// Only others are named.
+    Wrongly,
+}
+
+fn end(planted: &Deviation, whose: Option<u8>) -> End {
+    let drives = whose.map_or("0..last".to_owned(), |drive| drive.to_string());
+    let lines = [format!("drive {drives} deviates {}", planted.name)];
+    let (differs, named) = names(&lines);
+    let is_it = |named: &&Named| {
+        let drive = match (&named.whose, whose) {
+            (Whose::OneOf(drives), Some(drive)) => drives.contains(&drive),
+            (Whose::Every, None) => true,
+            _ => false,
+        };
+        named.deviation.name == planted.name && drive
+    };
+    let right = named.iter().find(is_it);
+    match (right, named.len()) {
+        (Some(right), 1) if matches!(&right.whose, Whose::OneOf(drives) if drives.len() > 1) => {
+            End::AmongOthers
+        }
+        (Some(_), 1) => End::Alone,
+        (Some(_), _) => End::AmongOthers,
+        (None, 0) if differs => End::NotNamed,
+        (None, 0) => End::NotSeen,
+        (None, _) => {
+            eprintln!("{lines:?}: {named:?}");
+            End::Wrongly
+        }
+    }
+}
+
+/// Each in a drive of its own, in turn.
+#[test]
+fn planted_in_turn() {
+    let mut ends = BTreeMap::new();
+    let of_the_bus = deviations().filter(|own| !own.behind_the_bus);
+    for (planted, drive) in of_the_bus.zip((0..DRIVES).cycle()) {
+        let end = end(planted, Some(drive));
+        if matches!(end, End::NotNamed) {
+            eprintln!("drive {drive} {}: it shows and is not named", planted.name);
+        }
+        *ends.entry(end).or_insert(0) += 1;
+    }
+    let count = |end| ends.get(&end).copied().unwrap_or(0);
+    assert_eq!(count(End::Wrongly), 0, "{ends:?}");
+    assert!(
+        count(End::Alone) + count(End::AmongOthers) >= 30,
+        "{ends:?}"
+    );
+    eprintln!("{ends:?}");
+}
+
+#[test]
+fn right_drives_have_no_names() {
+    let (differs, named) = names(&[]);
+    assert!(!differs && named.is_empty(), "{named:?}");
+}
