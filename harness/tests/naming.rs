@@ -18,6 +18,9 @@ use std::sync::{Mutex, OnceLock};
 
 const DRIVES: u8 = 3;
 
+/// A twin for each set of header lines that makes a ring.
+type Twins = BTreeMap<Vec<String>, Result<Twin, ()>>;
+
 /// How long a scenario may take that is played here.
 const SHORT: Span = Span::from_millis(150);
 
@@ -46,7 +49,7 @@ fn ring(lines: &[String]) -> Result<(Plan, SimulatedLink), ()> {
 
 /// A twin with more lines in its header. There are many of them, and each is asked for often.
 fn twin(lines: &[String]) -> Result<Twin, ()> {
-    static TWINS: OnceLock<Mutex<BTreeMap<Vec<String>, Result<Twin, ()>>>> = OnceLock::new();
+    static TWINS: OnceLock<Mutex<Twins>> = OnceLock::new();
     let twins = TWINS.get_or_init(Mutex::default);
     let mut twins = twins.lock().expect("no panic");
     let twin = twins.entry(lines.to_vec()).or_insert_with(|| {
@@ -133,8 +136,6 @@ enum End {
     NotNamed,
     /// It does not show.
     NotSeen,
-    /// Only others are named.
-    Wrongly,
 }
 
 fn end(planted: &Deviation, whose: Option<u8>) -> End {
@@ -158,10 +159,7 @@ fn end(planted: &Deviation, whose: Option<u8>) -> End {
         (Some(_), _) => End::AmongOthers,
         (None, 0) if differs => End::NotNamed,
         (None, 0) => End::NotSeen,
-        (None, _) => {
-            eprintln!("{lines:?}: {named:?}");
-            End::Wrongly
-        }
+        (None, _) => panic!("{lines:?}: only others are named: {named:?}"),
     }
 }
 
@@ -172,18 +170,13 @@ fn planted_in_turn() {
     let of_the_bus = deviations().filter(|own| !own.behind_the_bus);
     for (planted, drive) in of_the_bus.zip((0..DRIVES).cycle()) {
         let end = end(planted, Some(drive));
-        if matches!(end, End::NotNamed) {
-            eprintln!("drive {drive} {}: it shows and is not named", planted.name);
-        }
         *ends.entry(end).or_insert(0) += 1;
     }
     let count = |end| ends.get(&end).copied().unwrap_or(0);
-    assert_eq!(count(End::Wrongly), 0, "{ends:?}");
     assert!(
         count(End::Alone) + count(End::AmongOthers) >= 30,
         "{ends:?}"
     );
-    eprintln!("{ends:?}");
 }
 
 #[test]

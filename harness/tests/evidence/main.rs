@@ -1,5 +1,7 @@
 //! Folders of evidence: untouched ones verify, changed ones do not.
 
+#[path = "../debian/mod.rs"]
+mod debian;
 mod edits;
 #[path = "../served/ring.rs"]
 mod ring;
