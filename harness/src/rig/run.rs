@@ -355,10 +355,11 @@ pub(crate) const DENIED: &str = "the rig's [limits] do not let it be played to i
 /// Why a scenario is not played on rings of these sizes; `None` where it is, unless the rig's limits deny it.
 pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<String> {
     let sizes = |rings: &[RingSize]| -> Vec<u8> { rings.iter().map(|r| r.drives()).collect() };
-    lacks(plan, link).or_else(|| {
-        let differs = plan.rings != rings;
-        differs.then(|| other_size(&sizes(&plan.rings), &sizes(rings)))
-    })
+    // The size first: a link of another ring may have the number of one that there is.
+    match plan.rings == rings {
+        true => lacks(plan, link),
+        false => Some(other_size(&sizes(&plan.rings), &sizes(rings))),
+    }
 }
 
 /// Plays a scenario once on any link, with what comes before it.
