@@ -315,7 +315,8 @@ fn a_divergence_says_where() {
         .iter()
         .find_map(|conversation| twin.follow(conversation, EXACT).divergence)
         .expect("another form of the answer");
-    assert_eq!((found.byte, found.drive), (8, Some(1)));
+    // The answer may have been changed behind drive 1 as well: the bytes do not say which drive it was.
+    assert_eq!((found.byte, found.drive), (8, None));
     assert_eq!(found.what, What::Value);
     assert!(found.to_string().contains("ND21 10.1"), "{found}");
     let none = Hypothesis {
