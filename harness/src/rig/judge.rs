@@ -113,7 +113,13 @@ fn diverged(outcome: &mut Outcome, divergence: &Divergence, heard: &Heard<'_>) {
         }
         None => outcome.verdict = Verdict::Failed,
     }
-    outcome.remarks.push(format!("the model: {divergence}"));
+    let whose = match divergence.drive {
+        Some(_) => "",
+        None => "; not known which drive",
+    };
+    outcome
+        .remarks
+        .push(format!("the model: {divergence}{whose}"));
 }
 
 /// The scenario failed, and the drives gave every byte that the twin gave.

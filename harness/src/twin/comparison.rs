@@ -113,9 +113,8 @@ impl fmt::Display for Divergence {
         let what = self.what.words();
         let ring = if self.ring == 0 { "" } else { " of ring 2" };
         write!(f, "byte {}{ring}", self.byte)?;
-        match self.drive {
-            Some(drive) => write!(f, ", drive {drive}")?,
-            None => write!(f, ", not known which drive")?,
+        if let Some(drive) = self.drive {
+            write!(f, ", drive {drive}")?;
         }
         write!(
             f,

@@ -82,8 +82,8 @@ fn a_finding_is_made_readable() {
     ring    1
     strict
 
-    # byte 12, not known which drive: another value: received 00 at 3.724 ms, the manual says 01 at 3.724
-    # ms (ND21 10.1, data of the answer)
+    # byte 12: another value: received 00 at 3.724 ms, the manual says 01 at 3.724 ms (ND21 10.1, data of
+    # the answer)
     # found on drive 0 deviates writes-ignored
     > 8A FF 82 01 80 FD 01           # drive 0: WriteByte 01 to FD80
     > 88 FF C0 80 FD 3D              # drive 0: ReadByte FD80
