@@ -97,7 +97,7 @@ impl Judge {
         self.model = Model::new(self.size, properties);
     }
 
-    /// How a ring was otherwise than every drive of the manual would be. Behind that [`Self::begin`] is due.
+    /// Mismatch of a ring with every drive that the manual permits. Call [`Self::begin`] after it.
     pub(super) fn see(&mut self, exchange: Exchange) -> Option<Difference> {
         let before = self.possible.clone();
         let mut best: Option<Mismatch> = None;

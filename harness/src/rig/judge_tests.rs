@@ -71,7 +71,7 @@ fn check(ring: &str, rig: &str, scenario: &str, expected: Verdict) {
 const READ: &str = "> 88 FE C0 13 FE D1\n";
 const SET: &str = "drive 1 memory FE13 = 88\n";
 
-/// ND21 10.1: what a cell holds that nobody has set is the drive's own affair.
+/// ND21 10.1: the content of a cell that was not set is the drive's choice.
 #[test]
 fn a_state_that_the_scenario_does_not_set_settles_nothing() {
     let holds = "drive 1 memory FE13 = 12";

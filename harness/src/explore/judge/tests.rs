@@ -1,5 +1,4 @@
-//! Drives that make every choice that the manual leaves them otherwise than the model: none of them is blamed. Drives that are wrong
-//! are.
+//! Drives that make every choice left open by the manual in the opposite way to the model are not blamed. Wrong drives are.
 
 use super::*;
 use crate::explore::campaign::{Bounds, Campaign, End, Watcher};

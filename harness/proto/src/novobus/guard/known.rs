@@ -53,7 +53,7 @@ const TEXTS: &[(Facts, &str, &str)] = &[
     ),
     (
         Facts::PS_IDLE,
-        "`ps_status` (FF43) holds no positioning that somebody else has calculated (ND21 13.3.1)",
+        "`ps_status` (FF43) holds no positioning calculated outside this bench (ND21 13.3.1)",
         "write 00 or 01 to ps_status first",
     ),
     (

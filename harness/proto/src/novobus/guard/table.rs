@@ -1,7 +1,7 @@
 //! The cells of a drive by what writing there does: one table (ND21 14.2.1).
 //!
 //! The last column is about `max_speed`. A cell stands there as harmless, as a speed, or as a cell through which a motor
-//! could turn faster or otherwise than the speeds that the guard bounds. A cell that is not in the table needs everything allowed
+//! could turn faster than the speeds that the guard bounds, or turn without them. A cell that is not in the table needs everything allowed
 //! and no `max_speed`.
 
 use super::known::Facts;
