@@ -1,6 +1,6 @@
 #![no_main]
-drivebench_fuzz::counters!(harness_sim::transitions::WITHOUT_TIME_OUT);
-std::thread_local!(static DETECTOR: std::cell::RefCell<harness_sim::fuzz::Detector<Counters>> = std::cell::RefCell::default());
+drivebench_fuzz::counters!(harness_sim::novobus::transitions::WITHOUT_TIME_OUT);
+std::thread_local!(static DETECTOR: std::cell::RefCell<harness_sim::novobus::fuzz::Detector<Counters>> = std::cell::RefCell::default());
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
     let Counters = DETECTOR.with_borrow_mut(|detector| detector.watched(data));
 });

@@ -1,2 +1,2 @@
 #![no_main]
-libfuzzer_sys::fuzz_target!(|data: &[u8]| harness_sim::fuzz::links(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| harness_sim::novobus::fuzz::links(data));

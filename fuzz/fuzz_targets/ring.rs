@@ -1,6 +1,6 @@
 #![no_main]
-drivebench_fuzz::counters!(harness_sim::transitions::REACHABLE);
-std::thread_local!(static DRIVES: std::cell::RefCell<harness_sim::fuzz::ThreeDrives<Counters>> = std::cell::RefCell::default());
+drivebench_fuzz::counters!(harness_sim::novobus::transitions::REACHABLE);
+std::thread_local!(static DRIVES: std::cell::RefCell<harness_sim::novobus::fuzz::ThreeDrives<Counters>> = std::cell::RefCell::default());
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
     let Counters = DRIVES.with_borrow_mut(|drives| drives.watched(data));
 });

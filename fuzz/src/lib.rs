@@ -1,8 +1,8 @@
 //! What the targets share: libFuzzer's extra counters, fed with the protocol transitions of a case, and the mutator that
 //! repairs commands.
 
-use harness_sim::fuzz::repair;
-use harness_sim::transitions::Transition;
+use harness_sim::novobus::fuzz::repair;
+use harness_sim::novobus::transitions::Transition;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicU8, AtomicU16};
 
@@ -35,9 +35,9 @@ macro_rules! counters {
         #[derive(Debug, Default)]
         struct Counters;
 
-        impl harness_sim::transitions::Notes for Counters {
+        impl harness_sim::novobus::transitions::Notes for Counters {
             #[inline]
-            fn note(&mut self, cell: harness_sim::transitions::Transition) {
+            fn note(&mut self, cell: harness_sim::novobus::transitions::Transition) {
                 $crate::tell(&TRANSITIONS, &LEFT, cell);
             }
 

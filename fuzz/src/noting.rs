@@ -1,6 +1,6 @@
-//! Targets that tell libFuzzer what their cases reach, by the names of `harness_sim::fuzz::features`.
+//! Targets that tell libFuzzer what their cases reach, by the names of `harness_sim::novobus::fuzz::features`.
 
-use harness_sim::fuzz::{Feature, NOTING, Notebook};
+use harness_sim::novobus::fuzz::{Feature, NOTING, Notebook};
 use std::sync::atomic::{AtomicU8, Ordering};
 
 /// How many counters there are for features; two features with one counter are no harm.

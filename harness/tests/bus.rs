@@ -16,11 +16,11 @@ use harness_proto::novobus::master::Job;
 use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
-use harness_sim::bench::Bench;
-use harness_sim::drive::Drive;
 use harness_sim::fault::LinkFault;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, factory};
-use harness_sim::ring::Ring;
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::ring::Ring;
 
 fn size(drives: u64) -> RingSize {
     RingSize::new(drives).expect("1 to 250")

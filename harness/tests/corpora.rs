@@ -4,7 +4,7 @@ use harness::fuzz::coverage::Coverage;
 use harness::fuzz::distil::superfluous;
 use harness::fuzz::input::input;
 use harness::fuzz::{noting, targets};
-use harness_sim::transitions::{State, tour};
+use harness_sim::novobus::transitions::{State, tour};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -15,7 +15,7 @@ use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
-use harness_sim::deviation::{Deviation, deviations, master_deviations};
+use harness_sim::novobus::deviation::{Deviation, deviations, master_deviations};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

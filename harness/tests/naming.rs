@@ -12,7 +12,7 @@ use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness::twin::{Conversation, Exactness, Twin};
 use harness_proto::time::Span;
-use harness_sim::deviation::{Deviation, deviations};
+use harness_sim::novobus::deviation::{Deviation, deviations};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};
 

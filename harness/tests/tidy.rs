@@ -65,10 +65,13 @@ fn imports_go_one_way() {
         ),
         ("harness/sim/src", &["harness::", "std::time"]),
         // The ring knows no drive, and the reference model shares nothing.
-        ("harness/sim/src/ring.rs", &["plain", "bus_end"]),
-        ("harness/sim/src/link.rs", &["plain", "bus_end", "device"]),
+        ("harness/sim/src/novobus/ring.rs", &["plain", "bus_end"]),
         (
-            "harness/sim/src/reference.rs",
+            "harness/sim/src/novobus/link.rs",
+            &["plain", "bus_end", "device"],
+        ),
+        (
+            "harness/sim/src/novobus/reference.rs",
             &["harness_proto", "crate::"],
         ),
         // The master and the drive share the codec and nothing else.

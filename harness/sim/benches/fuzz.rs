@@ -2,7 +2,7 @@
 //! The inputs are conversations of ND21 9.2 to 9.8. What libFuzzer itself costs is not in it: for that run the target
 //! `empty` beside the others.
 
-use harness_sim::fuzz::{detector, ring};
+use harness_sim::novobus::fuzz::{detector, ring};
 use std::hint::black_box;
 use std::io::Write as _;
 use std::time::Instant;

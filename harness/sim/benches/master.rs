@@ -11,8 +11,8 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Job, Master, Options, Pace};
 use harness_proto::time::{Instant, Span};
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 use std::collections::VecDeque;
 
 const SIZES: [u64; 4] = [1, 6, 100, 250];

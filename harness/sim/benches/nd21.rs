@@ -15,10 +15,10 @@ use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
-use harness_sim::device::Device;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory};
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::device::Device;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 
 const SIZES: [u64; 3] = [1, 100, 250];
 const MILLISECONDS: u64 = 100;

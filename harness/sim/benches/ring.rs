@@ -13,9 +13,9 @@ use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::novobus::telegram::{Address, Telegram};
 use harness_proto::time::Instant;
-use harness_sim::device::Device;
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::device::Device;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 
 const SIZES: [u64; 4] = [1, 8, 100, 250];
 const BYTES: usize = 4096;

@@ -8,14 +8,14 @@ use harness_proto::novobus::command::Command;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::novobus::telegram::{Address, Telegram};
 use harness_proto::time::{Instant, Span};
-use harness_sim::deviation::{Deviant, Deviation, deviation, deviations};
-use harness_sim::device::Device;
-use harness_sim::drive::Drive;
 use harness_sim::fault::{Flips, LinkFault};
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, factory};
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
-use harness_sim::trace::{LinkTrace, Trace};
+use harness_sim::novobus::deviation::{Deviant, Deviation, deviation, deviations};
+use harness_sim::novobus::device::Device;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
+use harness_sim::novobus::trace::{LinkTrace, Trace};
 use proptest::prelude::*;
 
 const DRIVES: u8 = 3;
@@ -102,7 +102,7 @@ fn play(pieces: &[Piece], flip: Option<u64>, device: impl Fn() -> Drive) -> Trac
     ring.trace()
 }
 
-fn carried(trace: &Trace) -> Vec<&[harness_sim::link::LineByte]> {
+fn carried(trace: &Trace) -> Vec<&[harness_sim::novobus::link::LineByte]> {
     trace.links.iter().map(|l: &LinkTrace| &*l.bytes).collect()
 }
 

@@ -25,7 +25,7 @@ pub(crate) use discovery::count_behind;
 pub use discovery::{Identity, Recovery, State, count_drives, recover};
 pub use error::Error;
 /// What a master may send, by the rules of the bus alone.
-pub use harness_sim::fuzz::jobs::conduct;
+pub use harness_sim::novobus::fuzz::jobs::conduct;
 pub use s_ramp::SkStatus;
 pub use scope::{Measurement, Scope, Trigger};
 
@@ -33,7 +33,7 @@ use crate::link::Line;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{self, Counters, Event, Job, JobId, Outcome, Phase, Refused};
 use harness_proto::time::{Instant, Span};
-use harness_sim::deviation::MasterDeviation;
+use harness_sim::novobus::deviation::MasterDeviation;
 use pump::Pump;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -9,7 +9,7 @@ use harness_proto::novobus::master::{
     self, Counters, Event, Job, JobId, Outcome, Phase, Refused, Stop,
 };
 use harness_proto::time::{Instant, Span};
-use harness_sim::master::AnyMaster;
+use harness_sim::novobus::master::AnyMaster;
 use std::collections::BTreeMap;
 
 /// The most events that wait to be fetched.

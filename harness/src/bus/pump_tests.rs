@@ -5,10 +5,10 @@ use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLin
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
-use harness_sim::bench::Bench;
-use harness_sim::drive::Drive;
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 use std::sync::{Arc, Mutex};
 
 const DRIVES: u8 = 3;

@@ -7,7 +7,7 @@ use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{LAYOUTS, Layout, Reply};
 use harness_proto::novobus::sync::{Addressing, SyncByte};
-use harness_sim::drive::Model;
+use harness_sim::novobus::drive::Model;
 use std::collections::BTreeMap;
 
 /// The most bytes, or calls, of a conversation: it is played again for every case.

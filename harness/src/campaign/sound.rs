@@ -3,8 +3,8 @@
 use super::class::Wrong;
 use crate::link::{Link, SimulatedLink};
 use harness_proto::nd21::ram::{BUS_ADDR, ERRORCODE};
-use harness_sim::cells::Cells;
-use harness_sim::device::Device;
+use harness_sim::novobus::cells::Cells;
+use harness_sim::novobus::device::Device;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What drives hold, and held, without a fault.

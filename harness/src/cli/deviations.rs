@@ -3,7 +3,9 @@
 use super::args::{DeviationsArguments, Format};
 use super::exit::Exit;
 use super::output::Output;
-use harness_sim::deviation::{Deviation, MasterDeviation, deviations as all, master_deviations};
+use harness_sim::novobus::deviation::{
+    Deviation, MasterDeviation, deviations as all, master_deviations,
+};
 use serde::Serialize;
 use std::fmt::Write as _;
 

@@ -11,7 +11,7 @@ use crate::explore::{
 };
 use crate::rig::Run;
 use clap::Args;
-use harness_sim::deviation::deviations;
+use harness_sim::novobus::deviation::deviations;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

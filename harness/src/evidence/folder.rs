@@ -13,7 +13,7 @@ use crate::scenario::run::Outcome;
 use crate::twin::Exactness;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use harness_sim::trace::Trace;
+use harness_sim::novobus::trace::Trace;
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;

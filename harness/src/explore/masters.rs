@@ -1,11 +1,11 @@
-//! Cases for the bench's own master: jobs on a ring with faults, judged by the truth (`harness_sim::fuzz::jobs`).
+//! Cases for the bench's own master: jobs on a ring with faults, judged by the truth (`harness_sim::novobus::fuzz::jobs`).
 //!
 //! The judge knows which faults there were and looks into the drives, so that no second master is needed to say what the first one should
 //! have told. Cases are made from a seed and none depends on another.
 
 use super::dice::Dice;
-use harness_sim::deviation::MasterDeviation;
-use harness_sim::fuzz::jobs::{Lie, Work, judged};
+use harness_sim::novobus::deviation::MasterDeviation;
+use harness_sim::novobus::fuzz::jobs::{Lie, Work, judged};
 
 /// The most jobs and faults of a case.
 const MOST_RECORDS: usize = 24;

@@ -8,7 +8,7 @@ use super::dice::Dice;
 use super::play::Seen;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
-use harness_sim::trace::Trace;
+use harness_sim::novobus::trace::Trace;
 use std::collections::BTreeSet;
 
 /// The most cases that are kept.

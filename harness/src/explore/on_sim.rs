@@ -8,7 +8,7 @@ use super::play::play;
 use super::setup::Setup;
 use super::target::{Rehearsal, Target, Tried};
 use crate::link::{Link, SimulatedLink};
-use harness_sim::trace::Trace;
+use harness_sim::novobus::trace::Trace;
 
 /// A simulated ring beside its model, and beside the reference model where its drives are plain and sound.
 #[derive(Debug)]

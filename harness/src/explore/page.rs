@@ -14,9 +14,9 @@ use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
-use harness_sim::device::Device as _;
-use harness_sim::trace::{LinkTrace, Trace};
-use harness_sim::transitions::{Reached, Watched};
+use harness_sim::novobus::device::Device as _;
+use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::novobus::transitions::{Reached, Watched};
 use std::path::Path;
 
 /// Findings shown at most.

@@ -10,7 +10,7 @@ use crate::scenario::problem::Problems;
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::deviation;
+use harness_sim::novobus::deviation;
 use serde::{Deserialize, Serialize};
 
 /// The lines that make every drive of a ring a whole ND21.

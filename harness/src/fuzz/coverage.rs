@@ -3,8 +3,10 @@
 
 use super::input::{InputError, input};
 use super::noting;
-use harness_sim::fuzz::{Feature, Noting, WATCHING, features, of_cell};
-use harness_sim::transitions::{CELLS, Event, RULES, Reached, State, Transition, why_unreachable};
+use harness_sim::novobus::fuzz::{Feature, Noting, WATCHING, features, of_cell};
+use harness_sim::novobus::transitions::{
+    CELLS, Event, RULES, Reached, State, Transition, why_unreachable,
+};
 use include_dir::{Dir, include_dir};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;

@@ -1,6 +1,6 @@
-//! Distils inputs: the few small ones that reach everything which all of them reach, by the names of `harness_sim::fuzz::features`.
+//! Distils inputs: the few small ones that reach everything which all of them reach, by the names of `harness_sim::novobus::fuzz::features`.
 
-use harness_sim::fuzz::{Body, Feature, features};
+use harness_sim::novobus::fuzz::{Body, Feature, features};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt::Write as _;
 
@@ -352,7 +352,7 @@ impl<'w> Shrinking<'w> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use harness_sim::fuzz::NOTING;
+    use harness_sim::novobus::fuzz::NOTING;
 
     const BYTES: Pieces = Pieces::Bytes { head: 1, record: 1 };
 

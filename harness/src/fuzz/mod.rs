@@ -1,6 +1,6 @@
 //! Fuzz targets whose bodies need the whole bench, the kept inputs of all of them, and what those reach.
 //!
-//! The bodies for bytes of the bus are in `harness_sim::fuzz`; here are those for texts ([`scenario`], [`rig`]);
+//! The bodies for bytes of the bus are in `harness_sim::novobus::fuzz`; here are those for texts ([`scenario`], [`rig`]);
 //! those for captures and records stand beside what reads them.
 //! [`coverage`] holds the kept inputs against the matrix of protocol transitions and sums up what they reach, [`distil`](mod@distil) chooses
 //! what is worth keeping.
@@ -13,7 +13,7 @@ mod text;
 
 pub use text::{rig, scenario};
 
-use harness_sim::fuzz::{NOTING, Noting, TARGETS, Target};
+use harness_sim::novobus::fuzz::{NOTING, Noting, TARGETS, Target};
 
 /// The targets whose bodies need the whole bench.
 pub const BENCH_TARGETS: [Target; 4] = [

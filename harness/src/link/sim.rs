@@ -5,13 +5,13 @@ use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
-use harness_sim::bench::Bench;
-use harness_sim::device::Device;
-use harness_sim::drive::Drive;
-use harness_sim::link::LineByte;
-use harness_sim::ring::Ring;
-use harness_sim::trace::Trace;
-use harness_sim::witness::Complaint;
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::device::Device;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::link::LineByte;
+use harness_sim::novobus::ring::Ring;
+use harness_sim::novobus::trace::Trace;
+use harness_sim::novobus::witness::Complaint;
 use std::collections::VecDeque;
 
 /// One or two simulated rings.
@@ -73,7 +73,7 @@ impl SimulatedLink {
         }
     }
 
-    /// Puts a [witness](harness_sim::witness) beside every drive, to whom nobody has spoken; false where one is no whole ND21 and has none.
+    /// Puts a [witness](harness_sim::novobus::witness) beside every drive, to whom nobody has spoken; false where one is no whole ND21 and has none.
     #[must_use]
     pub fn witness(&mut self) -> bool {
         let byte_time = self.byte_time;

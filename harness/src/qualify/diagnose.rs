@@ -3,7 +3,7 @@
 use super::hypothesis::{Evidence, judge};
 use crate::rig::Driven;
 use crate::twin::{Conversation, Exactness, Twin};
-use harness_sim::deviation::{Deviation, MasterDeviation, deviations, master_deviations};
+use harness_sim::novobus::deviation::{Deviation, MasterDeviation, deviations, master_deviations};
 use std::fmt;
 
 /// Largest ring whose drives are all tried one by one; in larger ones only those that telegrams named are.

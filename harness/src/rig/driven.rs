@@ -9,7 +9,7 @@ use crate::scenario::plan::Plan;
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
-use harness_sim::deviation::MasterDeviation;
+use harness_sim::novobus::deviation::MasterDeviation;
 
 /// What is said of an attempt in which the bench's own master is wrong: no drive is to blame.
 const WRONG: &str =

@@ -9,7 +9,7 @@ use crate::scenario::run::{Finding, Outcome};
 use crate::scenario::verdict::Verdict;
 use crate::twin::{Comparison, Conversation, Divergence, Exactness, Own};
 use harness_proto::time::Span;
-use harness_sim::deviation;
+use harness_sim::novobus::deviation;
 
 /// Cells that the twin took over and that are listed at most.
 const MOST_ADOPTED: usize = 8;

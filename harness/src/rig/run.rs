@@ -17,7 +17,7 @@ use crate::scenario::simulate;
 use crate::twin::{Comparison, Conversation, Exactness, Twin};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
-use harness_sim::deviation::MasterDeviation;
+use harness_sim::novobus::deviation::MasterDeviation;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -9,7 +9,7 @@ use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::{Problems, Span};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{Drives, Scenario, Setup, SetupKind};
-use harness_sim::drive::Model;
+use harness_sim::novobus::drive::Model;
 
 /// The types of the device that a header knows, and a model of a rig's file begins with behind `ND21-`.
 const TYPES: [&str; 4] = ["5605", "5610", "5615", "5620"];

@@ -4,12 +4,12 @@ use super::plan::{Plan, PlannedSetupKind};
 use crate::link::SimulatedLink;
 use harness_proto::nd21::ee;
 use harness_proto::novobus::properties::Properties;
-use harness_sim::bench::Bench;
-use harness_sim::deviation::Deviant;
-use harness_sim::drive::{Drive, Model};
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, set_parity};
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::deviation::Deviant;
+use harness_sim::novobus::drive::{Drive, Model};
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 
 /// A link to simulated rings, their drives set up as the plan says.
 #[must_use]

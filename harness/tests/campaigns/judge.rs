@@ -3,7 +3,7 @@
 use harness::campaign::fault::{Bit, What};
 use harness::campaign::find::find;
 use harness::campaign::{Case, Class, Evidence, Outcome, Wrong};
-use harness_sim::reference;
+use harness_sim::novobus::reference;
 
 /// What a case is, by the reference model alone: no code of the simulator, the master or the campaign. It knows no
 /// time, so that it judges bits but the start bit.

@@ -1,8 +1,8 @@
 //! Wrong masters are found by cases made from a seed, and a right one passes them all.
 
 use harness::explore::masters::{case, cases_until_found, input};
-use harness_sim::deviation::{master_deviation, master_deviations};
-use harness_sim::fuzz::jobs::{Work, judged};
+use harness_sim::novobus::deviation::{master_deviation, master_deviations};
+use harness_sim::novobus::fuzz::jobs::{Work, judged};
 
 #[test]
 fn a_case_is_a_function_of_its_seed_and_number() {

@@ -4,7 +4,7 @@ use crate::command::{ended, findings, name, said};
 use harness::explore::{Finding, RECORD};
 use harness::port::Endpoint;
 use harness_proto::nd21::ram;
-use harness_sim::reference;
+use harness_sim::novobus::reference;
 use ring::Served;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};

@@ -1,5 +1,5 @@
 //! Attacks on the guard: telegrams of denied and allowed commands, whole and cut, shifted, mixed with recoveries, zeros,
-//! check sequences, short addresses, line errors and silence. `harness_sim::fuzz::guard` judges.
+//! check sequences, short addresses, line errors and silence. `harness_sim::novobus::fuzz::guard` judges.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -152,7 +152,7 @@ fn process_data_left_by_others_end_with_the_next_byte() {
     let mut case = vec![0, 0, 0, 0, 3, 0x85, 0xFF, 0xCA];
     case.extend(RECOVERY);
     case.extend([0x85, 0xFF, 0xCA]);
-    harness_sim::fuzz::guard(&case);
+    harness_sim::novobus::fuzz::guard(&case);
 }
 
 proptest! {
@@ -161,12 +161,12 @@ proptest! {
     /// No input makes the guard let pass what the limits deny.
     #[test]
     fn no_sequence_smuggles_a_command_through(case in case()) {
-        harness_sim::fuzz::guard(&case);
+        harness_sim::novobus::fuzz::guard(&case);
     }
 
     /// Nor do bytes without any order.
     #[test]
     fn nor_do_random_bytes(case in vec(any::<u8>(), 5..200)) {
-        harness_sim::fuzz::guard(&case);
+        harness_sim::novobus::fuzz::guard(&case);
     }
 }

@@ -13,10 +13,10 @@ use harness_proto::line::Rate;
 use harness_proto::nd21::io::Input;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::properties::Properties;
-use harness_sim::bench::Bench;
-use harness_sim::drive::Drive;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, factory};
-use harness_sim::ring::Ring;
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::ring::Ring;
 
 fn size(drives: u64) -> RingSize {
     RingSize::new(drives).expect("1 to 250")

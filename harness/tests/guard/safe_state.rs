@@ -9,10 +9,10 @@ use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
-use harness_sim::bench::Bench;
-use harness_sim::drive::Drive;
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 
 fn turning(bus: &Bus<'_>, drive: u16) {
     bus.write_word(axis(drive), ram::NSOLL, 0x2C3D)

@@ -10,7 +10,7 @@ use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_ane
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use harness_sim::drive::Model;
+use harness_sim::novobus::drive::Model;
 use ring::Served;
 use std::collections::BTreeMap;
 use std::io::Write;

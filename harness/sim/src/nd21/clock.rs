@@ -5,7 +5,7 @@
 //! and 250 with it released.
 
 use super::eeprom_controller::count_in;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::flags;
 use harness_proto::nd21::{ee, ram};
 

@@ -23,7 +23,7 @@
 use super::eeprom_controller::EepromController;
 use super::properties::Nd21Properties;
 use super::world::Mode;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{flags2, hw_version, hw_version2, ps_status, sw_version2};
 use harness_proto::nd21::errors::LINE_TEST;
 use harness_proto::nd21::functions::{self, Function};

@@ -3,8 +3,8 @@
 use super::program::Program;
 use super::properties::Nd21Properties;
 use super::world::{Shown, Stimulus};
-use crate::cells::Cells;
-use crate::device::Device;
+use crate::novobus::cells::Cells;
+use crate::novobus::device::Device;
 use harness_proto::line::Received;
 use harness_proto::nd21::functions::Function;
 use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};

@@ -6,7 +6,7 @@
 //! wrong test byte.
 
 use super::properties::Nd21Properties;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::{self, cells, ee, ram};
 use harness_proto::time::Instant;
 

@@ -4,7 +4,7 @@
 //! codes of 12 bits each, the newest first.
 
 use super::eeprom_controller::count_in;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::errors::display_digits;
 use harness_proto::nd21::ram;

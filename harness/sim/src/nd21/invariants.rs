@@ -4,7 +4,7 @@
 
 use super::positioning::Positioning;
 use super::world::Mode;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{flags, ps_status, status};
 use harness_proto::nd21::ram;
 

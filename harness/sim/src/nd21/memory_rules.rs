@@ -1,6 +1,6 @@
 //! Which writes from the bus reach a cell (ND21 14.2.1).
 
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::novobus::memory::RAM;
 

@@ -7,7 +7,7 @@
 //! without the error mode (E132).
 
 use super::world::World;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{hw_version, hw_version2, sw_version, sw_version2};
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;

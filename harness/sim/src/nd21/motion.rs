@@ -14,7 +14,7 @@
 
 use super::plant::{Plant, THOUSAND_RPM};
 use super::wave;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{flags, status, sw_version, sw_version2};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{RAMP_OFF, SLIPPING_OFF};

@@ -6,7 +6,7 @@
 
 use super::positioning::Positioning;
 use super::world::Mode;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{hw_version, hw_version2, status};
 use harness_proto::nd21::io::{GPO2, OUTPUTS};
 use harness_proto::nd21::ram;

@@ -17,7 +17,7 @@
 //!   on its ramp.
 
 use super::world::Mode;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{flags2, ps_status, sw_version};
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::position::{Mode as PositionMode, Position};

@@ -19,7 +19,7 @@ use super::scope::Scope;
 use super::source::Source;
 use super::world::{Mode, Shown, Stimulus, World};
 use super::{clock::Clock, memory_rules};
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21;
 use harness_proto::nd21::bits::{
     flags, flags2, hw_version, hw_version2, status, sw_version, sw_version2,

@@ -8,7 +8,7 @@
 
 use super::positioning::{Positioning, Situation};
 use super::world::Mode;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{flags2, ps_status};
 use harness_proto::nd21::ram;
 

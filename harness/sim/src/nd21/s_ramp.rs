@@ -41,7 +41,7 @@
 //! nominal value and is not led through the ramp generator. At reset and power-up the run is a new one.
 
 use super::world::Mode;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::ps_status::{CALCULATE, CALCULATED, FINISHED, NEGATIVE, START};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::s_ramp::{Direction, MAX_CYCLES, MAX_SPEED, Status, SupportPoint};

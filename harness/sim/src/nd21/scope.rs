@@ -31,7 +31,7 @@
 //!   a recording is stopped by hand in the middle of a scan period, the next one finishes that period.
 //! * *`scope_pointer`* is not set by the start of a recording; it goes on round the buffer.
 
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::scope_status::{ARMED, POSITIVE, STOPPED, TRIGGERED};
 use harness_proto::nd21::ram;
 

@@ -6,7 +6,7 @@
 //! `CntRevers`.
 
 use super::world::World;
-use crate::cells::Cells;
+use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{sw_version, sw_version2};
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::ram;

@@ -4,9 +4,9 @@ use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{Event, Job, JobId, Master, Options, Outcome, Phase};
 use harness_proto::time::Instant;
-use harness_sim::device::Device;
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::device::Device;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 
 /// A master, its ring, and all that went over the master's two links.
 pub(crate) struct Couple<D = PlainDrive> {

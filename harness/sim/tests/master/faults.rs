@@ -9,8 +9,8 @@ use harness_proto::novobus::master::{
     Event, Job, JobId, Master, Options, Outcome, Pace, Packing, Phase,
 };
 use harness_proto::time::Span;
-use harness_sim::counted::Counted;
 use harness_sim::fault::{DriveFault, Flips, LinkFault};
+use harness_sim::novobus::counted::Counted;
 
 const CASES: u64 = 1_500;
 /// Byte times in which faults happen.

@@ -9,11 +9,11 @@ use harness_proto::novobus::master::{
 };
 use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::time::Span;
-use harness_sim::counted::Counted;
-use harness_sim::device::Device;
 use harness_sim::fault::{DriveFault, Flips, LinkFault};
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::counted::Counted;
+use harness_sim::novobus::device::Device;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 
 const READ: Command = Command::ReadByte { address: 0xFE13 };
 const WRITE: Command = Command::WriteWord {

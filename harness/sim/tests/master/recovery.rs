@@ -12,8 +12,8 @@ use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::novobus::telegram::{Address, Telegram};
 use harness_proto::time::Span;
-use harness_sim::counted::Counted;
 use harness_sim::fault::{Flips, LinkFault};
+use harness_sim::novobus::counted::Counted;
 use std::collections::BTreeSet;
 
 fn flip(data: u8) -> LinkFault {

@@ -1,8 +1,8 @@
 //! The judge of jobs (`fuzz::jobs`): a right master never lies, and every wrong one is found by the body of the fuzz target.
 
 use crate::common::{Random, repeat, seed};
-use harness_sim::deviation::master_deviations;
-use harness_sim::fuzz::jobs::{Work, judged};
+use harness_sim::novobus::deviation::master_deviations;
+use harness_sim::novobus::fuzz::jobs::{Work, judged};
 
 /// Cases of the right master; `CASES` asks for more.
 const RIGHT: u64 = 3_000;

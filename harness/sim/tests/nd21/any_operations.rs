@@ -12,11 +12,11 @@ use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
-use harness_sim::device::Device;
 use harness_sim::nd21::{
     BusErrors, Mode, Nd21Drive, Nd21Properties, PsPosition, SRampWire, Stimulus, factory,
     set_parity,
 };
+use harness_sim::novobus::device::Device;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::RefCell;

@@ -5,8 +5,8 @@ use harness_proto::nd21::{bits, ram};
 use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
-use harness_sim::device::Device;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory, set_parity};
+use harness_sim::novobus::device::Device;
 
 /// A drive on the bench.
 pub(crate) struct Rig {

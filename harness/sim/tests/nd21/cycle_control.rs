@@ -332,17 +332,17 @@ fn power_failure_in_mid_write() {
     begin(&mut rig, Function::WrEe);
     // Two bytes of 10 ms are written, the third is lost, the fourth is as it was.
     rig.run(Span::from_millis(25));
-    harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
+    harness_sim::novobus::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(
         (rig.word(ram::ERRORCODE), eeprom(&rig, 0x60)),
         (0x0102, 0x000A_FF00)
     );
-    harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
+    harness_sim::novobus::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(rig.word(ram::ERRORCODE), 0x0102);
     rig.write_word(ram::EEPROM_BUFFER, 0x6000);
     rig.write(ram::EEPROM_CONTROL, 0x82);
     rig.run(Span::from_millis(20));
-    harness_sim::device::Device::power_on(&mut rig.drive, rig.now);
+    harness_sim::novobus::device::Device::power_on(&mut rig.drive, rig.now);
     assert_eq!(rig.word(ram::ERRORCODE), 0);
 }
 

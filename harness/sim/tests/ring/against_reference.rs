@@ -7,7 +7,7 @@ use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
-use harness_sim::reference;
+use harness_sim::novobus::reference;
 
 const CASES: u64 = 3_000;
 

@@ -5,9 +5,9 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::novobus::telegram::{Address, Telegram};
-use harness_sim::device::Device;
-use harness_sim::plain::PlainDrive;
-use harness_sim::ring::Ring;
+use harness_sim::novobus::device::Device;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
 
 /// A ring of plain drives at 38400 bit/s.
 pub(crate) fn ring(drives: u8) -> Ring<PlainDrive> {

@@ -5,7 +5,7 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::fuzz::coverage::{Coverage, CoverageError, Sum};
 use clap::Args;
-use harness_sim::transitions::{CELLS, Transition, why_unreachable};
+use harness_sim::novobus::transitions::{CELLS, Transition, why_unreachable};
 use serde::Serialize;
 use std::path::PathBuf;
 

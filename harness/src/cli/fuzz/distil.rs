@@ -8,7 +8,7 @@ use crate::fuzz::input::input;
 use crate::fuzz::noting;
 use crate::regular;
 use clap::Args;
-use harness_sim::fuzz::{Feature, features};
+use harness_sim::novobus::fuzz::{Feature, features};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

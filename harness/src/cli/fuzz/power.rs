@@ -10,7 +10,7 @@ use crate::explore::{
 use crate::rig::find::find;
 use clap::Args;
 use harness_proto::novobus::guard::Limits;
-use harness_sim::deviation::{Deviation, deviations, master_deviations};
+use harness_sim::novobus::deviation::{Deviation, deviations, master_deviations};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

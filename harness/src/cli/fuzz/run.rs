@@ -15,7 +15,7 @@ use crate::rig::{Rig, state};
 use clap::Args;
 use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
-use harness_sim::deviation;
+use harness_sim::novobus::deviation;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 

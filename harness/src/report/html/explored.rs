@@ -5,7 +5,7 @@ use super::page::{Section, page};
 use super::summary::Shown;
 use super::write::Html;
 use crate::explore::{About, Progress};
-use harness_sim::transitions::{Event, Reached, State, Transition, why_unreachable};
+use harness_sim::novobus::transitions::{Event, Reached, State, Transition, why_unreachable};
 
 /// Progress shown in a table at most; of a longer run every n-th line is.
 const ROWS: usize = 40;

@@ -14,8 +14,8 @@ use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::units::{Device, INCREMENTS_PER_TURN};
 use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::drive::Model;
 use harness_sim::nd21;
+use harness_sim::novobus::drive::Model;
 
 /// The words with which such a line begins.
 pub(super) const WORDS: [&str; 2] = ["drive", "drives"];

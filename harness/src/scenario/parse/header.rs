@@ -13,7 +13,7 @@ use crate::scenario::syntax::{
 use crate::scenario::times;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
-use harness_sim::deviation::MasterDeviation;
+use harness_sim::novobus::deviation::MasterDeviation;
 
 /// The most lines of a scenario.
 const MAX_LINES: usize = 20_000;

@@ -4,8 +4,8 @@ use crate::scenario::expression;
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Drives;
-use harness_sim::deviation::{Deviation, MasterDeviation};
-use harness_sim::deviation::{deviation, deviations, master_deviation, master_deviations};
+use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
+use harness_sim::novobus::deviation::{deviation, deviations, master_deviation, master_deviations};
 
 /// Reads one of a list of words.
 pub(super) fn named<T: Copy>(

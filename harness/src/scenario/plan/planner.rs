@@ -19,8 +19,8 @@ use harness_proto::nd21::units;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::time::{self, Instant};
-use harness_sim::drive::Model;
 use harness_sim::fault::LinkFault;
+use harness_sim::novobus::drive::Model;
 use std::ops::RangeInclusive;
 
 /// The most bytes that a run may leave on all links together: its record is held in memory.

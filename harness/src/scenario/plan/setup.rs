@@ -12,8 +12,8 @@ use harness_proto::nd21;
 use harness_proto::nd21::units::{self, Device, Scale, SpeedRange, Value};
 use harness_proto::novobus::memory;
 use harness_proto::novobus::properties::{Properties, Setting};
-use harness_sim::drive::Model;
 use harness_sim::nd21::{Nd21Properties, PROPERTIES};
+use harness_sim::novobus::drive::Model;
 use std::ops::RangeInclusive;
 
 impl Planner {

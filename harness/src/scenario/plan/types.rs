@@ -14,9 +14,9 @@ use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::RAM;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_proto::time;
-use harness_sim::deviation::{Deviation, MasterDeviation};
-use harness_sim::drive::Model;
 use harness_sim::nd21::Nd21Properties;
+use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
+use harness_sim::novobus::drive::Model;
 use std::ops::RangeInclusive;
 
 /// How often the bench looks at cells while it waits for one: a quarter of the cycle of the drive's

@@ -11,9 +11,9 @@ use crate::scenario::times::{Duration, Window};
 use harness_proto::line::Rate;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::units::Device;
-use harness_sim::deviation::{Deviation, MasterDeviation};
-use harness_sim::drive::Model;
 use harness_sim::fault::{DriveFault, Flips};
+use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
+use harness_sim::novobus::drive::Model;
 
 /// A scenario: what it is, the ring it needs, and its steps.
 #[derive(Clone, Debug)]

@@ -15,10 +15,10 @@ use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
-use harness_sim::bench::Bench;
-use harness_sim::drive::Drive;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, factory};
-use harness_sim::ring::Ring;
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::ring::Ring;
 
 const MOST: u16 = 300;
 /// What a regulator overshoots on the ramps of the factory's EEPROM, and half a bit of a speed, in rpm.

@@ -1,0 +1,426 @@
+//! One link of a ring: a wire that carries one byte at a time, and what can go wrong on it.
+
+use crate::fault::{Flips, LinkFault, Plan};
+use crate::novobus::uart::{self, Uart};
+use crate::novobus::under_way::{Bytes, UnderWay};
+use harness_proto::line::{LineError, Received};
+use harness_proto::time::{Instant, Span};
+
+/// A byte on a wire, at both of its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineByte {
+    /// When its stop bit has passed.
+    pub at: Instant,
+    /// What the transmitter put on the wire; `None` for a byte that nobody sent.
+    pub sent: Option<u8>,
+    /// What arrived at the receiver; `None` where nothing did. A drive without power reads nothing, but
+    /// the byte arrives.
+    pub received: Option<u8>,
+    /// What the receiver noticed.
+    pub error: Option<LineError>,
+    /// Whether the byte goes back to one that the master sent, rather than to a time-out.
+    pub(crate) solicited: bool,
+}
+
+impl LineByte {
+    /// A byte as somebody else has seen it: for traces of rings that are not simulated.
+    #[must_use]
+    pub fn seen(
+        at: Instant,
+        sent: Option<u8>,
+        received: Option<u8>,
+        error: Option<LineError>,
+    ) -> Self {
+        Self {
+            at,
+            sent,
+            received,
+            error,
+            solicited: true,
+        }
+    }
+
+    /// What arrives at the receiver, if anything does.
+    #[must_use]
+    pub fn arrival(&self) -> Option<Received> {
+        let error = self.error;
+        self.received.map(|byte| Received { byte, error })
+    }
+}
+
+/// A link cut open: what the transmitter sends goes to somebody else, and what the receiver hears comes from them.
+#[derive(Clone, Debug, Default)]
+struct Opening {
+    /// What has been sent and not been fetched.
+    sent: Bytes,
+    /// When the last byte sent arrives there.
+    last_arrival: Instant,
+}
+
+/// A wire from one transmitter to one receiver.
+#[derive(Clone, Debug)]
+pub struct Link {
+    byte_time: Span,
+    /// When the transmitter can start its next byte.
+    line_free: Instant,
+    /// When the last byte arrived: bytes arrive one after another.
+    last_arrival: Instant,
+    bytes: Bytes,
+    transmitted: u64,
+    plan: Plan<LinkFault>,
+    cut: bool,
+    opening: Option<Box<Opening>>,
+    /// The receiver, as long as it is out of step (a damaged start bit).
+    out_of_step: Option<Uart>,
+    /// Until when the line is held at 0.
+    held_until: Instant,
+    /// Nothing of all that stands between a byte and its receiver.
+    sound: bool,
+    arrived: u64,
+}
+
+impl Link {
+    pub(crate) fn new(byte_time: Span) -> Self {
+        Self {
+            byte_time,
+            line_free: Instant::START,
+            last_arrival: Instant::START,
+            bytes: Bytes::recorded(),
+            transmitted: 0,
+            plan: Plan::default(),
+            cut: false,
+            opening: None,
+            out_of_step: None,
+            held_until: Instant::START,
+            sound: true,
+            arrived: 0,
+        }
+    }
+
+    /// Is as new again, but keeps room and whether it records: a run of many short cases does not ask for memory in each.
+    pub(crate) fn restart(&mut self) {
+        let mut bytes = std::mem::take(&mut self.bytes);
+        bytes.clear();
+        let mut plan = std::mem::take(&mut self.plan);
+        plan.clear();
+        *self = Self {
+            bytes,
+            plan,
+            ..Self::new(self.byte_time)
+        };
+    }
+
+    /// Everything that this link has carried, in order; empty where nothing is recorded.
+    #[must_use]
+    pub fn log(&self) -> impl ExactSizeIterator<Item = LineByte> + Clone + '_ {
+        self.bytes.log()
+    }
+
+    /// Makes room for so many bytes.
+    pub(crate) fn reserve(&mut self, bytes: usize) {
+        self.bytes.reserve(bytes);
+    }
+
+    pub(crate) fn stop_recording(&mut self) {
+        self.bytes.record(false);
+    }
+
+    /// Records what it carries from now on.
+    pub(crate) fn record_anew(&mut self) {
+        self.bytes.record(true);
+    }
+
+    /// What has been recorded since the last call.
+    pub(crate) fn take_log(&mut self) -> Vec<LineByte> {
+        let log = self.bytes.log().collect();
+        self.bytes.forget_arrived();
+        log
+    }
+
+    /// Cuts the link open: from now on the receiver hears only what is fed, and what the transmitter sends has to be
+    /// fetched.
+    pub(crate) fn open(&mut self) {
+        self.opening.get_or_insert_default();
+        self.sound = false;
+    }
+
+    /// Feeds the receiver of an open link a byte that starts at `now` at the earliest; says when it arrives.
+    pub(crate) fn feed(&mut self, now: Instant, byte: Received) -> Instant {
+        self.line_up(UnderWay::pack(LineByte {
+            at: now + self.byte_time,
+            sent: Some(byte.byte),
+            received: Some(byte.byte),
+            error: byte.error,
+            solicited: true,
+        }));
+        self.last_arrival
+    }
+
+    /// When the next byte of an open link's transmitter has been sent.
+    pub(crate) fn next_sent(&self) -> Instant {
+        let opening = self.opening.as_ref();
+        opening.map_or(Instant::NEVER, |opening| opening.sent.next_arrival())
+    }
+
+    /// The next byte that an open link's transmitter has sent by `now`.
+    pub(crate) fn fetch(&mut self, now: Instant) -> Option<LineByte> {
+        let sent = &mut self.opening.as_mut()?.sent;
+        if sent.next_arrival() > now {
+            return None;
+        }
+        sent.take().map(UnderWay::unpack)
+    }
+
+    /// Forgets what it has carried and the faults whose byte has not come; what is under way counts as the first
+    /// bytes.
+    pub(crate) fn begin(&mut self) {
+        self.plan = Plan::default();
+        self.bytes.forget_arrived();
+        self.transmitted = self.bytes.under_way().len() as u64;
+        self.arrived = 0;
+    }
+
+    /// When the transmitter can start its next byte.
+    pub(crate) fn line_free(&self) -> Instant {
+        self.line_free
+    }
+
+    /// How many bytes have been transmitted, begun ones included.
+    pub(crate) fn transmitted(&self) -> u64 {
+        self.transmitted
+    }
+
+    /// How many bytes have reached the receiver's end, lost ones included.
+    pub(crate) fn arrived(&self) -> u64 {
+        self.arrived
+    }
+
+    /// Whether a byte is under way that goes back to the master's.
+    pub(crate) fn carries_solicited(&self) -> bool {
+        self.bytes.under_way().iter().any(|byte| byte.solicited())
+    }
+
+    /// Faults whose byte has not come yet.
+    pub(crate) fn waiting_faults(&self) -> impl Iterator<Item = (u64, LinkFault)> + '_ {
+        self.plan.waiting()
+    }
+
+    /// Arms a fault for the `byte`-th byte transmitted on this link, counted from 1.
+    pub(crate) fn arm(&mut self, byte: u64, fault: LinkFault) {
+        self.plan.add(byte, fault);
+        self.sound = false;
+    }
+
+    /// From now on nothing arrives; a byte on the wire is lost.
+    pub(crate) fn cut(&mut self, now: Instant) {
+        self.cut = true;
+        self.sound = false;
+        self.lose_after(now);
+    }
+
+    /// From now on everything arrives again.
+    pub(crate) fn join(&mut self) {
+        self.cut = false;
+    }
+
+    /// The line is held at 0 from now on.
+    pub(crate) fn hold(&mut self, now: Instant, span: Span) {
+        self.lose_after(now);
+        self.held_until = self.held_until.max(now + span);
+        self.sound = false;
+        let (bytes, last_arrival) = match &mut self.opening {
+            None => (&mut self.bytes, &mut self.last_arrival),
+            Some(opening) => (&mut opening.sent, &mut opening.last_arrival),
+        };
+        let at = (*last_arrival).max(now) + self.byte_time;
+        *last_arrival = at;
+        let byte = LineByte {
+            at,
+            sent: None,
+            received: Some(0),
+            error: Some(LineError::Break),
+            solicited: true,
+        };
+        bytes.insert(UnderWay::pack(byte));
+    }
+
+    /// The transmitter loses its power: what it has not finished is never sent.
+    pub(crate) fn silence(&mut self, now: Instant) {
+        self.lose_after(now);
+        self.line_free = self.line_free.min(now);
+    }
+
+    fn lose_after(&mut self, now: Instant) {
+        // On an open link what is under way is not the transmitter's.
+        let own = match &mut self.opening {
+            None => &mut self.bytes,
+            Some(opening) => &mut opening.sent,
+        };
+        for byte in own.under_way_mut() {
+            if byte.at > now {
+                byte.lose();
+            }
+        }
+    }
+
+    /// Puts a byte on the wire as soon as it is free, at `now` at the earliest.
+    #[inline]
+    pub(crate) fn transmit(&mut self, now: Instant, byte: u8, solicited: bool) {
+        let start = now.max(self.line_free);
+        let gap = start.since(self.line_free);
+        self.line_free = start + self.byte_time;
+        self.transmitted += 1;
+        let on_wire = UnderWay::whole(self.line_free, byte, solicited);
+        if self.sound {
+            self.line_up(on_wire);
+        } else {
+            self.transmit_with_care(gap, on_wire);
+        }
+    }
+
+    /// The same on a link on which something may happen to the byte.
+    #[cold]
+    fn transmit_with_care(&mut self, gap: Span, on_wire: UnderWay) {
+        let fault = self.plan.take(self.transmitted);
+        self.transmit_damaged(fault, gap, on_wire.unpack());
+        self.sound = self.plan.waiting().next().is_none()
+            && !self.cut
+            && self.line_free >= self.held_until
+            && self.opening.is_none()
+            && self.out_of_step.is_none();
+    }
+
+    fn transmit_damaged(&mut self, first: Option<LinkFault>, gap: Span, mut byte: LineByte) {
+        let start = self.line_free - self.byte_time;
+        // Several faults at one byte act one after the other, in the order of their lines.
+        let mut flips = Flips::default();
+        let mut copies = 1;
+        let mut next = first;
+        while let Some(fault) = next {
+            match fault {
+                LinkFault::Flip(more) => {
+                    flips = flips.and(more);
+                    byte.received = byte.received.map(|data| data ^ more.data);
+                }
+                LinkFault::Replace(data) => {
+                    flips = Flips::default();
+                    byte.received = byte.received.map(|_| data);
+                }
+                LinkFault::Drop => byte.received = None,
+                LinkFault::Duplicate => copies = 2,
+                LinkFault::Insert(data) => {
+                    let lost = self.cut || start < self.held_until;
+                    self.deliver(UnderWay::pack(LineByte {
+                        at: byte.at,
+                        sent: None,
+                        received: (!lost).then_some(data),
+                        error: None,
+                        solicited: true,
+                    }));
+                }
+                LinkFault::Delay(span) => byte.at += span,
+                LinkFault::Break(span) => {
+                    self.held_until = self.held_until.max(start + span);
+                    byte.received = Some(0);
+                    byte.error = Some(LineError::Break);
+                }
+                LinkFault::Overrun => byte.error = Some(LineError::Overrun),
+                LinkFault::Cut => self.cut = true,
+                LinkFault::Join => self.cut = false,
+            }
+            next = self.plan.take(self.transmitted);
+        }
+        if byte.error == Some(LineError::Break) {
+            byte.received = byte.received.map(|_| 0);
+        } else {
+            if flips.start || self.out_of_step.is_some() {
+                self.read_out_of_step(flips, gap, &mut byte);
+            } else {
+                byte.error = byte.error.or(flips.noticed());
+            }
+            if start < self.held_until {
+                byte.received = None;
+            }
+        }
+        if self.cut {
+            byte.received = None;
+        }
+        if byte.received.is_none() {
+            byte.error = None;
+            copies = 1;
+        }
+        self.deliver(UnderWay::pack(byte));
+        if copies == 2 {
+            self.deliver(UnderWay::pack(LineByte { sent: None, ..byte }));
+        }
+    }
+
+    /// Lets the receiver read what it takes for a byte, bit by bit, as long as it is out of step. What it has half
+    /// read when the line falls silent is read with the next byte.
+    fn read_out_of_step(&mut self, flips: Flips, gap: Span, byte: &mut LineByte) {
+        let mut receiver = self.out_of_step.take().unwrap_or_else(Uart::idle);
+        let bit_time = Span::from_units(self.byte_time.units() / uart::BITS);
+        for _ in 0..(gap.units() / bit_time.units()).min(uart::BITS) {
+            if let Some(read) = receiver.take(true) {
+                self.deliver(UnderWay::pack(LineByte {
+                    at: byte.at - self.byte_time,
+                    sent: None,
+                    received: Some(read.byte),
+                    error: read.error,
+                    solicited: byte.solicited,
+                }));
+            }
+        }
+        // The data bits have been inverted already.
+        let word = uart::bits(byte.sent.unwrap_or_default())
+            ^ (u16::from(byte.received.unwrap_or_default() ^ byte.sent.unwrap_or_default()) << 1)
+            ^ u16::from(flips.start)
+            ^ (u16::from(flips.parity) << 9)
+            ^ (u16::from(flips.stop) << 10);
+        let lost = byte.received.is_none();
+        byte.received = None;
+        for bit in 0..uart::BITS {
+            // Where nothing arrives the line is at rest.
+            if let Some(read) = receiver.take(lost || word >> bit & 1 == 1) {
+                byte.at = self.line_free - bit_time * (uart::BITS - 1 - bit);
+                byte.received = Some(read.byte);
+                byte.error = read.error;
+            }
+        }
+        self.out_of_step = (!receiver.in_step()).then_some(receiver);
+    }
+
+    /// Lets a byte of the transmitter's go its way.
+    fn deliver(&mut self, mut byte: UnderWay) {
+        match &mut self.opening {
+            None => self.line_up(byte),
+            Some(opening) => {
+                byte.at = byte.at.max(opening.last_arrival + self.byte_time);
+                opening.last_arrival = byte.at;
+                opening.sent.push(byte);
+            }
+        }
+    }
+
+    /// Lines a byte up behind those under way.
+    #[inline]
+    fn line_up(&mut self, mut byte: UnderWay) {
+        byte.at = byte.at.max(self.last_arrival + self.byte_time);
+        self.last_arrival = byte.at;
+        self.bytes.push(byte);
+    }
+
+    /// When the next byte arrives.
+    #[inline]
+    pub(crate) fn next_arrival(&self) -> Instant {
+        self.bytes.next_arrival()
+    }
+
+    /// Takes the next byte from the wire.
+    #[inline]
+    pub(crate) fn take(&mut self) -> Option<LineByte> {
+        let byte = self.bytes.take()?;
+        self.arrived += 1;
+        Some(byte.unpack())
+    }
+}

@@ -1,0 +1,205 @@
+//! A place in the ring: a device between its two links, with the faults of a drive.
+
+use crate::fault::{DriveFault, Plan};
+use crate::novobus::device::Device;
+use crate::novobus::link::Link;
+use crate::novobus::trace::Mark;
+use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::time::{Instant, Span};
+
+/// A device in its place in the ring.
+#[derive(Clone, Debug)]
+pub struct Node<D> {
+    device: D,
+    powered: bool,
+    stuck: Option<u8>,
+    plan: Plan<DriveFault>,
+    marks: Vec<Mark>,
+    recording: bool,
+    drive: u8,
+    /// See [`Device::head_start`].
+    head_start: Span,
+}
+
+impl<D: Device> Node<D> {
+    pub(crate) fn new(device: D, drive: u8) -> Self {
+        Self {
+            head_start: device.head_start(),
+            device,
+            powered: true,
+            stuck: None,
+            plan: Plan::default(),
+            marks: Vec::new(),
+            recording: true,
+            drive,
+        }
+    }
+
+    pub(crate) fn device(&self) -> &D {
+        &self.device
+    }
+
+    pub(crate) fn device_mut(&mut self) -> &mut D {
+        &mut self.device
+    }
+
+    pub(crate) fn powered(&self) -> bool {
+        self.powered
+    }
+
+    pub(crate) fn marks(&self) -> &[Mark] {
+        &self.marks
+    }
+
+    pub(crate) fn stop_recording(&mut self) {
+        self.recording = false;
+    }
+
+    /// Is as new again around a device that is, but keeps whether it records.
+    pub(crate) fn restart(&mut self) {
+        self.head_start = self.device.head_start();
+        self.powered = true;
+        self.stuck = None;
+        self.begin();
+    }
+
+    /// Forgets its marks, and the faults whose byte has not come.
+    pub(crate) fn begin(&mut self) {
+        self.plan.clear();
+        self.marks.clear();
+    }
+
+    /// Arms a fault for the `byte`-th byte on this drive's inbound link, lost ones included, counted from 1.
+    pub(crate) fn arm(&mut self, byte: u64, fault: DriveFault) {
+        self.plan.add(byte, fault);
+    }
+
+    /// Faults whose byte has not come yet.
+    pub(crate) fn waiting_faults(&self) -> impl Iterator<Item = (u64, DriveFault)> + '_ {
+        self.plan.waiting()
+    }
+
+    pub(crate) fn suffer(&mut self, fault: DriveFault, now: Instant, outbound: &mut Link) {
+        match fault {
+            DriveFault::Off => {
+                self.device.advance(now);
+                self.powered = false;
+                outbound.silence(now);
+            }
+            DriveFault::On => {
+                if !self.powered {
+                    self.device.power_on(now);
+                }
+                self.powered = true;
+            }
+            DriveFault::Stuck(byte) => self.stuck = Some(byte),
+            DriveFault::Unstuck => self.stuck = None,
+        }
+    }
+
+    /// When something next happens here.
+    pub(crate) fn next_event(&self, inbound: &Link, outbound: &Link) -> Instant {
+        let deadline = match self.deadline() {
+            None => Instant::NEVER,
+            Some(Deadline::At(at)) => at,
+            Some(Deadline::LineFree(from)) => outbound.line_free().max(from),
+        };
+        inbound.next_arrival().min(deadline)
+    }
+
+    #[inline]
+    fn deadline(&self) -> Option<Deadline> {
+        if self.powered {
+            self.device.deadline()
+        } else {
+            None
+        }
+    }
+
+    /// Does everything that is due here up to and including `until`.
+    ///
+    /// At one instant a time-out comes before a byte, and so does a drive's own first zero (it goes out
+    /// before the neighbour's is answered, ND21 9.9); a byte comes before any later zero (with something
+    /// to answer, none goes out unasked).
+    pub(crate) fn run(&mut self, inbound: &mut Link, outbound: &mut Link, until: Instant) {
+        self.run_bus(inbound, outbound, until);
+        if self.powered {
+            self.device.advance(until);
+        }
+    }
+
+    fn run_bus(&mut self, inbound: &mut Link, outbound: &mut Link, until: Instant) {
+        loop {
+            let arrival = inbound.next_arrival();
+            match self.deadline() {
+                Some(Deadline::At(at)) if at <= arrival => {
+                    if at > until {
+                        return;
+                    }
+                    self.act(at, outbound, inbound.arrived());
+                    continue;
+                }
+                Some(Deadline::LineFree(from))
+                    if outbound.line_free() < arrival
+                        || from == arrival && outbound.line_free() == arrival =>
+                {
+                    let at = outbound.line_free().max(from);
+                    if at > until {
+                        return;
+                    }
+                    self.act(at, outbound, inbound.arrived());
+                    continue;
+                }
+                _ => {}
+            }
+            if arrival > until {
+                return;
+            }
+            while let Some(fault) = self.plan.take(inbound.arrived() + 1) {
+                self.suffer(fault, arrival, outbound);
+            }
+            self.take_byte(arrival, inbound, outbound);
+        }
+    }
+
+    #[inline]
+    fn take_byte(&mut self, now: Instant, inbound: &mut Link, outbound: &mut Link) {
+        let Some(byte) = inbound.take() else { return };
+        let Some(received) = byte.arrival().filter(|_| self.powered) else {
+            return;
+        };
+        self.device.advance(now);
+        let step = self.device.receive(now, received);
+        self.finish(step, now, byte.solicited, inbound.arrived(), outbound);
+    }
+
+    fn act(&mut self, now: Instant, outbound: &mut Link, received: u64) {
+        self.device.advance(now);
+        let step = self.device.handle_deadline(now);
+        self.finish(step, now, false, received, outbound);
+    }
+
+    #[inline]
+    fn finish(
+        &mut self,
+        step: Step,
+        now: Instant,
+        solicited: bool,
+        received: u64,
+        outbound: &mut Link,
+    ) {
+        if let Some(byte) = step.byte {
+            outbound.transmit(now - self.head_start, self.stuck.unwrap_or(byte), solicited);
+        }
+        if self.recording && !step.marks.is_empty() {
+            self.marks.push(Mark {
+                drive: self.drive,
+                byte: received,
+                answered_as: step.byte.map(|_| outbound.transmitted()),
+                at: now,
+                marks: step.marks,
+                cause: self.device.cause(),
+            });
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! A ring: master -> drive N-1 -> ... -> drive 0 -> master, in virtual time (ND21 8.4, 8.5).
+//!
+//! A drive sees nothing but what the one before it sends. So there is no queue of events for the whole
+//! ring: [`Ring::run_until`] walks it once, drive after drive, and each does everything that is due on
+//! its inbound link up to that time.
+
+use crate::fault::{DriveFault, LinkFault};
+use crate::novobus::device::Device;
+use crate::novobus::link::{LineByte, Link};
+use crate::novobus::node::Node;
+use crate::novobus::trace::{LinkTrace, Trace};
+use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::{Instant, Span};
+use std::collections::VecDeque;
+
+/// How many byte times one walk covers at most: what is under way then stays in the processor's cache.
+const BYTES_A_WALK: u64 = 64;
+
+/// A ring of drives of one kind.
+#[derive(Clone, Debug)]
+pub struct Ring<D> {
+    size: RingSize,
+    rate: Rate,
+    /// `links[i]` ends at `nodes[i]`; the last one ends at the master.
+    links: Vec<Link>,
+    nodes: Vec<Node<D>>,
+    /// What the master still has to send, with the time before which it must not.
+    outbox: VecDeque<(Instant, u8)>,
+    /// What the master has received and nobody has fetched.
+    inbox: VecDeque<LineByte>,
+    now: Instant,
+    /// When the master will have sent everything that it has to send.
+    sent_by: Instant,
+}
+
+impl<D: Device> Ring<D> {
+    /// A ring on a line of the given rate; `device(k)` makes drive k.
+    pub fn new(size: RingSize, rate: Rate, mut device: impl FnMut(u8) -> D) -> Self {
+        let drives = (0..size.drives()).rev();
+        Self {
+            size,
+            rate,
+            links: vec![Link::new(rate.byte_time()); usize::from(size.drives()) + 1],
+            nodes: drives.map(|k| Node::new(device(k), k)).collect(),
+            outbox: VecDeque::new(),
+            inbox: VecDeque::new(),
+            now: Instant::START,
+            sent_by: Instant::START,
+        }
+    }
+
+    /// Is as new again once `restart` has made each device so, but keeps room, and what is recorded and what is not: a run of many short
+    /// cases does not ask for memory in each.
+    pub fn restart(&mut self, mut restart: impl FnMut(&mut D)) {
+        self.links.iter_mut().for_each(Link::restart);
+        for node in &mut self.nodes {
+            restart(node.device_mut());
+            node.restart();
+        }
+        self.outbox.clear();
+        self.inbox.clear();
+        self.now = Instant::START;
+        self.sent_by = Instant::START;
+    }
+
+    /// Makes room for so many bytes on every link at once: a short run then does not ask for memory again and again.
+    pub fn reserve(&mut self, bytes: usize) {
+        self.links.iter_mut().for_each(|link| link.reserve(bytes));
+        self.outbox.reserve(bytes);
+        self.inbox.reserve(bytes);
+    }
+
+    /// What link `link` has carried so far, as far as it was recorded; what was taken by [`Self::take_record`] is gone.
+    /// `None` where the ring has no such link.
+    #[must_use]
+    pub fn carried_by(
+        &self,
+        link: usize,
+    ) -> Option<impl ExactSizeIterator<Item = LineByte> + Clone + '_> {
+        self.links.get(link).map(Link::log)
+    }
+
+    /// Keeps no record of bytes and marks from now on: for runs that are too long for one.
+    pub fn stop_recording(&mut self) {
+        self.links.iter_mut().for_each(Link::stop_recording);
+        self.nodes.iter_mut().for_each(Node::stop_recording);
+    }
+
+    /// Records what link `link` carries from now on, for [`Self::take_record`]: a tap.
+    pub fn record_link(&mut self, link: usize) {
+        if let Some(link) = self.links.get_mut(link) {
+            link.record_anew();
+        }
+    }
+
+    /// What link `link` has carried since the last call, as far as it was recorded.
+    pub fn take_record(&mut self, link: usize) -> Vec<LineByte> {
+        self.links
+            .get_mut(link)
+            .map(Link::take_log)
+            .unwrap_or_default()
+    }
+
+    /// Cuts link `link` open: what its transmitter sends is to be fetched, and its receiver hears what is fed. Faults
+    /// of the link act in front of the cut.
+    pub fn open_link(&mut self, link: usize) {
+        if let Some(link) = self.links.get_mut(link) {
+            link.open();
+        }
+    }
+
+    /// Feeds the receiver of an open link a byte, behind those fed before; says when it arrives.
+    pub fn feed_link(&mut self, link: usize, byte: Received) -> Instant {
+        let now = self.now;
+        let link = self.links.get_mut(link);
+        link.map_or(now, |link| link.feed(now, byte))
+    }
+
+    /// The next byte that the transmitter of an open link has sent.
+    pub fn fetch_link(&mut self, link: usize) -> Option<LineByte> {
+        self.links.get_mut(link)?.fetch(self.now)
+    }
+
+    /// When the next byte of an open link can be fetched; `None` where none is under way.
+    #[must_use]
+    pub fn next_fetch(&self, link: usize) -> Option<Instant> {
+        let next = self.links.get(link)?.next_sent();
+        (next < Instant::NEVER).then_some(next)
+    }
+
+    /// When the byte on the last link reaches the master; `None` where there is none. One that is not yet there needs a byte time at
+    /// least.
+    #[must_use]
+    pub fn next_home(&self) -> Option<Instant> {
+        let next = self.links.last()?.next_arrival();
+        (next < Instant::NEVER).then_some(next)
+    }
+
+    /// Begins another conversation: bytes are counted anew, what was recorded and the faults whose byte has not come
+    /// are forgotten, and so is what was received and not fetched. Time and drives go on.
+    pub fn begin(&mut self) {
+        self.links.iter_mut().for_each(Link::begin);
+        self.nodes.iter_mut().for_each(Node::begin);
+        self.inbox.clear();
+    }
+
+    /// How many drives there are.
+    #[must_use]
+    pub fn size(&self) -> RingSize {
+        self.size
+    }
+
+    /// How long a byte takes on this line.
+    #[must_use]
+    pub fn byte_time(&self) -> Span {
+        self.rate.byte_time()
+    }
+
+    /// The time up to which everything has happened.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// Drive `k`, if the ring has it.
+    #[must_use]
+    pub fn drive(&self, k: u8) -> Option<&D> {
+        Some(self.nodes.get(self.place(k)?)?.device())
+    }
+
+    /// Drive `k`, if the ring has it.
+    pub fn drive_mut(&mut self, k: u8) -> Option<&mut D> {
+        let place = self.place(k)?;
+        Some(self.nodes.get_mut(place)?.device_mut())
+    }
+
+    /// Whether drive `k` has power.
+    #[must_use]
+    pub fn powered(&self, k: u8) -> bool {
+        let node = self.place(k).and_then(|place| self.nodes.get(place));
+        node.is_some_and(Node::powered)
+    }
+
+    fn place(&self, k: u8) -> Option<usize> {
+        self.size.first().checked_sub(k).map(usize::from)
+    }
+
+    /// Lets the master send `bytes` one after another, behind what it already has to send and not
+    /// before `not_before`.
+    pub fn send(&mut self, not_before: Instant, bytes: &[u8]) {
+        self.outbox
+            .extend(bytes.iter().map(|&byte| (not_before, byte)));
+        let start = self.sent_by.max(not_before).max(self.now);
+        self.sent_by = start + self.byte_time() * bytes.len() as u64;
+    }
+
+    /// When the master will have sent everything that it has to send.
+    #[must_use]
+    pub fn sent_by(&self) -> Instant {
+        self.sent_by
+    }
+
+    /// The next byte that has reached the master.
+    pub fn receive(&mut self) -> Option<LineByte> {
+        self.inbox.pop_front()
+    }
+
+    /// Arms a fault for the `byte`-th byte on link `link` (0 is the master's outgoing one).
+    pub fn arm_link(&mut self, link: usize, byte: u64, fault: LinkFault) {
+        if let Some(link) = self.links.get_mut(link) {
+            link.arm(byte, fault);
+        }
+    }
+
+    /// Arms a fault for the `byte`-th byte on drive `k`'s inbound link, lost ones included.
+    pub fn arm_drive(&mut self, k: u8, byte: u64, fault: DriveFault) {
+        if let Some(place) = self.place(k) {
+            self.nodes[place].arm(byte, fault);
+        }
+    }
+
+    /// Arms a fault for the first byte on the master's outgoing link that is sent behind all that are queued now.
+    pub fn arm_behind_queued(&mut self, fault: LinkFault) {
+        let queued = self.outbox.len() as u64;
+        if let Some(first) = self.links.first_mut() {
+            first.arm(first.transmitted() + queued + 1, fault);
+        }
+    }
+
+    /// Lets a fault happen to link `link` now. A fault that needs a byte waits for the next one.
+    pub fn suffer_link(&mut self, link: usize, fault: LinkFault) {
+        let now = self.now;
+        let Some(link) = self.links.get_mut(link) else {
+            return;
+        };
+        match fault {
+            LinkFault::Cut => link.cut(now),
+            LinkFault::Join => link.join(),
+            LinkFault::Break(span) => link.hold(now, span),
+            fault => link.arm(link.transmitted() + 1, fault),
+        }
+    }
+
+    /// Lets a fault happen to drive `k` now.
+    pub fn suffer_drive(&mut self, k: u8, fault: DriveFault) {
+        if let Some(place) = self.place(k) {
+            self.nodes[place].suffer(fault, self.now, &mut self.links[place + 1]);
+        }
+    }
+
+    /// The faults on links whose byte never came: link, byte, fault.
+    pub fn unused_link_faults(&self) -> impl Iterator<Item = (usize, u64, LinkFault)> + '_ {
+        self.links.iter().enumerate().flat_map(|(i, link)| {
+            link.waiting_faults()
+                .map(move |(byte, fault)| (i, byte, fault))
+        })
+    }
+
+    /// The faults in drives whose byte never came: drive, byte, fault.
+    pub fn unused_drive_faults(&self) -> impl Iterator<Item = (u8, u64, DriveFault)> + '_ {
+        (0u8..).zip(&self.nodes).flat_map(|(i, node)| {
+            let drive = self.size.first() - i;
+            node.waiting_faults()
+                .map(move |(byte, fault)| (drive, byte, fault))
+        })
+    }
+
+    /// Whether something is still under way that goes back to a byte of the master's.
+    #[must_use]
+    pub fn busy(&self) -> bool {
+        !self.outbox.is_empty() || self.links.iter().any(Link::carries_solicited)
+    }
+
+    /// When something happens next; `None` when nothing ever will unless the master sends.
+    #[must_use]
+    pub fn next_event(&self) -> Option<Instant> {
+        let master = self.outbox.front().map_or(Instant::NEVER, |(at, _)| {
+            (*at).max(self.links[0].line_free()).max(self.now)
+        });
+        let to_master = self.links.last().map_or(Instant::NEVER, Link::next_arrival);
+        let next = self
+            .nodes
+            .iter()
+            .zip(self.links.windows(2))
+            .map(|(node, links)| node.next_event(&links[0], &links[1]))
+            .fold(master.min(to_master), Instant::min);
+        (next < Instant::NEVER).then_some(next)
+    }
+
+    /// Lets everything happen up to and including `until`.
+    pub fn run_until(&mut self, until: Instant) {
+        let mut walked = self.now;
+        while let Some(next) = self.next_event().filter(|&next| next <= until) {
+            walked = until.min(next + self.byte_time() * BYTES_A_WALK);
+            self.walk(walked);
+        }
+        if walked < until {
+            // Nothing on the bus; but devices have a life of their own.
+            self.walk(until);
+        }
+        self.now = self.now.max(until);
+    }
+
+    /// Walks the ring once: every drive does all that is due up to `until`.
+    fn walk(&mut self, until: Instant) {
+        self.feed(until);
+        for i in 0..self.nodes.len() {
+            if let [inbound, outbound] = &mut self.links[i..i + 2] {
+                self.nodes[i].run(inbound, outbound, until);
+            }
+        }
+        if let Some(last) = self.links.last_mut() {
+            while last.next_arrival() <= until
+                && let Some(byte) = last.take()
+            {
+                self.inbox.push_back(byte);
+            }
+        }
+        self.now = self.now.max(until);
+    }
+
+    /// Puts on the wire what the master starts to send up to `until`.
+    fn feed(&mut self, until: Instant) {
+        while let Some(&(not_before, byte)) = self.outbox.front() {
+            let start = not_before.max(self.now);
+            if start.max(self.links[0].line_free()) > until {
+                return;
+            }
+            self.links[0].transmit(start, byte, true);
+            self.outbox.pop_front();
+        }
+    }
+
+    /// How many bytes all links together have carried.
+    #[must_use]
+    pub fn carried(&self) -> u64 {
+        self.links.iter().map(Link::arrived).sum()
+    }
+
+    /// What has happened so far.
+    #[must_use]
+    pub fn trace(&self) -> Trace {
+        let drives = self.size.drives();
+        let end = |place: usize| u8::try_from(place).ok().and_then(|p| drives.checked_sub(p));
+        let links = self.links.iter().enumerate().map(|(i, link)| LinkTrace {
+            from: end(i).filter(|&k| k < drives),
+            to: end(i + 1),
+            bytes: link.log().collect(),
+        });
+        let mut marks: Vec<_> = self.nodes.iter().flat_map(|n| n.marks().to_vec()).collect();
+        marks.sort_by_key(|mark| mark.at);
+        Trace {
+            drives,
+            links: links.collect(),
+            marks,
+        }
+    }
+}
