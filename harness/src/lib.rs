@@ -5,7 +5,7 @@
 //! buses themselves are in `harness_proto`, the simulated rings in `harness_sim`.
 #![forbid(unsafe_code)]
 
-pub mod bus;
+pub mod buses;
 pub mod campaign;
 pub mod capture;
 pub mod cli;
@@ -15,7 +15,6 @@ pub mod fuzz;
 pub mod guard;
 pub mod library;
 pub mod link;
-pub mod locate;
 pub mod manual;
 pub mod port;
 pub mod qualify;
@@ -26,4 +25,3 @@ pub mod scenario;
 pub mod serve;
 mod signals;
 pub mod top;
-pub mod twin;

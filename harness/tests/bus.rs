@@ -1,6 +1,6 @@
 //! The driver over a simulated ring of three ND21 (ND21 chapters 11, 12, 13.2).
 
-use harness::bus::{
+use harness::buses::novobus::driver::{
     Axis, Bus, Error, Options, Recovery, Scope, SkStatus, Trigger, count_drives, recover,
 };
 use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink, Stimulus};

@@ -2,6 +2,7 @@
 //! bytes and times at the master, cells that nobody knows, and faults on the master's own link only. The drives are plain ones, which take
 //! a fraction of the time of whole ND21s: what is behind the bus is left out.
 
+use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Event, Line, Recording, SimulatedLink};
 use harness::qualify::{Named, Seen, Whose, conversations, name};
@@ -10,7 +11,6 @@ use harness::scenario::plan::Plan;
 use harness::scenario::run::lacks;
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
-use harness::twin::{Conversation, Exactness, Twin};
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::{Deviation, deviations};
 use std::collections::BTreeMap;

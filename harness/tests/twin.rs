@@ -1,5 +1,6 @@
 //! The twin: a ring beside its model, and what explains a ring that is otherwise.
 
+use harness::buses::novobus::twin::{Conversation, Exactness, Twin, What};
 use harness::library::{Entry, sources};
 use harness::link::{Event, Link, Recording, Replay};
 use harness::qualify::{
@@ -10,7 +11,6 @@ use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_ane
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
-use harness::twin::{Conversation, Exactness, Twin, What};
 use harness_proto::time::Span;
 
 const EXACT: Exactness = Exactness {

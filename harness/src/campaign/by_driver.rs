@@ -4,7 +4,7 @@
 use super::class::{Evidence, Wrong, named};
 use super::fault::Case;
 use super::sound::{Sound, all_back};
-use crate::bus::{Axis, Bus, Error, Options};
+use crate::buses::novobus::driver::{Axis, Bus, Error, Options};
 use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
 use crate::scenario::plan::PlannedCall;
 use harness_proto::novobus::address::RingSize;

@@ -154,7 +154,7 @@ fn located(capture: &Capture) -> Option<(usize, u8)> {
     capture.traces.iter().enumerate().find_map(|(ring, trace)| {
         let last = trace.links.iter().find(|link| link.to.is_none())?;
         let received: Vec<Received> = last.bytes.iter().filter_map(LineByte::arrival).collect();
-        let found = crate::locate::locate(&received, trace.drives)?;
+        let found = crate::buses::novobus::locate::locate(&received, trace.drives)?;
         Some((ring, found.drive))
     })
 }

@@ -1,10 +1,10 @@
 //! What a qualification compared with the model, and what differed.
 
 use super::output::Output;
+use crate::buses::novobus::twin::{Conversation, Exactness};
 use crate::qualify::{Named, Seen};
 use crate::rig::{Driven, Played};
 use crate::scenario::verdict::Verdict;
-use crate::twin::{Conversation, Exactness};
 use harness_proto::time::Span;
 use std::fmt::Write as _;
 

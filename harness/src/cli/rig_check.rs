@@ -5,7 +5,7 @@ use super::output::Output;
 use super::rig::ListFormat;
 use super::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use super::run::progress_bar;
-use crate::bus::Error;
+use crate::buses::novobus::driver::Error;
 use crate::link::Trouble;
 use crate::rig::figures::{Figures, RingFigures, measure};
 use crate::rig::{Options, Rig, Session};

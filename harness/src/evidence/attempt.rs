@@ -3,6 +3,7 @@
 use super::folder::capture;
 use super::header::Header;
 use super::record::Line;
+use crate::buses::novobus::twin::{Conversation, Twin};
 use crate::library::Entry;
 use crate::link::{
     Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,
@@ -16,7 +17,6 @@ use crate::scenario::run::{AtFinding, Outcome, play};
 use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
-use crate::twin::{Conversation, Twin};
 use harness_proto::time::Span;
 
 /// How much longer a busy computer may have waited in one attempt; for records without looks.

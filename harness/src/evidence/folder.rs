@@ -6,11 +6,11 @@ use super::files::{
 };
 use super::record::{Line, SCHEMA, Writer};
 use super::signature;
+use crate::buses::novobus::twin::Exactness;
 use crate::link::{Capability, Event, SimulatedLink, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
-use crate::twin::Exactness;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::novobus::trace::Trace;

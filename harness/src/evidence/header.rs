@@ -2,9 +2,9 @@
 
 use super::files::{RIG, sum};
 use super::record::{Line, capabilities};
+use crate::buses::novobus::twin::Exactness;
 use crate::link::{Capability, SimulatedLink};
 use crate::rig::{Rig, Way, limits, line_rate};
-use crate::twin::Exactness;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::Limits;

@@ -4,7 +4,7 @@ use super::case::{Act, Beside, Case, Harm, Talk, To, What};
 use super::expect::{Both, Model, Must};
 use super::oracle::{Difference, sent};
 use super::order::Command;
-use crate::twin;
+use crate::buses::novobus::twin;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::properties::{

@@ -2,7 +2,7 @@
 
 use super::Watch;
 use super::safe_state::telegram;
-use crate::bus::Axis;
+use crate::buses::novobus::driver::Axis;
 use crate::link::{
     Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus,
     Trouble,

@@ -1,6 +1,6 @@
 //! The safe state of a bench: every drive stopped, standing and blocked, and read back.
 
-use crate::bus::{Axis, Bus, Error, Options, Order, recover};
+use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Order, recover};
 use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags, status};

@@ -1,8 +1,8 @@
 //! Which known deviation explains how a ring differed from the model; and which one of the master does, where the bench's own master is wrong.
 
 use super::hypothesis::{Evidence, judge};
+use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::rig::Driven;
-use crate::twin::{Conversation, Exactness, Twin};
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation, deviations, master_deviations};
 use std::fmt;
 

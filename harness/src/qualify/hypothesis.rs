@@ -1,6 +1,6 @@
 //! Hypotheses, judged by what their twins answer.
 
-use crate::twin::{Conversation, Exactness, Twin};
+use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness_proto::time::Span;
 
 /// A model with something changed.

@@ -2,7 +2,7 @@
 
 use super::hypothesis::{Evidence, Hypothesis, explaining};
 use super::probes::{Asked, Probe, hypotheses};
-use crate::twin::{Conversation, Exactness, Twin};
+use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness_proto::novobus::role::Role;
 use harness_proto::time::Span;
 use harness_sim::nd21::PROPERTIES;

@@ -4,7 +4,7 @@ use super::Rig;
 use super::line_test;
 use super::session::{End, Session};
 use super::shared::Shared;
-use crate::bus::{self, Axis, Bus, Identity, State};
+use crate::buses::novobus::driver::{self, Axis, Bus, Identity, State};
 use crate::link::{Line, Link};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
@@ -76,7 +76,7 @@ pub struct Figures {
 pub fn measure(
     mut session: Session,
     told: &mut dyn FnMut(Axis),
-) -> (Result<Figures, bus::Error>, Option<End>) {
+) -> (Result<Figures, driver::Error>, Option<End>) {
     let reported = session.opening().map(|health| health.reported.clone());
     let sizes = session.rings().to_vec();
     let rings = (0..)
@@ -153,8 +153,8 @@ fn drives(
     rig: &Rig,
     sizes: &[RingSize],
     told: &mut dyn FnMut(Axis),
-) -> Result<(Vec<DriveFigures>, u64), bus::Error> {
-    let bus = Bus::open(Box::new(shared.line()), sizes, bus::Options::default())?;
+) -> Result<(Vec<DriveFigures>, u64), driver::Error> {
+    let bus = Bus::open(Box::new(shared.line()), sizes, driver::Options::default())?;
     let mut drives = Vec::new();
     for some in bus.axes().chunks(SIDE_BY_SIDE) {
         for (axis, identity) in some.iter().zip(bus.identities(some)?) {

@@ -1,6 +1,6 @@
 //! Whether a ring is sound and as large as its rig's file says.
 
-use crate::bus::{count_behind, recover};
+use crate::buses::novobus::driver::{count_behind, recover};
 use crate::link::{Link, Trouble};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;

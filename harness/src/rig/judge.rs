@@ -3,11 +3,11 @@
 use super::check::Rig;
 use super::file::Deviation;
 use super::run::{Way, known, play_one, twin};
+use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
 use crate::link::{Event, Recording};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{Finding, Outcome};
 use crate::scenario::verdict::Verdict;
-use crate::twin::{Comparison, Conversation, Divergence, Exactness, Own};
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation;
 

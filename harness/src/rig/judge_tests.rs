@@ -3,13 +3,13 @@
 use super::super::check::parse;
 use super::super::run::{Way, known, play_one, twin};
 use super::{Heard, judge};
+use crate::buses::novobus::twin::{Conversation, Exactness};
 use crate::library::Entry;
 use crate::link::{Event, Line, Recording};
 use crate::scenario::run::Outcome;
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict::{self, Failed, Inconclusive, Passed};
-use crate::twin::{Conversation, Exactness};
 use harness_proto::time::Span;
 
 /// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.

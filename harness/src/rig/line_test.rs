@@ -5,8 +5,8 @@
 use super::Rig;
 use super::file::{Endpoint, Hooks, Line, Marks, Transport};
 use super::health::Unhealthy;
+use crate::buses::novobus::locate::locate;
 use crate::link;
-use crate::locate::locate;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::novobus::sync::SYNCO;

@@ -1,9 +1,9 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
 use super::driven::Driven;
+use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
 use crate::scenario::run::{Outcome, Unready};
 use crate::scenario::verdict::Verdict;
-use crate::twin::{Comparison, Conversation, Divergence};
 use harness_proto::time::Span;
 use harness_sim::novobus::trace::Trace;
 use std::collections::BTreeSet;
@@ -219,7 +219,7 @@ impl Again {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::What;
+    use crate::buses::novobus::twin::What;
     use Verdict::{Failed, Flaky, Inconclusive, Marginal, Passed};
     use harness_proto::line::Received;
     use harness_proto::novobus::role::Role;

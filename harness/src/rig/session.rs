@@ -12,7 +12,7 @@ use super::open::open;
 use super::session_error::SessionError;
 use super::state;
 use super::watchdog::{Alarm, Watchdog};
-use crate::bus::{Axis, count_behind};
+use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, StreamLink, Trouble};
 use harness_proto::line::{Rate, Received};

@@ -1,6 +1,6 @@
 //! What is known of a bench, and what the user wants to see of it.
 
-use crate::bus::{Axis, State};
+use crate::buses::novobus::driver::{Axis, State};
 use harness_proto::nd21::bits::set_in;
 use harness_proto::nd21::errors::display_digits;
 use harness_proto::nd21::ram;

@@ -6,7 +6,7 @@ mod speed;
 mod traffic;
 mod trouble;
 
-use harness::bus::{Axis, Bus, Options};
+use harness::buses::novobus::driver::{Axis, Bus, Options};
 use harness::guard::{Guarded, Limits};
 use harness::link::{Link, SimulatedLink, Stimulus};
 use harness_proto::line::Rate;

@@ -1,7 +1,7 @@
 //! The safe state, confirmed and not (ND21 11.8, 14.10).
 
 use super::{axis, bus, guarded, ring, size};
-use harness::bus::Bus;
+use harness::buses::novobus::driver::Bus;
 use harness::guard::{Guarded, Limits, SafeState, Standing, blind_stop, safe_state};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Rate;

@@ -1,7 +1,7 @@
 //! Ordinary traffic behind the guard: the driver's functions, and the scenarios of the corpus.
 
 use super::{axis, bus, guarded, link, size};
-use harness::bus::{Bus, Error, count_drives, recover};
+use harness::buses::novobus::driver::{Bus, Error, count_drives, recover};
 use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
 use harness::link::{

@@ -1,6 +1,6 @@
 //! Pages as plain text: the view is a function of what was read, of the keys and of the size.
 
-use harness::bus::{Axis, State};
+use harness::buses::novobus::driver::{Axis, State};
 use harness::top::view::{page, render, text};
 use harness::top::{DriveReading, Heading, Key, Press, Reading, RingReading, Top};
 use harness_proto::nd21::bits::{flags, flags2, status};

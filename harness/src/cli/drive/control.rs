@@ -4,7 +4,7 @@ use super::args::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use super::axes;
 use super::failure::Failure;
 use super::rig::{self, Bench, RigName, Use};
-use crate::bus::{Axis, Bus, Error};
+use crate::buses::novobus::driver::{Axis, Bus, Error};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::link::Line;

@@ -2,7 +2,7 @@
 
 use super::super::exit::Exit;
 use super::super::output::Output;
-use crate::bus;
+use crate::buses::novobus::driver;
 use crate::library::LibraryError;
 use crate::link::Trouble;
 use crate::scenario::problem::Problems;
@@ -19,7 +19,7 @@ pub(super) enum Failure {
     /// There is no file, or it has mistakes.
     File(LibraryError),
     /// The driver gave up.
-    Bus(bus::Error),
+    Bus(driver::Error),
 }
 
 impl Failure {
@@ -55,27 +55,27 @@ impl Failure {
 }
 
 /// A drive's fault, the bench's, or that of whoever asked.
-fn exit(error: &bus::Error) -> Exit {
+fn exit(error: &driver::Error) -> Exit {
     match error {
-        bus::Error::DriveError { .. }
-        | bus::Error::InReset { .. }
-        | bus::Error::Interrupted { .. }
-        | bus::Error::NotSet { .. }
-        | bus::Error::TimeOut { .. } => Exit::Failed,
-        bus::Error::Refused(_) | bus::Error::Value(_) | bus::Error::Open(_) => Exit::Usage,
-        bus::Error::Link(Trouble::Interrupted) => Exit::Interrupted,
-        bus::Error::Link(Trouble::Interlock(_)) => Exit::Interlock,
-        bus::Error::Link(Trouble::Denied(_)) => Exit::Usage,
-        bus::Error::Link(_)
-        | bus::Error::Unknown(_)
-        | bus::Error::Disturbed { .. }
-        | bus::Error::Stopped(_)
-        | bus::Error::NoSuchOrder => Exit::RigError,
+        driver::Error::DriveError { .. }
+        | driver::Error::InReset { .. }
+        | driver::Error::Interrupted { .. }
+        | driver::Error::NotSet { .. }
+        | driver::Error::TimeOut { .. } => Exit::Failed,
+        driver::Error::Refused(_) | driver::Error::Value(_) | driver::Error::Open(_) => Exit::Usage,
+        driver::Error::Link(Trouble::Interrupted) => Exit::Interrupted,
+        driver::Error::Link(Trouble::Interlock(_)) => Exit::Interlock,
+        driver::Error::Link(Trouble::Denied(_)) => Exit::Usage,
+        driver::Error::Link(_)
+        | driver::Error::Unknown(_)
+        | driver::Error::Disturbed { .. }
+        | driver::Error::Stopped(_)
+        | driver::Error::NoSuchOrder => Exit::RigError,
     }
 }
 
-impl From<bus::Error> for Failure {
-    fn from(error: bus::Error) -> Self {
+impl From<driver::Error> for Failure {
+    fn from(error: driver::Error) -> Self {
         Self::Bus(error)
     }
 }

@@ -6,7 +6,7 @@ use super::cell::{Found, find};
 use super::failure::Failure;
 use super::read::columns;
 use super::rig::{self, Bench, Use};
-use crate::bus::{Axis, Identity, State};
+use crate::buses::novobus::driver::{Axis, Identity, State};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::run::progress_bar;

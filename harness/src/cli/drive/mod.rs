@@ -1,4 +1,4 @@
-//! Commands on a bus: one file a command, over the driver [`crate::bus`].
+//! Commands on a bus: one file a command, over the driver [`crate::buses::novobus::driver`].
 
 mod args;
 mod axes;

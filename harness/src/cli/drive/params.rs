@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::params_file::{self, Entry, parameters};
 use super::rig::{self, Bench, Use};
 use super::{axes, file};
-use crate::bus::Axis;
+use crate::buses::novobus::driver::Axis;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::scenario::argument::{Location, Memory};

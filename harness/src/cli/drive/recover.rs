@@ -4,7 +4,7 @@
 use super::args::{Form, RecoverArguments};
 use super::failure::Failure;
 use super::rig::{self, RigName, Use};
-use crate::bus::{self, Axis, Recovery};
+use crate::buses::novobus::driver::{self, Axis, Recovery};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::link::Line;
@@ -32,13 +32,13 @@ pub(super) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Resu
         output.complain(&remark);
     }
     match trouble {
-        Some(trouble) => Err(bus::Error::Link(trouble).into()),
+        Some(trouble) => Err(driver::Error::Link(trouble).into()),
         None => show(arguments, &found, output),
     }
 }
 
 fn every(link: &mut dyn Line, rings: usize) -> Vec<Recovery> {
-    (0..rings).map(|ring| bus::recover(link, ring)).collect()
+    (0..rings).map(|ring| driver::recover(link, ring)).collect()
 }
 
 fn show(

@@ -3,7 +3,7 @@
 
 use super::args::RigArguments;
 use super::failure::Failure;
-use crate::bus::{Axis, Bus, Options};
+use crate::buses::novobus::driver::{Axis, Bus, Options};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};

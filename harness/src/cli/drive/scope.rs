@@ -7,7 +7,7 @@ use super::rig::{self, Bench, Use};
 use super::signal::Signal;
 use super::write::Orders;
 use super::{axes, file};
-use crate::bus::{Axis, Error, Measurement, Scope, Trigger};
+use crate::buses::novobus::driver::{Axis, Error, Measurement, Scope, Trigger};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::report::plot::plot;

@@ -6,7 +6,7 @@
 use super::args::TopArguments;
 use super::failure::Failure;
 use super::rig::{self, Bench, RigName, Use};
-use crate::bus::{Axis, Error, State, Width};
+use crate::buses::novobus::driver::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::link::Trouble;

@@ -5,7 +5,7 @@ use super::axes;
 use super::cell::{Found, find};
 use super::failure::Failure;
 use super::rig::{self, Bench, Use};
-use crate::bus::Axis;
+use crate::buses::novobus::driver::Axis;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::scenario::argument::{Location, cells};

@@ -3,7 +3,7 @@
 use super::look::Miss;
 use super::outcome::Stop;
 use super::player::Runner;
-use crate::locate::{self, Location};
+use crate::buses::novobus::locate::{self, Location};
 use crate::scenario::plan::PlannedCheck;
 use crate::scenario::problem::Span;
 use crate::scenario::syntax::Ending;

@@ -4,7 +4,7 @@
 use super::halt::Halt;
 use super::outcome::Stop;
 use super::player::Runner;
-use crate::bus::{Axis, Bus, Error, Options, conduct, count_drives};
+use crate::buses::novobus::driver::{Axis, Bus, Error, Options, conduct, count_drives};
 use crate::link::{Lead, Line, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::PlannedCall;

@@ -6,11 +6,11 @@
 use super::bytes::{matches, resolve};
 use super::outcome::{Outcome, Unready};
 use super::player::{AtFinding, Runner, lacks, play};
+use crate::buses::novobus::twin::unknowable;
 use crate::link::{Line, Link, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use crate::scenario::verdict::Verdict;
-use crate::twin::unknowable;
 use harness_proto::line::Received;
 use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;

@@ -4,7 +4,7 @@ mod attacks;
 mod random;
 
 use super::size;
-use harness::bus::{Bus, Options};
+use harness::buses::novobus::driver::{Bus, Options};
 use harness::guard::{Guarded, Limits};
 use harness::link::{Line, Link, SimulatedLink, Stimulus};
 use harness_proto::line::Rate;

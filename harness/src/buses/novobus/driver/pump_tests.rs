@@ -1,6 +1,6 @@
 //! How far ahead of the line bytes are handed over, in virtual time.
 
-use crate::bus::{Axis, Bus, Options};
+use crate::buses::novobus::driver::{Axis, Bus, Options};
 use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;

@@ -2,8 +2,8 @@
 
 use super::error::in_words;
 use super::{Axis, Bus, Error};
+use crate::buses::novobus::locate::locate;
 use crate::link::Line;
-use crate::locate::locate;
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::errors::display_digits;

@@ -1,0 +1,3 @@
+//! The buses: one folder each. Only this file names them all.
+
+pub mod novobus;

@@ -1,0 +1,5 @@
+//! NOVOBUS: what the bench knows of this bus alone (ND21 8 to 11).
+
+pub mod driver;
+pub mod locate;
+pub mod twin;
