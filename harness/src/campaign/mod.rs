@@ -12,6 +12,7 @@ pub mod conversation;
 pub mod fault;
 pub mod file;
 pub mod find;
+mod html;
 pub mod plan;
 pub mod replay;
 pub mod report;
@@ -20,4 +21,5 @@ pub mod sound;
 
 pub use class::{Class, Evidence, Wrong};
 pub use fault::Case;
+pub use html::campaigns;
 pub use run::{Campaign, Contradiction, Finished, Outcome};

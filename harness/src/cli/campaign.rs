@@ -9,7 +9,6 @@ use crate::campaign::find::{FindError, find, names};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line, table};
 use crate::campaign::{Campaign, Case, Class, Finished};
-use crate::report::html;
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -68,7 +67,7 @@ pub(super) fn campaign(
         ))?;
     }
     if let Some(path) = &arguments.html
-        && !write(path, &html::campaigns(&all), output)
+        && !write(path, &crate::campaign::campaigns(&all), output)
     {
         return Ok(Exit::RigError);
     }

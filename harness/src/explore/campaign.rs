@@ -1,18 +1,18 @@
 //! A run: case after case, what is new is kept, what is otherwise is confirmed and written down.
 
-use super::case::{Act, Case, Talk, To, What};
+use super::Difference;
+use super::Finding;
+use super::Pool;
 use super::dice::Dice;
+use super::drive_name;
 use super::error::ExploreError;
-use super::finding::Finding;
-use super::generate::{Generator, Scope};
-use super::mutate::mutate;
-use super::novelty::Pool;
-use super::oracle::Difference;
+use super::mutate;
 use super::record::{About, Kept, Line, Progress, Record};
-use super::setup::drive_name;
 use super::swarm::Swarm;
 use super::target::{Rehearsal, Target};
-use super::tour::tour;
+use super::tour;
+use super::{Act, Case, Talk, To, What};
+use super::{Generator, Scope};
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 

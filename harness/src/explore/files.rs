@@ -8,12 +8,12 @@ use std::path::Path;
 const LONGEST: u64 = 256 * 1024 * 1024;
 
 /// Writes a file as a whole or not at all.
-pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), ExploreError> {
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), ExploreError> {
     regular::write_text(path, text).map_err(|error| ExploreError::unwritten("write", path, &error))
 }
 
 /// Reads a text.
-pub(super) fn read_text(path: &Path) -> Result<String, ExploreError> {
+pub(crate) fn read_text(path: &Path) -> Result<String, ExploreError> {
     let read = || {
         let bytes = regular::read(path, Links::Refuse, LONGEST)?;
         String::from_utf8(bytes).map_err(std::io::Error::other)

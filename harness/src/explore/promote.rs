@@ -1,9 +1,9 @@
 //! A finding that is kept: a scenario, an input of the fuzz targets and the table that it leaves, in a checkout of the repository.
 
-use super::case::{Act, Case, Harm, What};
+use super::Finding;
 use super::error::ExploreError;
 use super::files::write_whole;
-use super::finding::Finding;
+use super::{Act, Case, Harm, What};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::manual::tables;

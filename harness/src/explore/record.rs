@@ -3,10 +3,10 @@
 //! `run.jsonl` is the record. Behind a line of progress everything in front of it is settled; what stands behind the last one is
 //! done again when a run is resumed.
 
-use super::case::Case;
+use super::Case;
+use super::Setup;
 use super::error::ExploreError;
 use super::files::read_text;
-use super::setup::Setup;
 use rustix::fs::FlockOperation;
 use serde::{Deserialize, Serialize};
 use std::fs::File;

@@ -1,8 +1,8 @@
 //! Swarm options: each round of a run uses a random subset of what a conversation can have. What is never there lets the rest
 //! stand out: a drive that forgets something after ten reads is not found where every third byte is damaged.
 
+use super::Scope;
 use super::dice::Dice;
-use super::generate::Scope;
 use std::collections::BTreeSet;
 
 /// Something that a conversation can have.

@@ -1,9 +1,9 @@
 //! What cases are tried on.
 
-use super::case::{Act, Case};
+use super::Difference;
+use super::Seen;
 use super::error::ExploreError;
-use super::oracle::Difference;
-use super::play::Seen;
+use super::{Act, Case};
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
 

@@ -1,8 +1,8 @@
 //! Findings made small, and kept.
 
 use crate::{Difference, bounds, explore, planted};
+use harness::buses::novobus::explore::shrink::{Shrunk, Subject, shrink};
 use harness::explore::promote::{Naming, checkout, promote};
-use harness::explore::shrink::{Shrunk, Subject, shrink};
 use harness::explore::{ExploreError, Finding, OnSim, Target};
 use harness::library::Entry;
 use harness::scenario::run::run;

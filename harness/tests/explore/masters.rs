@@ -1,6 +1,6 @@
 //! Wrong masters are found by cases made from a seed, and a right one passes them all.
 
-use harness::explore::masters::{case, cases_until_found, input};
+use harness::buses::novobus::explore::masters::{case, cases_until_found, input};
 use harness_sim::novobus::deviation::{master_deviation, master_deviations};
 use harness_sim::novobus::fuzz::jobs::{Work, judged};
 

@@ -3,7 +3,7 @@
 use crate::command::{begin_and_kill, drivebench, ended, findings, name, names, settled};
 use crate::findings::empty_checkout;
 use crate::{Heard, about, bounds, scope_of};
-use harness::explore::shrink::{Subject, shrink};
+use harness::buses::novobus::explore::shrink::{Subject, shrink};
 use harness::explore::{
     About, Beside, Campaign, Case, Finding, Line, OnSim, Planted, Setup, Target, beside,
     by_novelty, play,

@@ -1,7 +1,7 @@
 //! A case and its scenario are one.
 
 use crate::{repeat, scope, scope_of, seed};
-use harness::explore::text::{Expected, Page, text};
+use harness::buses::novobus::explore::text::{Expected, Page, text};
 use harness::explore::{Case, Dice, Generator, Scope, Seen, Setup, Swarm, mutate, play};
 use harness::library::Entry;
 use harness::link::Link;

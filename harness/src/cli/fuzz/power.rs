@@ -1,11 +1,12 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
 use super::rig::{simulated, tell};
+use crate::buses::novobus::explore::masters;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::explore::{
     About, Bounds, Campaign, ExploreError, Finding, OnSim, Planted, Pool, Progress, Setup, Swarm,
-    Watcher, masters,
+    Watcher,
 };
 use crate::rig::find::find;
 use clap::Args;

@@ -23,7 +23,7 @@ const STEPS: usize = 600;
 const ROWS: usize = 100;
 
 /// Writes the curves.
-pub(super) fn lines(html: &mut Html, id: &str, records: &[Record]) {
+pub(crate) fn lines(html: &mut Html, id: &str, records: &[Record]) {
     let times = records.iter().flat_map(|record| &record.samples);
     let ends = times.fold(None, |ends: Option<(f64, f64)>, sample| {
         let at = ms(sample);
@@ -78,20 +78,20 @@ fn ms(sample: &Sample) -> f64 {
 }
 
 /// A curve, and how its axes are labelled.
-pub(super) struct Curve<'c> {
+pub(crate) struct Curve<'c> {
     /// In front of the names of its parts.
-    pub(super) id: &'c str,
-    pub(super) title: &'c str,
+    pub(crate) id: &'c str,
+    pub(crate) title: &'c str,
     /// A point along and one upwards, in words.
-    pub(super) along: &'c dyn Fn(f64) -> String,
-    pub(super) upwards: &'c dyn Fn(f64) -> String,
+    pub(crate) along: &'c dyn Fn(f64) -> String,
+    pub(crate) upwards: &'c dyn Fn(f64) -> String,
     /// A value holds up to the next one.
-    pub(super) steps: bool,
+    pub(crate) steps: bool,
 }
 
 impl Curve<'_> {
     /// Draws it through these points, which are there, between these ends.
-    pub(super) fn draw(&self, html: &mut Html, known: &[(f64, f64)], (from, to): (f64, f64)) {
+    pub(crate) fn draw(&self, html: &mut Html, known: &[(f64, f64)], (from, to): (f64, f64)) {
         let values = known.iter().map(|(_, value)| *value);
         let (least, most) = values.fold(
             (f64::INFINITY, f64::NEG_INFINITY),

@@ -12,14 +12,10 @@
 //! | `scenario.rs` | the section of a scenario: verdict, section of the manual, expected beside received |
 //! | `diagram.rs` | the space-time diagram of a ring, and the data that the script shows of it |
 //! | `sequence.rs` | what the master and the drives said, one after another |
-//! | `campaign.rs` | the page of campaigns: maps of the ring |
-//! | `explored.rs` | the page of a run of fuzzing |
 //! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it does for whoever points at a byte |
 
-mod campaign;
 mod diagram;
-mod explored;
 mod lines;
 mod page;
 mod scenario;
@@ -27,9 +23,9 @@ mod sequence;
 mod summary;
 mod write;
 
-pub use campaign::campaigns;
-pub use explored::{Explored, explored};
+pub(crate) use lines::Curve;
 pub use page::{MAX_PAGE, Part, Section, page};
 pub use scenario::{Played, section};
+pub(crate) use summary::colour;
 pub use summary::{Head, Shown, run};
 pub use write::{Attribute, Html};

@@ -17,11 +17,11 @@ pub struct Head<'h> {
 
 /// A row of the table.
 #[derive(Clone, Debug)]
-pub(super) struct Row {
-    pub(super) name: String,
-    pub(super) title: String,
+pub(crate) struct Row {
+    pub(crate) name: String,
+    pub(crate) title: String,
     drives: String,
-    pub(super) verdict: Verdict,
+    pub(crate) verdict: Verdict,
     took: Span,
     sources: String,
 }
@@ -29,12 +29,12 @@ pub(super) struct Row {
 /// A scenario's section, and its row in the summary.
 #[derive(Clone, Debug)]
 pub struct Shown {
-    pub(super) row: Row,
-    pub(super) section: Section,
+    pub(crate) row: Row,
+    pub(crate) section: Section,
 }
 
 impl Row {
-    pub(super) fn of(played: &Played<'_>) -> Self {
+    pub(crate) fn of(played: &Played<'_>) -> Self {
         Self {
             name: played.name.to_owned(),
             title: played.title.to_owned(),
@@ -68,7 +68,7 @@ pub fn run(head: &Head<'_>, shown: Vec<Shown>) -> String {
 }
 
 /// The class of a verdict's colour.
-pub(super) fn colour(verdict: Verdict) -> &'static str {
+pub(crate) fn colour(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Passed => "good",
         Verdict::Skipped | Verdict::Marginal | Verdict::Flaky | Verdict::Inconclusive => "open",

@@ -120,7 +120,7 @@ impl Html {
     }
 
     /// The style and the script of a page: files of this folder, which are markup's own contents.
-    pub(super) fn own(&mut self, name: &'static str, contents: &'static str) {
+    pub(crate) fn own(&mut self, name: &'static str, contents: &'static str) {
         self.element(name, &[], |html| html.out.push_str(contents));
     }
 
@@ -153,7 +153,7 @@ impl Html {
 
     /// The page.
     #[must_use]
-    pub(super) fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         format!("<!DOCTYPE html>\n{}", self.out)
     }
 }

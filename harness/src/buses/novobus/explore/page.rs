@@ -1,13 +1,14 @@
 //! The page of a run of fuzzing, made from its folder and nothing else: the same folder gives the same page.
 
-use super::case::Case;
-use super::error::ExploreError;
-use super::finding::Finding;
-use super::play::play;
-use super::record::{Kept, Line, read};
+use super::html::{Explored, explored};
+use crate::explore::Case;
+use crate::explore::ExploreError;
+use crate::explore::Finding;
+use crate::explore::play;
+use crate::explore::{Kept, Line, read};
 use crate::library::Entry;
 use crate::link::Link;
-use crate::report::html::{Explored, Played, Shown, explored, section};
+use crate::report::html::{Played, Shown, section};
 use crate::scenario::problem::Span;
 use crate::scenario::run::{self, AtFinding, Outcome};
 use crate::scenario::simulate::simulated;

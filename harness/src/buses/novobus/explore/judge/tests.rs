@@ -1,17 +1,17 @@
 //! Drives that make every choice left open by the manual in the opposite way to the model are not blamed. Wrong drives are.
 
 use super::*;
-use crate::explore::campaign::{Bounds, Campaign, End, Watcher};
-use crate::explore::case::{Act, Case};
-use crate::explore::dice::Dice;
-use crate::explore::error::ExploreError;
-use crate::explore::finding::Finding;
-use crate::explore::generate::{RingScope, Scope};
-use crate::explore::novelty::Pool;
-use crate::explore::record::{About, Progress};
-use crate::explore::setup::Setup;
-use crate::explore::swarm::{Spice, Swarm};
-use crate::explore::target::{Rehearsal, Target, Tried};
+use crate::buses::novobus::explore::case::{Act, Case};
+use crate::buses::novobus::explore::generate::{RingScope, Scope};
+use crate::buses::novobus::explore::setup::Setup;
+use crate::explore::Dice;
+use crate::explore::ExploreError;
+use crate::explore::Finding;
+use crate::explore::Pool;
+use crate::explore::{About, Progress};
+use crate::explore::{Bounds, Campaign, End, Watcher};
+use crate::explore::{Rehearsal, Target, Tried};
+use crate::explore::{Spice, Swarm};
 use harness_proto::nd21::own;
 use harness_proto::novobus::bus_end::BusEnd;
 use harness_proto::novobus::error::BusError;

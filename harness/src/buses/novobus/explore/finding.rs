@@ -1,13 +1,13 @@
 //! A finding: a case, what was otherwise, and how to see it again. It is kept as JSON, with its scenario beside it.
 
-use super::case::Case;
-use super::error::ExploreError;
-use super::files::{read_text, write_whole};
-use super::judge::Judge;
-use super::oracle::Difference;
-use super::play::Seen;
-use super::setup::Setup;
-use super::text::{Expected, Page, text};
+use crate::buses::novobus::explore::judge::Judge;
+use crate::buses::novobus::explore::text::{Expected, Page, text};
+use crate::explore::Case;
+use crate::explore::Difference;
+use crate::explore::ExploreError;
+use crate::explore::Seen;
+use crate::explore::Setup;
+use crate::explore::files::{read_text, write_whole};
 use crate::manual::tables;
 use harness_proto::novobus::address::RingSize;
 use serde::{Deserialize, Serialize};

@@ -5,10 +5,10 @@
 //! behind the byte that is otherwise nothing is needed, then acts, parts of acts, faults, drives, silence and values.
 
 use super::case::{Act, Beside, Case, Harm, MOST_NET, Talk, To, What};
-use super::error::ExploreError;
 use super::oracle::Difference;
 use super::order::{Command, Order};
 use super::setup::Setup;
+use crate::explore::ExploreError;
 use harness_proto::novobus::memory::RAM;
 use std::collections::BTreeSet;
 

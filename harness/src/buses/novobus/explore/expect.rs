@@ -143,7 +143,7 @@ struct Drive {
 }
 
 /// A byte as the two of them see it; they may differ in whether there is one.
-pub(super) type Both = [Option<Received>; 2];
+pub(crate) type Both = [Option<Received>; 2];
 
 impl Drive {
     fn new(properties: Properties) -> Self {
@@ -206,19 +206,19 @@ impl Drive {
 
 /// What a byte received must be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Must {
+pub(crate) struct Must {
     /// The value.
-    pub(super) byte: u8,
+    pub(crate) byte: u8,
     /// Bits that are the drive's choice.
-    pub(super) open: u8,
+    pub(crate) open: u8,
     /// Whether a byte comes at all is the drive's choice.
-    pub(super) may_be_missing: bool,
+    pub(crate) may_be_missing: bool,
 }
 
 /// A ring of such drives, each with the same properties of the bus.
 #[derive(Clone, Debug)]
-pub(super) struct Model {
-    pub(super) properties: Properties,
+pub(crate) struct Model {
+    pub(crate) properties: Properties,
     /// The first drive is the one that hears the master.
     drives: Vec<Drive>,
     /// The answers under way, by their drives.
@@ -242,7 +242,7 @@ struct Answer {
 
 impl Model {
     /// A ring whose drives wait for a sync byte.
-    pub(super) fn new(size: RingSize, properties: Properties) -> Self {
+    pub(crate) fn new(size: RingSize, properties: Properties) -> Self {
         Self {
             properties,
             drives: vec![Drive::new(properties); usize::from(size.drives())],
@@ -252,13 +252,13 @@ impl Model {
     }
 
     /// A drive has carried out a `ResetH8`: for how long it tests itself, and what of the bus it does meanwhile, is its choice.
-    pub(super) fn was_reset(&self) -> bool {
+    pub(crate) fn was_reset(&self) -> bool {
         let mut cells = self.drives.iter().flat_map(|drive| &drive.cells);
         cells.any(|cells| cells.was_reset)
     }
 
     /// Whether a drive has just written cells with which its program works, or it is its choice which.
-    pub(super) fn writes_what_drives_use(&self) -> bool {
+    pub(crate) fn writes_what_drives_use(&self) -> bool {
         let uses = |drive: &Drive| {
             let [one, other] = &drive.cells;
             one.address_changed
@@ -269,7 +269,7 @@ impl Model {
     }
 
     /// Puts a byte on the link at `place`, the master's outgoing one being 0, and gives what the drive behind it answers.
-    pub(super) fn pass(&mut self, place: usize, bytes: Both) -> Both {
+    pub(crate) fn pass(&mut self, place: usize, bytes: Both) -> Both {
         match self.drives.get_mut(place) {
             Some(drive) => drive.step(bytes),
             None => bytes,
@@ -277,7 +277,7 @@ impl Model {
     }
 
     /// What the master must receive where these came out of the ring.
-    pub(super) fn must(&self, out: Both, role: Role) -> Option<Must> {
+    pub(crate) fn must(&self, out: Both, role: Role) -> Option<Must> {
         let must = |byte, open, may_be_missing| Must {
             byte,
             open,
@@ -317,7 +317,7 @@ impl Model {
     }
 
     /// Whether the checking byte with this role is one over data that are the drive's choice.
-    pub(super) fn awaits_open(&self, role: Role) -> bool {
+    pub(crate) fn awaits_open(&self, role: Role) -> bool {
         self.sum(role).is_some()
     }
 
@@ -332,7 +332,7 @@ impl Model {
     }
 
     /// The section of the rule that a byte with this role obeys: for what a cell holds, that by which it was written.
-    pub(super) fn section(&self, role: Role) -> &'static str {
+    pub(crate) fn section(&self, role: Role) -> &'static str {
         match role {
             Role::Data {
                 drive: Some(drive),
@@ -344,7 +344,7 @@ impl Model {
     }
 
     /// Takes over what was received for a byte that was sent.
-    pub(super) fn take(&mut self, (sent, role): (u8, Role), must: Must, received: u8) {
+    pub(crate) fn take(&mut self, (sent, role): (u8, Role), must: Must, received: u8) {
         if matches!(role, Role::CheckSequence | Role::Foreign) {
             self.answers.clear();
         }

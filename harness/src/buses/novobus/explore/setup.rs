@@ -33,7 +33,7 @@ pub struct Planted {
     clippy::trivially_copy_pass_by_ref,
     reason = "serde calls it with a reference"
 )]
-pub(super) const fn is_first(ring: &usize) -> bool {
+pub(crate) const fn is_first(ring: &usize) -> bool {
     *ring == 0
 }
 
@@ -174,7 +174,7 @@ impl Setup {
 }
 
 /// A drive as a scenario writes it: `3`, or `2:3` in ring 2; the ring is counted from 0.
-pub(super) fn drive_name(ring: usize, drive: u8) -> String {
+pub(crate) fn drive_name(ring: usize, drive: u8) -> String {
     let prefix = if ring == 0 { "" } else { "2:" };
     format!("{prefix}{drive}")
 }

@@ -3,9 +3,9 @@
 //! A feature is what a drive's end of the bus did, with what stood on the line then: which byte of which kind of telegram came behind
 //! which other, how the ring answered it, what the drives marked there (ND21 9.7) and for what reason.
 
-use super::case::Case;
-use super::dice::Dice;
-use super::play::Seen;
+use crate::explore::Case;
+use crate::explore::Dice;
+use crate::explore::Seen;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_sim::novobus::trace::Trace;

@@ -1,9 +1,9 @@
 //! What a drive must not take, and what it does then: wrong bytes at each place, and the way back (ND21 9.2 to 9.8, 10.4, 10.5).
 
 use super::super::case::{Act, Damage, Harm, Talk, To, What};
-use super::super::dice::Dice;
 use super::super::order::{Command, Order};
 use super::{Tour, page_cell, recover, shuffled, spare, spoiled, talk};
+use crate::explore::Dice;
 use harness_proto::novobus::check_sequence::SEQUENCE;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::layout;

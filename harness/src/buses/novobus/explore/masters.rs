@@ -3,7 +3,7 @@
 //! The judge knows which faults there were and looks into the drives, so that no second master is needed to say what the first one should
 //! have told. Cases are made from a seed and none depends on another.
 
-use super::dice::Dice;
+use crate::explore::Dice;
 use harness_sim::novobus::deviation::MasterDeviation;
 use harness_sim::novobus::fuzz::jobs::{Lie, Work, judged};
 

@@ -1,10 +1,10 @@
 //! New cases from numbers: telegrams mostly as they should be, now and then not, and a look at what came of them.
 
 use super::case::{Act, Beside, Case, Damage, Harm, MOST_NET, Talk, To, What};
-use super::dice::Dice;
 use super::idiom::Idiom;
 use super::order::{Command, Order, Spoil};
-use super::swarm::{Spice, Swarm};
+use crate::explore::Dice;
+use crate::explore::{Spice, Swarm};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::cells::{Access, RAM};
 use harness_proto::nd21::ram;
@@ -157,23 +157,23 @@ impl<'s> Generator<'s> {
     }
 
     /// A drive of the ring.
-    pub(super) fn drive(&self, dice: &mut Dice) -> u8 {
+    pub(crate) fn drive(&self, dice: &mut Dice) -> u8 {
         dice.below(usize::from(self.ring.drives)) as u8
     }
 
     /// All of them.
-    pub(super) fn drives(&self) -> std::ops::Range<u8> {
+    pub(crate) fn drives(&self) -> std::ops::Range<u8> {
         0..self.ring.drives
     }
 
     /// The link in front of a drive, where faults can be put on it.
-    pub(super) fn link_before(&self, drive: u8) -> Option<u8> {
+    pub(crate) fn link_before(&self, drive: u8) -> Option<u8> {
         let link = self.ring.drives.checked_sub(drive + 1)?;
         self.ring.links.contains(&link).then_some(link)
     }
 
     /// Whether the rig allows a command.
-    pub(super) fn allows(&self, command: Command) -> bool {
+    pub(crate) fn allows(&self, command: Command) -> bool {
         let act = command.act();
         let need = act.need();
         let eeprom = need.contains(Need::EEPROM) && !need.contains(Need::EVERYTHING);
@@ -181,7 +181,7 @@ impl<'s> Generator<'s> {
     }
 
     /// A command that changes something, where the rig allows one.
-    pub(super) fn change(&self, dice: &mut Dice) -> Command {
+    pub(crate) fn change(&self, dice: &mut Dice) -> Command {
         const CHANGES: [Spice; 5] = [
             Spice::WriteByte,
             Spice::WriteWord,
@@ -357,7 +357,7 @@ impl<'s> Generator<'s> {
         }
     }
 
-    pub(super) fn cell(&self, dice: &mut Dice) -> u16 {
+    pub(crate) fn cell(&self, dice: &mut Dice) -> u16 {
         match dice.below(100) {
             0..12 if self.swarm.has(Spice::Forbidden) => EDGES[dice.below(EDGES.len())],
             12..16 if self.swarm.has(Spice::Forbidden) => dice.word(),

@@ -14,7 +14,7 @@ use harness_proto::novobus::role::{Role, roles_with};
 use std::collections::BTreeMap;
 
 /// The first conversation with drives that were made ready: a telegram to nobody, behind which every drive knows its address (ND21 9.3).
-pub(super) fn prologue(drives: u8, beside: Option<Beside>) -> Case {
+pub(crate) fn prologue(drives: u8, beside: Option<Beside>) -> Case {
     let read = Command::ReadByte { cell: 0xFE13 };
     Case {
         drives,
@@ -25,7 +25,7 @@ pub(super) fn prologue(drives: u8, beside: Option<Beside>) -> Case {
 
 /// What the master sent, what met it on links, and what came back.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Exchange {
+pub(crate) struct Exchange {
     /// Bytes, and whether each went round whole.
     sent: Vec<(u8, bool)>,
     /// What happens on links: which link, which byte on it counted from 1.
@@ -35,7 +35,7 @@ pub(super) struct Exchange {
 
 impl Exchange {
     /// A case that was played.
-    pub(super) fn of(case: &Case, received: Vec<Received>) -> Self {
+    pub(crate) fn of(case: &Case, received: Vec<Received>) -> Self {
         let mut harms: BTreeMap<_, Vec<Harm>> = BTreeMap::new();
         for (link, byte, harm) in case.faults() {
             let place = (usize::from(link), byte);
@@ -61,7 +61,7 @@ struct Mismatch {
 
 /// What a ring was seen to do since its drives were made ready.
 #[derive(Clone, Debug)]
-pub(super) struct Judge {
+pub(crate) struct Judge {
     ring: usize,
     size: RingSize,
     /// Whether the link shows line errors at their bytes.
@@ -76,7 +76,7 @@ pub(super) struct Judge {
 
 impl Judge {
     /// A ring, counted from 0, of which nothing is known but its size.
-    pub(super) fn new(ring: usize, size: RingSize, line_errors: bool) -> Self {
+    pub(crate) fn new(ring: usize, size: RingSize, line_errors: bool) -> Self {
         let possible = all_properties();
         Self {
             ring,
@@ -90,7 +90,7 @@ impl Judge {
     }
 
     /// Its drives were made ready: what their cells hold is not known any more. Their kind stays known.
-    pub(super) fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.log.clear();
         self.sent.clear();
         let properties = self.possible.first().copied().unwrap_or_default();
@@ -98,7 +98,7 @@ impl Judge {
     }
 
     /// Mismatch of a ring with every drive that the manual permits. Call [`Self::begin`] after it.
-    pub(super) fn see(&mut self, exchange: Exchange) -> Option<Difference> {
+    pub(crate) fn see(&mut self, exchange: Exchange) -> Option<Difference> {
         let before = self.possible.clone();
         let mut best: Option<Mismatch> = None;
         loop {
@@ -244,7 +244,7 @@ impl Judge {
     }
 
     /// What a case will do to the drives, as far as the model knows.
-    pub(super) fn foresee(&self, case: &Case) -> Foreseen {
+    pub(crate) fn foresee(&self, case: &Case) -> Foreseen {
         let mut model = self.model.clone();
         let mut seen = Foreseen::default();
         let case = Exchange::of(case, Vec::new());
@@ -273,14 +273,14 @@ impl Judge {
 
 /// What a case will do.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Foreseen {
+pub(crate) struct Foreseen {
     /// How many bytes come back.
-    pub(super) count: usize,
+    pub(crate) count: usize,
     /// Those of them that drives may answer in more than one way, by their index.
-    pub(super) open: Vec<usize>,
+    pub(crate) open: Vec<usize>,
     /// Whether cells are written with which a drive's program works, or nobody knows which, or a fault meets what is the drive's choice: what
     /// comes of that no model says.
-    pub(super) is_harmful: bool,
+    pub(crate) is_harmful: bool,
 }
 
 /// A byte of the master's on its way round.

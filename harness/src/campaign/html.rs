@@ -1,10 +1,10 @@
 //! The page of campaigns: how many cases of each class, and where in the ring which class happens, as a map of letters and colours.
 
-use super::page::{Part, Section, page};
-use super::write::Html;
 use crate::campaign::fault::{Bit, What};
 use crate::campaign::report::{WORST, happened, share};
 use crate::campaign::{Class, Finished};
+use crate::report::html::Html;
+use crate::report::html::{Part, Section, page};
 use std::collections::BTreeMap;
 
 /// Cells of a map at most: of a larger one several bytes stand in one row.

@@ -48,7 +48,7 @@ pub struct Expected<'a> {
 }
 
 /// The lines in front of the first empty one, for rings of these sizes.
-pub(super) fn head(sizes: &[u8], strict: bool, page: &Page<'_>) -> String {
+pub(crate) fn head(sizes: &[u8], strict: bool, page: &Page<'_>) -> String {
     let mut text = format!("title   {}\n", page.title);
     // Writing to a String cannot fail.
     for source in page.sources {

@@ -1,17 +1,17 @@
 //! Short plots: acts that belong together, as a master would do them. Single acts in any order come to them too seldom.
 
 use super::case::{Act, Damage, Harm, MOST_NET, Talk, To, What};
-use super::dice::Dice;
 use super::generate::Generator;
 use super::order::{Command, Order, Spoil};
-use super::swarm::Spice;
+use crate::explore::Dice;
+use crate::explore::Spice;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::{CONFIRM_ERROR, ram};
 use harness_proto::novobus::checksum::Checksum;
 
 /// A short plot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Idiom {
+pub(crate) enum Idiom {
     /// A cell is changed and read again (ND21 10).
     WriteAndRead,
     /// Process data go out of one cell and into another (9.4).
@@ -36,7 +36,7 @@ pub(super) enum Idiom {
 
 impl Idiom {
     /// Each with what a swarm must have for it.
-    pub(super) const ALL: [(Self, Spice); 12] = [
+    pub(crate) const ALL: [(Self, Spice); 12] = [
         (Self::WriteAndRead, Spice::WriteByte),
         (Self::WriteAndRead, Spice::Or),
         (Self::WriteAndRead, Spice::WriteIo),
@@ -52,7 +52,7 @@ impl Idiom {
     ];
 
     /// Adds its acts.
-    pub(super) fn play(self, acts: &mut Vec<Act>, maker: &Generator<'_>, dice: &mut Dice) {
+    pub(crate) fn play(self, acts: &mut Vec<Act>, maker: &Generator<'_>, dice: &mut Dice) {
         let drive = maker.drive(dice);
         match self {
             Self::WriteAndRead => write_and_read(acts, drive, maker, dice),

@@ -1,12 +1,12 @@
 //! Cases on simulated rings, in virtual time.
 
 use super::case::Case;
-use super::error::ExploreError;
-use super::novelty::features;
 use super::oracle::{Difference, against_model, against_reference, against_witnesses, beside};
 use super::play::play;
 use super::setup::Setup;
-use super::target::{Rehearsal, Target, Tried};
+use crate::explore::ExploreError;
+use crate::explore::features;
+use crate::explore::{Rehearsal, Target, Tried};
 use crate::link::{Link, SimulatedLink};
 use harness_sim::novobus::trace::Trace;
 

@@ -1,9 +1,9 @@
 //! New cases from old ones.
 
 use super::case::{Act, Case, To, What};
-use super::dice::Dice;
 use super::generate::Generator;
 use super::order::{Command, Order};
+use crate::explore::Dice;
 
 /// A case made of one that is kept, and now and then of two.
 pub fn mutate(case: &Case, other: Option<&Case>, maker: &Generator<'_>, dice: &mut Dice) -> Case {

@@ -5,10 +5,10 @@ mod bus;
 mod memory;
 
 use super::case::{Act, Case, Talk, To, What};
-use super::dice::Dice;
 use super::generate::{RingScope, Scope};
 use super::order::{Command, Order, Spoil};
-use super::swarm::Spice;
+use crate::explore::Dice;
+use crate::explore::Spice;
 use harness_proto::nd21::{own, ram};
 
 /// The most bytes of a case of the tour.
@@ -53,7 +53,7 @@ struct Tour<'s> {
 
 /// The cases for a ring, in the order in which they are tried.
 #[must_use]
-pub(super) fn tour(scope: &Scope, ring: &RingScope, seed: u64) -> Vec<Case> {
+pub(crate) fn tour(scope: &Scope, ring: &RingScope, seed: u64) -> Vec<Case> {
     let own = Tour {
         ring,
         drives: visited(ring.drives),

@@ -1,9 +1,9 @@
 //! What a drive's memory must do: each cell, each value, each mask, and the ends of what commands may touch (ND21 9.4, 10.1 to 10.3).
 
 use super::super::case::{Act, What};
-use super::super::dice::Dice;
 use super::super::order::Command;
 use super::{Tour, exchange, page_cell, recover, shuffled, spare, talk};
+use crate::explore::Dice;
 use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::command::Kind;
 use harness_proto::novobus::memory::{ROM_BYTES, ROM_WORDS, in_range};

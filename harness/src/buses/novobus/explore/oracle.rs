@@ -139,7 +139,7 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
 }
 
 /// The bytes that a case sends, and whether each goes round whole; what comes late is whole.
-pub(super) fn sent(case: &Case) -> Vec<(u8, bool)> {
+pub(crate) fn sent(case: &Case) -> Vec<(u8, bool)> {
     let faults = case.faults().into_iter();
     let spoiling = faults.filter(|(.., harm)| !matches!(harm, Harm::Delay(_)));
     let damaged: BTreeSet<u64> = spoiling.map(|(_, byte, _)| byte).collect();
@@ -149,7 +149,7 @@ pub(super) fn sent(case: &Case) -> Vec<(u8, bool)> {
 }
 
 /// The roles of bytes that are answered: a PAUSE where a sync byte is due is not (ND21 9.2).
-pub(super) fn answered<'a>(
+pub(crate) fn answered<'a>(
     roles: &'a [Role],
     sent: &'a [(u8, bool)],
 ) -> impl Iterator<Item = Role> + 'a {

@@ -2,14 +2,14 @@
 //! made ready anew where nobody knows their state any more.
 
 use super::case::{Act, Beside, Case, Harm, What};
-use super::error::ExploreError;
 use super::judge::{Exchange, Judge, prologue};
-use super::novelty::features;
 use super::oracle::{Difference, sent};
 use super::order::{Command, Order};
 use super::play::Seen;
-use super::target::{Rehearsal, Target, Tried};
 use crate::buses::novobus::twin;
+use crate::explore::ExploreError;
+use crate::explore::features;
+use crate::explore::{Rehearsal, Target, Tried};
 use crate::guard::Guarded;
 use crate::link::{Capability, Line as _, Link, Moment, PlacedFault, SimulatedLink, Trouble};
 use crate::rig::{Run, examine};

@@ -1,10 +1,10 @@
 //! The page of a run of fuzzing: what was found, what was reached, how it went on.
 
-use super::lines::Curve;
-use super::page::{Section, page};
-use super::summary::Shown;
-use super::write::Html;
 use crate::explore::{About, Progress};
+use crate::report::html::Curve;
+use crate::report::html::Html;
+use crate::report::html::Shown;
+use crate::report::html::{Section, page};
 use harness_sim::novobus::transitions::{Event, Reached, State, Transition, why_unreachable};
 
 /// Progress shown in a table at most; of a longer run every n-th line is.
@@ -12,7 +12,7 @@ const ROWS: usize = 40;
 
 /// What a run of fuzzing has come to.
 #[derive(Clone, Debug)]
-pub struct Explored<'e> {
+pub(crate) struct Explored<'e> {
     /// What the run is.
     pub about: &'e About,
     /// How far it had come, again and again; the last one is where it stands.
@@ -29,7 +29,7 @@ pub struct Explored<'e> {
 
 /// The page of a run.
 #[must_use]
-pub fn explored(run: Explored<'_>) -> String {
+pub(crate) fn explored(run: Explored<'_>) -> String {
     let mut front = Html::new();
     front.element("section", &[("aria-labelledby", &"summary")], |html| {
         html.line("h2", &[("id", &"summary")], "Summary");
@@ -111,7 +111,7 @@ fn findings(html: &mut Html, all: &[Shown]) {
             html.element("tr", &[], |html| {
                 html.line(
                     "td",
-                    &[("class", &super::summary::colour(row.verdict))],
+                    &[("class", &crate::report::html::colour(row.verdict))],
                     row.verdict,
                 );
                 html.element("th", &[("scope", &"row")], |html| {

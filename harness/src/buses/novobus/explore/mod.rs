@@ -1,0 +1,37 @@
+//! Exploring the ring: cases as values, and what generates, plays, judges and shrinks them.
+
+mod case;
+mod expect;
+mod finding;
+mod generate;
+mod html;
+mod idiom;
+mod judge;
+pub mod masters;
+mod mutate;
+mod novelty;
+mod on_rig;
+mod on_sim;
+mod oracle;
+mod order;
+mod page;
+mod play;
+mod setup;
+pub mod shrink;
+pub mod text;
+mod tour;
+
+pub use case::{Act, Beside, Case, Damage, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, Talk, To, What};
+pub use finding::Finding;
+pub use generate::{Generator, RingScope, Scope};
+pub use mutate::mutate;
+pub use novelty::{MOST_KEPT, Pool, by_novelty, features};
+pub use on_rig::OnRig;
+pub use on_sim::OnSim;
+pub use oracle::{Difference, against_model, against_reference, against_witnesses, beside};
+pub use order::{Command, Order, Spoil};
+pub use page::page;
+pub use play::{Seen, play};
+pub(crate) use setup::drive_name;
+pub use setup::{Planted, Setup};
+pub(crate) use tour::tour;
