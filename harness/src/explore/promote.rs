@@ -110,7 +110,7 @@ pub fn promote(finding: &Finding, naming: &Naming, top: &Path) -> Result<Promote
     })
 }
 
-/// The snapshot of a scenario, as `cargo test --test scenarios` compares it; the model must pass the scenario.
+/// The snapshot of a scenario, as `cargo test --test files scenarios` compares it; the model must pass the scenario.
 fn snapshot(name: &str, text: &str) -> Result<String, ExploreError> {
     let entry = Entry::new(
         Source {
@@ -134,7 +134,7 @@ fn snapshot(name: &str, text: &str) -> Result<String, ExploreError> {
     }
     let traces: Vec<_> = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
     Ok(format!(
-        "---\nsource: harness/tests/scenarios.rs\n---\n{}\n",
+        "---\nsource: harness/tests/files/scenarios.rs\n---\n{}\n",
         page(&entry, &outcome, &traces).trim_end_matches('\n')
     ))
 }

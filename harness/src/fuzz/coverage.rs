@@ -61,7 +61,7 @@ pub enum CoverageError {
         error: InputError,
     },
     /// An input breaks a rule of the manual; the panic before this says which.
-    #[error("{name} breaks a rule, see above; `cargo test --test corpora` plays it too")]
+    #[error("{name} breaks a rule, see above; `cargo test --test bus corpora` plays it too")]
     Rule {
         /// The file.
         name: String,

@@ -1,7 +1,7 @@
 //! Qualification in virtual time: right drives have no deviations, whatever they may be asked, and what was found of wrong ones can be
 //! loaded again.
 
-use super::{ended, said, verify};
+use crate::program::{ended, said, verify};
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -88,6 +88,19 @@ impl Served {
             _folder: folder,
         }
     }
+
+    /// What a rig's file says of one of them under `[ring.1]`.
+    pub(crate) fn lines(&self, ring: usize) -> String {
+        let (transport, port) = match &self.endpoints[ring] {
+            Endpoint::Pty(path) => ("pty", path.display().to_string()),
+            Endpoint::Tcp(address) => ("tcp", address.clone()),
+            other => panic!("{other}"),
+        };
+        let drives = self.sizes[ring];
+        format!(
+            "drives = {drives}\ntransport = \"{transport}\"\nport = \"{port}\"\nmarks = \"in-band\"\ntime_tolerance = \"20ms\"\n"
+        )
+    }
 }
 
 impl Drop for Served {

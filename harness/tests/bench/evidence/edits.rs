@@ -1,0 +1,95 @@
+//! Edited evidence of simulated rigs, and signatures.
+
+use crate::edits::{PASSES, check, fit, kept};
+use crate::program::{Desk, ended};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// What makes the drives of a simulated rig its own, which all scenarios share.
+const OWN: &str =
+    "drives = 2\ntransport = \"sim\"\n[sim]\nsetup = [\"drive 0 memory FE20 = 00\"]\n";
+
+#[test]
+fn of_a_simulated_rig() {
+    check(&kept(OWN, "run", false));
+}
+
+#[test]
+fn of_rings_of_their_own() {
+    check(&kept("drives = 2\ntransport = \"sim\"\n", "run", false));
+}
+
+#[test]
+fn of_a_qualification() {
+    check(&kept(OWN, "qualify", false));
+}
+
+/// A scenario that failed is not made to have passed by changing all that tells of it.
+#[test]
+fn a_deleted_failure() {
+    let kept = kept(OWN, "run", false);
+    let lines = kept.lines();
+    let failed = |line: &Value| line["kind"] == "case" && line["name"] == "fails";
+    let mut without: Vec<Value> = lines.iter().filter(|line| !failed(line)).cloned().collect();
+    let last = without.last_mut().expect("lines");
+    last["verdicts"].as_array_mut().expect("a list").remove(1);
+    assert!(kept.refused(&without));
+}
+
+/// A signature by the standard tool, checked and broken.
+#[test]
+fn signatures() {
+    if !crate::debian::has("ssh-keygen", "signatures") {
+        return;
+    }
+    let keygen = |folder: &Path| {
+        Command::new("ssh-keygen")
+            .args(["-q", "-t", "ed25519", "-N", "", "-f", "key"])
+            .current_dir(folder)
+            .output()
+    };
+    let desk = Desk::new(OWN);
+    let made = keygen(&desk.path("")).expect("ssh-keygen");
+    assert!(made.status.success());
+    fs::write(desk.path("passes.scn"), PASSES).expect("room");
+    let run = |more: &[&str]| {
+        let fixed = ["run", "--rig", "desk.toml", "passes.scn", "--evidence"];
+        desk.run(&[&fixed[..], more].concat())
+    };
+    ended(
+        &run(&["none", "--sign", "missing"]),
+        2,
+        "ssh-keygen -t ed25519",
+    );
+    ended(&run(&["kept", "--sign", "key"]), 0, "1 passed");
+    let public = fs::read_to_string(desk.path("key.pub")).expect("a key");
+    fs::write(desk.path("signers"), format!("bench@lab {public}")).expect("room");
+    let signed = |identity: &str| {
+        let by = ["--allowed-signers", "signers", "--identity", identity];
+        desk.run(&[&["verify", "kept"], &by[..]].concat())
+    };
+    ended(&signed("bench@lab"), 0, "signed by    bench@lab");
+    ended(
+        &signed("someone@else"),
+        1,
+        "SHA256SUMS.sig is no signature of someone@else",
+    );
+    ended(
+        &desk.run(&["verify", "kept"]),
+        0,
+        "unconfirmed  its signature",
+    );
+    let versions = desk.path("kept/versions.json");
+    let text = fs::read_to_string(&versions).expect("a file");
+    fs::write(&versions, text.replace("kernel", "kernels")).expect("room");
+    fit(&desk.path("kept"));
+    ended(
+        &signed("bench@lab"),
+        1,
+        "SHA256SUMS.sig is no signature of bench@lab",
+    );
+    fs::remove_file(desk.path("kept/SHA256SUMS.sig")).expect("a file");
+    ended(&signed("bench@lab"), 1, "SHA256SUMS.sig: it is missing");
+}

@@ -1,0 +1,4 @@
+//! Folders of evidence: untouched ones verify, changed ones do not.
+
+mod edits;
+mod special;

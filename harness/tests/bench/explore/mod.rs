@@ -1,0 +1,107 @@
+//! Exploring: cases and their texts, runs that repeat and go on, findings that become small and are kept.
+
+mod command;
+mod findings;
+mod masters;
+mod rings;
+mod runs;
+mod texts;
+mod witness;
+
+use harness::explore::{
+    About, Bounds, Campaign, Difference, End, ExploreError, Finding, OnSim, Planted, Pool,
+    Progress, Rehearsal, RingScope, Scope, Setup, Spice, Swarm, Target, Tried, Watcher,
+};
+use harness_proto::novobus::guard::Limits;
+
+/// The seed of every random test: `DRIVEBENCH_SEED`, or always the same.
+fn seed() -> u64 {
+    let seed = std::env::var("DRIVEBENCH_SEED").ok();
+    seed.and_then(|seed| seed.parse().ok()).unwrap_or(38_400)
+}
+
+fn repeat(test: &str) -> String {
+    format!(
+        "repeat with: DRIVEBENCH_SEED={} cargo test --test bench {test}",
+        seed()
+    )
+}
+
+/// Everything on a simulated ring of plain drives.
+fn scope(drives: u8) -> Scope {
+    scope_of(drives, None)
+}
+
+/// The same with a second ring.
+fn scope_of(drives: u8, second: Option<u8>) -> Scope {
+    let (first, second) = RingScope::both(drives, second, |_, _| true);
+    let behind = [Spice::Motion, Spice::Eeprom];
+    let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
+    Scope {
+        first,
+        second,
+        spices: all.filter(|spice| !behind.contains(spice)).collect(),
+        limits: Limits::unlimited(),
+        spare_eeprom: false,
+    }
+}
+
+fn planted(drive: u8, name: &str) -> Setup {
+    Setup {
+        header: Vec::new(),
+        deviates: vec![Planted {
+            ring: 0,
+            drive,
+            name: name.to_owned(),
+        }],
+    }
+}
+
+fn about(setup: &Setup, seed: u64) -> About {
+    About {
+        schema: About::SCHEMA,
+        rig: "sim:3".to_owned(),
+        drives: 3,
+        second: None,
+        ports: false,
+        seed,
+        confirm: 2,
+        of: 3,
+        setup: setup.clone(),
+        spices: Vec::new(),
+    }
+}
+
+/// Keeps what a run tells of.
+#[derive(Default)]
+struct Heard {
+    findings: Vec<Finding>,
+}
+
+impl Watcher for Heard {
+    fn round(&mut self, _: u64, _: &Swarm) {}
+
+    fn found(&mut self, finding: &Finding, _: &str) {
+        self.findings.push(finding.clone());
+    }
+
+    fn progress(&mut self, _: &Progress, _: &Pool) {}
+}
+
+fn bounds(cases: u64, findings: usize) -> Bounds {
+    Bounds {
+        cases,
+        wire: None,
+        findings,
+        every: 50,
+    }
+}
+
+/// A run on a ring of three; what was found, and after how many cases it ended.
+fn explore(setup: &Setup, seed: u64, bounds: &Bounds) -> (Vec<Finding>, Campaign, End) {
+    let mut campaign = Campaign::new(about(setup, seed), scope(3));
+    let mut heard = Heard::default();
+    let mut target = OnSim::new(setup.clone());
+    let end = campaign.run(&mut target, None, bounds, &mut heard);
+    (heard.findings, campaign, end.expect("a simulated ring"))
+}

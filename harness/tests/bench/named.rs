@@ -1,0 +1,79 @@
+//! Wrong drives and wrong masters planted in simulated rigs: `qualify` names them.
+
+use crate::program::{Desk, ended, said};
+
+#[test]
+fn deviations_of_telegrams_are_named() {
+    named(&[
+        "checksum-wrong",
+        "checksum-not-checked",
+        "increments-twice",
+        "does-not-increment",
+        "forwards-without-delay",
+        "writes-ignored",
+        "read-long-reversed",
+    ]);
+}
+
+#[test]
+fn deviations_of_the_error_mode_are_named() {
+    named(&[
+        "ignores-parity-errors",
+        "counts-7-zeros",
+        "sends-16-zeros",
+        "sends-18-zeros",
+        "time-out-after-25ms",
+        "no-zeros-unasked",
+        "zeros-20ms-after-a-time-out",
+        "read-word-high-first",
+    ]);
+}
+
+/// Each of these, planted in the middle drive of three, is among those that `qualify` names.
+fn named(names: &[&str]) {
+    for name in names {
+        let desk = Desk::new(&format!(
+            "drives = 3\ntransport = \"sim\"\n[sim]\nsetup = [\"drive 1 deviates {name}\"]\n"
+        ));
+        let output = desk.run(&["qualify", "--rig", "desk.toml", "--evidence", "kept"]);
+        ended(&output, 1, &format!("{name} (ND21 "));
+        let line = |line: &str| line.starts_with("deviation") && line.contains(&format!("{name} "));
+        let text = said(&output);
+        let line = text.lines().find(|own| line(own)).expect("its name");
+        // A ring that cannot be played on any further may not show which drive it is.
+        let one_of = line
+            .rsplit_once("not known which drive: one of ")
+            .is_some_and(|(_, drives)| drives.split(", ").any(|drive| drive == "1"));
+        assert!(line.contains(" drive 1: ") || one_of, "{text}");
+        let verified = desk.run(&["verify", "kept"]);
+        ended(&verified, 0, "0 things wrong");
+    }
+}
+
+/// A wrong master of the bench's own is named, in the evidence too; and the bench is to blame, not a drive. `deviations` has all of them.
+#[test]
+fn wrong_masters_are_named() {
+    for (name, scenario) in [
+        ("check-byte-off-by-one", "11.6-driver-jobs"),
+        ("names-the-link-behind", "9.7-driver-names-the-link"),
+        ("never-gives-up", "11.5-driver-gives-up"),
+    ] {
+        let desk = Desk::new(&format!(
+            "drives = 3\ntransport = \"sim\"\n[sim]\nsetup = [\"master deviates {name}\"]\n"
+        ));
+        let more = [
+            "qualify",
+            scenario,
+            "--allow-motion",
+            "--rig",
+            "desk.toml",
+            "--evidence",
+            "kept",
+        ];
+        let output = desk.run(&more);
+        ended(&output, 3, &format!("the master: {name} "));
+        let named = std::fs::read_to_string(desk.path("kept/deviations.txt")).expect("a file");
+        assert!(named.contains("the bench is wrong, not a drive"), "{named}");
+        ended(&desk.run(&["verify", "kept"]), 0, "0 things wrong");
+    }
+}

@@ -1,0 +1,13 @@
+//! The bus in virtual time: the codec, the driver, the language, the guard and the twin on simulated rings.
+
+mod blind;
+mod busy;
+mod campaigns;
+mod corpora;
+mod deviations;
+mod driver;
+mod guard;
+mod language;
+mod naming;
+mod twin;
+mod vectors;

@@ -1,0 +1,136 @@
+//! The commands of a page, run in one shell in a folder of their own.
+
+use super::compare::fits;
+use super::page::{Mode, Shown, Step};
+use crate::debian;
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+use std::fmt::Write as _;
+use std::os::unix::process::CommandExt as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A page that hangs is ended; no page is judged by how long it takes.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// Does the steps and says what came out otherwise than the page shows.
+pub(super) fn differences(steps: &[Step], page: &str) -> String {
+    let home = tempfile::tempdir().expect("a folder");
+    let (work, out) = (home.path().join("work"), home.path().join("out"));
+    for folder in [&work, &out, &home.path().join("bin")] {
+        std::fs::create_dir(folder).expect("a folder");
+    }
+    let program = home.path().join("bin/drivebench");
+    std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_drivebench"), program).expect("a link");
+
+    let mut script = "cd work\n".to_owned();
+    let mut commands: Vec<&Shown> = Vec::new();
+    for (number, step) in steps.iter().enumerate() {
+        match step {
+            Step::File { name, text } => {
+                // Files are there when their turn comes: a later one may have the name of an earlier one.
+                let kept = out.join(format!("file{number}"));
+                std::fs::write(&kept, text).expect("a file");
+                let _written = writeln!(
+                    script,
+                    "mkdir -p \"$(dirname '{name}')\"; cp ../out/file{number} '{name}'"
+                );
+            }
+            Step::Command(mode, shown) if wanted(mode, page) => {
+                script.push_str(&one(&shown.command, commands.len()));
+                commands.push(shown);
+            }
+            Step::Command(..) => {}
+        }
+    }
+    std::fs::write(home.path().join("script"), script).expect("a file");
+    let ended = run(home.path());
+    let mut text = String::new();
+    if !ended {
+        let _written = writeln!(text, "{page}: did not end in {PATIENCE:?}");
+    }
+    for (number, shown) in commands.iter().enumerate() {
+        text.push_str(&difference(shown, &out, number, page));
+    }
+    text
+}
+
+fn wanted(mode: &Mode, page: &str) -> bool {
+    let Mode::Needs(tool) = mode else {
+        return *mode == Mode::Run;
+    };
+    debian::has(tool, page)
+}
+
+/// One command of the script. One in the background has begun when it has said its first line.
+fn one(command: &str, number: usize) -> String {
+    let wait = if command.ends_with('&') {
+        format!("while ! [ -s ../out/{number} ] && kill -0 $! 2>/dev/null; do sleep 0.05; done\n")
+    } else {
+        String::new()
+    };
+    format!(
+        "{{ {command}\n}} >\"$OUT/{number}\" 2>&1 </dev/null; echo $? >\"$OUT/{number}.code\"\n{}",
+        wait.replace("../out", "\"$OUT\"")
+    )
+}
+
+/// Runs the script in a process group of its own, and ends whatever of it is still there. `false`: it hung.
+fn run(home: &Path) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(home.join("bin")).chain(std::env::split_paths(&path));
+    let mut child = Command::new("sh")
+        .arg("script")
+        .current_dir(home)
+        .env_clear()
+        .env("PATH", std::env::join_paths(folders).expect("a path"))
+        .env("HOME", home)
+        .env("OUT", home.join("out"))
+        .env("TMPDIR", home)
+        .env("DRIVEBENCH_STATE", home.join("state"))
+        .env("NO_COLOR", "1")
+        .env("LANG", "C.UTF-8")
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .process_group(0)
+        .spawn()
+        .expect("a shell");
+    let group = Pid::from_child(&child);
+    let begun = Instant::now();
+    // The shell is looked at, not waited for: as long as it is not, its number is nobody else's.
+    let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+    let ended = loop {
+        if waitid(WaitId::Pid(group), look).is_ok_and(|status| status.is_some()) {
+            break true;
+        }
+        if begun.elapsed() > PATIENCE {
+            break false;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let _nobody_left = kill_process_group(group, Signal::KILL);
+    let _status = child.wait();
+    ended
+}
+
+fn difference(shown: &Shown, out: &Path, number: usize, page: &str) -> String {
+    let read = |name: String| std::fs::read_to_string(out.join(name)).unwrap_or_default();
+    let printed: Vec<_> = read(number.to_string())
+        .lines()
+        .map(str::to_owned)
+        .collect();
+    let code = read(format!("{number}.code"));
+    let code = code.trim();
+    let right = code == shown.code.to_string();
+    if right && (shown.output.is_empty() || fits(&shown.output, &printed)) {
+        return String::new();
+    }
+    let Shown { line, command, .. } = shown;
+    format!(
+        "{page}:{line}: $ {command}\nshown (exit code {}):\n{}\nprinted (exit code {code}):\n{}\n\n",
+        shown.code,
+        shown.output.join("\n"),
+        printed.join("\n")
+    )
+}

@@ -1,0 +1,16 @@
+//! One test a file: every scenario leaves its table, and every page of the guide says what is so.
+
+#[path = "../common/debian.rs"]
+mod debian;
+mod guide;
+mod scenarios;
+
+datatest_stable::harness! {
+    { test = scenarios::snapshot, root = "corpora/scenarios", pattern = r"\.scn$" },
+    { test = guide::refused, root = "harness/tests/files/guide/wrong", pattern = r"\.md$" },
+    { test = guide::commands, root = "harness/docs", pattern = r"\.md$" },
+    { test = guide::options, root = "harness/docs", pattern = r"\.md$" },
+    { test = guide::links, root = "harness/docs", pattern = r"\.md$" },
+    { test = guide::citations, root = "harness/docs", pattern = r"\.md$" },
+    { test = guide::pipelines, root = "harness/docs", pattern = r"\.md$" },
+}

@@ -1,0 +1,302 @@
+//! The bench end to end: a ring that another process serves, the program as a process of its own, and everything that can go
+//! wrong between them.
+
+mod commands;
+mod ways_out;
+
+use crate::program::{ended, said, verify};
+use crate::ring::Served;
+use harness::port::Endpoint;
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// A folder with a rig file, and the folder of locks.
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new(drives: u8, transport: &str, port: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let marks = match transport {
+            "serial" => "",
+            _ => "marks = \"in-band\"\n",
+        };
+        let text = format!(
+            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = {drives}\ntransport = \"{transport}\"\nport = \"{port}\"\n{marks}\
+             time_tolerance = \"20ms\"\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n"
+        );
+        std::fs::write(folder.path().join("desk.toml"), text).expect("room");
+        Self { folder }
+    }
+
+    fn of(served: &Served) -> Self {
+        let (transport, port) = match &served.endpoints[0] {
+            Endpoint::Pty(path) => ("pty", path.display().to_string()),
+            Endpoint::Tcp(address) => ("tcp", address.clone()),
+            other => panic!("{other}"),
+        };
+        Self::new(served.sizes[0], transport, &port)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.args(arguments);
+        command.arg("--rig").arg(self.path("desk.toml"));
+        command.env("DRIVEBENCH_STATE", self.path("state"));
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    }
+
+    /// Runs it to its end, which must come within bounded time.
+    fn run(&self, arguments: &[&str]) -> Output {
+        finish(self.command(arguments).spawn().expect("the program"))
+    }
+}
+
+fn finish(mut child: Child) -> Output {
+    let end = Instant::now() + Duration::from_secs(240);
+    while child.try_wait().expect("a process").is_none() {
+        if Instant::now() > end {
+            let _gone = child.kill();
+            panic!("it does not end");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.wait_with_output().expect("its output")
+}
+
+/// Waits until the first scenario has been played, whatever the machine is busy with: the rig is in use then, and more are to come.
+#[track_caller]
+fn playing(child: &mut Child) {
+    let out = child.stdout.as_mut().expect("its output");
+    let mut byte = [0];
+    while byte != *b"\n" {
+        out.read_exact(&mut byte)
+            .expect("a line for the first scenario");
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let pid = child.id().to_string();
+    let done = Command::new("kill").args([name, &pid]).status();
+    assert!(done.expect("kill").success());
+}
+
+#[test]
+fn a_ring_is_qualified_and_its_evidence_judged_again() {
+    for transport in ["tcp", "pty"] {
+        let served = Served::start("nd21", &[2], transport, true, &[]);
+        let desk = Desk::of(&served);
+        let folder = desk.path("evidence");
+        let evidence = folder.to_str().expect("a name");
+        let output = desk.run(&["qualify", "--allow-motion", "--evidence", evidence]);
+        let code = output.status.code();
+        assert!(matches!(code, Some(0 | 5)), "{code:?}: {}", said(&output));
+        ended(&output, code.unwrap_or(0), "deviations: n");
+        ended(
+            &output,
+            code.unwrap_or(0),
+            "read-long (nd21 10.1): four-data",
+        );
+        ended(
+            &output,
+            code.unwrap_or(0),
+            "2 drives are stopped, standing and blocked",
+        );
+        ended(&verify(&folder), 0, "0 things wrong");
+        // Another byte in the record is another verdict, and the sums tell of it.
+        let record = folder.join("run.jsonl");
+        let text = std::fs::read_to_string(&record).expect("a record");
+        let at = text.rfind("\"kind\":\"received\"").expect("a byte");
+        let byte = text[at..].find("\"byte\":\"").expect("its value") + at + 8;
+        let mut changed = text.clone();
+        changed.replace_range(byte..byte + 2, "5B");
+        std::fs::write(&record, changed).expect("room");
+        ended(&verify(&folder), 1, "run.jsonl was changed");
+        std::fs::write(&record, &text).expect("room");
+        std::fs::write(folder.join("SHA256SUMS"), [0xFF, 0xFE]).expect("room");
+        ended(&verify(&folder), 1, "was added");
+        // A run that was killed leaves half a line, and no sums.
+        std::fs::write(&record, &text[..byte]).expect("room");
+        std::fs::remove_file(folder.join("SHA256SUMS")).expect("sums");
+        ended(&verify(&folder), 5, "incomplete");
+        std::fs::write(&record, "nonsense\n").expect("room");
+        ended(&verify(&folder), 2, "line 1, column");
+    }
+}
+
+/// ND21 9.6: the same over a socket, where the ring is another process.
+#[test]
+fn a_wrong_drive_behind_a_socket_is_named() {
+    let more = ["drive 1 deviates checksum-wrong"];
+    let served = Served::start_with("nd21", &[2], "tcp", true, &[], &more);
+    let desk = Desk::of(&served);
+    let folder = desk.path("evidence");
+    let evidence = folder.to_str().expect("a name");
+    let output = desk.run(&["qualify", "--allow-motion", "--evidence", evidence]);
+    let said = said(&output);
+    assert!(said.contains("drive 1: checksum-wrong"), "{said}");
+}
+
+#[test]
+fn what_is_no_ring_says_so() {
+    // Nobody listens.
+    let desk = Desk::new(2, "tcp", "127.0.0.1:1");
+    ended(&desk.run(&["run"]), 3, "failed to connect to 127.0.0.1:1");
+    // A port that is no tty, a pty where a serial port should be, nothing at all.
+    let desk = Desk::new(2, "serial", "/dev/null");
+    ended(&desk.run(&["run"]), 3, "is no serial port");
+    let desk = Desk::new(2, "serial", "/dev/there-is-none");
+    ended(&desk.run(&["run"]), 3, "there is no port");
+    let served = Served::start("plain", &[2], "pty", true, &[]);
+    let Endpoint::Pty(path) = &served.endpoints[0] else {
+        panic!("a pty");
+    };
+    let desk = Desk::new(2, "serial", path.to_str().expect("a name"));
+    ended(&desk.run(&["run"]), 3, "pseudo terminal");
+    // More drives than stated, and fewer.
+    for stated in [1, 3] {
+        let desk = Desk::new(stated, "pty", path.to_str().expect("a name"));
+        let words = format!("the ring has 2 drives, the rig's file says {stated}");
+        ended(&desk.run(&["run"]), 3, &words);
+        ended(&desk.run(&["run"]), 3, "with 2 drives set `drives = 2`");
+    }
+    // An open ring: nothing comes back.
+    let open = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = open.local_addr().expect("an address").to_string();
+    let desk = Desk::new(2, "tcp", &address);
+    ended(&desk.run(&["run"]), 3, "nothing comes back");
+    // Another master talks, or noise.
+    let talker = std::thread::spawn(move || {
+        // Two connections of the run before, which tried the port with marks and without, and two of the next one.
+        for stream in open.incoming().take(4) {
+            let mut stream = stream.expect("a bench");
+            while stream.write_all(&[0x80, 0x88, 0x55]).is_ok() {
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        }
+    });
+    ended(
+        &desk.run(&["run"]),
+        3,
+        "noise on the cable, or another master",
+    );
+    talker.join().expect("an end");
+}
+
+/// A ring that does not open as its file says: the cause and the remedy are named (ND21 8.3, 9.9).
+#[test]
+fn a_ring_that_does_not_open_says_why() {
+    let edited = |desk: &Desk, from: &str, to: &str| {
+        let path = desk.path("desk.toml");
+        let text = std::fs::read_to_string(&path).expect("a rig file");
+        std::fs::write(&path, text.replace(from, to)).expect("room");
+    };
+    // The drives are set to half the rate.
+    let slow = Served::start_with("nd21", &[3], "tcp", true, &[], &["line 19200"]);
+    let desk = Desk::of(&slow);
+    ended(&desk.run(&["run"]), 3, "set `line = \"19200 8O1\"`");
+    edited(&desk, "drives = 3", "drives = 3\nline = \"19200 8O1\"");
+    ended(&desk.run(&["run", "9.2-synco"]), 0, "");
+    // Either end alone knows in-band marks.
+    let marked = Served::start("nd21", &[3], "tcp", true, &[]);
+    let desk = Desk::of(&marked);
+    edited(&desk, "marks = \"in-band\"", "");
+    ended(&desk.run(&["run"]), 3, "set `marks = \"in-band\"`");
+    let plain = Served::start("nd21", &[3], "tcp", false, &[]);
+    let desk = Desk::of(&plain);
+    ended(&desk.run(&["run"]), 3, "set `marks = \"none\"`");
+    edited(&desk, "marks = \"in-band\"", "");
+    ended(&desk.run(&["run", "9.2-synco"]), 0, "");
+}
+
+#[test]
+fn one_at_a_time_and_never_in_quarantine() {
+    let served = Served::start("nd21", &[2], "tcp", true, &[]);
+    let desk = Desk::of(&served);
+    let mut first = desk
+        .command(&["run", "--allow-motion"])
+        .spawn()
+        .expect("the program");
+    playing(&mut first);
+    let busy = desk.run(&["run", "9.2-synco"]);
+    ended(&busy, 75, "held by");
+    // kill -9: the lock goes with the process, and the ring is brought back by the next.
+    signal(&first, "-KILL");
+    let _gone = first.wait();
+    let output = desk.run(&["run", "8.2-exchange-2", "--allow-motion"]);
+    ended(&output, 0, "2 drives are stopped, standing and blocked");
+    let path = desk.path("desk.toml");
+    let path = path.to_str().expect("a name");
+    let mut quarantine = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    quarantine.args(["rig", "quarantine", path, "--reason", "smells of smoke"]);
+    quarantine.env("DRIVEBENCH_STATE", desk.path("state"));
+    assert!(quarantine.status().expect("the program").success());
+    ended(&desk.run(&["run"]), 3, "smells of smoke");
+}
+
+#[test]
+fn an_interruption_ends_in_the_safe_state() {
+    for name in ["-INT", "-TERM"] {
+        let served = Served::start("nd21", &[2], "tcp", true, &[]);
+        let desk = Desk::of(&served);
+        let mut child = desk
+            .command(&["run", "--allow-motion"])
+            .spawn()
+            .expect("the program");
+        playing(&mut child);
+        signal(&child, name);
+        let output = finish(child);
+        ended(&output, 130, "2 drives are stopped, standing and blocked");
+    }
+}
+
+#[test]
+fn a_port_that_vanishes_ends_the_run() {
+    let mut served = Served::start("nd21", &[2], "tcp", true, &[]);
+    let desk = Desk::of(&served);
+    let mut child = desk
+        .command(&["run", "--allow-motion"])
+        .spawn()
+        .expect("the program");
+    playing(&mut child);
+    let _gone = served.child.kill();
+    let output = finish(child);
+    ended(&output, 7, "the safe state is NOT confirmed");
+    // As the operating system puts it: bytes were under way or were not.
+    let said = said(&output);
+    let lost = ["closed the connection", "the port is lost"];
+    assert!(lost.iter().any(|words| said.contains(words)), "{said}");
+}
+
+/// What the rig's file does not allow never reaches the ring, and the program says what would allow it.
+#[test]
+fn nothing_that_is_not_allowed() {
+    let served = Served::start("nd21", &[3], "tcp", true, &[]);
+    let desk = Desk::of(&served);
+    let text = std::fs::read_to_string(desk.path("desk.toml")).expect("a rig");
+    let (text, _) = text.split_once("[limits]").expect("limits");
+    std::fs::write(desk.path("desk.toml"), text).expect("room");
+    let scenario = desk.path("go.scn");
+    let lines = "title x\nsource nd21 14.10\nring 3\nwrite-word 0 nsoll = 0100\n";
+    std::fs::write(&scenario, lines).expect("room");
+    let output = desk.run(&["run", scenario.to_str().expect("a name"), "--allow-motion"]);
+    let said = said(&output);
+    assert!(said.contains("allow_motion"), "{said}");
+    assert!(!said.contains("1 passed"), "{said}");
+    assert!(
+        said.contains("3 drives are stopped, standing and blocked"),
+        "{said}"
+    );
+}

@@ -1,0 +1,86 @@
+//! The page of a run: its structure, its bounds, text that would be markup, and what a browser makes of it.
+
+mod browser;
+mod devtools;
+mod hostile;
+mod pages;
+mod parser;
+mod program;
+
+use harness::library::Entry;
+use harness::link::Link;
+use harness::report::html::{Head, Played, Shown, run, section};
+use harness::scenario::run::{AtFinding, Outcome, play};
+use harness::scenario::simulate::simulated;
+use harness::scenario::source::Source;
+use harness_sim::novobus::trace::Trace;
+use std::path::{Path, PathBuf};
+
+/// A folder of one test's own, empty.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("html")
+        .join(name);
+    let _not_there = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+/// A built-in scenario's text.
+fn text(name: &str) -> String {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("corpora/scenarios/novobus/{name}.scn"));
+    std::fs::read_to_string(path).expect("a scenario")
+}
+
+/// A scenario, played.
+fn played(name: &str, text: &str) -> (Entry, Outcome, Vec<Trace>) {
+    let source = Source::from_bytes(format!("{name}.scn"), text.into()).expect("a text");
+    let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}\n{text}", p.all()));
+    let plan = entry.plan.clone().expect("novobus");
+    let mut link = simulated(&plan);
+    let outcome = play(&plan, &mut link, AtFinding::Stop);
+    let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+    (entry, outcome, traces)
+}
+
+/// Its section.
+fn shown(number: usize, name: &str, text: &str) -> Shown {
+    let (entry, outcome, traces) = played(name, text);
+    let sources: Vec<_> = entry
+        .scenario
+        .sources
+        .iter()
+        .map(|s| s.text.clone())
+        .collect();
+    let drives = traces[0].drives.to_string();
+    let own = Played {
+        name: entry.short_name(),
+        title: &entry.scenario.title,
+        sources: &sources,
+        drives: &drives,
+        text,
+        outcome: &outcome,
+        traces: &traces,
+        rate: entry.plan.as_ref().expect("novobus").rate,
+        again: "drivebench trace it",
+    };
+    section(number, &own)
+}
+
+/// The page of scenarios by name and text.
+fn page(scenarios: &[(&str, String)]) -> String {
+    let all = scenarios.iter().enumerate();
+    let all = all
+        .map(|(number, (name, text))| shown(number + 1, name, text))
+        .collect();
+    let head = Head {
+        title: "drivebench: a test",
+        facts: Vec::new(),
+    };
+    run(&head, all)
+}
+
+/// A scenario that fails: the third byte that comes is another one.
+const FAILS: &str = "title One byte is not as it should be\nsource nd21 10.1 read-byte\nring 3\ndrive 1 memory FE13 = 88\n\n\
+                     > 88 FE C0 13 FE D1\n> 80*3\n< 88 01 C1 13 88 A5 80*3\n";

@@ -1,0 +1,16 @@
+//! What people and other programs read and write: commands, reports, pages, captures, rig files, and the rules for the sources.
+
+mod captures;
+mod cli;
+mod cli_drive;
+#[path = "../common/debian.rs"]
+mod debian;
+mod html;
+#[path = "../common/junit_rules.rs"]
+mod junit_rules;
+#[path = "../common/record.rs"]
+mod record;
+mod reports;
+mod rig;
+mod tidy;
+mod top;
