@@ -337,10 +337,11 @@ impl Guard {
             _ if line_error => State::Doubt(Doubt::default()),
             // A drive in the error mode may take these for its neighbour's (ND21 9.7).
             (_, state) if !matches!(state, State::Doubt(_)) && self.zeros >= UPSTREAM_ZEROS => {
-                State::Doubt(Doubt {
-                    zeros: self.zeros.min(ZEROS),
-                    ..Doubt::default()
-                })
+                State::Doubt(Doubt::default().with_zeros(self.zeros))
+            }
+            // Zeros that a telegram has swallowed belong to the 17 as well (ND21 9.8).
+            (before, State::Doubt(doubt)) if byte == 0 && !matches!(before, State::Doubt(_)) => {
+                State::Doubt(doubt.with_zeros(self.zeros))
             }
             (_, state) => state,
         };
@@ -535,6 +536,15 @@ const fn length(code: u8) -> Option<usize> {
 }
 
 impl Doubt {
+    /// The same behind this many zeros in a row.
+    fn with_zeros(self, zeros: u8) -> Self {
+        Self {
+            cleared: self.cleared || zeros >= ZEROS,
+            zeros: zeros.min(ZEROS),
+            ..self
+        }
+    }
+
     fn follow(self, byte: u8) -> Result<Next, Cause> {
         let next = match byte {
             0 => {

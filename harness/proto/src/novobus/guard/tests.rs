@@ -217,3 +217,24 @@ fn data_in_needs_what_the_cell_needs_that_it_points_at() {
         assert!(!act.passes(&Limits::default()), "{act}");
     }
 }
+
+/// ND21 9.8: wherever drives stand, a telegram swallows at most nine of the 17 zeros, so the check sequence ends every doubt.
+#[test]
+fn the_check_sequence_passes_from_the_middle_of_a_telegram() {
+    for begun in [
+        &[0x88][..],
+        &[0x88, 0xFF],
+        &[0x88, 0xFF, 0xC0],
+        &[0x88, 0xFF, 0xC0, 0x13, 0xFE],
+        &[0x8E, 0x05, 0xC0],
+    ] {
+        let guard = behind(Limits::default(), &[begun, &CHECK_SEQUENCE].concat(), false);
+        assert!(guard.expect("it passes").at_rest(), "{begun:02X?}");
+        let short = [begun, &CHECK_SEQUENCE[1..]].concat();
+        let guard = behind(Limits::default(), &short, false);
+        assert!(
+            guard.is_err() || guard.is_ok_and(|guard| guard.in_doubt()),
+            "{begun:02X?}"
+        );
+    }
+}
