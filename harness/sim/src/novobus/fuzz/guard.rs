@@ -245,6 +245,12 @@ fn cell(low: u8, high: u8, data: u8, whole: bool, limits: &Limits) -> Option<&'s
             unless(limits.eeprom && limits.motion, "EEPROM by teach-in")
         }
         (0xFF, 0x32) if whole && data == 8 => unless(limits.motion, "process data"),
+        // 14.10.3: process data write any word there from now on.
+        (0xFF, 0x32) if whole && data != 0x31 && data != 0x32 => {
+            let any = |low| (0..=0xFF).find_map(|byte| cell(low, 0xFF, byte, true, limits));
+            let denied = unless(limits.motion, "process data");
+            denied.or(any(data)).or(any(data.wrapping_add(1)))
+        }
         // The drive's own bus: commands, address, pointers, buffers.
         (0xFF, 0x2A..=0x36) => Some("the bus itself"),
         (0xFE, 0xA0..) => Some("stack"),
