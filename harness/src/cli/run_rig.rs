@@ -164,7 +164,6 @@ fn all(
         }
     };
     if job.qualify {
-        run.rehearse();
         run.repeat();
     }
     if let Some(path) = &job.evidence {

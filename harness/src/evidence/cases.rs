@@ -220,7 +220,7 @@ impl Opened {
                 )
                 .reaching(super::attempt::reached(&self.rig, header));
                 // What the guard knew of the drives is not in the record.
-                let limited = header.qualified && !header.limits.allow_everything();
+                let limited = !header.limits.allow_everything();
                 let denied = remarks
                     .first()
                     .filter(|own| limited && own.starts_with(DENIED));

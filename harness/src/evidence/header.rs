@@ -123,7 +123,6 @@ pub(super) fn header(lines: &[Line], rig: &Rig, wrong: &mut Vec<String>) -> Resu
     if *schema > 1 && *own_rings != bare_run {
         must("`own_rings`", own_rings.to_string(), bare_run.to_string());
     }
-    let health = &rig.file.health;
     Ok(Header {
         schema: *schema,
         program: drivebench.clone(),
@@ -143,7 +142,7 @@ pub(super) fn header(lines: &[Line], rig: &Rig, wrong: &mut Vec<String>) -> Resu
         limits,
         way: Way {
             rings: rings.clone(),
-            attempts: health.between.then_some(health.attempts),
+            attempts: rig.examinations(),
             anew: expected_anew,
         },
         rings,

@@ -44,7 +44,6 @@ pub(super) fn rerun(
         Err(problems) => return vec![format!("the run cannot be played again: {problems}")],
     };
     if header.qualified {
-        run.rehearse();
         run.repeat();
     }
     let mut wrong = Vec::new();
@@ -85,6 +84,8 @@ fn scenario(
         lines: Vec::new(),
         captures: Vec::new(),
     };
+    // A run of an earlier version has begun what the limits deny, and its record has the attempt.
+    run.rehearse(lines.len() == 1);
     let outcome = match &entry.plan {
         None => Outcome::skipped("the rig has no such bus".to_owned()),
         Some(plan) => match run.play(plan, Some(&mut tape)) {

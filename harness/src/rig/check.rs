@@ -47,6 +47,13 @@ impl Rig {
             .map(|(ring, number)| (number, ring))
     }
 
+    /// How often a ring is examined before a scenario until it counts as ill; `None` where its file asks for no examination. An interlock
+    /// asks for one: its drive must answer, whatever the scenario before has left.
+    pub(crate) fn examinations(&self) -> Option<u8> {
+        let wanted = self.file.health.between || !self.file.interlock.is_empty();
+        wanted.then_some(self.file.health.attempts)
+    }
+
     /// Whether its rings are simulated in the program. Such a rig needs no lock: everyone has a copy.
     #[must_use]
     pub fn is_simulated(&self) -> bool {

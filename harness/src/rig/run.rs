@@ -42,7 +42,7 @@ pub struct Run<'s> {
     again: Again,
     /// Drives are not reset before a scenario, whatever is allowed.
     as_they_are: bool,
-    /// What the rig's limits do not let be played to its end is not begun.
+    /// A scenario that the rig's limits do not permit to its end is skipped, and nothing of it is sent.
     rehearses: bool,
     /// How often a scenario that does not pass is played where the rig's file asks for less.
     least: u8,
@@ -78,7 +78,7 @@ impl<'s> Run<'s> {
             again: Again::new(tolerance > Span::ZERO),
             least: 1,
             as_they_are: false,
-            rehearses: false,
+            rehearses: true,
         })
     }
 
@@ -125,7 +125,7 @@ impl<'s> Run<'s> {
         let way = self.way();
         let recording = Recording::new(self.session.link(), &mut forgotten);
         let why = not_played(plan, &recording, &way.rings).or_else(|| {
-            let why = self.rehearses.then(|| self.denied(plan))??;
+            let why = self.denied(plan)?;
             Some(format!("{DENIED}{why}"))
         });
         if let Some(why) = why {
@@ -166,17 +166,17 @@ impl<'s> Run<'s> {
             self.session.link().reset_after_denial();
             way.examine_after_denial(self.session.rig());
         }
-        if !self.session.rig().file.interlock.is_empty() {
-            // What the scenario before has left may answer nothing.
-            self.session.health()?;
-            self.session.look_at_interlocks();
-        }
         let mut both = Both {
             events: Vec::new(),
             sink,
         };
+        // What the scenario before has left may answer no interlock.
+        let examined = way.examine(&mut Recording::new(self.session.link(), &mut both));
+        if examined.is_ok() {
+            self.session.ask_interlocks();
+        }
         let mut recording = Recording::new(self.session.link(), &mut both);
-        let outcome = play_one(&mut recording, plan, &way);
+        let outcome = examined.map(|()| play_examined(&mut recording, plan, &way));
         let rings = way.rings.len();
         let traces = (0..rings).map(|ring| recording.trace(ring)).collect();
         let mut outcome = match outcome {
@@ -225,19 +225,17 @@ impl<'s> Run<'s> {
     /// How attempts go on this rig.
     #[must_use]
     pub fn way(&self) -> Way {
-        let file = &self.session.rig().file;
         let limits = self.session.limits();
         Way {
             rings: self.session.rings().to_vec(),
-            attempts: file.health.between.then_some(file.health.attempts),
+            attempts: self.session.rig().examinations(),
             anew: limits.reset && limits.motion && !self.as_they_are,
         }
     }
 
-    /// Skips from now on what the rig's limits do not let be played to its end: it is played on the model first, and nothing of it
-    /// is sent.
-    pub fn rehearse(&mut self) {
-        self.rehearses = !self.session.limits().allow_everything();
+    /// Whether a scenario is played on the model first, and skipped where the guard denies a byte of it there. By default it is.
+    pub(crate) fn rehearse(&mut self, rehearses: bool) {
+        self.rehearses = rehearses;
     }
 
     /// Plays from now on what does not pass once more at least, where time is real: what a busy computer has caused does not come
@@ -251,6 +249,9 @@ impl<'s> Run<'s> {
     /// What the guard refuses of a plan on the model.
     fn denied(&self, plan: &Plan) -> Option<String> {
         let rig = self.session.rig();
+        if !self.rehearses || self.session.limits().allow_everything() {
+            return None;
+        }
         // A simulated drive that is wrong on purpose is rehearsed as a right one too.
         let model = twin(rig, &known(rig)).ok()?.into_link();
         let mut guarded = Guarded::new(model, self.session.limits());
@@ -299,6 +300,17 @@ impl Way {
     /// telegram. The attempt's record holds the recovery, so that the twin follows it.
     pub(crate) fn examine_after_denial(&mut self, rig: &Rig) {
         self.attempts = Some(rig.file.health.attempts);
+    }
+
+    /// Examines the rings, where they are examined before an attempt.
+    ///
+    /// # Errors
+    /// The ring that is ill.
+    fn examine(&self, link: &mut dyn Link) -> Result<(), (usize, Unhealthy)> {
+        match self.attempts {
+            Some(attempts) => examine(link, &self.rings, attempts).map(|_| ()),
+            None => Ok(()),
+        }
     }
 
     /// The conversations that are compared, and whether with a twin that nobody has spoken to. Where drives are reset, what
@@ -371,9 +383,12 @@ pub fn play_one(
     plan: &Plan,
     way: &Way,
 ) -> Result<Outcome, (usize, Unhealthy)> {
-    if let Some(attempts) = way.attempts {
-        examine(link, &way.rings, attempts)?;
-    }
+    way.examine(link)?;
+    Ok(play_examined(link, plan, way))
+}
+
+/// The same behind the examination.
+fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
     let ready = match way.anew {
         true => start_anew(link, &way.rings),
         false => Ok(()),
@@ -388,7 +403,7 @@ pub fn play_one(
     if matches!(link.trouble(), Some(Trouble::Denied(_))) {
         come_home(link);
     }
-    Ok(outcome)
+    outcome
 }
 
 /// Keeps events and hands them on.

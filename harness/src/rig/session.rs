@@ -496,9 +496,14 @@ impl Session {
     /// Looks at every interlock; one that does not hold, or whose drive does not answer, is [trouble](crate::link::Trouble::Interlock) of the
     /// link from then on. Nothing is under way.
     pub fn look_at_interlocks(&mut self) {
+        self.ask_interlocks();
+        self.link.begin();
+    }
+
+    /// The same inside a conversation that goes on, so that its clock counts the time that this takes.
+    pub(super) fn ask_interlocks(&mut self) {
         if let Some(mut interlocks) = Interlocks::of(&self.rig) {
             self.link.look(|line| interlocks.look_at_all(line));
-            self.link.begin();
         }
     }
 

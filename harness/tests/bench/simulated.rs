@@ -233,63 +233,86 @@ fn a_run_that_judges_nothing_is_incomplete() {
     ended(&command.output().expect("the program"), 5, "1 skipped");
 }
 
-/// What the guard keeps back was not played, wherever it stands, and the record says so too.
+/// A scenario that the rig's limits do not permit to its end is skipped with the limit named, and nothing of it is sent. It spoils no run, and
+/// alone it is incomplete.
 #[test]
-fn what_is_kept_back_is_no_pass() {
+fn what_the_limits_deny_is_skipped() {
     let folder = tempfile::tempdir().expect("a folder");
-    let kept = folder.path().join("kept");
-    let path = folder.path().join("back.scn");
-    let text = rig(2, false, "", ", \"drive 0 memory FE97 = 00\"").replace("= true", "= false");
-    for steps in ["> 85 FF 0F A0\n? sent 4 bytes\n", "> 80\n! 1->0: drop\n"] {
-        let _none_yet = std::fs::remove_dir_all(&kept);
-        std::fs::write(&path, format!("title x\nring 2\n{steps}")).expect("room");
-        let names = [&path, &kept].map(|path| path.to_str().expect("a name"));
-        let output = run(folder.path(), &text, &[names[0], "--evidence", names[1]]);
-        ended(&output, 2, "1 aborted");
-        let again = verify(&kept);
-        ended(&again, 0, "aborted");
-        assert!(!said(&again).contains("passed"), "{}", said(&again));
-    }
-}
-
-/// A denial ends one scenario: the twin follows the recovery behind it, so that the next scenario is judged as ever, by `verify` too. The
-/// driver's part of a denied scenario is no fault of the bench.
-#[test]
-fn a_denial_ends_one_scenario() {
-    let folder = tempfile::tempdir().expect("a folder");
-    // With a setup of its own the rig is played on as one with ports is.
-    let text = rig(2, false, "", ", \"drive 0 memory FE13 = 88\"");
-    let text = text.replace("allow_motion = true", "allow_motion = false");
-    let file = folder.path().join("rig.toml");
-    std::fs::write(&file, text).expect("room");
-    let read = "> 88 (0-N) C0 13 FE D1\n> 80*4\n< 88 00 C0 13 88 A5\n";
-    for (number, denied) in [
-        "master write-word 0 nsoll = 100rpm",
-        "write-word 0 nsoll = 100rpm",
-        "drive 1 memory FF6C = 01 00",
+    let text = rig(2, false, "", ", \"drive 0 memory FE13 = 88\"").replace("= true", "= false");
+    let write = |name: &str, lines: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, format!("title x\nring 2\n{lines}\n")).expect("room");
+        path.to_str().expect("a name").to_owned()
+    };
+    let after = write(
+        "after.scn",
+        "> 88 (0-N) C0 13 FE D1\n> 80*4\n< 88 00 C0 13 88 A5",
+    );
+    for (number, (lines, limit)) in [
+        ("> 85 FF 0F A0\n? sent 4 bytes", "allow_motion"),
+        (
+            "> 80\n! 1->0: drop",
+            "everything allowed in the rig's [limits]",
+        ),
+        (
+            "master write-word 0 nsoll = 100rpm\nwait 1ms",
+            "allow_motion",
+        ),
+        ("write-word 0 nsoll = 100rpm\nwait 1ms", "allow_motion"),
+        ("drive 1 memory FF6C = 01 00\nwait 1ms", "allow_motion"),
+        ("write-byte 0 FF57 = 04", "allow_monitoring"),
     ]
     .into_iter()
     .enumerate()
     {
-        let scenario = |name: &str, lines: &str| {
-            let path = folder.path().join(format!("{name}.scn"));
-            std::fs::write(&path, format!("title {name}\nring 2\n{lines}\n")).expect("room");
-            path
-        };
-        let denied = scenario("denied", &format!("{denied}\nwait 1ms"));
-        let after = scenario("after", read);
-        let evidence = folder.path().join(format!("evidence-{number}"));
-        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
-        command.arg("run").arg(denied).arg(after);
-        command.arg("--rig").arg(&file);
-        command.arg("--evidence").arg(&evidence);
-        let output = command.output().expect("the program");
-        let text = said(&output);
-        ended(&output, 2, "allow_motion");
-        assert!(text.contains("aborted denied"), "{text}");
-        assert!(text.contains("passed after"), "{text}");
-        assert!(!text.contains("own master"), "{text}");
-        ended(&verify(&evidence), 0, "0 things wrong");
+        let denied = write("denied.scn", lines);
+        let kept = folder.path().join(format!("kept-{number}"));
+        let evidence = ["--evidence", kept.to_str().expect("a name")];
+        let alone = run(folder.path(), &text, &[denied.as_str()]);
+        ended(&alone, 5, "0 passed, 0 failed, 1 skipped");
+        ended(&alone, 5, limit);
+        let output = run(
+            folder.path(),
+            &text,
+            &[&[denied.as_str(), after.as_str()], &evidence[..]].concat(),
+        );
+        ended(&output, 0, "skipped denied");
+        ended(&output, 0, "passed after");
+        let record = std::fs::read_to_string(kept.join("run.jsonl")).expect("a record");
+        let case = record.find("\"denied\"").expect("its case");
+        assert!(!record[..case].contains("\"sent\""), "{record}");
+        ended(&verify(&kept), 0, "0 things wrong");
+    }
+}
+
+/// Where drives are asked about an interlock before each scenario, the ring is brought back first, and the twin follows that.
+#[test]
+fn an_interlock_disturbs_no_verdict() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, lines: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, format!("title x\nring 2\n{lines}")).expect("room");
+        path.to_str().expect("a name").to_owned()
+    };
+    // One scenario leaves the drives in the error mode, the other one in the middle of a telegram.
+    let error = write("error.scn", "> 00 80\n< 00 00\n");
+    let middle = write("middle.scn", "> 88 (0-N) C0\n");
+    let read = write(
+        "read.scn",
+        "> 88 (0-N) C0 13 FE D1\n> 80*4\n< 88 00 C0 13 88 A5\n",
+    );
+    let interlock =
+        "[[interlock]]\ndrive = 0\ncell = \"nist\"\nmax = \"300rpm\"\nevery = \"5ms\"\n";
+    for (number, more) in ["", "[health]\nbetween = false\n"].into_iter().enumerate() {
+        let text = rig(2, false, "", ", \"drive 0 memory FE13 = 88\"") + interlock + more;
+        let kept = folder.path().join(number.to_string());
+        let names = [&error, &read, &middle, &read, &error, &middle, &read];
+        let mut arguments: Vec<_> = names.iter().map(|name| name.as_str()).collect();
+        arguments.extend(["--evidence", kept.to_str().expect("a name")]);
+        let output = run(folder.path(), &text, &arguments);
+        ended(&output, 0, "7 passed, 0 failed");
+        assert!(!said(&output).contains("note:"), "{}", said(&output));
+        ended(&verify(&kept), 0, "0 things wrong");
     }
 }
 
