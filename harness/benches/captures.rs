@@ -8,8 +8,8 @@ use harness::report::vcd::Signals;
 use harness::report::{csv, pcapng, vcd};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Instant;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
 use std::io::Write;
 
 /// Bytes on all links together.

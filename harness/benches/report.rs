@@ -8,7 +8,7 @@ use harness::report::walk::Reader;
 use harness::scenario::run::{AtFinding, Outcome, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::process::Command;
 
 fn main() {

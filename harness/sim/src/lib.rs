@@ -3,9 +3,11 @@
 //! A simulated run is a function of what is sent, of the faults and of the drives' cells: two runs give
 //! the same bytes at the same times. Nothing sleeps and nothing ticks: a run jumps from event to event.
 //!
-//! [`novobus`] is the ring with its drives, [`nd21`] the whole drive on it, and [`fault`] the faults of a line.
+//! [`novobus`] is the ring with its drives, [`nd21`] the whole drive on it, [`fault`] the faults of a line, and [`record`]
+//! what a run leaves.
 #![forbid(unsafe_code)]
 
 pub mod fault;
 pub mod nd21;
 pub mod novobus;
+pub mod record;

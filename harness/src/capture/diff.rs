@@ -6,8 +6,8 @@ use crate::report::meaning::Meaning;
 use crate::report::pcapng::name;
 use crate::report::walk::Reader;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
 use std::fmt;
 
 /// Bytes in front of and behind the first difference that are shown.

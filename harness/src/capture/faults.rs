@@ -4,8 +4,8 @@ use crate::report::pcapng::name;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::LinkTrace;
+use harness_sim::record::LineByte;
+use harness_sim::record::LinkTrace;
 
 /// A run of lost bytes longer than this is a cut cable.
 const CUT: usize = 8;

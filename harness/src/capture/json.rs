@@ -6,8 +6,8 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::Mark;
+use harness_sim::record::LineByte;
+use harness_sim::record::Mark;
 use serde::Deserialize;
 
 #[derive(Deserialize)]

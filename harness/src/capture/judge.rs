@@ -12,8 +12,8 @@ use crate::scenario::source::{Source, SourceError};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::time::Span;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::LinkTrace;
+use harness_sim::record::LineByte;
+use harness_sim::record::LinkTrace;
 
 /// What came of a judgement.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
         |ring: usize, own: &LinkTrace, index: usize| own.to.is_some() || behind(ring, own, index);
     let master = compare(left, right, tolerance, &inner, end);
     let links = compare(left, right, tolerance, &behind, end);
-    let last = |trace: &harness_sim::novobus::trace::Trace| {
+    let last = |trace: &harness_sim::record::Trace| {
         trace.links.iter().any(|link| link.to.is_none())
     };
     let verdict = if !capture.traces.iter().all(last) {

@@ -9,8 +9,8 @@ use crate::scenario::source::Source;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
 use std::fmt::Write as _;
 
 /// Bytes on a line of a scenario, where it is not a long one.

@@ -6,7 +6,7 @@ use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::{LinkTrace, Trace};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What a ring's first and last link tell.

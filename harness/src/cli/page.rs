@@ -5,7 +5,7 @@ use crate::library::Entry;
 use crate::regular;
 use crate::report::html::{Head, Played, Shown, run, section};
 use crate::scenario::run::Outcome;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};
 
 /// A page that is being collected.

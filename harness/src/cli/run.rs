@@ -18,7 +18,7 @@ use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtFinding, Finding, Outcome, play};
 use crate::scenario::simulate::simulated;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
 

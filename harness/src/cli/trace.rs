@@ -13,7 +13,7 @@ use crate::report::vcd::{self, Signals};
 use crate::report::{csv, json, pcapng};
 use crate::scenario::run::{AtFinding, Record};
 use harness_proto::line::Rate;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::io::{BufWriter, Write};
 
 /// Lines about damaged bytes shown below a table.

@@ -18,7 +18,7 @@ use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::Path;

@@ -13,7 +13,7 @@ use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;

@@ -12,7 +12,7 @@ use crate::capture::read;
 use crate::link::{Event, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::time::Instant;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::{LinkTrace, Trace};
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -12,7 +12,7 @@ use crate::scenario::syntax::Bus;
 use harness_proto::line::LineError;
 use harness_proto::nd21::cells::cell;
 use harness_sim::novobus::fuzz::{Feature, Notebook};
-use harness_sim::novobus::link::LineByte;
+use harness_sim::record::LineByte;
 
 /// The sizes of ring for which a scenario is settled: its own, the smallest and the largest (ND21 8.4).
 const SIZES: [Option<u8>; 3] = [None, Some(1), Some(250)];

@@ -17,7 +17,7 @@ use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::guard::{Denial, Found, Guard, Limits};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

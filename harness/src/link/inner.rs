@@ -10,7 +10,7 @@ use super::tamper::Tamper;
 use crate::port::{Outgoing, Wire};
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::link::LineByte;
+use harness_sim::record::LineByte;
 use rustix::event::PollFd;
 use std::collections::VecDeque;
 use std::time;

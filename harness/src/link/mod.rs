@@ -26,7 +26,7 @@ use harness_proto::line::Received;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::fmt;
 
 /// What a rig can be asked to have.

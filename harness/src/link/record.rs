@@ -10,7 +10,7 @@ use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Shown, Stimulus, 
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::collections::VecDeque;
 
 /// The most rings of a bench (ND21 8.4).

@@ -9,7 +9,7 @@
 use super::{Capability, Event, Lead, Line, Link, LinkFault, Look, Moment, PlacedFault, Trouble};
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::collections::VecDeque;
 
 /// A record, played back.

@@ -6,7 +6,7 @@ use super::tamper::Tamper;
 use crate::port::{Outgoing, Wire};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::link::LineByte;
+use harness_sim::record::LineByte;
 use std::collections::VecDeque;
 
 /// How far ahead of the line bytes are given to the operating system.

@@ -8,9 +8,9 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
-use harness_sim::novobus::link::LineByte;
+use harness_sim::record::LineByte;
 use harness_sim::novobus::ring::Ring;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use harness_sim::novobus::witness::Complaint;
 use std::collections::VecDeque;
 

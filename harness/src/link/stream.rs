@@ -15,7 +15,7 @@ use crate::port::{LastWords, Wire, wake_on_time};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::{LinkTrace, Trace};
 use rustix::event::{Timespec, poll};
 use rustix::io::Errno;
 use std::cell::Cell;

@@ -8,7 +8,7 @@ use super::LinkFault;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::Flips;
-use harness_sim::novobus::link::LineByte;
+use harness_sim::record::LineByte;
 use std::collections::BTreeMap;
 
 /// What becomes of a byte.

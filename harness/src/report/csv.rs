@@ -17,8 +17,8 @@
 use super::pcapng::name;
 use super::walk::{Reader, Seen, in_time};
 use harness_proto::novobus::error_mode::Marks;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{Mark, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{Mark, Trace};
 use std::io::Write;
 
 /// The first line.

@@ -25,8 +25,8 @@
 use crate::scenario::run::Record;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Span;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Mark, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Mark, Trace};
 use serde::Serialize;
 use std::io::Write;
 

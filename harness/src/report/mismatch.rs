@@ -2,7 +2,7 @@
 
 use super::table::{LEGEND, Part, table};
 use crate::scenario::run::{Difference, Finding, Shown, show};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
 /// Rows of the table shown before and behind the one that differs.

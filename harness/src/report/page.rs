@@ -4,7 +4,7 @@ use super::plot::plots;
 use super::table::{LEGEND, Part, table, wires};
 use crate::library::Entry;
 use crate::scenario::run::Outcome;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
 /// Rows of a table that a page holds at most.

@@ -16,8 +16,8 @@
 
 use super::walk::in_time;
 use harness_proto::line::{LineError, Rate};
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
 use std::io::Write;
 
 /// The link type.

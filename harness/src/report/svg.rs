@@ -12,7 +12,7 @@ use super::walk::State;
 use cells::{Area, Columns, areas};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::fmt::Write as _;
 use std::ops::Range;
 

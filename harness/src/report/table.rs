@@ -5,8 +5,8 @@
 //! where that differs from what was sent (`--` for nothing, `~` behind a byte marked bad).
 
 use harness_proto::novobus::error_mode::Marks;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::LineByte;
+use harness_sim::record::Trace;
 use std::fmt::Write as _;
 use std::ops::Range;
 

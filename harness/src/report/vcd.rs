@@ -22,8 +22,8 @@
 use super::pcapng::name;
 use super::walk::{Reader, State};
 use harness_proto::line::{LineError, Rate};
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 use std::io::Write;

@@ -3,8 +3,8 @@
 use super::meaning::{Meaning, Observer, Role};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Instant;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Mark, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Mark, Trace};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

@@ -7,7 +7,7 @@ use crate::link::{
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 
 /// Where a rig's rings end: in the simulator, or at ports.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
 use crate::scenario::run::{Outcome, Unready};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::collections::BTreeSet;
 
 /// How often a scenario is played whose bytes are right and come at other times than the model says.

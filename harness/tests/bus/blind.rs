@@ -3,7 +3,7 @@
 use harness::link::{Capability, Line, Link, Moment, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 
 /// A link that shows nothing of its drives: a ring of which only the master's ends are known.
 pub(crate) struct Blind<L>(pub(crate) L);

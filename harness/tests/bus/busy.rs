@@ -8,7 +8,7 @@ use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 
 /// How long the computer does something else.
 const BUSY: Span = Span::from_millis(60);

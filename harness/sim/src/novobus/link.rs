@@ -2,51 +2,10 @@
 
 use crate::fault::{Flips, LinkFault, Plan};
 use crate::novobus::uart::{self, Uart};
+use crate::record::LineByte;
 use crate::novobus::under_way::{Bytes, UnderWay};
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
-
-/// A byte on a wire, at both of its ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LineByte {
-    /// When its stop bit has passed.
-    pub at: Instant,
-    /// What the transmitter put on the wire; `None` for a byte that nobody sent.
-    pub sent: Option<u8>,
-    /// What arrived at the receiver; `None` where nothing did. A drive without power reads nothing, but
-    /// the byte arrives.
-    pub received: Option<u8>,
-    /// What the receiver noticed.
-    pub error: Option<LineError>,
-    /// Whether the byte goes back to one that the master sent, rather than to a time-out.
-    pub(crate) solicited: bool,
-}
-
-impl LineByte {
-    /// A byte as somebody else has seen it: for traces of rings that are not simulated.
-    #[must_use]
-    pub fn seen(
-        at: Instant,
-        sent: Option<u8>,
-        received: Option<u8>,
-        error: Option<LineError>,
-    ) -> Self {
-        Self {
-            at,
-            sent,
-            received,
-            error,
-            solicited: true,
-        }
-    }
-
-    /// What arrives at the receiver, if anything does.
-    #[must_use]
-    pub fn arrival(&self) -> Option<Received> {
-        let error = self.error;
-        self.received.map(|byte| Received { byte, error })
-    }
-}
 
 /// A link cut open: what the transmitter sends goes to somebody else, and what the receiver hears comes from them.
 #[derive(Clone, Debug, Default)]

@@ -19,7 +19,6 @@ pub mod node;
 pub mod plain;
 pub mod reference;
 pub mod ring;
-pub mod trace;
 pub mod transitions;
 mod uart;
 mod under_way;

@@ -3,7 +3,7 @@
 use crate::fault::{DriveFault, Plan};
 use crate::novobus::device::Device;
 use crate::novobus::link::Link;
-use crate::novobus::trace::Mark;
+use crate::record::Mark;
 use harness_proto::novobus::bus_end::{Deadline, Step};
 use harness_proto::time::{Instant, Span};
 

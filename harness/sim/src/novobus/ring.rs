@@ -6,9 +6,10 @@
 
 use crate::fault::{DriveFault, LinkFault};
 use crate::novobus::device::Device;
-use crate::novobus::link::{LineByte, Link};
+use crate::novobus::link::Link;
+use crate::record::LineByte;
 use crate::novobus::node::Node;
-use crate::novobus::trace::{LinkTrace, Trace};
+use crate::record::{LinkTrace, Trace};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};

@@ -1,6 +1,6 @@
 //! What is on a wire, and what has come out of it.
 
-use crate::novobus::link::LineByte;
+use crate::record::LineByte;
 use harness_proto::line::LineError;
 use harness_proto::time::Instant;
 

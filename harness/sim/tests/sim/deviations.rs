@@ -15,7 +15,7 @@ use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::plain::PlainDrive;
 use harness_sim::novobus::ring::Ring;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::{LinkTrace, Trace};
 use proptest::prelude::*;
 
 const DRIVES: u8 = 3;
@@ -102,7 +102,7 @@ fn play(pieces: &[Piece], flip: Option<u64>, device: impl Fn() -> Drive) -> Trac
     ring.trace()
 }
 
-fn carried(trace: &Trace) -> Vec<&[harness_sim::novobus::link::LineByte]> {
+fn carried(trace: &Trace) -> Vec<&[harness_sim::record::LineByte]> {
     trace.links.iter().map(|l: &LinkTrace| &*l.bytes).collect()
 }
 

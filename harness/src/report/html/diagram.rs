@@ -10,7 +10,7 @@ use crate::report::svg::cells::{Area, Columns, areas};
 use crate::report::svg::{MAX_AREAS, Scale, class};
 use crate::report::walk::State;
 use harness_proto::line::Rate;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -9,7 +9,7 @@ use super::write::Html;
 use crate::scenario::run::{Difference, Finding, Outcome, Shown as Byte, show};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 
 /// Bytes of a line shown before and behind the one that differs.
 const AROUND: usize = 12;

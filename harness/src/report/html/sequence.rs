@@ -8,8 +8,8 @@ use crate::report::pcapng::name;
 use crate::report::walk::Reader;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Instant;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 

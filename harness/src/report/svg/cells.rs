@@ -4,8 +4,8 @@ use super::{MAX_ROWS, Scale};
 use crate::report::csv::{remark, status};
 use crate::report::walk::{Reader, State};
 use harness_proto::novobus::error_mode::Marks;
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::LineByte;
+use harness_sim::record::Trace;
 use std::ops::Range;
 
 /// One byte of one link.
@@ -58,7 +58,7 @@ impl Columns {
                 }
                 let marked = seen.mark.map_or_else(String::new, remark);
                 let detected =
-                    |mark: &harness_sim::novobus::trace::Mark| mark.marks.contains(Marks::DETECTED);
+                    |mark: &harness_sim::record::Mark| mark.marks.contains(Marks::DETECTED);
                 cells.push(Cell {
                     at: byte.at.since_start().units(),
                     state: seen.state,

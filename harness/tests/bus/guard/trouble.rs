@@ -14,7 +14,7 @@ use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 
 fn plan(text: &str) -> Plan {
     let source = Source {

@@ -6,7 +6,7 @@ use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::LineError;
 use harness_proto::time::Span;
-use harness_sim::novobus::link::LineByte;
+use harness_sim::record::LineByte;
 
 fn options<'o>(setup: Option<&'o Source>) -> Options<'o> {
     Options {

@@ -5,8 +5,8 @@ use harness::capture::{Capture, Run, diff, read};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};
-use harness_sim::novobus::link::LineByte;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 

@@ -13,7 +13,7 @@ use harness::report::html::{Head, Played, Shown, run, section};
 use harness::scenario::run::{AtFinding, Outcome, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};
 
 /// A folder of one test's own, empty.

@@ -8,7 +8,7 @@ use crate::explore::Dice;
 use crate::explore::Seen;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 use std::collections::BTreeSet;
 
 /// The most cases that are kept.

@@ -8,7 +8,7 @@ use crate::explore::ExploreError;
 use crate::explore::features;
 use crate::explore::{Rehearsal, Target, Tried};
 use crate::link::{Link, SimulatedLink};
-use harness_sim::novobus::trace::Trace;
+use harness_sim::record::Trace;
 
 /// A simulated ring beside its model, and beside the reference model where its drives are plain and sound.
 #[derive(Debug)]

@@ -14,7 +14,7 @@ use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::reference;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::{LinkTrace, Trace};
 use harness_sim::novobus::witness::Complaint;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;

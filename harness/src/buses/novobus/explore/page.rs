@@ -16,7 +16,7 @@ use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
 use harness_sim::novobus::device::Device as _;
-use harness_sim::novobus::trace::{LinkTrace, Trace};
+use harness_sim::record::{LinkTrace, Trace};
 use harness_sim::novobus::transitions::{Reached, Watched};
 use std::path::Path;
 
