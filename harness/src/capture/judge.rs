@@ -88,9 +88,8 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
         |ring: usize, own: &LinkTrace, index: usize| own.to.is_some() || behind(ring, own, index);
     let master = compare(left, right, tolerance, &inner, end);
     let links = compare(left, right, tolerance, &behind, end);
-    let last = |trace: &harness_sim::record::Trace| {
-        trace.links.iter().any(|link| link.to.is_none())
-    };
+    let last =
+        |trace: &harness_sim::record::Trace| trace.links.iter().any(|link| link.to.is_none());
     let verdict = if !capture.traces.iter().all(last) {
         Verdict::Inconclusive
     } else if master.differ > 0 {

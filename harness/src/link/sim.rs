@@ -8,10 +8,10 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
-use harness_sim::record::LineByte;
 use harness_sim::novobus::ring::Ring;
-use harness_sim::record::Trace;
 use harness_sim::novobus::witness::Complaint;
+use harness_sim::record::LineByte;
+use harness_sim::record::Trace;
 use std::collections::VecDeque;
 
 /// One or two simulated rings.

@@ -183,7 +183,7 @@ impl Expression {
 }
 
 /// Reads a number without arithmetic.
-pub(super) fn plain(scanner: &mut Scanner<'_>) -> Result<i64, Problem> {
+pub(crate) fn plain(scanner: &mut Scanner<'_>) -> Result<i64, Problem> {
     let mut ahead = scanner.clone();
     let digits = ahead.take_while(|c| c.is_ascii_digit());
     match digits.and_then(|digits| digits.value.parse().ok()) {
@@ -196,7 +196,7 @@ pub(super) fn plain(scanner: &mut Scanner<'_>) -> Result<i64, Problem> {
 }
 
 /// Reads a sum.
-pub(super) fn sum(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
+pub(crate) fn sum(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
     let here = scanner.here();
     let expression = sum_at(scanner, 0)?;
     Ok(Located {

@@ -5,17 +5,20 @@
 //! and refuses what cannot be, and [`run`] plays it on a [`Link`](crate::link::Link). The language is
 //! described in `LANGUAGE.md` beside this file.
 
-pub mod argument;
 pub mod expression;
 pub mod parse;
 pub mod pattern;
-pub mod plan;
 pub mod problem;
 pub mod quantity;
 pub mod run;
-mod scanner;
-pub mod simulate;
+pub(crate) mod scanner;
 pub mod source;
 pub mod syntax;
-mod times;
+pub(crate) mod times;
 pub mod verdict;
+
+/// What is settled, simulated and read by the one bus that is played today.
+pub use crate::buses::novobus::{
+    language::{argument, plan},
+    simulate,
+};

@@ -137,7 +137,7 @@ fn low_byte(number: &Located, scope: Scope) -> Result<u8, Problem> {
 }
 
 /// Reads bytes up to the end of the line or to something that is none.
-pub(super) fn pattern(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
+pub(crate) fn pattern(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
     let here = scanner.here();
     let items = items(scanner, 0)?;
     if items.is_empty() {

@@ -108,7 +108,7 @@ impl Dimension {
     }
 
     /// The name of its first unit.
-    pub(super) fn unit(self) -> &'static str {
+    pub(crate) fn unit(self) -> &'static str {
         let own = |unit: &&Unit| unit.dimension == self;
         UNITS.iter().find(own).map_or("", |unit| unit.name)
     }
@@ -205,7 +205,7 @@ impl Quantity {
 
     /// The nearest whole number of `parts` of the unit of the scales, if it is from `least` to `most`
     /// whole units.
-    pub(super) fn whole(self, parts: i32, least: i32, most: i32) -> Result<i32, Problem> {
+    pub(crate) fn whole(self, parts: i32, least: i32, most: i32) -> Result<i32, Problem> {
         let (n, d) = (self.value.numerator(), self.value.denominator());
         let number = n
             .checked_mul(i64::from(parts))
@@ -258,7 +258,7 @@ impl fmt::Display for Tolerance {
 }
 
 /// Whether what stands there can only be a number with a unit: what can be read as bytes is bytes.
-pub(super) fn ahead(scanner: &Scanner<'_>) -> bool {
+pub(crate) fn ahead(scanner: &Scanner<'_>) -> bool {
     let mut ahead = scanner.clone();
     let signed = ahead.eat("-") || ahead.eat("+");
     let Some(digits) = ahead.take_while(|c| c.is_ascii_digit()) else {
@@ -289,7 +289,7 @@ pub(super) fn ahead(scanner: &Scanner<'_>) -> bool {
 
 /// A value such as `5A`, that a person can mean as a number with a unit and the program must read as
 /// bytes: the number and the unit.
-pub(super) fn ambiguous(scanner: &Scanner<'_>) -> Option<(String, &'static Unit)> {
+pub(crate) fn ambiguous(scanner: &Scanner<'_>) -> Option<(String, &'static Unit)> {
     let mut ahead = scanner.clone();
     let digits = ahead.take_while(|c| c.is_ascii_digit())?;
     if ahead.tight().starts_with(' ') {
@@ -314,7 +314,7 @@ fn is_unit(c: char) -> bool {
 }
 
 /// Reads a number with its unit; where it must measure something, only a unit of that will do.
-pub(super) fn quantity(
+pub(crate) fn quantity(
     scanner: &mut Scanner<'_>,
     dimension: Option<Dimension>,
 ) -> Result<Quantity, Problem> {
@@ -365,7 +365,7 @@ pub(super) fn quantity(
 }
 
 /// Reads `+-` and how far a value may be off, if that comes next.
-pub(super) fn tolerance(
+pub(crate) fn tolerance(
     scanner: &mut Scanner<'_>,
     dimension: Dimension,
 ) -> Result<Option<Tolerance>, Problem> {
@@ -389,7 +389,7 @@ pub(super) fn tolerance(
 }
 
 /// Takes `+-` or `±` if it comes next.
-pub(super) fn plus_minus(scanner: &mut Scanner<'_>) -> bool {
+pub(crate) fn plus_minus(scanner: &mut Scanner<'_>) -> bool {
     scanner.eat("+-") || scanner.eat("±")
 }
 

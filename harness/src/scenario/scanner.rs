@@ -4,7 +4,7 @@ use super::problem::{Problem, Span, Spanned};
 
 /// A line without its comment.
 #[derive(Clone, Debug)]
-pub(super) struct Scanner<'a> {
+pub(crate) struct Scanner<'a> {
     text: &'a str,
     /// Where the line starts in the file.
     offset: usize,
@@ -13,7 +13,7 @@ pub(super) struct Scanner<'a> {
 
 impl<'a> Scanner<'a> {
     /// A scanner for the line that starts at `offset`; a `#` begins a comment.
-    pub(super) fn new(line: &'a str, offset: usize) -> Self {
+    pub(crate) fn new(line: &'a str, offset: usize) -> Self {
         let text = line.split('#').next().unwrap_or_default().trim_end();
         Self {
             text,
@@ -22,34 +22,34 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    pub(super) fn skip_space(&mut self) {
+    pub(crate) fn skip_space(&mut self) {
         let rest = &self.text[self.at..];
         self.at += rest.len() - rest.trim_start().len();
     }
 
     /// Whether nothing but white space is left.
-    pub(super) fn at_end(&mut self) -> bool {
+    pub(crate) fn at_end(&mut self) -> bool {
         self.skip_space();
         self.at == self.text.len()
     }
 
     /// What is left, white space in front taken away.
-    pub(super) fn rest(&mut self) -> &'a str {
+    pub(crate) fn rest(&mut self) -> &'a str {
         self.skip_space();
         &self.text[self.at..]
     }
 
     /// What is left, white space in front included.
-    pub(super) fn tight(&self) -> &'a str {
+    pub(crate) fn tight(&self) -> &'a str {
         &self.text[self.at..]
     }
 
-    pub(super) fn peek(&mut self) -> Option<char> {
+    pub(crate) fn peek(&mut self) -> Option<char> {
         self.rest().chars().next()
     }
 
     /// Where the scanner stands; one character wide, or none at the end.
-    pub(super) fn here(&mut self) -> Span {
+    pub(crate) fn here(&mut self) -> Span {
         let width = self.peek().map_or(0, char::len_utf8);
         let start = self.offset + self.at;
         Span {
@@ -59,7 +59,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// From the place `from` to where the scanner stands.
-    pub(super) fn since(&self, from: Span) -> Span {
+    pub(crate) fn since(&self, from: Span) -> Span {
         Span {
             start: from.start,
             end: self.offset + self.text[..self.at].trim_end().len(),
@@ -67,7 +67,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The same place in a line that ends before the first of these tokens; [`Self::go_on`] comes back.
-    pub(super) fn before(&self, tokens: &[&str]) -> Self {
+    pub(crate) fn before(&self, tokens: &[&str]) -> Self {
         let rest = &self.text[self.at..];
         let ends = tokens.iter().filter_map(|token| rest.find(token));
         let end = ends.min().unwrap_or(rest.len());
@@ -78,12 +78,12 @@ impl<'a> Scanner<'a> {
     }
 
     /// Goes on where a scanner from [`Self::before`] has come to.
-    pub(super) fn go_on(&mut self, from: &Self) {
+    pub(crate) fn go_on(&mut self, from: &Self) {
         self.at = from.at;
     }
 
     /// Takes `token` if it comes next.
-    pub(super) fn eat(&mut self, token: &str) -> bool {
+    pub(crate) fn eat(&mut self, token: &str) -> bool {
         if self.rest().starts_with(token) {
             self.at += token.len();
             true
@@ -93,7 +93,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Takes the word `word` if it comes next as a whole word.
-    pub(super) fn eat_word(&mut self, word: &str) -> bool {
+    pub(crate) fn eat_word(&mut self, word: &str) -> bool {
         let before = self.clone();
         if self
             .word()
@@ -106,7 +106,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Takes what comes next as long as `wanted` says so; `None` where that is nothing.
-    pub(super) fn take_while(&mut self, wanted: impl Fn(char) -> bool) -> Option<Spanned<&'a str>> {
+    pub(crate) fn take_while(&mut self, wanted: impl Fn(char) -> bool) -> Option<Spanned<&'a str>> {
         let rest = self.rest();
         let length = rest.find(|c| !wanted(c)).unwrap_or(rest.len());
         if length == 0 {
@@ -124,7 +124,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Takes a word: letters, with digits, `-` and `_` in it.
-    pub(super) fn word(&mut self) -> Option<Spanned<&'a str>> {
+    pub(crate) fn word(&mut self) -> Option<Spanned<&'a str>> {
         if !self.peek().is_some_and(|c| c.is_ascii_alphabetic()) {
             return None;
         }
@@ -132,7 +132,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Takes whatever stands there up to the next white space, for a message.
-    pub(super) fn chunk(&mut self) -> Spanned<&'a str> {
+    pub(crate) fn chunk(&mut self) -> Spanned<&'a str> {
         let here = self.here();
         self.take_while(|c| !c.is_whitespace()).unwrap_or(Spanned {
             value: "",
@@ -141,7 +141,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// A mistake right here: something else stands where `expected` should.
-    pub(super) fn unexpected(&mut self, expected: &str) -> Problem {
+    pub(crate) fn unexpected(&mut self, expected: &str) -> Problem {
         let mut ahead = self.clone();
         let found = ahead.chunk();
         let message = if found.value.is_empty() {
@@ -153,7 +153,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Nothing more may follow.
-    pub(super) fn expect_end(&mut self) -> Result<(), Problem> {
+    pub(crate) fn expect_end(&mut self) -> Result<(), Problem> {
         if self.at_end() {
             return Ok(());
         }

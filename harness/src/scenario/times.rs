@@ -84,14 +84,14 @@ impl Window {
 }
 
 /// Reads a time.
-pub(super) fn duration(scanner: &mut Scanner<'_>) -> Result<Duration, Problem> {
+pub(crate) fn duration(scanner: &mut Scanner<'_>) -> Result<Duration, Problem> {
     let start = scanner.here();
     let (digits, decimals) = number(scanner)?;
     finish(scanner, digits, decimals, start)
 }
 
 /// Reads a time or a window.
-pub(super) fn window(scanner: &mut Scanner<'_>) -> Result<Window, Problem> {
+pub(crate) fn window(scanner: &mut Scanner<'_>) -> Result<Window, Problem> {
     let start = scanner.here();
     let (digits, decimals) = number(scanner)?;
     // In `5..7ms` the first number borrows the unit of the second.

@@ -2,8 +2,8 @@
 
 use crate::fault::{Flips, LinkFault, Plan};
 use crate::novobus::uart::{self, Uart};
-use crate::record::LineByte;
 use crate::novobus::under_way::{Bytes, UnderWay};
+use crate::record::LineByte;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 

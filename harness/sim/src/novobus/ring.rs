@@ -7,8 +7,8 @@
 use crate::fault::{DriveFault, LinkFault};
 use crate::novobus::device::Device;
 use crate::novobus::link::Link;
-use crate::record::LineByte;
 use crate::novobus::node::Node;
+use crate::record::LineByte;
 use crate::record::{LinkTrace, Trace};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;

@@ -2,5 +2,7 @@
 
 pub mod driver;
 pub mod explore;
+pub mod language;
 pub mod locate;
+pub mod simulate;
 pub mod twin;

@@ -1,8 +1,8 @@
 //! The header, and the lines one after another.
 
-use super::drive::{self, Line};
 use super::step;
-use super::words::{master_deviates, named};
+use crate::buses::novobus::language::parse::drive::{self, Line};
+use crate::buses::novobus::language::parse::words::{master_deviates, named};
 use crate::link::Capability;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
@@ -19,7 +19,7 @@ use harness_sim::novobus::deviation::MasterDeviation;
 const MAX_LINES: usize = 20_000;
 
 /// The word behind `master` that makes a header line of it.
-pub(super) const DEVIATES: &str = "deviates";
+pub(crate) const DEVIATES: &str = "deviates";
 
 const HEADER_WORDS: [&str; 8] = [
     "title", "source", "bus", "ring", "needs", "line", "strict", "deadline",

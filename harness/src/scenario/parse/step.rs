@@ -1,10 +1,10 @@
 //! Steps: a time or none, then `>`, `<`, `!`, `?` or a job.
 
-use super::check;
-use super::drive::{self, Line};
-use super::job;
-use super::value::place as cell;
-use super::words::{drives, named, required, ring_prefix};
+use crate::buses::novobus::language::parse::check;
+use crate::buses::novobus::language::parse::drive::{self, Line};
+use crate::buses::novobus::language::parse::job;
+use crate::buses::novobus::language::parse::value::place as cell;
+use crate::buses::novobus::language::parse::words::{drives, named, required, ring_prefix};
 use crate::scenario::expression::{self, Counter, Located};
 use crate::scenario::pattern;
 use crate::scenario::problem::{Problem, Span, nearest};
@@ -17,7 +17,7 @@ use crate::scenario::times;
 use harness_sim::fault::{DriveFault, Flips};
 
 /// Reads a step.
-pub(super) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+pub(crate) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
     let start = scanner.here();
     let when = if scanner.eat("+") {
         When::After(times::window(scanner)?)
@@ -118,7 +118,7 @@ fn begin_loop(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
 }
 
 /// A line that begins with `drive`, as a step.
-pub(super) fn drive_action(drives: Drives, line: Line, span: Span) -> Result<Action, Problem> {
+pub(crate) fn drive_action(drives: Drives, line: Line, span: Span) -> Result<Action, Problem> {
     match line {
         Line::Setup(what) => Err(not_a_step(span, &what)),
         Line::Influence(influence) => Ok(Action::Influence(drives, influence)),
@@ -131,7 +131,7 @@ pub(super) fn drive_action(drives: Drives, line: Line, span: Span) -> Result<Act
 }
 
 /// A header line among the steps.
-pub(super) fn behind_the_first(span: Span, word: &str) -> Problem {
+pub(crate) fn behind_the_first(span: Span, word: &str) -> Problem {
     Problem::new(
         span,
         format!("`{word}` stands behind the first step"),
@@ -140,7 +140,7 @@ pub(super) fn behind_the_first(span: Span, word: &str) -> Problem {
 }
 
 /// What a drive is set to hold or to be, among the steps.
-pub(super) fn not_a_step(span: Span, what: &SetupKind) -> Problem {
+pub(crate) fn not_a_step(span: Span, what: &SetupKind) -> Problem {
     let help = match what {
         SetupKind::Memory(..) => {
             "move the line up, above the first step; `? drive ...` checks cells, `write-byte` writes one"
@@ -232,7 +232,7 @@ fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
 }
 
 /// A link by its two ends: its ring, where it stands, and the ends.
-pub(super) fn link(scanner: &mut Scanner<'_>) -> Result<(usize, Located, LinkEnds), Problem> {
+pub(crate) fn link(scanner: &mut Scanner<'_>) -> Result<(usize, Located, LinkEnds), Problem> {
     let here = scanner.here();
     let ring = ring_prefix(scanner);
     let from = end(scanner)?;

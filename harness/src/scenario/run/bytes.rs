@@ -7,7 +7,7 @@ use harness_proto::time::Instant;
 use std::fmt::Write as _;
 
 /// Whether a received byte is what is expected.
-pub(super) fn matches(expected: Expected, received: Received) -> bool {
+pub(crate) fn matches(expected: Expected, received: Received) -> bool {
     match expected {
         Expected::Byte(byte) => received.is(byte),
         Expected::Any => received.error.is_none(),
@@ -17,7 +17,7 @@ pub(super) fn matches(expected: Expected, received: Received) -> bool {
 }
 
 /// A checking byte as the byte that it must be, by what was received before it.
-pub(super) fn resolve(expected: Expected, before: &[(Instant, Received)]) -> Expected {
+pub(crate) fn resolve(expected: Expected, before: &[(Instant, Received)]) -> Expected {
     match expected {
         Expected::MinusChecksum(over) => {
             let from = before.len().saturating_sub(usize::from(over));

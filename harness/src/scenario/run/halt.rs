@@ -10,7 +10,7 @@ const NAMED: usize = 6;
 
 /// Why a scenario cannot go on.
 #[derive(Clone, Debug)]
-pub(super) enum Halt {
+pub(crate) enum Halt {
     /// It has grown too long.
     Full(String),
     /// The link carries nothing more.
@@ -20,7 +20,7 @@ pub(super) enum Halt {
 impl Runner<'_> {
     /// Ends the conversation: nothing more is sent, and what is under way comes back. Trouble of the
     /// link outweighs every finding, as a finding may be its effect.
-    pub(super) fn wind_up(&mut self, result: Result<(), Stop>) -> Result<(), Stop> {
+    pub(crate) fn wind_up(&mut self, result: Result<(), Stop>) -> Result<(), Stop> {
         let mut result = match (result, self.unseen.take()) {
             (Ok(()), Some(unseen)) => Err(unseen),
             (result, _) => result,
@@ -45,7 +45,7 @@ impl Runner<'_> {
 
     /// Whether the conversation has to end here: the link is in trouble, or there is no room for more in the record. Looked at behind
     /// every step and behind the last bytes, since no later step may follow.
-    pub(super) fn halted(&mut self) -> Result<(), Stop> {
+    pub(crate) fn halted(&mut self) -> Result<(), Stop> {
         self.notice();
         match &self.full {
             Some(Halt::Full(why)) => Err(Stop::aborted(self.place, why.clone())),
@@ -55,7 +55,7 @@ impl Runner<'_> {
     }
 
     /// Notes the first reason for which the conversation has to end.
-    pub(super) fn notice(&mut self) {
+    pub(crate) fn notice(&mut self) {
         if self.full.is_some() {
             return;
         }

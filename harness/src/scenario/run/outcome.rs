@@ -1,6 +1,6 @@
 //! What comes of playing: outcome, finding, and why playing stops.
 
-use super::record::Record;
+use crate::buses::novobus::language::run::record::Record;
 use crate::link::Trouble;
 use crate::scenario::pattern::Expected;
 use crate::scenario::problem::Span;
@@ -56,7 +56,7 @@ impl Outcome {
 
     /// The same where trouble of the link has come behind its last step: what was judged before is a remark.
     #[must_use]
-    pub(super) fn ended_by(self, trouble: &Trouble) -> Self {
+    pub(crate) fn ended_by(self, trouble: &Trouble) -> Self {
         let before = format!("before that: {}", self.verdict);
         let found = self.finding.map(|finding| finding.message);
         let own = [trouble.to_string(), before];
@@ -70,7 +70,7 @@ impl Outcome {
 
     /// A scenario that a drive could not be made ready for, and what of it was wrong.
     #[must_use]
-    pub(super) fn not_ready(verdict: Verdict, unready: Unready, remark: String) -> Self {
+    pub(crate) fn not_ready(verdict: Verdict, unready: Unready, remark: String) -> Self {
         Self {
             unready: Some(unready),
             ..Self::not_played(verdict, remark)
@@ -102,7 +102,7 @@ impl Outcome {
 
 impl Trouble {
     /// What an attempt comes to that this trouble ends: the bench's fault, but a denied command and an interruption are nobody's.
-    pub(super) fn verdict(&self) -> Verdict {
+    pub(crate) fn verdict(&self) -> Verdict {
         match self {
             Self::Lost(_) | Self::Garbled(_) | Self::Interlock(_) => Verdict::RigError,
             Self::Denied(_) | Self::Interrupted => Verdict::Aborted,
@@ -142,13 +142,13 @@ pub struct Difference {
 }
 
 /// Why playing stops.
-pub(super) struct Stop {
-    pub(super) verdict: Verdict,
-    pub(super) finding: Box<Finding>,
+pub(crate) struct Stop {
+    pub(crate) verdict: Verdict,
+    pub(crate) finding: Box<Finding>,
 }
 
 impl Stop {
-    pub(super) fn failed(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn failed(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Failed,
             finding: Box::new(Finding {
@@ -161,11 +161,11 @@ impl Stop {
     }
 
     /// What is wrong, in a sentence.
-    pub(super) fn into_message(self) -> String {
+    pub(crate) fn into_message(self) -> String {
         self.finding.message
     }
 
-    pub(super) fn inconclusive(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn inconclusive(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Inconclusive,
             ..Self::failed(span, message)
@@ -173,7 +173,7 @@ impl Stop {
     }
 
     /// All bytes are right, and some were late.
-    pub(super) fn marginal(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn marginal(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Marginal,
             ..Self::failed(span, message)
@@ -181,21 +181,21 @@ impl Stop {
     }
 
     /// Trouble of the link.
-    pub(super) fn trouble(span: Span, trouble: &Trouble) -> Self {
+    pub(crate) fn trouble(span: Span, trouble: &Trouble) -> Self {
         Self {
             verdict: trouble.verdict(),
             ..Self::failed(span, trouble.to_string())
         }
     }
 
-    pub(super) fn aborted(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn aborted(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Aborted,
             ..Self::failed(span, message)
         }
     }
 
-    pub(super) fn differs(mut self, difference: Difference) -> Self {
+    pub(crate) fn differs(mut self, difference: Difference) -> Self {
         self.finding.difference = Some(difference);
         self
     }

@@ -3,7 +3,7 @@
 use super::bytes::{Shown, matches, resolve, show};
 use super::halt::Halt;
 use super::outcome::{Difference, Outcome, Stop};
-use super::record::Recorder;
+use crate::buses::novobus::language::run::record::Recorder;
 use crate::link::{Capability, Link, Moment};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
-pub(super) const MAX_ROUND: time::Span = time::Span::from_millis(3_600_000);
+pub(crate) const MAX_ROUND: time::Span = time::Span::from_millis(3_600_000);
 
 /// How long a link may need for a pause.
 const PAUSE: time::Span = time::Span::from_millis(50);
@@ -94,52 +94,52 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
 
 /// What the master has received from one ring.
 #[derive(Default)]
-pub(super) struct RingRecord {
-    pub(super) received: Vec<(Instant, Received)>,
+pub(crate) struct RingRecord {
+    pub(crate) received: Vec<(Instant, Received)>,
     /// The first byte that no line has asked for yet.
-    pub(super) next: usize,
+    pub(crate) next: usize,
     /// The first byte behind the last check sequence.
-    pub(super) since_recovery: usize,
+    pub(crate) since_recovery: usize,
     /// What was sent, and whether no fault was put on it at the master's end.
-    pub(super) sent: Vec<(u8, bool)>,
+    pub(crate) sent: Vec<(u8, bool)>,
 }
 
-pub(super) struct Runner<'a> {
-    pub(super) link: &'a mut dyn Link,
-    pub(super) plan: &'a Plan,
+pub(crate) struct Runner<'a> {
+    pub(crate) link: &'a mut dyn Link,
+    pub(crate) plan: &'a Plan,
     at_finding: AtFinding,
     strict: bool,
     /// Why nothing more can be played: no room for more in what is recorded, or trouble on the link.
-    pub(super) full: Option<Halt>,
+    pub(crate) full: Option<Halt>,
     /// The first check on something that the link does not show.
-    pub(super) unseen: Option<Stop>,
-    pub(super) recorder: Recorder,
+    pub(crate) unseen: Option<Stop>,
+    pub(crate) recorder: Recorder,
     /// Cells that were read over the bus, where the link does not show them.
-    pub(super) seen: BTreeMap<(usize, u8, u16), u8>,
+    pub(crate) seen: BTreeMap<(usize, u8, u16), u8>,
     /// Drives that have just answered a telegram, where the link does not show the error mode.
-    pub(super) answers: BTreeSet<(usize, u8)>,
-    pub(super) rings: Vec<RingRecord>,
+    pub(crate) answers: BTreeSet<(usize, u8)>,
+    pub(crate) rings: Vec<RingRecord>,
     /// When the line before was done.
-    pub(super) line_before: Instant,
+    pub(crate) line_before: Instant,
     deadline: time::Span,
-    pub(super) corrected: u64,
+    pub(crate) corrected: u64,
     /// What the driver said was wrong in its last job, the first first.
-    pub(super) disturbed: Vec<Fault>,
+    pub(crate) disturbed: Vec<Fault>,
     /// How the commands of that job have ended.
-    pub(super) ended: Vec<Ending>,
+    pub(crate) ended: Vec<Ending>,
     /// The commands that each ring was sent by the driver; `None` where there may be others.
-    pub(super) asked: Vec<Option<Vec<(u8, Command)>>>,
+    pub(crate) asked: Vec<Option<Vec<(u8, Command)>>>,
     /// When the driver last left the line of a ring free in the middle of its work, if it did.
-    pub(super) gap: Option<Instant>,
-    pub(super) sent: u64,
-    pub(super) sent_from: Instant,
-    pub(super) sent_to: Instant,
+    pub(crate) gap: Option<Instant>,
+    pub(crate) sent: u64,
+    pub(crate) sent_from: Instant,
+    pub(crate) sent_to: Instant,
     /// The step that is under way, or the last one.
-    pub(super) place: Span,
+    pub(crate) place: Span,
 }
 
 impl<'a> Runner<'a> {
-    pub(super) fn new(plan: &'a Plan, link: &'a mut dyn Link, at_finding: AtFinding) -> Self {
+    pub(crate) fn new(plan: &'a Plan, link: &'a mut dyn Link, at_finding: AtFinding) -> Self {
         Self {
             rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
             line_before: link.now(),
@@ -289,7 +289,7 @@ impl Runner<'_> {
         }
     }
 
-    pub(super) fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    pub(crate) fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
         if self.sent == 0 {
             self.sent_from = self.link.now().max(self.sent_to);
         }
@@ -304,7 +304,7 @@ impl Runner<'_> {
     }
 
     /// The next byte that nobody has asked for.
-    pub(super) fn take_next(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    pub(crate) fn take_next(&mut self, ring: usize) -> Option<(Instant, Received)> {
         self.fetch();
         let record = &mut self.rings[ring];
         let byte = record.received.get(record.next).copied()?;
@@ -313,7 +313,7 @@ impl Runner<'_> {
     }
 
     /// Lets time pass up to `until`, with a pause for the link where it wants one and there is room for it.
-    pub(super) fn pass_until(&mut self, until: Instant) {
+    pub(crate) fn pass_until(&mut self, until: Instant) {
         while self.link.now() < until && self.full.is_none() {
             let due = self.link.pause_due();
             let due = due.filter(|due| *due + PAUSE < until && !self.link.busy());
@@ -326,7 +326,7 @@ impl Runner<'_> {
     }
 
     /// Lets the link ask drives what it wants to know, if nothing is under way. No line asks for what comes.
-    pub(super) fn pause(&mut self) {
+    pub(crate) fn pause(&mut self) {
         self.fetch();
         if !self.link.busy() {
             self.link.pause();
@@ -334,14 +334,14 @@ impl Runner<'_> {
     }
 
     /// Lets time pass until everything that was sent has come round (or has been lost).
-    pub(super) fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         let end = self.link.now() + MAX_ROUND;
         while self.link.busy() && self.link.now() < end && self.wait(end) {}
         self.fetch();
     }
 
     /// Lets time pass until something happens. False where nothing will, or where the record is full.
-    pub(super) fn wait(&mut self, until: Instant) -> bool {
+    pub(crate) fn wait(&mut self, until: Instant) -> bool {
         loop {
             self.notice();
             if self.full.is_some() {
@@ -358,7 +358,7 @@ impl Runner<'_> {
         }
     }
 
-    pub(super) fn fetch(&mut self) {
+    pub(crate) fn fetch(&mut self) {
         for (index, record) in self.rings.iter_mut().enumerate() {
             while let Some(byte) = self.link.receive(index) {
                 record.received.push(byte);
@@ -371,7 +371,7 @@ impl Runner<'_> {
     }
 
     /// Bytes that no line has asked for are none of the next line's business.
-    pub(super) fn forget(&mut self, ring: usize) {
+    pub(crate) fn forget(&mut self, ring: usize) {
         self.rings[ring].next = self.rings[ring].received.len();
     }
 

@@ -1,11 +1,10 @@
 //! A scenario as written, for a ring of any size.
 
-mod cell;
-mod check;
-mod job;
 mod scenario;
 
-pub use cell::{CellCheck, Place, Relation, Written};
-pub use check::{Check, Condition, DriveCheck, Ending, Showing};
-pub use job::{Job, JobKind, MasterCall, Target};
+pub use crate::buses::novobus::language::syntax::cell::{CellCheck, Place, Relation, Written};
+pub use crate::buses::novobus::language::syntax::check::{
+    Check, Condition, DriveCheck, Ending, Showing,
+};
+pub use crate::buses::novobus::language::syntax::job::{Job, JobKind, MasterCall, Target};
 pub use scenario::*;

@@ -1,8 +1,8 @@
 //! The scenario, its header and its steps.
 
-use super::cell::{Place, Written};
-use super::check::{Check, DriveCheck};
-use super::job::Job;
+use crate::buses::novobus::language::syntax::cell::{Place, Written};
+use crate::buses::novobus::language::syntax::check::{Check, DriveCheck};
+use crate::buses::novobus::language::syntax::job::Job;
 use crate::link::{Capability, Stimulus};
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::pattern::Pattern;

@@ -16,8 +16,8 @@ use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
 use harness_sim::novobus::device::Device as _;
-use harness_sim::record::{LinkTrace, Trace};
 use harness_sim::novobus::transitions::{Reached, Watched};
+use harness_sim::record::{LinkTrace, Trace};
 use std::path::Path;
 
 /// Findings shown at most.

@@ -18,7 +18,7 @@ use harness_sim::nd21;
 use harness_sim::novobus::drive::Model;
 
 /// The words with which such a line begins.
-pub(super) const WORDS: [&str; 2] = ["drive", "drives"];
+pub(crate) const WORDS: [&str; 2] = ["drive", "drives"];
 
 /// Positions have 31 bits (ND21 13.1.9).
 const MAX_TURNS: i32 = 16_384;
@@ -34,7 +34,7 @@ const DEVICES: [(&str, Device); 4] = [
 ];
 
 /// What stands behind the drives.
-pub(super) enum Line {
+pub(crate) enum Line {
     /// What it holds or is; in the header only.
     Setup(SetupKind),
     /// What happens to it.
@@ -118,7 +118,7 @@ const CONDITIONS: [(&str, Held); 11] = [
 ];
 
 /// Reads what stands behind `drive`.
-pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, Line), Problem> {
+pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, Line), Problem> {
     let drives = drives(scanner)?;
     let before = scanner.clone();
     let word = scanner.word().map_or("", |word| word.value);
@@ -134,7 +134,7 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, Line), Problem>
 }
 
 /// Reads what stands behind `? drive` and `until drive`.
-pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<DriveCheck, Problem> {
+pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<DriveCheck, Problem> {
     let here = scanner.here();
     let drives = drives(scanner)?;
     let condition = condition(scanner, &[])?;
@@ -400,7 +400,7 @@ fn display(scanner: &mut Scanner<'_>) -> Result<Option<[u8; 3]>, Problem> {
 }
 
 /// Any error of the drive: its code of four digits, or its printed name (ND21 14.11).
-pub(super) fn error(scanner: &mut Scanner<'_>) -> Result<ErrorCode, Problem> {
+pub(crate) fn error(scanner: &mut Scanner<'_>) -> Result<ErrorCode, Problem> {
     let text = scanner.rest().to_owned();
     let named = |error: &&ErrorCode| {
         let code = format!("{:04X}", error.code());

@@ -1,8 +1,8 @@
 //! Cells that are recorded while a scenario is played.
 
 use super::look::{hex, physical};
-use super::player::Runner;
 use crate::scenario::plan::{LOOK, MAX_LOOKS, PlannedLooks, PlannedRecord};
+use crate::scenario::run::player::Runner;
 use harness_proto::nd21::units::{self, Scale};
 use harness_proto::time::{Instant, Span};
 
@@ -90,9 +90,9 @@ impl Record {
 
 /// The records of a run.
 #[derive(Default)]
-pub(super) struct Recorder {
+pub(crate) struct Recorder {
     /// Every record, in order of their beginnings.
-    pub(super) records: Vec<Record>,
+    pub(crate) records: Vec<Record>,
     /// The records that go on: which, and when the cell is looked at next.
     running: Vec<(usize, Instant)>,
     samples: usize,
@@ -101,18 +101,18 @@ pub(super) struct Recorder {
 
 impl Recorder {
     /// When a cell is looked at next.
-    pub(super) fn next(&self) -> Instant {
+    pub(crate) fn next(&self) -> Instant {
         let times = self.running.iter().map(|(_, at)| *at);
         times.fold(Instant::NEVER, Instant::min)
     }
 
     /// Counts a look at cells.
-    pub(super) fn count_look(&mut self) {
+    pub(crate) fn count_look(&mut self) {
         self.looks += 1;
     }
 
     /// Whether there was too much to record, in a sentence.
-    pub(super) fn too_much(&self) -> Option<String> {
+    pub(crate) fn too_much(&self) -> Option<String> {
         if self.samples > MAX_SAMPLES {
             return Some(format!(
                 "more than {MAX_SAMPLES} samples recorded: too long"
@@ -125,7 +125,7 @@ impl Recorder {
 
 impl Runner<'_> {
     /// Begins or ends records. A cell has one record at a time.
-    pub(super) fn record(&mut self, record: &PlannedRecord) {
+    pub(crate) fn record(&mut self, record: &PlannedRecord) {
         for drive in record.drives.clone() {
             let recorder = &mut self.recorder;
             recorder.running.retain(|(index, _)| {
@@ -156,7 +156,7 @@ impl Runner<'_> {
     }
 
     /// Notes what the cells hold whose time has come.
-    pub(super) fn note(&mut self) {
+    pub(crate) fn note(&mut self) {
         let now = self.link.now();
         if self.recorder.next() > now {
             return;

@@ -1,23 +1,18 @@
 //! What a step does to drives, and what it waits for or reads of them.
 
 use super::look::{Miss, judge};
-use super::outcome::Stop;
-use super::player::Runner;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::plan::{LOOK, PlannedDriveCheck, Reading};
 use crate::scenario::problem::Span;
+use crate::scenario::run::outcome::Stop;
+use crate::scenario::run::player::Runner;
 use crate::scenario::syntax::Influence;
 use harness_proto::time;
 use std::ops::RangeInclusive;
 
 impl Influence {
     /// Lets it happen to drives, now.
-    pub(in crate::scenario) fn act(
-        &self,
-        link: &mut dyn Link,
-        ring: usize,
-        drives: RangeInclusive<u8>,
-    ) {
+    pub(crate) fn act(&self, link: &mut dyn Link, ring: usize, drives: RangeInclusive<u8>) {
         for drive in drives {
             match self {
                 Self::Stimuli(stimuli) => {
@@ -37,7 +32,7 @@ impl Influence {
 
 impl Runner<'_> {
     /// Lets time pass until a check holds. What was sent before goes on its way meanwhile.
-    pub(super) fn until(
+    pub(crate) fn until(
         &mut self,
         check: &PlannedDriveCheck,
         within: time::Span,
@@ -72,7 +67,7 @@ impl Runner<'_> {
     }
 
     /// What a look at drives is for the verdict. What the link does not show does not end the scenario.
-    pub(super) fn judged(&mut self, seen: Result<(), Miss>, span: Span) -> Result<(), Stop> {
+    pub(crate) fn judged(&mut self, seen: Result<(), Miss>, span: Span) -> Result<(), Stop> {
         match seen {
             Ok(()) => Ok(()),
             Err(Miss::Otherwise(message)) => Err(Stop::failed(span, message)),
@@ -85,7 +80,7 @@ impl Runner<'_> {
     }
 
     /// The number in an answer that has just come whole.
-    pub(super) fn read(
+    pub(crate) fn read(
         &self,
         ring: usize,
         answer: usize,

@@ -1,11 +1,11 @@
 //! What can be seen of drives, beside what must hold.
 
-use super::bytes::{Shown as Byte, matches};
-use super::player::Runner;
 use crate::link::{Mode, Shown};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{CellTest, PlannedCell, PlannedCondition, PlannedDriveCheck, number};
 use crate::scenario::quantity::{Quantity, Tolerance, Unit};
+use crate::scenario::run::bytes::{Shown as Byte, matches};
+use crate::scenario::run::player::Runner;
 use crate::scenario::syntax::{Relation, Showing};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits;
@@ -16,7 +16,7 @@ use std::ops::RangeInclusive;
 const ROUNDING: f64 = 1e-12;
 
 /// Why a check does not hold.
-pub(super) enum Miss {
+pub(crate) enum Miss {
     /// Something else was found, in a sentence.
     Otherwise(String),
     /// It cannot be seen on this link, in a sentence.
@@ -25,12 +25,12 @@ pub(super) enum Miss {
 
 impl Runner<'_> {
     /// Whether something holds of drives, and of which of them it does not.
-    pub(super) fn look(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
+    pub(crate) fn look(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
         self.look_at_drives(check, check.drives.clone())
     }
 
     /// The same, up to the first drive of which it does not hold: for whoever looks often.
-    pub(super) fn glance(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
+    pub(crate) fn glance(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
         let mut drives = check.drives.clone();
         drives.try_for_each(|drive| self.look_at_drives(check, drive..=drive))
     }
@@ -139,7 +139,7 @@ impl Runner<'_> {
     }
 
     /// The bytes of a cell; `None` where the link does not show them.
-    pub(super) fn bytes(
+    pub(crate) fn bytes(
         &self,
         ring: usize,
         drive: u8,
@@ -162,7 +162,7 @@ fn list(ring: usize, drives: &[u8]) -> String {
 }
 
 /// Whether the bytes of a cell are what they must be; otherwise what they are, in a sentence.
-pub(super) fn judge(cell: &PlannedCell, found: &[u8], units: units::Drive) -> Result<(), String> {
+pub(crate) fn judge(cell: &PlannedCell, found: &[u8], units: units::Drive) -> Result<(), String> {
     let name = &cell.name;
     match &cell.test {
         CellTest::Bytes(expected) => {
@@ -263,11 +263,7 @@ fn nearest(scale: Scale, number: Quantity, units: units::Drive) -> Option<Vec<u8
 }
 
 /// The number that the bytes of a cell are; `None` where they are none.
-pub(in crate::scenario) fn physical(
-    scale: Scale,
-    bytes: &[u8],
-    units: units::Drive,
-) -> Option<f64> {
+pub(crate) fn physical(scale: Scale, bytes: &[u8], units: units::Drive) -> Option<f64> {
     match scale.value(bytes, units)?.ok()? {
         Value::Exact(ratio) => Some(ratio.to_f64()),
         Value::Approximate(value) => Some(value),
@@ -359,7 +355,7 @@ fn sign(relation: Relation) -> &'static str {
 }
 
 /// Bytes as written: `0652`.
-pub(in crate::scenario) fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }
 

@@ -19,7 +19,7 @@ struct Loop {
 }
 
 /// Every step with the scope in which it is played.
-pub(super) struct Unroll<'s> {
+pub(crate) struct Unroll<'s> {
     steps: &'s [Step],
     next: usize,
     scope: Scope,
@@ -29,7 +29,7 @@ pub(super) struct Unroll<'s> {
 
 impl<'s> Unroll<'s> {
     /// The steps of a scenario whose loops are whole, as the parser has checked. Numbers of loops refer to ring 1.
-    pub(super) const fn new(steps: &'s [Step], scope: Scope) -> Self {
+    pub(crate) const fn new(steps: &'s [Step], scope: Scope) -> Self {
         Self {
             steps,
             next: 0,
@@ -40,7 +40,7 @@ impl<'s> Unroll<'s> {
     }
 
     /// Whether the last step stands in a loop.
-    pub(super) const fn in_loop(&self) -> bool {
+    pub(crate) const fn in_loop(&self) -> bool {
         !self.loops.is_empty()
     }
 

@@ -1,12 +1,12 @@
 //! What a scenario can check.
 
 use super::cell::{CellCheck, Place};
-use super::{Drives, LinkEnds};
 use crate::link::Mode;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
+use crate::scenario::syntax::{Drives, LinkEnds};
 use crate::scenario::times::Duration;
 use harness_proto::novobus::error::BusError;
 

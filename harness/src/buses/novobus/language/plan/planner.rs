@@ -24,7 +24,7 @@ use harness_sim::novobus::drive::Model;
 use std::ops::RangeInclusive;
 
 /// The most bytes that a run may leave on all links together: its record is held in memory.
-pub(in crate::scenario) const MAX_CARRIED: u64 = 20_000_000;
+pub(crate) const MAX_CARRIED: u64 = 20_000_000;
 
 /// The longest delay or break.
 const MAX_FAULT: time::Span = time::Span::from_millis(10_000);
@@ -201,22 +201,22 @@ impl PlannedAction {
     }
 }
 
-pub(super) struct Planner {
-    pub(super) byte_time: time::Span,
-    pub(super) rings: Vec<RingSize>,
-    pub(super) setups: Vec<PlannedSetup>,
+pub(crate) struct Planner {
+    pub(crate) byte_time: time::Span,
+    pub(crate) rings: Vec<RingSize>,
+    pub(crate) setups: Vec<PlannedSetup>,
     /// What the scales of each ring's drives depend on.
-    pub(super) units: Vec<Vec<units::Drive>>,
+    pub(crate) units: Vec<Vec<units::Drive>>,
     /// The model of drives of which the header does not say it.
-    pub(super) model: Model,
+    pub(crate) model: Model,
     /// The model of each ring's drives.
-    pub(super) models: Vec<Vec<Model>>,
+    pub(crate) models: Vec<Vec<Model>>,
     /// The counters of the loops around the step in hand.
-    pub(super) scope: Scope,
+    pub(crate) scope: Scope,
 }
 
 impl Planner {
-    pub(super) fn ring(&self, index: usize, span: Span) -> Result<RingSize, Problem> {
+    pub(crate) fn ring(&self, index: usize, span: Span) -> Result<RingSize, Problem> {
         self.rings.get(index).copied().ok_or_else(|| {
             Problem::new(
                 span,
@@ -228,7 +228,7 @@ impl Planner {
     }
 
     /// What the expressions of a line for this ring can refer to.
-    pub(super) fn size(&self, ring: usize) -> Scope {
+    pub(crate) fn size(&self, ring: usize) -> Scope {
         let drives = self.rings.get(ring).map_or(0, |r| i64::from(r.drives()));
         self.scope.of_ring(drives)
     }
@@ -246,7 +246,7 @@ impl Planner {
         }
     }
 
-    pub(super) fn drives(&self, drives: &Drives) -> Result<RangeInclusive<u8>, Problem> {
+    pub(crate) fn drives(&self, drives: &Drives) -> Result<RangeInclusive<u8>, Problem> {
         let from = self.drive(drives.ring, &drives.from)?;
         let to = match &drives.to {
             Some(to) => self.drive(drives.ring, to)?,
@@ -255,7 +255,7 @@ impl Planner {
         Ok(from.min(to)..=from.max(to))
     }
 
-    pub(super) fn one(&self, drives: &Drives) -> Result<(usize, u8), Problem> {
+    pub(crate) fn one(&self, drives: &Drives) -> Result<(usize, u8), Problem> {
         Ok((drives.ring, self.drive(drives.ring, &drives.from)?))
     }
 

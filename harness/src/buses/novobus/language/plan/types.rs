@@ -40,22 +40,22 @@ pub struct Plan {
     pub master: Option<&'static MasterDeviation>,
     /// The steps, in order.
     pub steps: Vec<PlannedStep>,
-    pub(super) setups: Vec<PlannedSetup>,
+    pub(crate) setups: Vec<PlannedSetup>,
     /// What the scales of each ring's drives depend on.
-    pub(super) units: Vec<Vec<units::Drive>>,
+    pub(crate) units: Vec<Vec<units::Drive>>,
     /// The model of each ring's drives.
-    pub(super) models: Vec<Vec<Model>>,
+    pub(crate) models: Vec<Vec<Model>>,
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct PlannedSetup {
-    pub(super) ring: usize,
-    pub(super) drives: RangeInclusive<u8>,
-    pub(super) what: PlannedSetupKind,
+pub(crate) struct PlannedSetup {
+    pub(crate) ring: usize,
+    pub(crate) drives: RangeInclusive<u8>,
+    pub(crate) what: PlannedSetupKind,
 }
 
 #[derive(Clone, Debug)]
-pub(in crate::scenario) enum PlannedSetupKind {
+pub(crate) enum PlannedSetupKind {
     Memory(u16, Vec<u8>),
     Eeprom(u8, Vec<u8>),
     Model(Model),
@@ -68,7 +68,7 @@ pub(in crate::scenario) enum PlannedSetupKind {
 
 impl PlannedSetupKind {
     /// Sets what the setup says of a drive's properties, if it says anything of them.
-    pub(in crate::scenario) fn apply_to(&self, properties: &mut Properties) {
+    pub(crate) fn apply_to(&self, properties: &mut Properties) {
         // Planning has refused what cannot be set.
         let _known = match self {
             Self::Word(name, word) => properties.set(name, Setting::Word(word)),
@@ -78,7 +78,7 @@ impl PlannedSetupKind {
     }
 
     /// What a rig must have for it.
-    pub(in crate::scenario) fn needs(&self) -> Option<Capability> {
+    pub(crate) fn needs(&self) -> Option<Capability> {
         match self {
             // No command writes ROM or registers (ND21 10.2): only a simulated drive can be given them.
             Self::Memory(address, _) if !RAM.contains(address) => Some(Capability::Simulator),
@@ -93,7 +93,7 @@ impl PlannedSetupKind {
     }
 
     /// The same for the drive behind the bus.
-    pub(in crate::scenario) fn apply_to_nd21(&self, properties: &mut Nd21Properties) {
+    pub(crate) fn apply_to_nd21(&self, properties: &mut Nd21Properties) {
         match self {
             // Planning has refused what cannot be set; the bus's own properties are not found here.
             Self::Word(name, word) => {
@@ -110,7 +110,7 @@ impl PlannedSetupKind {
 
 impl Influence {
     /// What a rig must have for it.
-    pub(super) fn needs(&self) -> Capability {
+    pub(crate) fn needs(&self) -> Capability {
         match self {
             Self::Stimuli(_) => Capability::Simulator,
             Self::Power(_) => Capability::Power,
@@ -229,7 +229,7 @@ pub struct PlannedCell {
 }
 
 impl PlannedCell {
-    pub(super) fn new(place: &Place, size: usize, test: CellTest) -> Self {
+    pub(crate) fn new(place: &Place, size: usize, test: CellTest) -> Self {
         Self {
             name: place.name.clone(),
             address: place.address,
@@ -371,7 +371,7 @@ impl Plan {
     }
 
     /// What happens to drives from outside the bus before anything is sent, in order of the lines.
-    pub(in crate::scenario) fn influences(
+    pub(crate) fn influences(
         &self,
     ) -> impl Iterator<Item = (usize, RangeInclusive<u8>, &Influence)> + '_ {
         self.setups.iter().filter_map(|setup| match &setup.what {
@@ -395,7 +395,7 @@ impl Plan {
     }
 
     /// The links on which faults are put, by ring and place.
-    pub(in crate::scenario) fn fault_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub(crate) fn fault_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.steps.iter().filter_map(|step| match step.action {
             PlannedAction::Fault(ring, PlacedFault::Link(link, _), _) => Some((ring, link)),
             _ => None,
@@ -410,7 +410,7 @@ impl Plan {
     }
 
     /// What drive `drive` is set to hold and how to behave, in order of the lines.
-    pub(in crate::scenario) fn setups_of(
+    pub(crate) fn setups_of(
         &self,
         ring: usize,
         drive: u8,
@@ -419,7 +419,7 @@ impl Plan {
     }
 }
 
-pub(super) fn setups_of(
+pub(crate) fn setups_of(
     setups: &[PlannedSetup],
     ring: usize,
     drive: u8,

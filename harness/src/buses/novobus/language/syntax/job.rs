@@ -1,11 +1,11 @@
 //! The jobs of the master that a scenario can give.
 
-use super::Drives;
 use super::cell::{Place, Written};
 use crate::link::Capability;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::quantity::{Quantity, Tolerance};
+use crate::scenario::syntax::Drives;
 
 /// A job as written.
 #[derive(Clone, Debug)]
@@ -116,7 +116,7 @@ pub enum JobKind {
 
 impl Job {
     /// What the job needs of a rig beside the bus itself.
-    pub(in crate::scenario) fn needs(&self) -> Option<Capability> {
+    pub(crate) fn needs(&self) -> Option<Capability> {
         match self {
             Self::Command {
                 kind: JobKind::Reset,

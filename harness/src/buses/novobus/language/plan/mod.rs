@@ -9,12 +9,12 @@ mod setup;
 mod types;
 mod unroll;
 
-pub(super) use drive::{MAX_LOOKS, number};
+pub(crate) use drive::{MAX_LOOKS, number};
 pub(crate) use job::Exchange;
-pub(super) use planner::MAX_CARRIED;
+pub(crate) use planner::MAX_CARRIED;
 pub use planner::{plan, plan_step};
-pub(super) use setup::{in_memory, number_bytes};
-pub(super) use types::PlannedSetupKind;
+pub(crate) use setup::{in_memory, number_bytes};
+pub(crate) use types::PlannedSetupKind;
 pub use types::{
     CellTest, LOOK, Plan, PlannedAction, PlannedCall, PlannedCell, PlannedCheck, PlannedCondition,
     PlannedDriveCheck, PlannedLooks, PlannedRecord, PlannedStep, PlannedWhen, PlannedWindow,

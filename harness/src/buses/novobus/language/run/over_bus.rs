@@ -3,13 +3,13 @@
 //! What is read to answer a check stands beside the conversation: its bytes are not counted, and no line asks for
 //! them.
 
-use super::bytes::{matches, resolve};
-use super::outcome::{Outcome, Unready};
-use super::player::{AtFinding, Runner, lacks, play};
 use crate::buses::novobus::twin::unknowable;
 use crate::link::{Line, Link, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
+use crate::scenario::run::bytes::{matches, resolve};
+use crate::scenario::run::outcome::{Outcome, Unready};
+use crate::scenario::run::player::{AtFinding, Runner, lacks, play};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::nd21;
@@ -38,13 +38,13 @@ impl Runner<'_> {
     }
 
     /// What was asked before says nothing of now.
-    pub(super) fn forget_answers(&mut self) {
+    pub(crate) fn forget_answers(&mut self) {
         self.seen.clear();
         self.answers.clear();
     }
 
     /// How much later an answer over the bus can come than the cell itself: the cell is asked for again and again.
-    pub(super) fn asking_time(&self, check: &PlannedDriveCheck) -> Span {
+    pub(crate) fn asking_time(&self, check: &PlannedDriveCheck) -> Span {
         if !self.is_asked_for(check) {
             return Span::ZERO;
         }
@@ -61,7 +61,7 @@ impl Runner<'_> {
 
     /// Where the link shows neither cells nor the error mode, asks the drives that a check is about. What does not
     /// answer stays unseen, and nothing is asked in the middle of a telegram or behind an error.
-    pub(super) fn ask_for(&mut self, check: &PlannedDriveCheck) {
+    pub(crate) fn ask_for(&mut self, check: &PlannedDriveCheck) {
         let status = nd21::ram::STATUS;
         let (address, size) = match &check.condition {
             PlannedCondition::Memory(address, bytes) => (*address, bytes.len()),

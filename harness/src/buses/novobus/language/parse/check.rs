@@ -2,9 +2,9 @@
 
 use super::drive;
 use super::job;
-use super::step;
 use super::words::{drives, named, required};
 use crate::scenario::expression::{self, Located};
+use crate::scenario::parse::step;
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::{Check, Drives, Ending};
@@ -12,7 +12,7 @@ use crate::scenario::times;
 use harness_proto::novobus::error::BusError;
 
 /// Reads what stands behind `?`.
-pub(super) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
+pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
     #[derive(Clone, Copy)]
     enum Word {
         Located,

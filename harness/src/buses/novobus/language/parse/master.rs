@@ -29,7 +29,7 @@ const CALLS: [&str; 11] = [
 const MOST_CALLS: usize = 64;
 
 /// Reads what stands behind `master`: one call, or several behind semicolons that go out together.
-pub(super) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
+pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     let once = scanner.eat_word("once");
     let mut ahead = scanner.clone();
     if !once && ahead.eat_word("count") {
@@ -77,7 +77,7 @@ fn one_call(scanner: &mut Scanner<'_>) -> Result<(Drives, MasterCall), Problem> 
         let mut known = super::job::names();
         known.extend(CALLS);
         known.retain(|name| !["master", "recover"].contains(name));
-        known.extend([super::header::DEVIATES, "once"]);
+        known.extend([crate::scenario::parse::header::DEVIATES, "once"]);
         let problem = scanner.unexpected("what the driver is to do");
         return Err(problem.did_you_mean(name, &known));
     }

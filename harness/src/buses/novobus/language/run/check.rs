@@ -1,11 +1,11 @@
 //! Checks.
 
 use super::look::Miss;
-use super::outcome::Stop;
-use super::player::Runner;
 use crate::buses::novobus::locate::{self, Location};
 use crate::scenario::plan::PlannedCheck;
 use crate::scenario::problem::Span;
+use crate::scenario::run::outcome::Stop;
+use crate::scenario::run::player::Runner;
 use crate::scenario::syntax::Ending;
 use harness_proto::novobus::master::{End, Fault, RingLink};
 
@@ -14,7 +14,7 @@ use harness_proto::novobus::master::{End, Fault, RingLink};
 const PROBE: usize = 64;
 
 impl Runner<'_> {
-    pub(super) fn check(
+    pub(crate) fn check(
         &mut self,
         check: &PlannedCheck,
         timed: bool,

@@ -19,7 +19,7 @@ use std::ops::RangeInclusive;
 impl Planner {
     /// Settles what the header says of drives. Bytes and types come first: on them depends what numbers
     /// with a unit are.
-    pub(super) fn set_up(&mut self, setups: &[Setup]) -> Vec<Problem> {
+    pub(crate) fn set_up(&mut self, setups: &[Setup]) -> Vec<Problem> {
         let mut found = Vec::new();
         let mut planned = Vec::new();
         for numbers in [false, true] {
@@ -112,7 +112,7 @@ impl Planner {
     }
 
     /// Runs of drives with the same scales.
-    pub(super) fn alike(
+    pub(crate) fn alike(
         &self,
         ring: usize,
         drives: RangeInclusive<u8>,
@@ -129,7 +129,7 @@ impl Planner {
     }
 
     /// What a drive's scales depend on.
-    pub(super) fn units_of(&self, ring: usize, drive: u8) -> units::Drive {
+    pub(crate) fn units_of(&self, ring: usize, drive: u8) -> units::Drive {
         let of_ring = self.units.get(ring);
         let units = of_ring.and_then(|drives| drives.get(usize::from(drive)));
         units.copied().unwrap_or(DEFAULT_UNITS)
@@ -199,7 +199,7 @@ impl Planner {
     }
 
     /// Refuses what only the nd21 model has for a drive of another.
-    pub(super) fn only_nd21(&self, drives: &Drives, what: &str, span: Span) -> Result<(), Problem> {
+    pub(crate) fn only_nd21(&self, drives: &Drives, what: &str, span: Span) -> Result<(), Problem> {
         let model = |drive: &u8| {
             let of_ring = self.models.get(drives.ring);
             of_ring.and_then(|models| models.get(usize::from(*drive)))
@@ -218,7 +218,7 @@ impl Planner {
 
 /// Which model stands where the header says nothing: `nd21` where no line names a model and one needs what
 /// only it has.
-pub(super) fn model_unless_said(scenario: &Scenario) -> Model {
+pub(crate) fn model_unless_said(scenario: &Scenario) -> Model {
     let said = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
     if scenario.setups.iter().any(said) {
         return Model::default();
@@ -249,7 +249,7 @@ pub(super) fn model_unless_said(scenario: &Scenario) -> Model {
 const MAX_SETUPS: usize = 100_000;
 
 /// What a plain drive has not got.
-pub(super) const OUTSIDE: &str = "plugs, motor and display";
+pub(crate) const OUTSIDE: &str = "plugs, motor and display";
 
 /// A drive of which the header says nothing (LANGUAGE.md, "Types and ranges").
 const DEFAULT_UNITS: units::Drive = units::Drive {
@@ -266,7 +266,7 @@ fn has_number(setup: &Setup) -> bool {
 }
 
 /// The bytes of a number with a unit.
-pub(in crate::scenario) fn number_bytes(
+pub(crate) fn number_bytes(
     scale: Option<Scale>,
     value: &Written,
     units: units::Drive,
@@ -288,7 +288,7 @@ pub(in crate::scenario) fn number_bytes(
     }
 }
 
-pub(in crate::scenario) fn in_memory(place: &Place, length: usize) -> Result<(), Problem> {
+pub(crate) fn in_memory(place: &Place, length: usize) -> Result<(), Problem> {
     let last = usize::from(place.address) + length.max(1) - 1;
     let inside = |range: &RangeInclusive<u16>| {
         range.contains(&place.address) && last <= usize::from(*range.end())

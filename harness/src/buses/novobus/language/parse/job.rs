@@ -51,14 +51,14 @@ const FORMS: [Form; 13] = [
 ];
 
 /// Every name that a job can have.
-pub(super) fn names() -> Vec<&'static str> {
+pub(crate) fn names() -> Vec<&'static str> {
     let mut names: Vec<_> = FORMS.iter().map(|form| form.name).collect();
     names.extend(["recover", "exchange", "master"]);
     names
 }
 
 /// Reads what stands behind the job's name; `None` where there is no such job.
-pub(super) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, Problem>> {
+pub(crate) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, Problem>> {
     match name {
         "recover" => Some(recover(scanner)),
         "exchange" => Some(exchange(scanner)),
@@ -75,7 +75,7 @@ fn recover(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
 }
 
 /// `ring 2`, or nothing for the first one.
-pub(super) fn which_ring(scanner: &mut Scanner<'_>) -> Result<usize, Problem> {
+pub(crate) fn which_ring(scanner: &mut Scanner<'_>) -> Result<usize, Problem> {
     let named = scanner.eat_word("ring");
     let mut ahead = scanner.clone();
     let ring = match ahead.take_while(|c| c.is_ascii_digit()).map(|d| d.value) {
@@ -99,7 +99,7 @@ fn exchange(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
 }
 
 /// `1234 = ABCD`: what a drive gets as process data, and what it gives.
-pub(super) fn process_data(
+pub(crate) fn process_data(
     scanner: &mut Scanner<'_>,
 ) -> Result<(Pattern, Option<Pattern>), Problem> {
     let here = scanner.here();
@@ -144,7 +144,7 @@ fn operands(
 }
 
 /// A command of the driver; `None` where there is none of this name.
-pub(super) fn driver_command(
+pub(crate) fn driver_command(
     name: &str,
     scanner: &mut Scanner<'_>,
 ) -> Option<Result<(Drives, MasterCall), Problem>> {

@@ -10,7 +10,7 @@ use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::units::turns_to_raw;
 
 impl Planner {
-    pub(super) fn master(
+    pub(crate) fn master(
         &self,
         calls: &[(Drives, MasterCall)],
         once: bool,

@@ -17,14 +17,14 @@ const POSITION: (&str, &str) = ("position", "umdrist");
 const BEHIND: [&str; 3] = ["+-", "±", "within"];
 
 /// Every name of a RAM cell.
-pub(super) fn cell_names() -> impl Iterator<Item = &'static str> {
+pub(crate) fn cell_names() -> impl Iterator<Item = &'static str> {
     let own = cells::RAM.iter().map(|cell| cell.printed);
     own.chain([POSITION.0])
 }
 
 /// A RAM cell by its printed name (ND21 14.2.1), which may have blanks and signs in it; `None` where no
 /// name comes next.
-pub(super) fn cell_by_name(scanner: &mut Scanner<'_>) -> Option<Place> {
+pub(crate) fn cell_by_name(scanner: &mut Scanner<'_>) -> Option<Place> {
     let alias = cells::cell(POSITION.1).map(|cell| (POSITION.0, cell));
     let printed = cells::RAM.iter().map(|cell| (cell.printed, cell));
     named(scanner, printed.chain(alias))
@@ -57,7 +57,7 @@ fn named(
 }
 
 /// A cell: four hexadecimal digits, or its printed name.
-pub(in crate::scenario) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
+pub(crate) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
     if let Some(place) = cell_by_name(scanner) {
         return Ok(place);
     }
@@ -87,7 +87,7 @@ pub(in crate::scenario) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Pro
 
 /// An EEPROM cell: two hexadecimal digits, its printed name, or the name of the RAM cell that is loaded
 /// from it (ND21 14.2.2).
-pub(in crate::scenario) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
+pub(crate) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
     let own = eeprom::EEPROM.iter().map(|cell| (cell.printed, cell));
     if let Some(place) = named(scanner, own) {
         return Ok(place);
@@ -143,13 +143,13 @@ pub(in crate::scenario) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Pla
 }
 
 /// `= VALUE`
-pub(super) fn assigned(scanner: &mut Scanner<'_>, place: &Place) -> Result<Written, Problem> {
+pub(crate) fn assigned(scanner: &mut Scanner<'_>, place: &Place) -> Result<Written, Problem> {
     equals(scanner)?;
     value(scanner, place.scale(), place)
 }
 
 /// Bytes up to what may stand behind a value.
-pub(in crate::scenario) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
+pub(crate) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
     let mut part = scanner.before(&BEHIND);
     let bytes = pattern::pattern(&mut part)?;
     scanner.go_on(&part);
@@ -157,7 +157,7 @@ pub(in crate::scenario) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, P
 }
 
 /// Bytes, a number with a unit, or `off`, as it fits the cell.
-pub(in crate::scenario) fn value(
+pub(crate) fn value(
     scanner: &mut Scanner<'_>,
     scale: Option<Scale>,
     place: &Place,
@@ -208,7 +208,7 @@ pub(in crate::scenario) fn value(
 }
 
 /// `+-1%`, `+-10rpm` behind a number with a unit.
-pub(super) fn tolerance(
+pub(crate) fn tolerance(
     scanner: &mut Scanner<'_>,
     value: &Written,
 ) -> Result<Option<Tolerance>, Problem> {
@@ -227,7 +227,7 @@ pub(super) fn tolerance(
 }
 
 /// What stands behind a cell's name in a check: `= 1500rpm +-1%`, `& E0 = 00`, `< 100rpm`.
-pub(super) fn cell_check(scanner: &mut Scanner<'_>, place: Place) -> Result<CellCheck, Problem> {
+pub(crate) fn cell_check(scanner: &mut Scanner<'_>, place: Place) -> Result<CellCheck, Problem> {
     let mask = if scanner.eat("&") {
         let mut part = scanner.before(&["=", "<", ">"]);
         let mask = pattern::pattern(&mut part)?;

@@ -21,7 +21,7 @@ const MAX_RECORDS: usize = 1_000;
 const NUMBER: usize = 4;
 
 impl Planner {
-    pub(super) fn drive_check(
+    pub(crate) fn drive_check(
         &self,
         check: &DriveCheck,
         needs: &mut Vec<Capability>,
@@ -152,7 +152,7 @@ impl Planner {
     }
 
     /// Refuses what happens from outside the bus to a drive that has no outside.
-    pub(super) fn influence(
+    pub(crate) fn influence(
         &self,
         drives: &Drives,
         influence: &Influence,
@@ -164,7 +164,7 @@ impl Planner {
         }
     }
 
-    pub(super) fn record(&self, recording: &Recording) -> Result<PlannedRecord, Problem> {
+    pub(crate) fn record(&self, recording: &Recording) -> Result<PlannedRecord, Problem> {
         let place = &recording.place;
         let scale = place.scale();
         let own = place.cell.map_or(1, |cell| usize::from(cell.size));
@@ -207,14 +207,14 @@ impl Planner {
 
 /// Records that run, by ring, drive and address, and how many there were.
 #[derive(Default)]
-pub(super) struct Running {
+pub(crate) struct Running {
     cells: BTreeSet<(usize, u8, u16)>,
     records: usize,
 }
 
 impl Running {
     /// What does not run cannot be ended, and a report has an end too.
-    pub(super) fn take(&mut self, record: &PlannedRecord) -> Result<(), Problem> {
+    pub(crate) fn take(&mut self, record: &PlannedRecord) -> Result<(), Problem> {
         for drive in record.drives.clone() {
             let cell = (record.ring, drive, record.address);
             if record.looks != PlannedLooks::Off {
@@ -240,7 +240,7 @@ impl Running {
 }
 
 /// The number that these bytes are, the highest first.
-pub(in crate::scenario) fn number(bytes: &[u8], signed: bool) -> i64 {
+pub(crate) fn number(bytes: &[u8], signed: bool) -> i64 {
     let negative = signed && bytes.first().is_some_and(|byte| byte & 0x80 != 0);
     let start = if negative { -1 } else { 0 };
     bytes
@@ -261,5 +261,4 @@ fn wrong_length(place: &Place, pattern: &Pattern, found: usize, size: usize) -> 
 }
 
 /// Ten minutes of looks: a run that looks longer at cells is too long.
-pub(in crate::scenario) const MAX_LOOKS: u64 =
-    time::Span::from_millis(600_000).units() / LOOK.units() + 1;
+pub(crate) const MAX_LOOKS: u64 = time::Span::from_millis(600_000).units() / LOOK.units() + 1;

@@ -1,14 +1,14 @@
 //! The driver's part of a scenario: calls over the same line that the scenario plays on, so that what is
 //! recorded, limited and shown is all the same.
 
-use super::halt::Halt;
-use super::outcome::Stop;
-use super::player::Runner;
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, conduct, count_drives};
 use crate::link::{Lead, Line, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::PlannedCall;
 use crate::scenario::problem::Span;
+use crate::scenario::run::halt::Halt;
+use crate::scenario::run::outcome::Stop;
+use crate::scenario::run::player::Runner;
 use crate::scenario::syntax::Ending;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -85,7 +85,7 @@ impl Line for Through<'_, '_> {
 
 impl Runner<'_> {
     /// Lets the driver do this of these drives; commands go out together.
-    pub(super) fn master(
+    pub(crate) fn master(
         &mut self,
         ring: usize,
         calls: &[(u8, PlannedCall)],
@@ -138,7 +138,7 @@ impl Runner<'_> {
     }
 
     /// A line sends by itself what the driver is not asked for.
-    pub(super) fn not_the_driver(&mut self, ring: usize) {
+    pub(crate) fn not_the_driver(&mut self, ring: usize) {
         if let Some(asked) = self.asked.get_mut(ring) {
             *asked = None;
         }
@@ -160,7 +160,7 @@ impl Runner<'_> {
 
     /// Whether what was sent into a ring is as the manual says, without a gap where nothing was wrong. Where time is real, a gap is that
     /// of a busy computer, and no drive's fault.
-    pub(super) fn rules_kept(&self, ring: usize, span: Span) -> Result<(), Stop> {
+    pub(crate) fn rules_kept(&self, ring: usize, span: Span) -> Result<(), Stop> {
         let drives = self.link.drives(ring);
         let record = self.rings.get(ring);
         let sent = record.into_iter().flat_map(|record| &record.sent);
@@ -180,7 +180,7 @@ impl Runner<'_> {
     }
 
     /// Lets the driver count the drives.
-    pub(super) fn count(&mut self, ring: usize, expected: u8, span: Span) -> Result<(), Stop> {
+    pub(crate) fn count(&mut self, ring: usize, expected: u8, span: Span) -> Result<(), Stop> {
         self.settle();
         self.forget(ring);
         let mut line = Through {

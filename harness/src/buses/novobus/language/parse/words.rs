@@ -8,7 +8,7 @@ use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
 use harness_sim::novobus::deviation::{deviation, deviations, master_deviation, master_deviations};
 
 /// Reads one of a list of words.
-pub(super) fn named<T: Copy>(
+pub(crate) fn named<T: Copy>(
     scanner: &mut Scanner<'_>,
     names: &[(&str, T)],
     what: &str,
@@ -30,7 +30,7 @@ pub(super) fn named<T: Copy>(
 }
 
 /// The name of a deviation of a drive.
-pub(super) fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, Problem> {
+pub(crate) fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, Problem> {
     let names: Vec<_> = deviations().map(|d| d.name).collect();
     let masters: Vec<_> = master_deviations().map(|d| d.name).collect();
     let other = ("a drive", "a master", "`master deviates NAME`");
@@ -38,7 +38,7 @@ pub(super) fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, 
 }
 
 /// The name of a deviation of the master.
-pub(super) fn master_deviates(
+pub(crate) fn master_deviates(
     scanner: &mut Scanner<'_>,
 ) -> Result<&'static MasterDeviation, Problem> {
     let names: Vec<_> = master_deviations().map(|d| d.name).collect();
@@ -70,7 +70,7 @@ fn one_of<T>(
 }
 
 /// `95..99`, `N-1`, `2:0..last`.
-pub(super) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
+pub(crate) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
     let ring = ring_prefix(scanner);
     let from = expression::sum(scanner)?;
     let to = if scanner.eat("..") {
@@ -83,7 +83,7 @@ pub(super) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
 
 /// `2:` in front of a drive or a link of the second ring. The colon of `drive 2: off` is another one:
 /// no number follows it.
-pub(super) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
+pub(crate) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
     let rest = scanner.rest();
     let behind = |prefix| rest.strip_prefix(prefix).unwrap_or_default();
     let number = |text: &str| {
@@ -101,7 +101,7 @@ pub(super) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
     0
 }
 
-pub(in crate::scenario) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
+pub(crate) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
     if scanner.eat("=") {
         Ok(())
     } else {
@@ -110,7 +110,7 @@ pub(in crate::scenario) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Probl
 }
 
 /// One of these words must come next; the first of them is named where none does.
-pub(super) fn required(scanner: &mut Scanner<'_>, words: &[&str]) -> Result<(), Problem> {
+pub(crate) fn required(scanner: &mut Scanner<'_>, words: &[&str]) -> Result<(), Problem> {
     if words.iter().any(|word| scanner.eat_word(word)) {
         return Ok(());
     }

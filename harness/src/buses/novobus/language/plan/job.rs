@@ -17,7 +17,7 @@ use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::novobus::telegram::{Address, Telegram};
 
 impl Planner {
-    pub(super) fn job(&self, job: &Job) -> Result<PlannedAction, Problem> {
+    pub(crate) fn job(&self, job: &Job) -> Result<PlannedAction, Problem> {
         match job {
             Job::Recover(ring) => {
                 self.ring(*ring, Span::default())?;
@@ -99,7 +99,7 @@ impl Planner {
         }
     }
 
-    pub(super) fn command(
+    pub(crate) fn command(
         &self,
         kind: JobKind,
         drive: (usize, u8),
@@ -180,7 +180,7 @@ impl Planner {
     }
 
     /// A cell with what is added to its address.
-    pub(super) fn moved(&self, place: &Place, ring: usize) -> Result<Place, Problem> {
+    pub(crate) fn moved(&self, place: &Place, ring: usize) -> Result<Place, Problem> {
         let Some(offset) = &place.offset else {
             return Ok(place.clone());
         };
@@ -230,7 +230,7 @@ impl Planner {
     }
 
     /// Exactly `count` bytes that are read.
-    pub(super) fn expected_data(
+    pub(crate) fn expected_data(
         &self,
         data: &Written,
         place: Option<&Place>,
@@ -245,7 +245,7 @@ impl Planner {
     }
 
     /// Exactly `count` known bytes.
-    pub(super) fn known(
+    pub(crate) fn known(
         &self,
         pattern: &Pattern,
         count: usize,
@@ -256,7 +256,7 @@ impl Planner {
     }
 
     /// Exactly `count` bytes.
-    pub(super) fn data(
+    pub(crate) fn data(
         &self,
         pattern: &Pattern,
         count: usize,
@@ -306,9 +306,9 @@ pub(crate) struct Exchange {
     /// What is sent.
     pub(crate) bytes: Vec<u8>,
     /// What must come back.
-    pub(in crate::scenario) expected: Vec<Expected>,
+    pub(crate) expected: Vec<Expected>,
     /// Where in it the data stand that are read, in memory order.
-    pub(in crate::scenario) data: Vec<usize>,
+    pub(crate) data: Vec<usize>,
 }
 
 impl Exchange {
@@ -391,7 +391,7 @@ fn scale_of(place: &Place, width: usize) -> Result<Scale, Problem> {
 }
 
 /// Whether a command reaches a cell.
-pub(super) fn reaches(command: &Command, place: &Place) -> Result<(), Problem> {
+pub(crate) fn reaches(command: &Command, place: &Place) -> Result<(), Problem> {
     if memory::in_range(command.kind(), place.address) {
         return Ok(());
     }

@@ -1,14 +1,14 @@
 //! Cells, values and numbers that stand outside a scenario, on a command line or in a file of parameters:
 //! in the same words.
 
-use super::expression::{self, Scope};
-use super::parse::{bytes, eeprom_place, equals, place, value};
 use super::plan::{in_memory, number_bytes};
-use super::problem::{Problem, Problems, Span};
-use super::quantity::{self, Dimension, Quantity};
-use super::scanner::Scanner;
-use super::syntax::{Place, Written};
-use super::times;
+use crate::scenario::expression::{self, Scope};
+use crate::scenario::parse::{bytes, eeprom_place, equals, place, value};
+use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::quantity::{self, Dimension, Quantity};
+use crate::scenario::scanner::Scanner;
+use crate::scenario::syntax::{Place, Written};
+use crate::scenario::times;
 use harness_proto::nd21::cells::{Access, Cell};
 use harness_proto::nd21::units::{self, Scale};
 use harness_proto::time;

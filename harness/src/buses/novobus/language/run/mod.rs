@@ -1,0 +1,8 @@
+//! The bus's words, played.
+
+pub(crate) mod check;
+pub(crate) mod drives;
+pub(crate) mod look;
+pub(crate) mod master;
+pub(crate) mod over_bus;
+pub(crate) mod record;
