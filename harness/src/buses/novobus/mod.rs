@@ -1,8 +1,15 @@
 //! NOVOBUS: what the bench knows of this bus alone (ND21 8 to 11).
 
+pub mod campaign;
+pub mod capture;
 pub mod driver;
 pub mod explore;
+pub mod fuzz;
+pub mod guard;
 pub mod language;
+pub mod link;
 pub mod locate;
+pub mod probes;
 pub mod simulate;
+pub mod top;
 pub mod twin;

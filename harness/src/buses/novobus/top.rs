@@ -172,7 +172,7 @@ impl Sort {
 
 /// What keys go to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Entry {
+pub(crate) enum Entry {
     /// The commands.
     #[default]
     None,
@@ -196,20 +196,20 @@ pub struct Row {
 /// The state of the view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Top {
-    pub(super) heading: Heading,
-    pub(super) reading: Reading,
+    pub(crate) heading: Heading,
+    pub(crate) reading: Reading,
     /// What is read while the page stands still.
     paused: Option<Reading>,
     /// Disturbances up to this time are not shown.
     forgotten: Option<Span>,
-    pub(super) filter: String,
-    pub(super) only_errors: bool,
-    pub(super) sort: Sort,
-    pub(super) entry: Entry,
+    pub(crate) filter: String,
+    pub(crate) only_errors: bool,
+    pub(crate) sort: Sort,
+    pub(crate) entry: Entry,
     /// The first row in sight.
-    pub(super) first: usize,
+    pub(crate) first: usize,
     /// How many rows the page has room for.
-    pub(super) page: usize,
+    pub(crate) page: usize,
 }
 
 impl Top {
@@ -243,7 +243,7 @@ impl Top {
         self.keep_in_sight();
     }
 
-    pub(super) fn pause(&mut self) {
+    pub(crate) fn pause(&mut self) {
         match self.paused.take() {
             Some(later) => self.reading = later,
             None => self.paused = Some(self.reading.clone()),
@@ -251,18 +251,18 @@ impl Top {
         self.keep_in_sight();
     }
 
-    pub(super) fn forget_disturbances(&mut self) {
+    pub(crate) fn forget_disturbances(&mut self) {
         self.forgotten = Some(self.reading.at);
     }
 
     /// What was disturbed since it was last told to forget.
-    pub(super) fn disturbances(&self) -> impl Iterator<Item = &Disturbance> {
+    pub(crate) fn disturbances(&self) -> impl Iterator<Item = &Disturbance> {
         let forgotten = self.forgotten;
         let all = self.reading.disturbances.iter();
         all.filter(move |one| forgotten.is_none_or(|until| one.last > until))
     }
 
-    pub(super) fn keep_in_sight(&mut self) {
+    pub(crate) fn keep_in_sight(&mut self) {
         let rows = self.shown().len();
         self.first = self.first.min(rows.saturating_sub(self.page.max(1)));
     }
@@ -298,7 +298,7 @@ impl Top {
     }
 
     /// How many drives are in each mode: go, stop, block, error, reset.
-    pub(super) fn modes(&self) -> [(&'static str, usize); 5] {
+    pub(crate) fn modes(&self) -> [(&'static str, usize); 5] {
         ["go", "stop", "block", "error", "reset"].map(|mode| {
             let drives = self.reading.drives.iter();
             (mode, drives.filter(|d| d.state.mode() == mode).count())

@@ -1,7 +1,7 @@
 //! What a guard with a `max_speed` has to know of drives, read from them.
 
-use super::Guarded;
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Width};
+use crate::guard::Guarded;
 use crate::link::Line;
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::guard::{Configuration, Found};

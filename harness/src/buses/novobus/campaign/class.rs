@@ -1,6 +1,6 @@
 //! What can come of a fault.
 
-use super::fault::link_index;
+use crate::campaign::fault::link_index;
 use harness_proto::novobus::master::{End, Fault};
 use serde::{Deserialize, Serialize};
 use std::fmt;

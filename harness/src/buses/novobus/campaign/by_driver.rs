@@ -2,9 +2,9 @@
 //! (`bus`, ND21 11.5). What it reports is taken for what it knows.
 
 use super::class::{Evidence, Wrong, named};
-use super::fault::Case;
 use super::sound::{Sound, all_back};
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options};
+use crate::campaign::fault::Case;
 use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
 use crate::scenario::plan::PlannedCall;
 use harness_proto::novobus::address::RingSize;

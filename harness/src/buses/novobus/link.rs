@@ -1,6 +1,6 @@
 //! A link to simulated rings, in virtual time.
 
-use super::{Capability, Line, Link, Mode, Moment, PlacedFault, Shown, Stimulus, link_name};
+use crate::link::{Capability, Line, Link, Mode, Moment, PlacedFault, Shown, Stimulus, link_name};
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::sync::SYNCO;

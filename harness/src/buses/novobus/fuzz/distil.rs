@@ -447,7 +447,7 @@ mod tests {
             text.contains("#   sync byte due, no address byte seen: SYNCO\n"),
             "{text}"
         );
-        let read = super::super::input::input("a.hex", text.as_bytes());
+        let read = crate::fuzz::input::input("a.hex", text.as_bytes());
         assert_eq!(read.as_ref(), Ok(&one.input));
     }
 

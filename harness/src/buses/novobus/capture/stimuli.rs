@@ -11,16 +11,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What a ring's first and last link tell.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Told {
+pub(crate) struct Told {
     /// What cells held before: drive and address.
-    pub(super) cells: BTreeMap<(u8, u16), u8>,
+    pub(crate) cells: BTreeMap<(u8, u16), u8>,
     /// Bytes received, counted from 0, that are data which changed by themselves, or their checking byte.
-    pub(super) unforeseen: BTreeSet<usize>,
+    pub(crate) unforeseen: BTreeSet<usize>,
 }
 
 /// Reads what was sent on the first link beside what came on the last, and what each drive itself sent, as far as that
 /// was captured.
-pub(super) fn told(size: RingSize, trace: &Trace) -> Told {
+pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
     let first = trace.links.iter().find(|link| link.from.is_none());
     let sent: Vec<_> = first
         .iter()

@@ -1,8 +1,8 @@
 //! What the inputs of the targets for texts, captures and records reach: which statements are taken, and which mistakes are found.
 
-use super::{rig as rig_body, scenario as scenario_body};
 use crate::capture::{self, CaptureError};
 use crate::evidence;
+use crate::fuzz::{rig as rig_body, scenario as scenario_body};
 use crate::rig;
 use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
@@ -24,7 +24,7 @@ const STATEMENT: usize = 3;
 ///
 /// # Panics
 /// As the target.
-pub(super) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
+pub(crate) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
     scenario_body(data);
     let Ok(source) = Source::from_bytes("input.scn".to_owned(), data.to_vec()) else {
         return notes.note(|| Feature::new("", "no text", "not UTF-8"));
@@ -52,7 +52,7 @@ pub(super) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
 ///
 /// # Panics
 /// As the target.
-pub(super) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
+pub(crate) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
     rig_body(data);
     let Ok(source) = Source::from_bytes("input.toml".to_owned(), data.to_vec()) else {
         return notes.note(|| Feature::new("", "no text", "not UTF-8"));
@@ -70,7 +70,7 @@ pub(super) fn rig(data: &[u8], notes: &mut Notebook<'_>) {
 ///
 /// # Panics
 /// As the target.
-pub(super) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
+pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     capture::fuzz::import(data);
     let form = match data.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'{') => "JSON",
@@ -128,7 +128,7 @@ fn arrival(byte: &LineByte) -> &'static str {
 ///
 /// # Panics
 /// As the target.
-pub(super) fn record(data: &[u8], notes: &mut Notebook<'_>) {
+pub(crate) fn record(data: &[u8], notes: &mut Notebook<'_>) {
     evidence::fuzz::record(data);
     evidence::fuzz::noted(data, &mut |place, what| {
         notes.note(|| Feature::new("", place, shape(&what)));

@@ -1,6 +1,6 @@
 //! What the master says in a campaign, taken from a scenario, and what must come back of it (ND21 9.1-9.6).
 
-use super::plan::Shape;
+use crate::campaign::plan::Shape;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedCall, PlannedWhen};
 use crate::scenario::problem::{Problem, Span};
 use harness_proto::line::Received;

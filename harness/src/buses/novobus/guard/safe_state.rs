@@ -88,7 +88,7 @@ impl fmt::Display for SafeState {
 }
 
 /// Brings every drive of the rings to its safe state and reads it back; a guarded line lets all of it pass, behind a
-/// denial after [`Guarded::reset_after_denial`](super::Guarded::reset_after_denial).
+/// denial after [`Guarded::reset_after_denial`](crate::guard::Guarded::reset_after_denial).
 ///
 /// A ring is brought back first (9.8), whatever was half-sent. Then all drives get the first of the steps, each is seen to do it, and
 /// the next follows, on a drive that does not stand as well. The software stop ends every motion on its ramp (11.8); with the
@@ -313,7 +313,7 @@ pub fn blind_stop(size: RingSize) -> Vec<u8> {
 
 /// A telegram with a command and nothing else to a drive of a ring, its address spelled out (ND21 9.2); empty for a drive that the ring
 /// does not have.
-pub(super) fn telegram(size: RingSize, drive: u8, command: Command) -> Vec<u8> {
+pub(crate) fn telegram(size: RingSize, drive: u8, command: Command) -> Vec<u8> {
     let net = command.encode();
     let length = u8::try_from(net.len()).unwrap_or(u8::MAX);
     let header = Header::new(Addressing::AddressFollows, false, length);

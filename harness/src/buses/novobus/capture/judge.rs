@@ -1,8 +1,8 @@
 //! A capture beside the model: what was done to the ring is done to a simulated one, and what both answer is compared.
 
-use super::Capture;
-use super::diff::{Run, Summary, compare};
 use super::scenario::{Options, SketchError, scenario, unforeseen};
+use crate::capture::Capture;
+use crate::capture::diff::{Run, Summary, compare};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::scenario::problem::Problems;

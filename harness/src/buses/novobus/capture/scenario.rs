@@ -1,8 +1,8 @@
 //! A capture as a scenario: what the master sent at its times, what was damaged on the way, what came back.
 
-use super::Capture;
-use super::faults::faults;
 use super::stimuli::{Told, told};
+use crate::capture::Capture;
+use crate::capture::faults::faults;
 use crate::scenario::parse::parse;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
@@ -268,7 +268,7 @@ fn receives(index: usize, ring: &Ring<'_>, width: usize) -> Vec<String> {
 }
 
 /// Bytes received, counted from 0, that cannot be foretold, ring by ring.
-pub(super) fn unforeseen(capture: &Capture) -> Vec<Told> {
+pub(crate) fn unforeseen(capture: &Capture) -> Vec<Told> {
     let rings = capture.traces.iter().enumerate();
     rings
         .map(|(index, trace)| Ring::of(index, trace).map_or_else(|_| Told::default(), |r| r.told))

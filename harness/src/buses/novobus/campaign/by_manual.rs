@@ -4,9 +4,9 @@
 
 use super::class::{Evidence, Wrong};
 use super::conversation::Answers;
-use super::fault::{Case, link_index};
 use super::sound::{Sound, all_back};
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
+use crate::campaign::fault::{Case, link_index};
 use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};

@@ -1,7 +1,7 @@
 //! What came of a campaign, for people and for tools.
 
 use super::class::{Class, Evidence, Wrong};
-use super::run::{Finished, Outcome};
+use crate::campaign::run::{Finished, Outcome};
 use crate::link::link_name;
 use harness_proto::nd21::cells::cell_at;
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! Captures in the JSON of `drivebench trace` (see [`crate::report::json`]); keys that are not known are passed over.
 
-use super::{Assembly, Capture, CaptureError, adjacent, end, line_byte};
+use crate::capture::{Assembly, Capture, CaptureError, adjacent, end, line_byte};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::error::BusError;
@@ -60,7 +60,7 @@ struct MarkObject {
 const LATEST: u64 = u64::MAX / 4;
 
 /// Reads a file.
-pub(super) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
+pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
     let object: Object = serde_json::from_slice(bytes).map_err(|error| CaptureError::At {
         offset: offset(bytes, error.line(), error.column()),
         what: error.to_string(),
