@@ -2,6 +2,7 @@
 
 pub mod campaign;
 pub mod capture;
+pub(crate) mod cli;
 pub mod driver;
 pub mod explore;
 pub mod fuzz;
@@ -10,6 +11,8 @@ pub mod language;
 pub mod link;
 pub mod locate;
 pub mod probes;
+pub mod report;
+pub mod rig;
 pub mod simulate;
 pub mod top;
 pub mod twin;

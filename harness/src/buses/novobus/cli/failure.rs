@@ -1,15 +1,15 @@
 //! Why a command on a bus came to no good end, and which exit code that is.
 
-use super::super::exit::Exit;
-use super::super::output::Output;
 use crate::buses::novobus::driver;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
 use crate::library::LibraryError;
 use crate::link::Trouble;
 use crate::scenario::problem::Problems;
 
 /// Why a command ended early.
 #[derive(Debug)]
-pub(super) enum Failure {
+pub(crate) enum Failure {
     /// Standard output cannot be written to.
     Output(std::io::Error),
     /// What is wrong, in a sentence, with the exit code for it.
@@ -24,17 +24,17 @@ pub(super) enum Failure {
 
 impl Failure {
     /// Something was asked for that cannot be, or that needs a leave that was not given.
-    pub(super) fn refused(message: impl Into<String>) -> Self {
+    pub(crate) fn refused(message: impl Into<String>) -> Self {
         Self::Said(Exit::Usage, message.into())
     }
 
     /// A drive is or did otherwise than asked.
-    pub(super) fn drive(message: impl Into<String>) -> Self {
+    pub(crate) fn drive(message: impl Into<String>) -> Self {
         Self::Said(Exit::Failed, message.into())
     }
 
     /// Says what is wrong and gives the exit code for it.
-    pub(super) fn tell(&self, output: &mut Output) -> Exit {
+    pub(crate) fn tell(&self, output: &mut Output) -> Exit {
         match self {
             Self::Output(error) => output.unwritable(error),
             Self::Said(exit, message) => {

@@ -1,11 +1,11 @@
 //! What a rig shows of itself: who its drives are, how long a byte takes round its rings, and what went wrong meanwhile.
 
-use super::Rig;
 use super::line_test;
-use super::session::{End, Session};
-use super::shared::Shared;
 use crate::buses::novobus::driver::{self, Axis, Bus, Identity, State};
 use crate::link::{Line, Link};
+use crate::rig::Rig;
+use crate::rig::session::{End, Session};
+use crate::rig::shared::Shared;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::sync::SYNCO;
@@ -176,7 +176,7 @@ fn drives(
 
 /// What the rig's file says of a drive and the drive does not.
 fn contradiction(rig: &Rig, axis: Axis, identity: &Identity) -> Option<String> {
-    let own = |entry: &&super::file::DriveEntry| {
+    let own = |entry: &&crate::rig::file::DriveEntry| {
         usize::from(entry.ring) == axis.ring() + 1 && entry.address == axis.drive()
     };
     let stated = rig.file.drive.iter().find(own)?.serial.as_deref()?;

@@ -10,7 +10,7 @@ use harness_proto::novobus::memory::in_range;
 use serde_json::json;
 
 /// Reads the bytes of a cell; a word and a double word at one instant, where the bus can.
-pub(super) fn read(bus: &Bus<'_>, axis: Axis, location: &Location) -> Result<Vec<u8>, Error> {
+pub(crate) fn read(bus: &Bus<'_>, axis: Axis, location: &Location) -> Result<Vec<u8>, Error> {
     let address = location.address();
     if location.memory == Memory::Eeprom {
         return bus.read_eeprom_bytes(axis, low(address), location.size);
@@ -29,7 +29,7 @@ pub(super) fn read(bus: &Bus<'_>, axis: Axis, location: &Location) -> Result<Vec
 }
 
 /// Writes bytes from the address of a cell on, word by word where the bus can.
-pub(super) fn write(
+pub(crate) fn write(
     bus: &Bus<'_>,
     axis: Axis,
     location: &Location,
@@ -71,16 +71,16 @@ fn low(address: u16) -> u8 {
 }
 
 /// What was found in a cell.
-pub(super) struct Found<'a> {
-    pub(super) axis: Axis,
-    pub(super) location: &'a Location,
-    pub(super) bytes: Vec<u8>,
-    pub(super) units: Drive,
+pub(crate) struct Found<'a> {
+    pub(crate) axis: Axis,
+    pub(crate) location: &'a Location,
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) units: Drive,
 }
 
 impl Found<'_> {
     /// The bytes as hexadecimal digits.
-    pub(super) fn raw(&self) -> String {
+    pub(crate) fn raw(&self) -> String {
         hex(&self.bytes)
     }
 
@@ -89,7 +89,7 @@ impl Found<'_> {
     }
 
     /// The value with its unit; empty for bytes without a scale.
-    pub(super) fn value(&self) -> String {
+    pub(crate) fn value(&self) -> String {
         match (self.location.scale, self.decoded()) {
             (None, _) => String::new(),
             (Some(scale), Some(value)) => shown(value, scale),
@@ -98,7 +98,7 @@ impl Found<'_> {
     }
 
     /// The value without its unit, for tools.
-    pub(super) fn number(&self) -> serde_json::Value {
+    pub(crate) fn number(&self) -> serde_json::Value {
         match (self.location.scale, self.decoded()) {
             (_, Some(Value::Exact(number))) => json!(number.to_f64()),
             (_, Some(Value::Approximate(number))) => json!(number),
@@ -108,12 +108,12 @@ impl Found<'_> {
     }
 
     /// The unit, empty where there is none.
-    pub(super) fn unit(&self) -> &'static str {
+    pub(crate) fn unit(&self) -> &'static str {
         self.location.scale.map_or("", |scale| scale.unit())
     }
 
     /// The names of the bits that are set (13.3.1, 14.4).
-    pub(super) fn bits(&self) -> Vec<&'static str> {
+    pub(crate) fn bits(&self) -> Vec<&'static str> {
         match (self.location.memory, &self.bytes[..]) {
             (Memory::Ram, [byte]) => bits::set_in(self.location.address(), *byte).collect(),
             _ => Vec::new(),
@@ -121,7 +121,7 @@ impl Found<'_> {
     }
 
     /// Value or bits, for people; empty where there is nothing to say beside the bytes.
-    pub(super) fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let bits = self.bits();
         if bits.is_empty() {
             self.value()
@@ -131,7 +131,7 @@ impl Found<'_> {
     }
 
     /// Bytes with value or bits: `0652 (428.44 rpm)`.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let words = self.words();
         if words.is_empty() {
             self.raw()
@@ -142,7 +142,7 @@ impl Found<'_> {
 }
 
 /// Reads a cell with what its scale depends on.
-pub(super) fn find<'a>(
+pub(crate) fn find<'a>(
     bus: &Bus<'_>,
     (axis, units): (Axis, Drive),
     location: &'a Location,
@@ -156,6 +156,6 @@ pub(super) fn find<'a>(
 }
 
 /// Bytes as hexadecimal digits.
-pub(super) fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }

@@ -11,7 +11,7 @@ use crate::link::Line;
 use serde_json::json;
 
 /// Brings every ring of a bench back.
-pub(super) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Result<Exit, Failure> {
     let Some(RigName::Named(name)) = &arguments.rig.rig else {
         let (plan, mut link) = rig::link(&arguments.rig, output)?;
         return show(arguments, &every(&mut link, plan.rings.len()), output);

@@ -4,7 +4,7 @@
 //! the script shows it to whoever points at a byte or walks through the bytes by keys, and lays the bytes out at their
 //! times. Equal neighbours are one rectangle, and all rectangles of a colour one path.
 
-use super::write::Html;
+use crate::report::html::Html;
 use crate::report::pcapng::name;
 use crate::report::svg::cells::{Area, Columns, areas};
 use crate::report::svg::{MAX_AREAS, Scale, class};
@@ -55,7 +55,7 @@ struct Data {
 }
 
 /// Writes the diagram of one ring. `id` names its parts.
-pub(super) fn diagram(
+pub(crate) fn diagram(
     html: &mut Html,
     id: &str,
     title: &str,

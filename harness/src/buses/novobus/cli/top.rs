@@ -55,7 +55,7 @@ const CELLS: [(u16, Width); 9] = [
 ];
 
 /// Shows drives until a key ends it.
-pub(super) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit, Failure> {
     if arguments.every == Span::ZERO {
         return Err(Failure::refused("--every must be longer than nothing"));
     }

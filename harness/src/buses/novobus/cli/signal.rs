@@ -9,15 +9,15 @@ use harness_proto::nd21::units::{Drive, trigger_level_to_raw};
 const PAGE: u8 = 0xFF;
 
 /// A cell that can be recorded.
-pub(super) struct Signal {
-    pub(super) location: Location,
+pub(crate) struct Signal {
+    pub(crate) location: Location,
     /// The low byte of its address.
-    pub(super) selector: u8,
+    pub(crate) selector: u8,
 }
 
 impl Signal {
     /// A signal as written.
-    pub(super) fn new(text: &str) -> Result<Self, Failure> {
+    pub(crate) fn new(text: &str) -> Result<Self, Failure> {
         let mut cells = cells(&[text.to_owned()])?;
         let signal = cells.pop().and_then(|location| {
             let [page, selector] = location.address().to_be_bytes();
@@ -32,7 +32,7 @@ impl Signal {
     }
 
     /// The bytes of the cell that a recorded one stands for: it is the highest.
-    pub(super) fn bytes(&self, recorded: u8) -> Vec<u8> {
+    pub(crate) fn bytes(&self, recorded: u8) -> Vec<u8> {
         let mut bytes = vec![0; usize::from(self.location.size)];
         if let Some(first) = bytes.first_mut() {
             *first = recorded;
@@ -41,7 +41,7 @@ impl Signal {
     }
 
     /// `scope_level` for a value of this signal (14.10.6.3).
-    pub(super) fn level(&self, text: &str, units: Drive) -> Result<u8, Failure> {
+    pub(crate) fn level(&self, text: &str, units: Drive) -> Result<u8, Failure> {
         let value = value_at(text, 0, &self.location);
         let bytes = value.and_then(|value| self.location.bytes(&value, units));
         match bytes {

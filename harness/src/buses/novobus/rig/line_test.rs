@@ -2,11 +2,11 @@
 //!
 //! [`cause`] names the likely cause when a ring does not open. It is a pure function of what the test heard.
 
-use super::Rig;
-use super::file::{Endpoint, Hooks, Line, Marks, Transport};
 use super::health::Unhealthy;
 use crate::buses::novobus::locate::locate;
 use crate::link;
+use crate::rig::Rig;
+use crate::rig::file::{Endpoint, Hooks, Line, Marks, Transport};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::novobus::sync::SYNCO;
@@ -32,7 +32,7 @@ type Pass = Vec<(Instant, Received)>;
 
 /// What the line test heard on one ring.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Heard {
+pub(crate) struct Heard {
     /// Bytes that came before anything was sent.
     pub unasked: Vec<Received>,
     /// What came back for [`SENT`] SYNCO, twice.
@@ -116,7 +116,7 @@ impl From<Line> for Rate {
 }
 
 /// Listens, and sends SYNCO twice.
-pub(super) fn listen(line: &mut dyn link::Line, ring: usize) -> Heard {
+pub(crate) fn listen(line: &mut dyn link::Line, ring: usize) -> Heard {
     let end = line.now() + LISTEN;
     let mut unasked = Vec::new();
     while line.now() < end && line.trouble().is_none() {
@@ -155,7 +155,7 @@ const WITH_FF: [u8; 5] = [0x82, 0x00, 0xFF, SYNCO, SYNCO];
 
 /// Whether a ring behind a port with in-band marks answers as one that knows none: it sees FF FF in place of the net byte FF, and the
 /// second one is no sync byte (ND21 9.2). Its FF and the first zero of its error mode then look like a damaged byte.
-pub(super) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
+pub(crate) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
     while line.receive(ring).is_some() {}
     let end = line.send(ring, &WITH_FF) + FIRST_BYTE;
     let mut heard: Vec<Received> = Vec::new();
@@ -169,7 +169,7 @@ pub(super) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
 
 /// The rate of a ring whose bytes come back slower than they were sent; `None` where they do not. A computer that stood still
 /// does not look like a slow ring: the fastest of three passes counts.
-pub(super) fn slower(line: &mut dyn link::Line, ring: usize, stated: Rate) -> Option<Rate> {
+pub(crate) fn slower(line: &mut dyn link::Line, ring: usize, stated: Rate) -> Option<Rate> {
     (0..RATE_PASSES)
         .map(|_| slower_in(&pass(line, ring), stated))
         .try_fold(None, |least: Option<Rate>, found| {
@@ -206,7 +206,7 @@ fn slower_in(pass: &Pass, stated: Rate) -> Option<Rate> {
 }
 
 /// The likely cause, from what the health check and the line test found.
-pub(super) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
+pub(crate) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
     if !heard.unasked.is_empty() {
         return unasked(&heard.unasked);
     }
@@ -252,7 +252,7 @@ pub(super) fn cause(ill: &Unhealthy, heard: &Heard, stated: Rate) -> Cause {
 }
 
 /// The likely cause of bytes that come although nothing was sent.
-pub(super) fn unasked(bytes: &[Received]) -> Cause {
+pub(crate) fn unasked(bytes: &[Received]) -> Cause {
     if bytes.iter().all(|byte| byte.is(0)) {
         Cause::Babbling
     } else {
@@ -262,7 +262,7 @@ pub(super) fn unasked(bytes: &[Received]) -> Cause {
 
 /// Rigs that differ from this one in one setting of its line, each with the cause that it proves when it opens. None where power
 /// would be switched.
-pub(super) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
+pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
     let first = &rig.file.ring.first.endpoint;
     if rig.is_simulated() || !rig.file.power.is_empty() {
         return Vec::new();
@@ -439,7 +439,7 @@ mod tests {
         let rig = |ring: &str, more: &str| {
             let text =
                 format!("schema = 1\n[rig]\nid = \"x\"\n[ring.1]\ndrives = 3\n{ring}\n{more}");
-            super::super::parse(&source("x.toml", text)).expect("a rig")
+            crate::rig::parse(&source("x.toml", text)).expect("a rig")
         };
         let tcp = "transport = \"tcp\"\nport = \"127.0.0.1:4021\"";
         let found = neighbours(&rig(tcp, "[hooks.before]\ncommand = [\"true\"]\n"));

@@ -33,17 +33,17 @@ impl Cell {
 }
 
 /// The bytes that are to be drawn, link by link.
-pub(in crate::report) struct Columns {
+pub(crate) struct Columns {
     /// The first row.
     first: usize,
     links: Vec<Vec<Cell>>,
     /// Whether rows were left out.
-    pub(in crate::report) cut: bool,
+    pub(crate) cut: bool,
 }
 
 impl Columns {
     /// Reads the rows wanted of a trace.
-    pub(in crate::report) fn read(trace: &Trace, rows: Option<Range<usize>>) -> Self {
+    pub(crate) fn read(trace: &Trace, rows: Option<Range<usize>>) -> Self {
         let all = trace.links.iter().map(|l| l.bytes.len()).max().unwrap_or(0);
         let rows = rows.unwrap_or(0..all);
         let wanted = rows.start.min(all)..rows.end.min(all);
@@ -103,23 +103,23 @@ fn carried(byte: &LineByte) -> String {
 
 /// Bytes that are drawn as one.
 #[derive(Clone, Debug)]
-pub(in crate::report) struct Area {
-    pub(in crate::report) links: Range<usize>,
-    pub(in crate::report) rows: Range<usize>,
+pub(crate) struct Area {
+    pub(crate) links: Range<usize>,
+    pub(crate) rows: Range<usize>,
     /// When the first one and the last one had passed.
-    pub(in crate::report) from: u64,
-    pub(in crate::report) to: u64,
-    pub(in crate::report) state: State,
-    pub(in crate::report) status: String,
-    pub(in crate::report) letters: String,
-    pub(in crate::report) words: String,
-    pub(in crate::report) section: &'static str,
-    pub(in crate::report) remark: String,
-    pub(in crate::report) fault: bool,
+    pub(crate) from: u64,
+    pub(crate) to: u64,
+    pub(crate) state: State,
+    pub(crate) status: String,
+    pub(crate) letters: String,
+    pub(crate) words: String,
+    pub(crate) section: &'static str,
+    pub(crate) remark: String,
+    pub(crate) fault: bool,
 }
 
 /// Every byte is in one area; side by side only where rows are aligned. In order of rows.
-pub(in crate::report) fn areas(columns: &Columns, scale: Scale) -> Vec<Area> {
+pub(crate) fn areas(columns: &Columns, scale: Scale) -> Vec<Area> {
     let links = &columns.links;
     let height = links.iter().map(Vec::len).max().unwrap_or(0);
     let mut taken: Vec<Vec<bool>> = links.iter().map(|l| vec![false; l.len()]).collect();

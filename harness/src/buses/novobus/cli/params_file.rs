@@ -22,7 +22,7 @@ use toml::de::{DeTable, DeValue};
 const TABLE: &str = "nd21";
 
 /// The parameters FF60-FF7F, and the cells that are loaded from the EEPROM at reset (14.2.2, 13.1.4, 14.6.6).
-pub(super) fn parameters() -> Vec<Location> {
+pub(crate) fn parameters() -> Vec<Location> {
     let cells = LINKS.iter().flat_map(|link| {
         let linked = link.ram..link.ram + u16::from(link.size);
         RAM.iter()
@@ -34,7 +34,7 @@ pub(super) fn parameters() -> Vec<Location> {
 }
 
 /// A value as it stands in a file: a number with its unit where that gives back the same bytes.
-pub(super) fn value(found: &Found<'_>) -> String {
+pub(crate) fn value(found: &Found<'_>) -> String {
     // `180 V per 1000 rpm` is written `180 V`.
     let shown = found.value();
     let text = shown.split(" per ").next().unwrap_or_default();
@@ -50,7 +50,7 @@ pub(super) fn value(found: &Found<'_>) -> String {
 }
 
 /// The text of a file with what was found in a drive.
-pub(super) fn text(drive: &str, found: &[Found<'_>]) -> String {
+pub(crate) fn text(drive: &str, found: &[Found<'_>]) -> String {
     let key = |name: &str| {
         let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if name.chars().all(bare) {
@@ -84,14 +84,14 @@ pub(super) fn text(drive: &str, found: &[Found<'_>]) -> String {
 }
 
 /// A parameter as a file has it.
-pub(super) struct Entry {
-    pub(super) location: Location,
-    pub(super) bytes: Vec<u8>,
+pub(crate) struct Entry {
+    pub(crate) location: Location,
+    pub(crate) bytes: Vec<u8>,
 }
 
 /// The parameters of a file for a drive, and what their scales depend on when they are loaded; in the order of
 /// [`parameters`].
-pub(super) fn read(source: &Source, drive: Drive) -> Result<(Vec<Entry>, Drive), Problems> {
+pub(crate) fn read(source: &Source, drive: Drive) -> Result<(Vec<Entry>, Drive), Problems> {
     let mut problems = Vec::new();
     let written = values(source, &mut problems);
     let units = units(&written, drive);

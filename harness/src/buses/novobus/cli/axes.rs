@@ -46,7 +46,7 @@ impl FromStr for Axes {
 }
 
 /// The drives of a bus that are meant, each once, in the order in which they are named.
-pub(super) fn select(wanted: &[Axes], bus: &[Axis]) -> Result<Vec<Axis>, Failure> {
+pub(crate) fn select(wanted: &[Axes], bus: &[Axis]) -> Result<Vec<Axis>, Failure> {
     let mut selected: Vec<Axis> = Vec::new();
     for axes in wanted {
         let found: Vec<Axis> = match axes {
@@ -83,7 +83,7 @@ pub(super) fn select(wanted: &[Axes], bus: &[Axis]) -> Result<Vec<Axis>, Failure
 }
 
 /// The only drive that is meant.
-pub(super) fn single(wanted: &Axes, bus: &[Axis]) -> Result<Axis, Failure> {
+pub(crate) fn single(wanted: &Axes, bus: &[Axis]) -> Result<Axis, Failure> {
     match select(std::slice::from_ref(wanted), bus)?[..] {
         [axis] => Ok(axis),
         _ => Err(Failure::refused("one drive expected here, not several")),

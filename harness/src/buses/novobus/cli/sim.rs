@@ -15,7 +15,7 @@ use harness_proto::time::Span;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-pub(super) const SIM_HELP: &str = "\
+pub(crate) const SIM_HELP: &str = "\
 On standard output stands a line for each ring once all are ready, `ring 1: 3 drives at 127.0.0.1:40123`, then with
 --control ADDRESS a line `control at 127.0.0.1:40124`; with --control - the answers follow. What clients do is told on
 standard error.
@@ -176,7 +176,7 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, Place)>, 
 }
 
 /// Serves the rings of a simulated bench.
-pub(super) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
     let (plan, link) = rig::link(&arguments.rig, output)?;
     let pace = match arguments.pace {
         Speed::Line => Pace::Line,

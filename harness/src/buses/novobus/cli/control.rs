@@ -20,12 +20,12 @@ const RESET: Span = Span::from_millis(200);
 type Call = fn(&Bus<'_>, Axis) -> Result<(), Error>;
 
 /// Lets drives run.
-pub(super) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
     with_leave(arguments, output, "go", |bus, axis| bus.go(axis), CYCLES)
 }
 
 /// Resets drives.
-pub(super) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
     let Some(RigName::Named(_)) = &arguments.select.rig.rig else {
         let reset: Call = |bus, axis| bus.reset(axis);
         return with_leave(arguments, output, "reset", reset, RESET);
@@ -70,21 +70,21 @@ fn leave_to(arguments: &MoveArguments, purpose: &'static str) -> Use {
 }
 
 /// Stops drives.
-pub(super) fn stop(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn stop(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
     quietly(arguments, output, Use::look("stop"), |bus, axis| {
         bus.stop(axis)
     })
 }
 
 /// Blocks drives.
-pub(super) fn block(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn block(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
     quietly(arguments, output, Use::look("block"), |bus, axis| {
         bus.block(axis)
     })
 }
 
 /// Confirms errors.
-pub(super) fn delete_error(
+pub(crate) fn delete_error(
     arguments: &DeleteErrorArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {

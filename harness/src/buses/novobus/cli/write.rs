@@ -25,14 +25,14 @@ const ORDERS: [u16; 7] = [
 ];
 
 /// What is to be written into a drive.
-pub(super) struct Orders {
+pub(crate) struct Orders {
     axis: Axis,
     cells: Vec<(Location, Vec<u8>)>,
 }
 
 impl Orders {
     /// Settles the values of a command line for a drive; what can make its motor turn needs a leave.
-    pub(super) fn new(
+    pub(crate) fn new(
         bench: &Bench,
         axis: Axis,
         (texts, values): (&[String], &[(Location, Written)]),
@@ -83,7 +83,7 @@ impl Orders {
     }
 
     /// Writes all of it, in order.
-    pub(super) fn write(&self, bench: &Bench) -> Result<(), Failure> {
+    pub(crate) fn write(&self, bench: &Bench) -> Result<(), Failure> {
         for (location, bytes) in &self.cells {
             cell::write(&bench.bus, self.axis, location, bytes)?;
         }
@@ -92,7 +92,7 @@ impl Orders {
 }
 
 /// Writes cells and shows them before and after.
-pub(super) fn write(arguments: &WriteArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn write(arguments: &WriteArguments, output: &mut Output) -> Result<Exit, Failure> {
     let values = assignments(&arguments.values)?;
     let what = Use {
         purpose: "write",

@@ -17,7 +17,7 @@ use harness_proto::nd21::units::{Date, Drive};
 use harness_proto::nd21::{PARAMETERS, ee};
 
 /// Does what one of the commands says.
-pub(super) fn params(command: &ParamsCommand, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn params(command: &ParamsCommand, output: &mut Output) -> Result<Exit, Failure> {
     match command {
         ParamsCommand::Save(arguments) => {
             let look = Use::look("params save");

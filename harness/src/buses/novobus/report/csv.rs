@@ -14,8 +14,8 @@
 //! | `section` | where the rule stands in the ND21 manual |
 //! | `mark` | what the sender remarked: `detected`, with the cause, `upstream`, `seventeenth`, `sequence`, `recovered` |
 
-use super::pcapng::name;
 use super::walk::{Reader, Seen, in_time};
+use crate::report::pcapng::name;
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::record::LineByte;
 use harness_sim::record::{Mark, Trace};

@@ -6,7 +6,7 @@ use crate::regular;
 use std::path::Path;
 
 /// Writes a text into a file.
-pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
+pub(crate) fn write(path: &Path, text: &str) -> Result<(), Failure> {
     if path.file_name().is_none() {
         return Err(Failure::refused(format!(
             "{} is not the name of a file",

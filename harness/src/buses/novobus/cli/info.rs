@@ -29,7 +29,7 @@ struct Drive<'a> {
 }
 
 /// Shows drives.
-pub(super) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exit, Failure> {
     rig::on(
         &arguments.rig,
         Use::look("info"),

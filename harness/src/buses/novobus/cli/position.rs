@@ -30,7 +30,7 @@ struct Run {
 }
 
 /// Takes a drive to a position.
-pub(super) fn position(
+pub(crate) fn position(
     arguments: &PositionArguments,
     output: &mut Output,
 ) -> Result<Exit, Failure> {

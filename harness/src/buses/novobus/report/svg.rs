@@ -5,10 +5,10 @@
 //! byte reads what it is, by which rule and section. Equal bytes side by side are one rectangle. No scripts; colours
 //! follow the reader's light or dark scheme; a long run is cut, and the picture says so.
 
-pub(super) mod cells;
+pub(crate) mod cells;
 
-use super::pcapng::name;
 use super::walk::State;
+use crate::report::pcapng::name;
 use cells::{Area, Columns, areas};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
@@ -108,7 +108,7 @@ const STYLE: &str = "\
 .nb .f{fill:#5d3f8f}.nb .g{fill:#474e57}.nb .x{stroke:#ff8a80}}";
 
 /// The class of a state's colour.
-pub(super) fn class(state: State) -> char {
+pub(crate) fn class(state: State) -> char {
     match state {
         State::Idle => 'a',
         State::Forwarding => 'b',

@@ -1,8 +1,8 @@
 //! What the master and the drives said, one after another: jobs with their answers, faults on the line, the error mode and the way
 //! out of it (ND21 9.5, 9.7, 9.8). It is read from the links at both ends of the master, and from what drives remarked.
 
-use super::write::Html;
 use crate::report::csv::{remark, status};
+use crate::report::html::Html;
 use crate::report::meaning::Role;
 use crate::report::pcapng::name;
 use crate::report::walk::Reader;
@@ -87,7 +87,7 @@ struct Event {
 }
 
 /// Writes the events; false where there are none.
-pub(super) fn sequence(html: &mut Html, id: &str, trace: &Trace) -> bool {
+pub(crate) fn sequence(html: &mut Html, id: &str, trace: &Trace) -> bool {
     let events = events(trace);
     if events.is_empty() {
         return false;

@@ -16,7 +16,7 @@ use harness_proto::time::Span;
 const MOST: u64 = 1_000_000;
 
 /// Shows values, a line each time.
-pub(super) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<Exit, Failure> {
     let cells = cells(&arguments.cells)?;
     if arguments.every == Span::ZERO || arguments.length.units() / arguments.every.units() > MOST {
         return Err(Failure::refused(format!(

@@ -54,18 +54,18 @@ impl FromStr for RigName {
 
 /// What a command does with a bench.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Use {
+pub(crate) struct Use {
     /// Its name; others who want the bench are told.
-    pub(super) purpose: &'static str,
+    pub(crate) purpose: &'static str,
     /// Motors may turn, as far as the command line goes.
-    pub(super) moves: bool,
+    pub(crate) moves: bool,
     /// The drives stay as they are behind a good end: nothing was changed, or so it was asked for.
-    pub(super) holds: bool,
+    pub(crate) holds: bool,
 }
 
 impl Use {
     /// For a command that changes nothing.
-    pub(super) const fn look(purpose: &'static str) -> Self {
+    pub(crate) const fn look(purpose: &'static str) -> Self {
         Self {
             purpose,
             moves: false,
@@ -75,8 +75,8 @@ impl Use {
 }
 
 /// A bench that has been opened.
-pub(super) struct Bench {
-    pub(super) bus: Bus<'static>,
+pub(crate) struct Bench {
+    pub(crate) bus: Bus<'static>,
     plan: Plan,
     /// The rig in use, if it is none that was set up for this command.
     rig: Option<Shared>,
@@ -85,7 +85,7 @@ pub(super) struct Bench {
 impl Bench {
     /// What the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds,
     /// which the drive is asked for (14.3.2).
-    pub(super) fn units(&self, axis: Axis) -> Result<Drive, Failure> {
+    pub(crate) fn units(&self, axis: Axis) -> Result<Drive, Failure> {
         Ok(Drive {
             range: self.bus.speed_range(axis)?,
             ..self.plan.units(axis.ring(), axis.drive())
@@ -93,7 +93,7 @@ impl Bench {
     }
 
     /// The same without asking the drive: `range` is what it said of its range of speeds.
-    pub(super) fn units_with(&self, axis: Axis, range: SpeedRange) -> Drive {
+    pub(crate) fn units_with(&self, axis: Axis, range: SpeedRange) -> Drive {
         Drive {
             range,
             ..self.plan.units(axis.ring(), axis.drive())
@@ -101,7 +101,7 @@ impl Bench {
     }
 
     /// Does something with the rig in use, if it is one; the bus carries nothing meanwhile.
-    pub(super) fn with_rig<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
+    pub(crate) fn with_rig<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
         self.rig.as_ref()?.with(act)
     }
 
@@ -139,7 +139,7 @@ impl Bench {
 
 /// Opens a bench, does something on it, and gives it back: with its drives as they are where `as_what` says so and all went
 /// well, or where nothing was done; in its safe state otherwise.
-pub(super) fn on(
+pub(crate) fn on(
     arguments: &RigArguments,
     as_what: Use,
     output: &mut Output,
@@ -149,7 +149,7 @@ pub(super) fn on(
 }
 
 /// The same, with something done to a rig before its master begins: what leaves no master knowing where the drives are.
-pub(super) fn on_after(
+pub(crate) fn on_after(
     arguments: &RigArguments,
     as_what: Use,
     output: &mut Output,
@@ -185,7 +185,7 @@ pub(super) fn on_after(
 }
 
 /// Takes a rig for a command.
-pub(super) fn take(
+pub(crate) fn take(
     rig: &Rig,
     arguments: &RigArguments,
     as_what: Use,
@@ -203,7 +203,7 @@ pub(super) fn take(
 }
 
 /// The rig of this name.
-pub(super) fn named(
+pub(crate) fn named(
     name: &str,
     arguments: &RigArguments,
     output: &mut Output,
@@ -246,7 +246,7 @@ fn give_back(
 }
 
 /// The simulated drives of a bench, with nothing sent to them. A rig with ports is stood in for by its simulated likeness.
-pub(super) fn link(
+pub(crate) fn link(
     arguments: &RigArguments,
     output: &mut Output,
 ) -> Result<(Plan, SimulatedLink), Failure> {

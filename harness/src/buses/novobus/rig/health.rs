@@ -135,7 +135,7 @@ fn examine_once(
 
 /// Whether unasked bytes are those of drives that have missed their master (ND21 9.9): zeros, then for ever the address of the drive behind
 /// the silence.
-pub(super) fn sounds_timed_out(heard: &[Received], ring: Option<RingSize>) -> bool {
+pub(crate) fn sounds_timed_out(heard: &[Received], ring: Option<RingSize>) -> bool {
     let Some(last) = heard.last().map(|received| received.byte) else {
         return false;
     };
@@ -147,7 +147,7 @@ pub(super) fn sounds_timed_out(heard: &[Received], ring: Option<RingSize>) -> bo
 }
 
 impl Unhealthy {
-    pub(super) fn talking(bytes: &[Received]) -> Self {
+    pub(crate) fn talking(bytes: &[Received]) -> Self {
         Self::Talking {
             count: bytes.len(),
             bytes: shown(bytes),

@@ -11,7 +11,7 @@ use crate::scenario::argument::{Location, Memory, cells};
 use serde_json::json;
 
 /// Reads cells and shows them.
-pub(super) fn read(arguments: &ReadArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn read(arguments: &ReadArguments, output: &mut Output) -> Result<Exit, Failure> {
     let cells = cells(&arguments.cells)?;
     let look = Use::look("read");
     rig::on(&arguments.rig, look, output, |bench, output| {
@@ -90,7 +90,7 @@ fn object(found: &Found<'_>) -> serde_json::Value {
 }
 
 /// A table with a heading; each column is as wide as what stands in it.
-pub(super) fn columns<const N: usize>(heading: &[&str; N], rows: &[[String; N]]) -> String {
+pub(crate) fn columns<const N: usize>(heading: &[&str; N], rows: &[[String; N]]) -> String {
     let width = |column: usize| {
         let of_rows = rows.iter().map(|row| row[column].chars().count());
         of_rows.chain([heading[column].len()]).max().unwrap_or(0)

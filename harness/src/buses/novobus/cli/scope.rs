@@ -28,7 +28,7 @@ struct Recording<'a> {
 }
 
 /// Records signals.
-pub(super) fn scope(arguments: &ScopeArguments, output: &mut Output) -> Result<Exit, Failure> {
+pub(crate) fn scope(arguments: &ScopeArguments, output: &mut Output) -> Result<Exit, Failure> {
     let names = [Some(&arguments.signal1), arguments.signal2.as_ref()];
     let signals = names
         .into_iter()

@@ -20,14 +20,14 @@ mod top;
 mod watch;
 mod write;
 
-pub(super) use args::DriveCommand;
+pub(crate) use args::DriveCommand;
 
-use super::exit::Exit;
-use super::output::Output;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
 use failure::Failure;
 
 /// Does what a command says; what stands in its way is told.
-pub(super) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
     let end = match command {
         DriveCommand::Read(arguments) => read::read(arguments, output),
         DriveCommand::Write(arguments) => write::write(arguments, output),
