@@ -18,7 +18,7 @@ pub struct LineByte {
     /// What the receiver noticed.
     pub error: Option<LineError>,
     /// Whether the byte goes back to one that the master sent, rather than to a time-out.
-    pub(crate) solicited: bool,
+    pub solicited: bool,
 }
 
 impl LineByte {

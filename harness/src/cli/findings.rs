@@ -16,7 +16,7 @@ const MOST_LISTED: usize = 12;
 
 /// What was played, and what of it differed from the model.
 #[derive(Default)]
-pub(crate) struct Findings {
+pub(super) struct Findings {
     /// The conversations of each attempt that differed.
     differing: Vec<Vec<Conversation>>,
     /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
@@ -26,8 +26,8 @@ pub(crate) struct Findings {
     /// The drives that the telegrams around a difference name.
     suspects: Vec<u8>,
     /// What the bench's own master did, and whether it was ever wrong.
-    pub(crate) driven: Vec<Driven>,
-    pub(crate) master_is_wrong: bool,
+    pub(super) driven: Vec<Driven>,
+    pub(super) master_is_wrong: bool,
     /// Scenarios and conversations that were played, and that were compared to their end and equal.
     played: usize,
     equal: usize,
@@ -44,7 +44,7 @@ pub(crate) struct Findings {
 
 impl Findings {
     /// Notes what came of a scenario on a rig that states this tolerance of times.
-    pub(crate) fn note(&mut self, name: &str, played: &Played, tolerance: Span) {
+    pub(super) fn note(&mut self, name: &str, played: &Played, tolerance: Span) {
         let verdict = played.outcome.verdict;
         let Some(last) = played.last_played() else {
             self.skipped += 1;
@@ -58,7 +58,8 @@ impl Findings {
             self.own += own;
         }
         let differs = last.comparisons.iter().any(|own| own.divergence.is_some());
-        let whole = last.comparisons.len() == last.conversations.len();
+        let left_out = last.comparisons.iter().any(|own| own.left_out);
+        let whole = last.comparisons.len() == last.conversations.len() && !left_out;
         let why = match verdict {
             Verdict::Skipped => "the drives could not be made ready",
             _ if differs => "a byte differed",
@@ -80,7 +81,7 @@ impl Findings {
     }
 
     /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
-    pub(crate) fn note_attempts(&mut self, played: &Played, tolerance: Span) {
+    pub(super) fn note_attempts(&mut self, played: &Played, tolerance: Span) {
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());
             self.master_is_wrong |= !attempt.master_is_right;
@@ -102,27 +103,27 @@ impl Findings {
     }
 
     /// Notes a probe that was asked.
-    pub(crate) fn note_probe(&mut self) {
+    pub(super) fn note_probe(&mut self) {
         self.probes += 1;
     }
 
     /// Notes something that was not compared, or not equal.
-    pub(crate) fn note_open(&mut self, why: String) {
+    pub(super) fn note_open(&mut self, why: String) {
         self.open.push(why);
     }
 
     /// Whether something differed that a drive is to blame for.
-    pub(crate) fn differ(&self) -> bool {
+    pub(super) fn differ(&self) -> bool {
         !self.differing.is_empty() || !self.with_driver.is_empty()
     }
 
     /// Whether something was not compared, or not equal.
-    pub(crate) fn is_open(&self) -> bool {
+    pub(super) fn is_open(&self) -> bool {
         !self.open.is_empty()
     }
 
     /// What is to be explained. Where the driver's part shows nothing new it is left out.
-    pub(crate) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
+    pub(super) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
         Seen {
             drives,
             suspects: &self.suspects,
@@ -137,7 +138,7 @@ impl Findings {
 
     /// Prints the deviations that explain what differed, none where they were not looked for, and what was compared; `known` are those
     /// that the rig's file names.
-    pub(crate) fn tell(
+    pub(super) fn tell(
         &self,
         named: Option<&[Named]>,
         known: &[String],

@@ -9,16 +9,16 @@ use miette::{GraphicalReportHandler, GraphicalTheme};
 use std::io::{IsTerminal, Write};
 
 /// Where results and messages go.
-pub(crate) struct Output {
+pub(super) struct Output {
     colour_out: bool,
     colour_err: bool,
-    pub(crate) progress: bool,
+    pub(super) progress: bool,
     /// Standard output is a terminal.
-    pub(crate) terminal: bool,
+    pub(super) terminal: bool,
 }
 
 impl Output {
-    pub(crate) fn new(color: When, progress: Progress) -> Self {
+    pub(super) fn new(color: When, progress: Progress) -> Self {
         let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let colour = |terminal: bool| match color {
             When::Always => true,
@@ -40,35 +40,35 @@ impl Output {
     }
 
     /// Whether what goes to standard output may have colours.
-    pub(crate) const fn colours(&self) -> bool {
+    pub(super) const fn colours(&self) -> bool {
         self.colour_out
     }
 
     /// Writes a result.
-    pub(crate) fn result(&mut self, text: &str) -> std::io::Result<()> {
+    pub(super) fn result(&mut self, text: &str) -> std::io::Result<()> {
         let mut out = std::io::stdout().lock();
         unless_closed(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
     }
 
     /// Writes a message for people.
-    pub(crate) fn complain(&mut self, text: &str) {
+    pub(super) fn complain(&mut self, text: &str) {
         let label = paint("error", "1;31", self.colour_err);
         self.say(&format!("{label}: {text}\n"));
     }
 
     /// Says that standard output or a file cannot be written to, and gives the exit code for it.
-    pub(crate) fn unwritable(&mut self, error: &std::io::Error) -> Exit {
+    pub(super) fn unwritable(&mut self, error: &std::io::Error) -> Exit {
         self.complain(&format!("failed to write: {error}"));
         Exit::RigError
     }
 
     /// Writes to standard error; where that is closed, nobody wants to read it.
-    pub(crate) fn say(&mut self, text: &str) {
+    pub(super) fn say(&mut self, text: &str) {
         let _unwritable = std::io::stderr().lock().write_all(text.as_bytes());
     }
 
     /// Shows every mistake of a scenario with the line it stands in.
-    pub(crate) fn mistakes(&mut self, problems: &Problems) {
+    pub(super) fn mistakes(&mut self, problems: &Problems) {
         let theme = if self.colour_err {
             GraphicalTheme::unicode()
         } else {
@@ -85,7 +85,7 @@ impl Output {
     }
 
     /// Shows why there is no scenario.
-    pub(crate) fn library_error(&mut self, error: &LibraryError) {
+    pub(super) fn library_error(&mut self, error: &LibraryError) {
         match error {
             LibraryError::Mistakes(problems) => self.mistakes(problems),
             other => self.complain(&other.to_string()),
@@ -93,7 +93,7 @@ impl Output {
     }
 
     /// A verdict for standard output, padded.
-    pub(crate) fn verdict(&self, verdict: Verdict) -> String {
+    pub(super) fn verdict(&self, verdict: Verdict) -> String {
         let colour = match verdict {
             Verdict::Passed => "32",
             Verdict::Skipped | Verdict::Marginal => "33",
@@ -106,7 +106,7 @@ impl Output {
 
 /// The reader of a pipe that has seen enough (`drivebench run | head`) is no failure, and does not change
 /// the exit code.
-pub(crate) fn unless_closed(result: std::io::Result<()>) -> std::io::Result<()> {
+pub(super) fn unless_closed(result: std::io::Result<()>) -> std::io::Result<()> {
     match result {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other,

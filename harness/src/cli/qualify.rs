@@ -24,16 +24,16 @@ use std::time::SystemTime;
 const MOST_TOLD: usize = 8;
 
 /// The file of a folder of evidence that says what was compared and which deviations explain it.
-pub(crate) const DEVIATIONS: &str = "deviations.txt";
+pub(super) const DEVIATIONS: &str = "deviations.txt";
 
 /// What is said where a run ended early.
-pub(crate) const ENDED: &str = "the run ended before everything was played";
+pub(super) const ENDED: &str = "the run ended before everything was played";
 
 /// How often a probe is played until a value explains it: a busy computer is late now and then.
 const PROBED: usize = 3;
 
 /// Qualifies a rig.
-pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
     let Some(rig) = find_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };
@@ -68,7 +68,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
 }
 
 /// Plays what is judged by the model alone, settles what the manual leaves open, and names what drives do otherwise.
-pub(crate) fn settle(
+pub(super) fn settle(
     run: &mut Run<'_>,
     findings: &mut Findings,
     ill: bool,
@@ -97,9 +97,12 @@ pub(crate) fn settle(
             }
         }
     }
-    let profile = match ill {
-        true => None,
-        false => Some(profile(run, findings, folder.as_deref_mut(), output)?),
+    let (profile, settled) = match ill {
+        true => (None, Vec::new()),
+        false => {
+            let (profile, settled) = profile(run, findings, folder.as_deref_mut(), output)?;
+            (Some(profile), settled)
+        }
     };
     if ended || over(run, output) {
         findings.note_open(ENDED.to_owned());
@@ -108,7 +111,7 @@ pub(crate) fn settle(
     let named = format!(
         "{}{}",
         name_master(findings, output)?,
-        name_drives(run, findings, ended, output)?
+        name_drives(run, findings, (!ended).then_some(&settled), output)?
     );
     let exit = match findings.master_is_wrong {
         true => Exit::RigError,
@@ -148,11 +151,12 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
     Ok(text)
 }
 
-/// The deviations that explain every byte, and what was compared.
+/// The deviations that explain every byte, and what was compared. The drives of the model have the properties of the bus that these header
+/// lines settle; `None` where the run ended early, and no deviation is looked for.
 fn name_drives(
     run: &mut Run<'_>,
     findings: &Findings,
-    ended: bool,
+    settled: Option<&Vec<String>>,
     output: &mut Output,
 ) -> Result<String, Stop> {
     let rig = run.session().rig();
@@ -160,19 +164,22 @@ fn name_drives(
     let known = rig.file.deviation.iter();
     let known: Vec<_> = known.map(|entry| entry.name.clone()).collect();
     let seen = findings.seen(drives, run.exactness());
-    let named = (findings.differ() && !ended)
-        .then(|| name(&seen, &|lines: &[String]| run.twin_with(lines)));
+    let settled = settled.filter(|_| findings.differ());
+    let named = settled.map(|settled| {
+        let twin = |lines: &[String]| run.twin_with(&[settled, lines].concat());
+        name(&seen, &twin)
+    });
     Ok(findings.tell(named.as_deref(), &known, output)?)
 }
 
 /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus is part of every later
-/// question; a time of a drive is the middle of a span, and no later answer rests on it.
+/// question and is the second value, as lines of a header; a time of a drive is the middle of a span, and no later answer rests on it.
 fn profile(
     run: &mut Run<'_>,
     findings: &mut Findings,
     mut folder: Option<&mut Folder>,
     output: &mut Output,
-) -> Result<Profile, Stop> {
+) -> Result<(Profile, Vec<String>), Stop> {
     let rings: Vec<u8> = run.session().rings().iter().map(|r| r.drives()).collect();
     let drives = rings.first().copied().unwrap_or(1);
     let mut profile = Profile {
@@ -226,7 +233,7 @@ fn profile(
         output.result(&format!("{property} ({section}): {whose}{why}\n"))?;
         profile.leave_open(property, &format!("{whose}{why}"));
     }
-    Ok(profile)
+    Ok((profile, known))
 }
 
 /// What came of asking.

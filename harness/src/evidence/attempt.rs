@@ -148,6 +148,7 @@ pub(super) fn again(
         conversations: &conversations,
         comparisons: &comparisons,
         unplaced,
+        alive: &|| {},
     };
     judge(&mut outcome, &heard);
     Again {

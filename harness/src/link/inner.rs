@@ -58,20 +58,20 @@ type Waiting = (Instant, Outgoing, time::Instant);
 /// An inner link that the bench has a port at.
 #[derive(Debug)]
 pub struct InnerLink {
-    pub(crate) ring: usize,
+    pub(super) ring: usize,
     /// Counted from the master's outgoing link.
-    pub(crate) place: usize,
+    pub(super) place: usize,
     ports: Ports,
-    pub(crate) tamper: Tamper,
+    pub(super) tamper: Tamper,
     queue: VecDeque<Waiting>,
     free: Instant,
     last_arrival: Instant,
-    pub(crate) log: Vec<LineByte>,
-    pub(crate) carried: u64,
+    pub(super) log: Vec<LineByte>,
+    pub(super) carried: u64,
     /// Bytes that an interposer has taken from the ring, and those that it has given back, since the ring was last at
     /// rest.
-    pub(crate) taken: u64,
-    pub(crate) given: u64,
+    pub(super) taken: u64,
+    pub(super) given: u64,
     delay: Delay,
 }
 
@@ -107,7 +107,7 @@ impl InnerLink {
         self.delay
     }
 
-    pub(crate) fn shows_errors(&self) -> bool {
+    pub(super) fn shows_errors(&self) -> bool {
         match &self.ports {
             Ports::Tap(wire) | Ports::Interposer(wire) => wire.abilities().shows_errors,
             Ports::TwoPortInterposer(up, down) => {
@@ -116,7 +116,7 @@ impl InnerLink {
         }
     }
 
-    pub(crate) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
+    pub(super) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
         let (first, second) = match &self.ports {
             Ports::Tap(wire) | Ports::Interposer(wire) => (wire, None),
             Ports::TwoPortInterposer(up, down) => (up, Some(down)),
@@ -124,7 +124,7 @@ impl InnerLink {
         std::iter::once(first).chain(second).map(Wire::poll_fd)
     }
 
-    pub(crate) fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.tamper = Tamper::default();
         self.queue.clear();
         self.free = Instant::START;
@@ -135,21 +135,21 @@ impl InnerLink {
     }
 
     /// The ring is at rest: nothing is under way.
-    pub(crate) fn rest(&mut self) {
+    pub(super) fn rest(&mut self) {
         (self.taken, self.given) = (0, 0);
     }
 
     /// When something waits to be passed on.
-    pub(crate) fn due(&self) -> Option<Instant> {
+    pub(super) fn due(&self) -> Option<Instant> {
         self.queue.front().map(|(start, ..)| *start)
     }
 
-    pub(crate) fn busy(&self) -> bool {
+    pub(super) fn busy(&self) -> bool {
         !self.queue.is_empty()
     }
 
     /// Takes what has come and passes on what is due.
-    pub(crate) fn pump(
+    pub(super) fn pump(
         &mut self,
         now: Instant,
         byte_time: Span,

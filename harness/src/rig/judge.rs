@@ -2,6 +2,7 @@
 
 use super::check::Rig;
 use super::file::Deviation;
+use super::left_open;
 use super::run::{Way, known, play_one, twin};
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
 use crate::link::{Event, Recording};
@@ -30,6 +31,8 @@ pub(crate) struct Heard<'h> {
     pub(crate) comparisons: &'h [Comparison],
     /// Line errors that the transport reported without their bytes.
     pub(crate) unplaced: u64,
+    /// Is called as long as the program works: explaining a difference takes time.
+    pub(crate) alive: &'h dyn Fn(),
 }
 
 /// Settles the verdict of an attempt. A byte that differs from the twin's is the drive's fault, unless the rig's file says that the
@@ -111,7 +114,15 @@ fn diverged(outcome: &mut Outcome, divergence: &Divergence, heard: &Heard<'_>) {
             }
             outcome.remarks.push(told(entry));
         }
-        None => outcome.verdict = Verdict::Failed,
+        None => match left_open::explanation(heard) {
+            Some(choice) => {
+                outcome.verdict = Verdict::Inconclusive;
+                outcome.remarks.push(format!(
+                    "the manual leaves open what differs: {choice} explains every byte; `qualify` settles such properties"
+                ));
+            }
+            None => outcome.verdict = Verdict::Failed,
+        },
     }
     let whose = match divergence.drive {
         Some(_) => "",
@@ -212,12 +223,17 @@ fn explained_by_known(finding: &Finding, heard: &Heard<'_>) -> bool {
         && switched_on(heard.rig, &deviations, heard).is_some_and(fails_alike)
 }
 
-/// Whether a finding may be about bytes behind the first one that a drive sent unasked.
+/// Whether a finding may be about bytes of the scenario's own conversation, behind the first one of that ring that a drive sent unasked.
 fn in_a_race(finding: &Finding, heard: &Heard<'_>) -> bool {
-    let difference = finding.difference.as_ref();
-    let found = difference.and_then(|difference| difference.at);
-    let mut races = heard.comparisons.iter().filter_map(|c| c.unasked);
-    races.any(|first| found.is_none_or(|at| at >= first))
+    let compared = heard.conversations.iter().zip(heard.comparisons);
+    let of_scenario = compared.filter(|(conversation, _)| conversation.has_steps());
+    let mut races = of_scenario.flat_map(|(_, comparison)| &comparison.unasked);
+    match &finding.difference {
+        Some(found) => {
+            races.any(|race| race.ring == found.ring && found.at.is_none_or(|at| at >= race.at))
+        }
+        None => races.next().is_some(),
+    }
 }
 
 /// The answer of a drive that a finding is about, if its value depends on the drive's own state: the byte that differs, or else one
@@ -248,7 +264,7 @@ fn of_the_drive<'h>(finding: &Finding, heard: &Heard<'h>) -> Option<&'h Own> {
 }
 
 /// Whether a known deviation is none that the simulator has.
-pub(crate) fn by_hand(entry: &Deviation) -> bool {
+pub(super) fn by_hand(entry: &Deviation) -> bool {
     deviation::deviation(&entry.name).is_none()
 }
 

@@ -3,17 +3,27 @@
 use super::super::check::parse;
 use super::super::run::{Way, known, play_one, twin};
 use super::{Heard, judge};
-use crate::buses::novobus::twin::{Conversation, Exactness};
+use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::Entry;
 use crate::link::{Event, Line, Recording};
 use crate::scenario::run::Outcome;
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict::{self, Failed, Inconclusive, Passed};
-use harness_proto::time::Span;
+use harness_proto::time::{Instant, Span};
 
 /// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.
 fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
+    judged_with(ring, rig, scenario, &|_| {})
+}
+
+/// The same where the comparisons with the twin are changed before.
+fn judged_with(
+    ring: &str,
+    rig: &str,
+    scenario: &str,
+    change: &dyn Fn(&mut [Comparison]),
+) -> Outcome {
     let source = |text: String| Source {
         name: "test".to_owned(),
         text: text.into(),
@@ -48,7 +58,8 @@ fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
     };
     let conversations = Conversation::all(&events, byte_time, true);
     let mut twin = twin(&rig, &known(&rig)).expect("a twin");
-    let (comparisons, _) = twin.follow_all(&conversations, exactness);
+    let (mut comparisons, _) = twin.follow_all(&conversations, exactness);
+    change(&mut comparisons);
     let heard = Heard {
         rig: &rig,
         plan: &plan,
@@ -57,6 +68,7 @@ fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
         conversations: &conversations,
         comparisons: &comparisons,
         unplaced: 0,
+        alive: &|| {},
     };
     judge(&mut outcome, &heard);
     outcome
@@ -184,4 +196,62 @@ fn cells_that_process_data_have_written_are_known() {
     let noted = judged(swapped, "", scenario);
     let learned = |remark: &String| remark.contains("did not know");
     assert!(!noted.remarks.iter().any(learned), "{noted:#?}");
+}
+
+/// ND21 9.9: a race of clocks excuses bytes of its own ring and conversation only.
+#[test]
+fn a_race_excuses_nothing_elsewhere() {
+    let scenario = format!("{SET}{READ}< 88 01 C0 13 77 xx\n");
+    let race = |ring: usize| Unasked {
+        ring,
+        at: Instant::START,
+    };
+    let verdict =
+        |change: &dyn Fn(&mut [Comparison])| judged_with("", "", &scenario, change).verdict;
+    assert_eq!(verdict(&|_| {}), Failed);
+    assert_eq!(verdict(&|all| all[0].unasked.push(race(0))), Failed);
+    let of_all = |ring: usize| {
+        move |all: &mut [Comparison]| all.iter_mut().for_each(|own| own.unasked.push(race(ring)))
+    };
+    assert_eq!(verdict(&of_all(1)), Failed);
+    assert_eq!(verdict(&of_all(0)), Inconclusive);
+}
+
+/// ND21 9.8: a byte that is lost at the very end of a conversation is noticed although no line asks for it.
+#[test]
+fn a_byte_missing_at_the_end_does_not_pass() {
+    let scenario = "> 08 00*40 FF 44 72 4C 41\n";
+    check("", "", scenario, Passed);
+    let swallows = "drive 1 deviates swallows-the-end-of-a-check-sequence";
+    check(swallows, "", scenario, Verdict::Marginal);
+}
+
+/// ND21 9.2, 9.8, 10.1: what the manual leaves open is no drive's fault, in every drive, in one, and where several choices show together.
+#[test]
+fn a_choice_of_the_drives_is_not_blamed() {
+    let forwards = |drives: &str| format!("drive {drives} property broken-sequence = forwarded\n");
+    let broken = "> 08 00*40 FF 44 72 00 80*8\nrecover\n";
+    let long = "read-long 1 FE12\n";
+    let set = "drive 1 memory FE12 = 12 34 56 78\n";
+    let printed = "drive 0..last property read-long = as-printed\n";
+    check(&forwards("0..last"), "", broken, Inconclusive);
+    check(&forwards("1"), "", broken, Inconclusive);
+    let both = forwards("0..last") + printed;
+    let asks_both = format!("{set}{broken}> 8C FE C7 12 FE 31 32 3A\n");
+    let outcome = judged(&both, "", &asks_both);
+    assert_eq!(outcome.verdict, Inconclusive, "{outcome:#?}");
+    let named = outcome.remarks.iter().any(|remark| {
+        remark.contains("broken-sequence = forwarded") && remark.contains("read-long = as-printed")
+    });
+    assert!(named, "{outcome:#?}");
+    check(printed, "", &format!("{set}{long}"), Inconclusive);
+    // No choice explains these.
+    let wrong = "drive 1 deviates checksum-wrong\n";
+    check(wrong, "", &format!("{set}{long}"), Failed);
+    check(
+        &(forwards("0..last") + wrong),
+        "",
+        &format!("{broken}read-byte 1 FE13\n"),
+        Failed,
+    );
 }

@@ -3,6 +3,7 @@
 
 use super::Rig;
 use super::driven::Driven;
+use super::health::{Unhealthy, examine};
 use super::judge::{Heard, by_hand, judge};
 use super::played::{Again, Attempt, Played};
 use super::session::Session;
@@ -10,7 +11,6 @@ use super::session_error::SessionError;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin};
 use crate::guard::Guarded;
 use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
-use crate::rig::health::{Unhealthy, examine};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{AtFinding, Outcome, come_home, lacks, play_over_bus, start_anew};
@@ -106,10 +106,15 @@ impl<'s> Run<'s> {
     /// # Errors
     /// The lines have mistakes.
     pub fn twin_with(&self, lines: &[String]) -> Result<Twin, Problems> {
+        self.alive();
+        twin(self.session.rig(), lines)
+    }
+
+    /// Tells the session's watchdog that the program works.
+    fn alive(&self) {
         if let Some(beats) = &self.beats {
             beats.fetch_add(1, Ordering::Relaxed);
         }
-        twin(self.session.rig(), lines)
     }
 
     /// Plays a scenario, and again where it did not pass, as often as the rig's file says.
@@ -199,6 +204,7 @@ impl<'s> Run<'s> {
         let driven = Driven::new(plan, &both.events, &way, recorded, &outcome);
         // In real time a record does not hold every moment at which the master was asked.
         let driven = driven.filter(|_| simulated);
+        let alive = || self.alive();
         let heard = Heard {
             rig: self.session.rig(),
             plan,
@@ -207,6 +213,7 @@ impl<'s> Run<'s> {
             conversations: &conversations,
             comparisons: &comparisons,
             unplaced,
+            alive: &alive,
         };
         let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
         judge(&mut outcome, &heard);

@@ -5,7 +5,9 @@
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Event, Line, Recording, SimulatedLink};
-use harness::qualify::{Named, Seen, Whose, conversations, name};
+use harness::qualify::{
+    Answer, Named, Seen, Whose, answer, conversations, hypotheses, name, probes,
+};
 use harness::rig::{Way, play_one};
 use harness::scenario::plan::Plan;
 use harness::scenario::run::lacks;
@@ -95,19 +97,32 @@ fn as_they_are() -> Way {
     }
 }
 
+/// A conversation as a bench whose clock is 0.7 % faster than the drives' sees it.
+fn slow(conversation: &mut Conversation) {
+    for (_, at, _) in &mut conversation.received {
+        *at += Span::from_nanos(at.since_start().as_nanos() / 1_000 * 7);
+    }
+}
+
+/// What comes of playing a scenario on a link.
+fn played(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
+    let mut link = link.clone();
+    let byte_time = link.byte_time();
+    let mut events: Vec<Event> = Vec::new();
+    let mut recording = Recording::new(&mut link, &mut events);
+    let _verdict = play_one(&mut recording, plan, &as_they_are());
+    let mut all = Conversation::all(&events, byte_time, true);
+    all.iter_mut().for_each(slow);
+    all
+}
+
 /// The names that a qualification gives to a ring with these lines, and whether it differed from the model at all.
 fn names(lines: &[String]) -> (bool, Vec<Named>) {
     let way = as_they_are();
     let link = twin(lines).expect("a ring").into_link();
     let (mut differing, mut alike) = (Vec::new(), Vec::new());
     for plan in plans() {
-        let mut link = link.clone();
-        let byte_time = link.byte_time();
-        let mut events: Vec<Event> = Vec::new();
-        let mut recording = Recording::new(&mut link, &mut events);
-        let _verdict = play_one(&mut recording, plan, &way);
-        let all = Conversation::all(&events, byte_time, true);
-        let (conversations, _) = way.compared(all, THROUGH_A_PORT);
+        let (conversations, _) = way.compared(played(plan, &link), THROUGH_A_PORT);
         let mut right = twin(&[]).expect("a ring");
         let (comparisons, _) = right.follow_all(&conversations, THROUGH_A_PORT);
         match comparisons.iter().any(|own| own.divergence.is_some()) {
@@ -183,4 +198,38 @@ fn planted_in_turn() {
 fn right_drives_have_no_names() {
     let (differs, named) = names(&[]);
     assert!(!differs && named.is_empty(), "{named:?}");
+}
+
+/// ND21 9.9: the time-outs of the drives, and their waits, lie 0.3 ms apart at most. No drive is named, and what the probes of these times
+/// settle is the manual's own value.
+#[test]
+fn right_drives_with_clocks_of_their_own_have_no_names() {
+    let time_outs = ["time-out", "time-out-wait", "time-out-answer"];
+    let probes = probes(DRIVES).expect("no mistakes");
+    for seed in 0..8_u64 {
+        let tenths = |place: u64| (seed * 7 + place * 5) % 4;
+        let own = |place: u64, property: &str| {
+            let drive = place % u64::from(DRIVES);
+            let ms = tenths(place);
+            format!("drive {drive} property {property} = 10.{ms}ms")
+        };
+        let lines: Vec<_> = (0..6)
+            .map(|place| own(place, time_outs[usize::from(place >= 3)]))
+            .collect();
+        let (differs, named) = names(&lines);
+        assert!(!differs && named.is_empty(), "{lines:?}: {named:?}");
+        let link = twin(&lines).expect("a ring").into_link();
+        for probe in probes
+            .iter()
+            .filter(|own| time_outs.contains(&own.property))
+        {
+            let entries = probe.entries.iter().filter_map(|entry| entry.plan.as_ref());
+            let seen: Vec<_> = entries.map(|plan| played(plan, &link)).collect();
+            let found = answer(probe, DRIVES, &seen, THROUGH_A_PORT, &twin).expect("rings");
+            let manual = &hypotheses(probe.property, DRIVES)[0];
+            let is_manual =
+                matches!(&found, Answer::Settled { lines, .. } if *lines == manual.lines);
+            assert!(is_manual, "{lines:?}: {}: {found:?}", probe.property);
+        }
+    }
 }

@@ -136,7 +136,8 @@ impl<D: Device> Node<D> {
                     if at > until {
                         return;
                     }
-                    self.act(at, outbound, inbound.arrived());
+                    // Only a device that delays its answers sends here.
+                    self.act(at, true, outbound, inbound.arrived());
                     continue;
                 }
                 Some(Deadline::LineFree(from))
@@ -147,7 +148,8 @@ impl<D: Device> Node<D> {
                     if at > until {
                         return;
                     }
-                    self.act(at, outbound, inbound.arrived());
+                    let solicited = !self.device.in_error();
+                    self.act(at, solicited, outbound, inbound.arrived());
                     continue;
                 }
                 _ => {}
@@ -173,10 +175,10 @@ impl<D: Device> Node<D> {
         self.finish(step, now, byte.solicited, inbound.arrived(), outbound);
     }
 
-    fn act(&mut self, now: Instant, outbound: &mut Link, received: u64) {
+    fn act(&mut self, now: Instant, solicited: bool, outbound: &mut Link, received: u64) {
         self.device.advance(now);
         let step = self.device.handle_deadline(now);
-        self.finish(step, now, false, received, outbound);
+        self.finish(step, now, solicited, received, outbound);
     }
 
     #[inline]

@@ -9,16 +9,16 @@ use std::time::{Duration, Instant};
 const PAUSE: Duration = Duration::from_secs(1);
 
 /// Tells it: findings on standard output, all else on standard error.
-pub(crate) struct Telling<'o> {
-    pub(crate) output: &'o mut Output,
+pub(super) struct Telling<'o> {
+    pub(super) output: &'o mut Output,
     /// Where the files of findings stand.
-    pub(crate) folder: Option<PathBuf>,
+    pub(super) folder: Option<PathBuf>,
     /// Whether rounds are told.
-    pub(crate) rounds: bool,
+    pub(super) rounds: bool,
     /// When the progress was told last.
-    pub(crate) told: Option<Instant>,
+    pub(super) told: Option<Instant>,
     /// Why standard output could not be written.
-    pub(crate) failed: Option<std::io::Error>,
+    pub(super) failed: Option<std::io::Error>,
 }
 
 impl Watcher for Telling<'_> {
@@ -62,7 +62,7 @@ impl Watcher for Telling<'_> {
 }
 
 /// The last line of a run.
-pub(crate) fn summary(campaign: &Campaign, end: &End) -> String {
+pub(super) fn summary(campaign: &Campaign, end: &End) -> String {
     let progress = campaign.progress();
     let (confirmed, flaky) = campaign.findings();
     let why = match end {

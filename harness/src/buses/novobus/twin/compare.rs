@@ -1,7 +1,7 @@
 //! Byte for byte: what a ring sent back, and what its twin says.
 
-use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, What};
-use super::follow::Conversation;
+use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, Unasked, What};
+use super::follow::{Conversation, Expected};
 use super::unasked::Sent;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
@@ -18,8 +18,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The longest run of one byte in which each counts: more than the 25 zeros of 9.7.
 const LONGEST_RUN: usize = 32;
 
-/// How long before the end of a conversation in real time bytes may be missing.
-const TAIL: Span = Span::from_millis(20);
+/// How much later than its model a drive may detect a time-out: after 20 ms instead of 10 (ND21 9.9).
+const LATEST_TIME_OUT: Span = Span::from_millis(10);
 
 /// What a ring sent back, beside what its twin received.
 struct Rows<'a> {
@@ -37,8 +37,8 @@ impl Rows<'_> {
         self.roles.get(index).copied().unwrap_or(Role::Foreign)
     }
 
-    /// Whether a byte is missing because a conversation in real time ended with it under way. One that came although the twin does not send
-    /// it, not even later, is never excused.
+    /// Whether the conversation ended before a byte that is missing could be called late. One that came although the twin does not send it,
+    /// not even later, is never excused.
     fn cut_short(&self, index: usize, what: &What, tail: Instant) -> bool {
         match (what, self.expected.get(index), self.received.get(index)) {
             (What::Missing, Some((at, _)), None) => *at >= tail,
@@ -48,32 +48,33 @@ impl Rows<'_> {
 }
 
 /// What is compared, ring by ring.
-pub(crate) struct Comparer<'a> {
-    pub(crate) exactness: Exactness,
+pub(super) struct Comparer<'a> {
+    pub(super) exactness: Exactness,
     /// Cells that were written in the rig's session: of these the model knows what they hold.
-    pub(crate) written: &'a mut BTreeSet<(usize, u8, u16)>,
+    pub(super) written: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells that were written in the present attempt.
-    pub(crate) written_now: &'a mut BTreeSet<(usize, u8, u16)>,
+    pub(super) written_now: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells taken over.
-    pub(crate) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
+    pub(super) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
     /// Where the incoming process data (14.10.3) of a drive go, in page FF, where the master has written it.
-    pub(crate) targets: &'a mut BTreeMap<(usize, u8), u8>,
+    pub(super) targets: &'a mut BTreeMap<(usize, u8), u8>,
     /// Drives whose outgoing process data (14.10.3) change by themselves.
-    pub(crate) moving: BTreeSet<(usize, u8)>,
+    pub(super) moving: BTreeSet<(usize, u8)>,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
-    pub(crate) recording: BTreeSet<(usize, u8)>,
-    pub(crate) comparison: Comparison,
+    pub(super) recording: BTreeSet<(usize, u8)>,
+    pub(super) comparison: Comparison,
 }
 
 impl Comparer<'_> {
     /// Compares what came from a ring with what its twin received.
-    pub(crate) fn ring(
+    pub(super) fn ring(
         &mut self,
         ring: usize,
         size: RingSize,
         conversation: &Conversation,
-        expected: &[(Instant, Received)],
+        answer: &Expected,
     ) {
+        let expected = &answer.bytes[..];
         let sent = conversation.sent_in(ring);
         let received = &conversation.received_in(ring);
         let (places, roles) = answered(size, &sent);
@@ -88,7 +89,7 @@ impl Comparer<'_> {
             let all = conversation.sent_at(ring);
             let answered: Vec<_> = places.iter().map(|place| all[*place]).collect();
             let (all, answered) = (&all[..], &answered[..]);
-            Sent { answered, all }.judge(size, (expected, received), self.exactness.tolerance)
+            Sent { answered, all }.judge(size, (answer, received), self.exactness.tolerance)
         });
         let unasked = unasked.flatten();
         let (shorter, short);
@@ -99,8 +100,7 @@ impl Comparer<'_> {
             (shorter, short) = (collapsed(expected), collapsed(received));
             (&shorter[..], &short[..])
         };
-        // What was still coming when the conversation ended came a moment sooner or later.
-        let tail = conversation.end - self.exactness.tolerance - TAIL;
+        let tail = conversation.end - self.exactness.tolerance;
         let rows = Rows {
             ring,
             roles: &roles,
@@ -125,7 +125,8 @@ impl Comparer<'_> {
             let mut index = index;
             if let Some(race) = race {
                 let at = received.get(index).or(expected.get(index));
-                self.comparison.unasked = at.map(|(at, _)| *at);
+                let at = at.map(|(at, _)| Unasked { ring, at: *at });
+                self.comparison.unasked.extend(at);
                 if let (None, Some((place, fault))) = (&what, &race.fault) {
                     (index, what) = (*place, Some(fault.clone()));
                 }
@@ -136,9 +137,6 @@ impl Comparer<'_> {
                     None => continue,
                 }
             };
-            if real_time && rows.cut_short(index, &what, tail) {
-                return;
-            }
             let role = rows.role(index);
             let drive = match size.drives() {
                 1 => Some(0),
@@ -154,6 +152,18 @@ impl Comparer<'_> {
                 step: step_at(index),
                 drive,
             };
+            let early = if race.is_some() {
+                LATEST_TIME_OUT
+            } else {
+                Span::ZERO
+            };
+            if real_time && rows.cut_short(index, &found.what, tail - early) {
+                // An unasked byte may come later still. Any other is late, or it is lost.
+                if race.is_none() {
+                    self.comparison.untimely.get_or_insert(found);
+                }
+                return;
+            }
             self.comparison.divergence.get_or_insert(found);
             return;
         }

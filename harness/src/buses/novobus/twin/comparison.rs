@@ -154,6 +154,15 @@ pub struct Own {
     pub address: Option<u16>,
 }
 
+/// The first byte in a conversation that a drive sent unasked (ND21 9.9).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unasked {
+    /// In which ring, counted from 0.
+    pub ring: usize,
+    /// When it was received, or was due.
+    pub at: Instant,
+}
+
 /// What came of a comparison.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Comparison {
@@ -167,9 +176,11 @@ pub struct Comparison {
     pub own: Vec<Own>,
     /// The first byte that is otherwise, apart from its time.
     pub divergence: Option<Divergence>,
-    /// In real time, when the first byte came that a drive sent unasked (ND21 9.9). The bytes behind it are a race of clocks: of them only
-    /// what holds for every order is compared.
-    pub unasked: Option<Instant>,
+    /// In real time, the first byte of each ring that a drive sent unasked. The bytes behind it are a race of clocks: of them only what
+    /// holds for every order is compared.
+    pub unasked: Vec<Unasked>,
+    /// Whether a ring was left out: an earlier conversation ended in such a race.
+    pub left_out: bool,
     /// The first byte at another time.
     pub untimely: Option<Divergence>,
     /// All differences of times together.

@@ -4,7 +4,7 @@ use super::compare::{Comparer, unknowable};
 use super::comparison::{Comparison, Exactness};
 use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
-use harness_proto::nd21::bits::{scope_status, status as status_bits};
+use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::PAGE;
@@ -80,7 +80,8 @@ impl Conversation {
                     let received = bytes.iter().map(|byte| (*ring, start, *byte));
                     open.received.extend(received);
                 }
-                Event::Probe(..) | Event::Trouble(_) | Event::Look(_) => {}
+                Event::Look(look) => open.end = open.end.max(look.at),
+                Event::Probe(..) | Event::Trouble(_) => {}
             }
         }
         all.push(open);
@@ -88,7 +89,7 @@ impl Conversation {
     }
 
     /// The bytes sent into a ring, and whether they went round whole.
-    pub(crate) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
+    pub(super) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
         let mut damaged = BTreeSet::new();
         let mut sent = Vec::new();
         let own = self.done.iter().filter(|(at, _)| *at == ring);
@@ -112,7 +113,7 @@ impl Conversation {
     }
 
     /// When each byte sent into a ring began.
-    pub(crate) fn sent_at(&self, ring: usize) -> Vec<Instant> {
+    pub(super) fn sent_at(&self, ring: usize) -> Vec<Instant> {
         let own = self.done.iter().filter(|(at, _)| *at == ring);
         let starts = own.filter_map(|(_, done)| match done {
             Done::Sent(at, _) => Some(*at),
@@ -143,9 +144,30 @@ impl Conversation {
     }
 
     /// The bytes received from a ring.
-    pub(crate) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
+    pub(super) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
         let own = self.received.iter().filter(|(at, ..)| *at == ring);
         own.map(|(_, at, byte)| (*at, *byte)).collect()
+    }
+}
+
+/// What a twin received from a ring in a conversation.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Expected {
+    /// The bytes, and when each came.
+    pub(super) bytes: Vec<(Instant, Received)>,
+    /// The place of the first one that a drive sent unasked (ND21 9.9).
+    pub(super) unasked: Option<usize>,
+}
+
+impl Expected {
+    /// Takes what has come from a ring of the link.
+    fn fetch(&mut self, link: &mut SimulatedLink, ring: usize) {
+        while let Some((at, byte, asked)) = link.receive_with_cause(ring) {
+            if !asked {
+                self.unasked.get_or_insert(self.bytes.len());
+            }
+            self.bytes.push((at, byte));
+        }
     }
 }
 
@@ -183,6 +205,16 @@ impl Twin {
 
     /// Lives through a conversation, and says how what was received compares with what it received itself.
     pub fn follow(&mut self, conversation: &Conversation, exactness: Exactness) -> Comparison {
+        self.follow_rings(conversation, exactness, &BTreeSet::new())
+    }
+
+    /// The same, but some rings are not compared.
+    fn follow_rings(
+        &mut self,
+        conversation: &Conversation,
+        exactness: Exactness,
+        left_out: &BTreeSet<usize>,
+    ) -> Comparison {
         let real_time = exactness.tolerance > Span::ZERO;
         let slack = if real_time { SLACK } else { Span::ZERO };
         let (mut moving, mut recording) = (self.moving(), self.recording());
@@ -200,9 +232,13 @@ impl Twin {
             targets: &mut self.targets,
             moving,
             recording,
-            comparison: Comparison::default(),
+            comparison: Comparison {
+                left_out: !left_out.is_empty(),
+                ..Comparison::default()
+            },
         };
-        for (ring, (size, expected)) in self.sizes.iter().zip(&received).enumerate() {
+        let rings = self.sizes.iter().zip(&received).enumerate();
+        for (ring, (size, expected)) in rings.filter(|(ring, _)| !left_out.contains(ring)) {
             comparer.ring(ring, *size, conversation, expected);
         }
         comparer.comparison
@@ -220,6 +256,12 @@ impl Twin {
         })
     }
 
+    /// Whether a drive monitors time-outs (ND21 14.10.2).
+    pub(crate) fn monitors(&self) -> bool {
+        let monitors = |flags: u8| flags & flags2::MONITORING != 0;
+        !self.drives(ram::FLAGS2, monitors).is_empty()
+    }
+
     /// Drives with such a byte in a cell.
     fn drives(&self, address: u16, such: impl Fn(u8) -> bool) -> BTreeSet<(usize, u8)> {
         let rings = self.sizes.iter().enumerate();
@@ -229,26 +271,27 @@ impl Twin {
         drives.filter(holds).collect()
     }
 
-    /// Lives through conversations one after another. In real time nobody knows how a ring comes out of one in which drives
-    /// sent unasked (9.9): it is a race of their bytes with the master's. What comes behind it is not compared, and the
-    /// second value says that another twin is needed.
+    /// Lives through conversations one after another. In real time no model knows how a ring comes out of a conversation in which drives
+    /// sent unasked (9.9): it is a race of their bytes with the master's. The ring is not compared any more behind that conversation, and
+    /// the second value says that another twin is needed.
     pub fn follow_all(
         &mut self,
         conversations: &[Conversation],
         exactness: Exactness,
     ) -> (Vec<Comparison>, bool) {
-        let mut comparisons = Vec::new();
+        let mut comparisons: Vec<Comparison> = Vec::new();
+        let mut left_out = BTreeSet::new();
         self.written_now.clear();
         for conversation in conversations {
-            let comparison = self.follow(conversation, exactness);
-            let race = comparison.unasked.is_some();
-            comparisons.push(comparison);
-            if race {
-                return (comparisons, true);
+            if left_out.len() == self.sizes.len() {
+                break;
             }
+            let comparison = self.follow_rings(conversation, exactness, &left_out);
+            left_out.extend(comparison.unasked.iter().map(|unasked| unasked.ring));
+            comparisons.push(comparison);
         }
         let diverged = comparisons.iter().any(|c| c.divergence.is_some());
-        (comparisons, diverged)
+        (comparisons, diverged || !left_out.is_empty())
     }
 
     /// The same up to the first conversation in which a byte is otherwise.
@@ -260,7 +303,7 @@ impl Twin {
         let mut comparisons = Vec::new();
         for conversation in conversations {
             let comparison = self.follow(conversation, exactness);
-            let last = comparison.divergence.is_some() || comparison.unasked.is_some();
+            let last = comparison.divergence.is_some() || !comparison.unasked.is_empty();
             comparisons.push(comparison);
             if last {
                 break;
@@ -270,11 +313,7 @@ impl Twin {
     }
 
     /// Lives through a conversation, and `slack` longer, and gives what it received, ring by ring.
-    fn answer(
-        &mut self,
-        conversation: &Conversation,
-        slack: Span,
-    ) -> Vec<Vec<(Instant, Received)>> {
+    fn answer(&mut self, conversation: &Conversation, slack: Span) -> Vec<Expected> {
         self.link.begin();
         let byte_time = self.link.byte_time();
         let mut done = conversation.done.iter().peekable();
@@ -308,33 +347,26 @@ impl Twin {
             }
         }
         self.link.run_until(conversation.end + slack);
-        let mut received = vec![Vec::new(); self.sizes.len()];
+        let mut received = vec![Expected::default(); self.sizes.len()];
         for (ring, received) in received.iter_mut().enumerate() {
-            while let Some(byte) = self.link.receive(ring) {
-                received.push(byte);
-            }
+            received.fetch(&mut self.link, ring);
         }
         received
     }
 
     /// Adds what the twin would receive until `tolerance` behind the end of a conversation, where more bytes came than it received itself:
     /// a drive may be that much earlier than the model. The twin itself stays where it is.
-    fn add_later(
-        &self,
-        conversation: &Conversation,
-        tolerance: Span,
-        received: &mut [Vec<(Instant, Received)>],
-    ) {
-        let more = |(ring, own): (usize, &Vec<_>)| conversation.received_in(ring).len() > own.len();
+    fn add_later(&self, conversation: &Conversation, tolerance: Span, received: &mut [Expected]) {
+        let more = |(ring, own): (usize, &Expected)| {
+            conversation.received_in(ring).len() > own.bytes.len()
+        };
         if !received.iter().enumerate().any(more) {
             return;
         }
         let mut later = self.link.clone();
         later.run_until(conversation.end + tolerance);
         for (ring, received) in received.iter_mut().enumerate() {
-            while let Some(byte) = later.receive(ring) {
-                received.push(byte);
-            }
+            received.fetch(&mut later, ring);
         }
     }
 

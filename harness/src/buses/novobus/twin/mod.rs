@@ -11,5 +11,5 @@ mod follow;
 mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};
-pub use comparison::{Adopted, Comparison, Divergence, Exactness, Look, Own, What};
+pub use comparison::{Adopted, Comparison, Divergence, Exactness, Look, Own, Unasked, What};
 pub use follow::{Conversation, Done, Twin};

@@ -4,58 +4,55 @@
 //! first byte that was sent unasked to the next byte of the master's, only what holds for every order is asked for.
 
 use super::comparison::What;
+use super::follow::Expected;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 
-/// A silence of the master's behind which a byte may be unasked: shorter than a time-out and the wait behind it (9.9), 10 ms each, also in
-/// drives that are too fast.
-const SILENCE: Span = Span::from_millis(8);
-
 /// A byte and when it came.
 type Heard = (Instant, Received);
 
-/// The first byte that was sent unasked.
+/// Where a race of clocks begins: at the first byte that was sent unasked.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Unasked {
+pub(super) struct Race {
     /// Its place among the bytes received.
-    pub(crate) first: usize,
+    pub(super) first: usize,
     /// Whether it is unasked both in the ring and in the model: then its value and its time are compared.
-    pub(crate) in_both: bool,
+    pub(super) in_both: bool,
     /// A byte from there on that no order of the clocks explains, and how it differs.
-    pub(crate) fault: Option<(usize, What)>,
+    pub(super) fault: Option<(usize, What)>,
 }
 
 /// When the bytes of the master's that are answered were sent, in order, and the other bytes.
-pub(crate) struct Sent<'a> {
+pub(super) struct Sent<'a> {
     /// When each byte that is answered began.
-    pub(crate) answered: &'a [Instant],
+    pub(super) answered: &'a [Instant],
     /// When every byte began.
-    pub(crate) all: &'a [Instant],
+    pub(super) all: &'a [Instant],
 }
 
 impl Sent<'_> {
-    /// The first byte that came before the byte of the master's that it would answer, and behind a silence of the master's.
-    fn first(&self, bytes: &[Heard]) -> Option<usize> {
+    /// The first byte received from `from` on that came before the byte of the master's that it would answer.
+    fn first(&self, received: &[Heard], from: Instant) -> Option<usize> {
         let unasked = |(index, (at, _)): (usize, &Heard)| {
             let early = self.answered.get(index).is_none_or(|start| at < start);
-            let before = self.all.partition_point(|start| start <= at);
-            let last = before.checked_sub(1).map(|last| self.all[last]);
-            early && last.is_some_and(|last| at.since(last) >= SILENCE)
+            early && *at >= from
         };
-        bytes.iter().enumerate().position(unasked)
+        received.iter().enumerate().position(unasked)
     }
 
     /// The first byte that was sent unasked, by the ring or by its model, and what is wrong from there to the next byte of the master's.
-    /// `None` where each byte was asked for.
-    pub(crate) fn judge(
+    /// `None` where the model sends none: no drive may then (ND21 9.9).
+    pub(super) fn judge(
         &self,
         size: RingSize,
-        (expected, received): (&[Heard], &[Heard]),
+        (answer, received): (&Expected, &[Heard]),
         tolerance: Span,
-    ) -> Option<Unasked> {
-        let model = self.first(expected);
-        let ring = self.first(received);
+    ) -> Option<Race> {
+        let expected = &answer.bytes[..];
+        let model = answer.unasked;
+        let (due, _) = expected[model?];
+        let ring = self.first(received, due - tolerance);
         let first = match (model, ring) {
             (Some(model), Some(ring)) => model.min(ring),
             (one, other) => one.or(other)?,
@@ -85,7 +82,7 @@ impl Sent<'_> {
             let offset = received[first..].iter().position(foreign)?;
             Some((first + offset, What::Value))
         };
-        Some(Unasked {
+        Some(Race {
             first,
             in_both,
             fault: here.map(|what| (first, what)).or_else(foreign),
