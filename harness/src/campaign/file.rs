@@ -1,7 +1,7 @@
 //! What may stand in a campaign file (`corpora/campaigns/*.toml`), and the check of a text.
 
-use super::class::Class;
 use super::fault::{Bit, LONGEST, MAX_GAP, wire_index};
+use crate::campaign::class::Class;
 use crate::rig::schema::{Step, compare, place, syntax};
 use crate::rig::values::{Time, Wire};
 use crate::scenario::problem::{Problem, Problems};

@@ -5,21 +5,20 @@
 //! manual describes a master (ND21 9.7, 9.8), [`by_driver`] lets the driver play it. [`class`](mod@class) says what the outcomes are, and
 //! [`report`] shows them; [`replay`] prints one case as a scenario.
 
-pub mod by_driver;
-pub mod by_manual;
-pub mod class;
-pub mod conversation;
 pub mod fault;
 pub mod file;
 pub mod find;
 mod html;
 pub mod plan;
 pub mod replay;
-pub mod report;
-mod run;
-pub mod sound;
+pub(crate) mod run;
 
-pub use class::{Class, Evidence, Wrong};
+pub use crate::buses::novobus::campaign::class::{Class, Evidence, Wrong};
 pub use fault::Case;
 pub use html::campaigns;
 pub use run::{Campaign, Contradiction, Finished, Outcome};
+
+/// The classes of the one bus whose conversations are disturbed today, and how a case is played there.
+pub use crate::buses::novobus::campaign::{
+    by_driver, by_manual, class, conversation, report, sound,
+};

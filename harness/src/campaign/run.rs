@@ -1,12 +1,12 @@
 //! A campaign, read and played.
 
-use super::by_driver::ByDriver;
-use super::by_manual::{ByManual, Said};
-use super::class::{Class, Evidence};
-use super::conversation::{Talk, talk, telegrams};
 use super::fault::Case;
 use super::file::{CampaignFile, Expect, read};
 use super::plan::{Shape, cases};
+use crate::campaign::by_driver::ByDriver;
+use crate::campaign::by_manual::{ByManual, Said};
+use crate::campaign::class::{Class, Evidence};
+use crate::campaign::conversation::{Talk, talk, telegrams};
 use crate::library::{Entry, LibraryError, sources};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::simulate::bench;

@@ -76,7 +76,7 @@ pub fn diff(left: Run<'_>, right: Run<'_>, tolerance: Span) -> Summary {
 
 /// The same; `ignored` says of ring, link and byte what is not compared, and bytes of the right side behind `until` that the left
 /// has not are none too many.
-pub(super) fn compare(
+pub(crate) fn compare(
     left: Run<'_>,
     right: Run<'_>,
     tolerance: Span,

@@ -12,7 +12,7 @@ const CUT: usize = 8;
 
 /// The faults of a link, a line each. What a cable did cannot always be told from its bytes: a break is taken to
 /// last as long as bytes were lost behind it, many lost bytes are a cut. A delay is not seen.
-pub(super) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
+pub(crate) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
     let name = name(ring, link);
     let bytes = &link.bytes;
     let mut lines = Vec::new();

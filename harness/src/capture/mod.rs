@@ -8,18 +8,14 @@
 //! Every file gives a capture or says at which place it is none; what a capture takes of memory is bounded by the size
 //! of its file, and that by [`MAX_FILE`].
 
-mod diff;
-mod faults;
+pub(crate) mod diff;
+pub(crate) mod faults;
 pub mod fuzz;
-mod json;
-mod judge;
 mod pcapng;
-mod scenario;
-mod stimuli;
 
+pub use crate::buses::novobus::capture::judge::{JudgeError, Judged, judge};
+pub use crate::buses::novobus::capture::scenario::{Options, SketchError, scenario};
 pub use diff::{Difference, Run, Summary, diff};
-pub use judge::{JudgeError, Judged, judge};
-pub use scenario::{Options, SketchError, scenario};
 
 use crate::regular::{self, Links};
 use harness_proto::line::Rate;
@@ -103,7 +99,7 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
     if bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]) {
         pcapng::read(bytes, rate)
     } else if text == Some(&b'{') {
-        json::read(bytes, rate)
+        crate::buses::novobus::capture::json::read(bytes, rate)
     } else {
         let begins = bytes.iter().take(8).map(|byte| format!("{byte:02X}"));
         let begins: Vec<_> = begins.collect();
@@ -123,7 +119,7 @@ pub fn is_capture(path: &Path) -> bool {
 }
 
 /// The ends of a link by its name: `98->97`, `master->99`, `2:0->master`; with the ring, counted from 0.
-fn ends(name: &str) -> Option<(usize, Option<u8>, Option<u8>)> {
+pub(crate) fn ends(name: &str) -> Option<(usize, Option<u8>, Option<u8>)> {
     let (ring, own) = match name.strip_prefix("2:") {
         Some(own) => (1, own),
         None => (0, name),
@@ -134,7 +130,7 @@ fn ends(name: &str) -> Option<(usize, Option<u8>, Option<u8>)> {
 }
 
 /// `master`, or a drive's number.
-fn end(text: &str) -> Option<Option<u8>> {
+pub(crate) fn end(text: &str) -> Option<Option<u8>> {
     if text == "master" {
         return Some(None);
     }
@@ -144,7 +140,7 @@ fn end(text: &str) -> Option<Option<u8>> {
 }
 
 /// Whether a link can have these ends (ND21 8.5).
-fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
+pub(crate) fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
     match (from, to) {
         (None, Some(_)) | (Some(0), None) => true,
         (Some(from), Some(to)) => from == to + 1,
@@ -154,14 +150,14 @@ fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
 
 /// Puts a capture together of its links.
 #[derive(Default)]
-struct Assembly {
+pub(crate) struct Assembly {
     /// In ring order: that of falling numbers of the receiver, the master being the last.
     rings: [BTreeMap<u16, LinkTrace>; 2],
 }
 
 impl Assembly {
     /// The link with these ends, its bytes so far.
-    fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkTrace {
+    pub(crate) fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkTrace {
         let order = to.map_or(1_000, |drive| 999 - u16::from(drive));
         self.rings[ring.min(1)].entry(order).or_insert(LinkTrace {
             from,
@@ -171,7 +167,7 @@ impl Assembly {
     }
 
     /// The capture; `sizes` where the file says how many drives there are.
-    fn finish(
+    pub(crate) fn finish(
         self,
         sizes: [Option<u8>; 2],
         marks: [Vec<Mark>; 2],
@@ -266,7 +262,7 @@ impl Capture {
 }
 
 /// A byte of a link, its time in nanoseconds since the start.
-fn line_byte(
+pub(crate) fn line_byte(
     nanos: u64,
     sent: Option<u8>,
     received: Option<u8>,

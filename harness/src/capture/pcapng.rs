@@ -40,7 +40,7 @@ struct Byte {
 }
 
 /// Reads a file.
-pub(super) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
+pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
     let mut reader = Reader {
         bytes,
         big: false,

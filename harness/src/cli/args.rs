@@ -1,12 +1,12 @@
 //! The command line.
 
 use super::campaign::ClassName;
-use super::drive::DriveCommand;
 use super::exit::Exit;
 use super::fuzz::FuzzCommand;
 use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shrink::ShrinkArguments;
+use crate::buses::novobus::cli::DriveCommand;
 use crate::rig::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -466,11 +466,11 @@ fn rate(text: &str) -> Result<Rate, String> {
         .ok_or_else(|| "38400, 19200 or 9600 is expected (ND21 8.3)".to_owned())
 }
 /// What `--wire-time` of the commands of `fuzz` says of itself.
-pub(super) const WIRE_TIME_HELP: &str = "How long the line is used at most, such as 60s; on a rig with ports one minute \
+pub(crate) const WIRE_TIME_HELP: &str = "How long the line is used at most, such as 60s; on a rig with ports one minute \
                                          where nothing is said";
 
 /// A time such as `30s`; at most a day.
-pub(super) fn duration(text: &str) -> Result<Duration, String> {
+pub(crate) fn duration(text: &str) -> Result<Duration, String> {
     const LONGEST: Duration = Duration::from_secs(24 * 3_600);
     let time: Time = text
         .parse()

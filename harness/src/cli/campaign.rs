@@ -13,7 +13,7 @@ use clap::ValueEnum;
 use std::path::PathBuf;
 
 /// Plays campaigns.
-pub(super) fn campaign(
+pub(crate) fn campaign(
     arguments: &CampaignArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {

@@ -7,7 +7,7 @@ use harness_proto::nd21::cells::{Access, Cell, RAM};
 use harness_proto::nd21::eeprom::EEPROM;
 
 /// Shows the cells.
-pub(super) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
     let filter = arguments
         .filter
         .as_deref()

@@ -6,7 +6,7 @@ use super::output::Output;
 use crate::library::{Entry, sources};
 
 /// Reads scenarios and plays nothing.
-pub(super) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io::Result<Exit> {
     let sources = match sources(&arguments.files) {
         Ok(sources) => sources,
         Err(error) => {

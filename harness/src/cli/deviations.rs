@@ -61,7 +61,7 @@ struct Table {
 }
 
 /// Shows the deviations.
-pub(super) fn deviations(
+pub(crate) fn deviations(
     arguments: &DeviationsArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {

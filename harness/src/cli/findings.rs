@@ -16,7 +16,7 @@ const MOST_LISTED: usize = 12;
 
 /// What was played, and what of it differed from the model.
 #[derive(Default)]
-pub(super) struct Findings {
+pub(crate) struct Findings {
     /// The conversations of each attempt that differed.
     differing: Vec<Vec<Conversation>>,
     /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
@@ -26,8 +26,8 @@ pub(super) struct Findings {
     /// The drives that the telegrams around a difference name.
     suspects: Vec<u8>,
     /// What the bench's own master did, and whether it was ever wrong.
-    pub(super) driven: Vec<Driven>,
-    pub(super) master_is_wrong: bool,
+    pub(crate) driven: Vec<Driven>,
+    pub(crate) master_is_wrong: bool,
     /// Scenarios and conversations that were played, and that were compared to their end and equal.
     played: usize,
     equal: usize,
@@ -44,7 +44,7 @@ pub(super) struct Findings {
 
 impl Findings {
     /// Notes what came of a scenario on a rig that states this tolerance of times.
-    pub(super) fn note(&mut self, name: &str, played: &Played, tolerance: Span) {
+    pub(crate) fn note(&mut self, name: &str, played: &Played, tolerance: Span) {
         let verdict = played.outcome.verdict;
         let Some(last) = played.last_played() else {
             self.skipped += 1;
@@ -81,7 +81,7 @@ impl Findings {
     }
 
     /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
-    pub(super) fn note_attempts(&mut self, played: &Played, tolerance: Span) {
+    pub(crate) fn note_attempts(&mut self, played: &Played, tolerance: Span) {
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());
             self.master_is_wrong |= !attempt.master_is_right;
@@ -103,27 +103,27 @@ impl Findings {
     }
 
     /// Notes a probe that was asked.
-    pub(super) fn note_probe(&mut self) {
+    pub(crate) fn note_probe(&mut self) {
         self.probes += 1;
     }
 
     /// Notes something that was not compared, or not equal.
-    pub(super) fn note_open(&mut self, why: String) {
+    pub(crate) fn note_open(&mut self, why: String) {
         self.open.push(why);
     }
 
     /// Whether something differed that a drive is to blame for.
-    pub(super) fn differ(&self) -> bool {
+    pub(crate) fn differ(&self) -> bool {
         !self.differing.is_empty() || !self.with_driver.is_empty()
     }
 
     /// Whether something was not compared, or not equal.
-    pub(super) fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         !self.open.is_empty()
     }
 
     /// What is to be explained. Where the driver's part shows nothing new it is left out.
-    pub(super) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
+    pub(crate) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
         Seen {
             drives,
             suspects: &self.suspects,
@@ -138,7 +138,7 @@ impl Findings {
 
     /// Prints the deviations that explain what differed, none where they were not looked for, and what was compared; `known` are those
     /// that the rig's file names.
-    pub(super) fn tell(
+    pub(crate) fn tell(
         &self,
         named: Option<&[Named]>,
         known: &[String],

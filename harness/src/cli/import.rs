@@ -25,13 +25,13 @@ use std::time::Duration;
 const DISSECTOR: &str = include_str!("../report/novobus.lua");
 
 /// Prints the dissector.
-pub(super) fn dissector(output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn dissector(output: &mut Output) -> std::io::Result<Exit> {
     output.result(DISSECTOR)?;
     Ok(Exit::Passed)
 }
 
 /// Reads a capture and judges it, shows it or makes a scenario of it.
-pub(super) fn import(arguments: &ImportArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::io::Result<Exit> {
     let path = &arguments.file;
     let Some(capture) = read(path, arguments.line, output) else {
         return Ok(Exit::Usage);
@@ -175,7 +175,7 @@ fn details(judged: &Judged, capture: &Capture) -> String {
 }
 
 /// Compares two captures or runs.
-pub(super) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::Result<Exit> {
     let left = side(&arguments.left, arguments, output);
     let right = side(&arguments.right, arguments, output);
     let (Some(left), Some(right)) = (left, right) else {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// The verdicts of a run on their way into a file, if one is wanted.
-pub(super) struct Cases {
+pub(crate) struct Cases {
     rig: String,
     file: Option<PathBuf>,
     cases: Vec<Case>,
@@ -19,7 +19,7 @@ pub(super) struct Cases {
 
 impl Cases {
     /// Of a run on this rig.
-    pub(super) fn new(rig: &str, file: Option<&Path>) -> Self {
+    pub(crate) fn new(rig: &str, file: Option<&Path>) -> Self {
         Self {
             rig: rig.to_owned(),
             file: file.map(Path::to_owned),
@@ -28,7 +28,7 @@ impl Cases {
     }
 
     /// Notes what came of a scenario.
-    pub(super) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
+    pub(crate) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
         let found = outcome.finding.iter().map(|found| found.message.clone());
         let message: Vec<_> = found.chain(outcome.remarks.clone()).collect();
         self.cases.push(Case {
@@ -46,7 +46,7 @@ impl Cases {
     }
 
     /// Writes the file, whole or not at all; where that fails it is told, and the exit code is that of a bench that failed.
-    pub(super) fn write(&self, exit: Exit, output: &mut Output) -> Exit {
+    pub(crate) fn write(&self, exit: Exit, output: &mut Output) -> Exit {
         let Some(path) = &self.file else {
             return exit;
         };

@@ -7,7 +7,7 @@ use super::run::select;
 use std::fmt::Write as _;
 
 /// Shows what scenarios there are.
-pub(super) fn list(selection: &Selection, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn list(selection: &Selection, output: &mut Output) -> std::io::Result<Exit> {
     let entries = match select(selection, None) {
         Ok(entries) => entries,
         Err(errors) => {

@@ -8,7 +8,7 @@ use clap_complete::Shell;
 use std::path::Path;
 
 /// Prints a completion script.
-pub(super) fn completions(shell: Shell, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn completions(shell: Shell, output: &mut Output) -> std::io::Result<Exit> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Arguments::command(), "drivebench", &mut script);
     output.result(&String::from_utf8_lossy(&script))?;
@@ -16,7 +16,7 @@ pub(super) fn completions(shell: Shell, output: &mut Output) -> std::io::Result<
 }
 
 /// Prints the man page, or writes one a command into a folder.
-pub(super) fn man(folder: Option<&Path>, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn man(folder: Option<&Path>, output: &mut Output) -> std::io::Result<Exit> {
     let command = Arguments::command();
     match folder {
         None => {

@@ -11,7 +11,7 @@ use harness_sim::nd21;
 use std::fmt::Write as _;
 
 /// Shows the coverage of the manual and the ledger.
-pub(super) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::io::Result<Exit> {
     let entries = match select(&Selection::default(), None) {
         Ok(entries) => entries,
         Err(errors) => {

@@ -5,8 +5,7 @@ mod campaign;
 mod cells;
 mod check;
 mod deviations;
-mod drive;
-mod exit;
+pub(crate) mod exit;
 mod findings;
 mod fuzz;
 mod import;
@@ -14,15 +13,15 @@ mod junit;
 mod list;
 mod man;
 mod manual;
-mod output;
+pub(crate) mod output;
 mod page;
 mod promote;
 mod qualify;
 mod report;
 mod rig;
 mod rig_check;
-mod rig_failure;
-mod run;
+pub(crate) mod rig_failure;
+pub(crate) mod run;
 mod run_rig;
 mod schema;
 mod shrink;
@@ -86,7 +85,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Rig { command } => rig::rig(&command, output),
         Command::Campaign(arguments) => campaign::campaign(&arguments, output),
         Command::Deviations(arguments) => deviations::deviations(&arguments, output),
-        Command::Drive(command) => drive::drive(&command, output),
+        Command::Drive(command) => crate::buses::novobus::cli::drive(&command, output),
         Command::Completions { shell } => man::completions(shell, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),
     }

@@ -9,16 +9,16 @@ use miette::{GraphicalReportHandler, GraphicalTheme};
 use std::io::{IsTerminal, Write};
 
 /// Where results and messages go.
-pub(super) struct Output {
+pub(crate) struct Output {
     colour_out: bool,
     colour_err: bool,
-    pub(super) progress: bool,
+    pub(crate) progress: bool,
     /// Standard output is a terminal.
-    pub(super) terminal: bool,
+    pub(crate) terminal: bool,
 }
 
 impl Output {
-    pub(super) fn new(color: When, progress: Progress) -> Self {
+    pub(crate) fn new(color: When, progress: Progress) -> Self {
         let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let colour = |terminal: bool| match color {
             When::Always => true,
@@ -40,35 +40,35 @@ impl Output {
     }
 
     /// Whether what goes to standard output may have colours.
-    pub(super) const fn colours(&self) -> bool {
+    pub(crate) const fn colours(&self) -> bool {
         self.colour_out
     }
 
     /// Writes a result.
-    pub(super) fn result(&mut self, text: &str) -> std::io::Result<()> {
+    pub(crate) fn result(&mut self, text: &str) -> std::io::Result<()> {
         let mut out = std::io::stdout().lock();
         unless_closed(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
     }
 
     /// Writes a message for people.
-    pub(super) fn complain(&mut self, text: &str) {
+    pub(crate) fn complain(&mut self, text: &str) {
         let label = paint("error", "1;31", self.colour_err);
         self.say(&format!("{label}: {text}\n"));
     }
 
     /// Says that standard output or a file cannot be written to, and gives the exit code for it.
-    pub(super) fn unwritable(&mut self, error: &std::io::Error) -> Exit {
+    pub(crate) fn unwritable(&mut self, error: &std::io::Error) -> Exit {
         self.complain(&format!("failed to write: {error}"));
         Exit::RigError
     }
 
     /// Writes to standard error; where that is closed, nobody wants to read it.
-    pub(super) fn say(&mut self, text: &str) {
+    pub(crate) fn say(&mut self, text: &str) {
         let _unwritable = std::io::stderr().lock().write_all(text.as_bytes());
     }
 
     /// Shows every mistake of a scenario with the line it stands in.
-    pub(super) fn mistakes(&mut self, problems: &Problems) {
+    pub(crate) fn mistakes(&mut self, problems: &Problems) {
         let theme = if self.colour_err {
             GraphicalTheme::unicode()
         } else {
@@ -85,7 +85,7 @@ impl Output {
     }
 
     /// Shows why there is no scenario.
-    pub(super) fn library_error(&mut self, error: &LibraryError) {
+    pub(crate) fn library_error(&mut self, error: &LibraryError) {
         match error {
             LibraryError::Mistakes(problems) => self.mistakes(problems),
             other => self.complain(&other.to_string()),
@@ -93,7 +93,7 @@ impl Output {
     }
 
     /// A verdict for standard output, padded.
-    pub(super) fn verdict(&self, verdict: Verdict) -> String {
+    pub(crate) fn verdict(&self, verdict: Verdict) -> String {
         let colour = match verdict {
             Verdict::Passed => "32",
             Verdict::Skipped | Verdict::Marginal => "33",
@@ -106,7 +106,7 @@ impl Output {
 
 /// The reader of a pipe that has seen enough (`drivebench run | head`) is no failure, and does not change
 /// the exit code.
-pub(super) fn unless_closed(result: std::io::Result<()>) -> std::io::Result<()> {
+pub(crate) fn unless_closed(result: std::io::Result<()>) -> std::io::Result<()> {
     match result {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other,

@@ -9,7 +9,7 @@ use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};
 
 /// A page that is being collected.
-pub(super) struct Page {
+pub(crate) struct Page {
     path: PathBuf,
     shown: Vec<Shown>,
 }
@@ -17,7 +17,7 @@ pub(super) struct Page {
 impl Page {
     /// A page for a file, where one is wanted; false where it could not be written anyway, which has been said then: a run may take
     /// hours.
-    pub(super) fn new(path: Option<&Path>, output: &mut Output) -> Result<Option<Self>, Refused> {
+    pub(crate) fn new(path: Option<&Path>, output: &mut Output) -> Result<Option<Self>, Refused> {
         let Some(path) = path else { return Ok(None) };
         writable(path, output)?;
         Ok(Some(Self {
@@ -27,12 +27,12 @@ impl Page {
     }
 
     /// Where it goes.
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Adds a scenario that was played.
-    pub(super) fn add(&mut self, entry: &Entry, outcome: &Outcome, traces: &[Trace]) {
+    pub(crate) fn add(&mut self, entry: &Entry, outcome: &Outcome, traces: &[Trace]) {
         let sources: Vec<_> = entry
             .scenario
             .sources
@@ -62,17 +62,17 @@ impl Page {
     }
 
     /// Writes it; false where that failed, which has been said then.
-    pub(super) fn write(self, head: &Head<'_>, output: &mut Output) -> bool {
+    pub(crate) fn write(self, head: &Head<'_>, output: &mut Output) -> bool {
         let text = run(head, self.shown);
         write(&self.path, &text, output)
     }
 }
 
 /// A file that cannot be written, which has been said.
-pub(super) struct Refused;
+pub(crate) struct Refused;
 
 /// Looks whether a file could be written.
-pub(super) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> {
+pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
@@ -89,7 +89,7 @@ pub(super) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> 
 }
 
 /// Writes a page, whole or not at all; false where that failed, which has been said then.
-pub(super) fn write(path: &Path, text: &str, output: &mut Output) -> bool {
+pub(crate) fn write(path: &Path, text: &str, output: &mut Output) -> bool {
     match regular::write_text(path, text) {
         Ok(()) => {
             output.say(&format!("the report is in {}\n", path.display()));
@@ -103,7 +103,7 @@ pub(super) fn write(path: &Path, text: &str, output: &mut Output) -> bool {
 }
 
 /// A word of a command line, as a shell reads it.
-pub(super) fn word(text: &str) -> String {
+pub(crate) fn word(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@%".contains(c);
     if !text.is_empty() && text.chars().all(plain) {
         text.to_owned()

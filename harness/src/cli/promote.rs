@@ -28,7 +28,7 @@ pub struct PromoteArguments {
 }
 
 /// Writes the files.
-pub(super) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std::io::Result<Exit> {
     let promoted = promoted(arguments);
     let promoted = match promoted {
         Ok(promoted) => promoted,

@@ -24,16 +24,16 @@ use std::time::SystemTime;
 const MOST_TOLD: usize = 8;
 
 /// The file of a folder of evidence that says what was compared and which deviations explain it.
-pub(super) const DEVIATIONS: &str = "deviations.txt";
+pub(crate) const DEVIATIONS: &str = "deviations.txt";
 
 /// What is said where a run ended early.
-pub(super) const ENDED: &str = "the run ended before everything was played";
+pub(crate) const ENDED: &str = "the run ended before everything was played";
 
 /// How often a probe is played until a value explains it: a busy computer is late now and then.
 const PROBED: usize = 3;
 
 /// Qualifies a rig.
-pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
     let Some(rig) = find_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };
@@ -68,7 +68,7 @@ pub(super) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
 }
 
 /// Plays what is judged by the model alone, settles what the manual leaves open, and names what drives do otherwise.
-pub(super) fn settle(
+pub(crate) fn settle(
     run: &mut Run<'_>,
     findings: &mut Findings,
     ill: bool,

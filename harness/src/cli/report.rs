@@ -8,7 +8,7 @@ use crate::evidence::{RIG, derive};
 use crate::explore::{RECORD, page};
 
 /// Makes the reports of a folder again.
-pub(super) fn report(arguments: &ReportArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn report(arguments: &ReportArguments, output: &mut Output) -> std::io::Result<Exit> {
     for path in arguments.html.iter().chain(&arguments.junit) {
         if writable(path, output).is_err() {
             return Ok(Exit::Usage);

@@ -90,7 +90,7 @@ impl Failure {
 }
 
 /// Does what is asked.
-pub(super) fn rig(command: &RigCommand, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn rig(command: &RigCommand, output: &mut Output) -> std::io::Result<Exit> {
     match command_on(command, output) {
         Ok(exit) => Ok(exit),
         Err(Failure::Output(error)) => Err(error),

@@ -30,7 +30,7 @@ pub struct CheckRigArguments {
 }
 
 /// Opens a bench and says what it shows.
-pub(super) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::io::Result<Exit> {
     let Some(rig) = find_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };

@@ -12,7 +12,7 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 /// The rig of this name; what is wrong with it is told.
-pub(super) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
+pub(crate) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
     match find(name, &folder()) {
         Ok(rig) => Some(rig),
         Err(FindError::Mistakes(problems)) => {
@@ -27,7 +27,7 @@ pub(super) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
 }
 
 /// What a program does that hangs: it says so, and ends with the exit code for drives that nobody knows to stand.
-pub(super) fn alarm() -> Alarm {
+pub(crate) fn alarm() -> Alarm {
     Alarm::new(|why| {
         let why = format!("error: {why}\n");
         // Standard error may be what hangs.
@@ -44,7 +44,7 @@ pub(super) fn alarm() -> Alarm {
 }
 
 /// The exit code for a rig that cannot be used.
-pub(super) fn exit_of(error: &SessionError) -> Exit {
+pub(crate) fn exit_of(error: &SessionError) -> Exit {
     match error {
         SessionError::Lock(LockError::Busy { .. }) => Exit::Busy,
         SessionError::Interrupted { end: Some(end), .. } if end.is_unsafe() => Exit::NotSafe,
@@ -60,7 +60,7 @@ pub(super) fn exit_of(error: &SessionError) -> Exit {
 }
 
 /// Gives a rig back in its safe state and tells how; what ended the work early is graver than what came of it.
-pub(super) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -> (End, Exit) {
+pub(crate) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -> (End, Exit) {
     let exit = match session.link().trouble() {
         Some(Trouble::Interrupted) => Exit::Interrupted,
         Some(Trouble::Interlock(why)) => {
@@ -80,7 +80,7 @@ pub(super) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -
 }
 
 /// Tells how a rig was given back; a safe state that is not confirmed is graver than all else.
-pub(super) fn tell_end(end: &End, exit: Exit, output: &mut Output) -> Exit {
+pub(crate) fn tell_end(end: &End, exit: Exit, output: &mut Output) -> Exit {
     for remark in &end.remarks {
         output.complain(remark);
     }

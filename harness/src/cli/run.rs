@@ -26,7 +26,7 @@ use std::fmt::Write as _;
 ///
 /// # Errors
 /// The first file that is not there, or the mistakes of every scenario that has some.
-pub(super) fn select(
+pub(crate) fn select(
     selection: &Selection,
     ring: Option<u8>,
 ) -> Result<Vec<Entry>, Vec<LibraryError>> {
@@ -49,7 +49,7 @@ pub(super) fn select(
 }
 
 /// Plays scenarios, one line each.
-pub(super) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
     let rig = match arguments.rig.as_deref().map(|name| find_rig(name, output)) {
         None => None,
         Some(Some(rig)) => Some(rig),
@@ -210,13 +210,13 @@ fn traces(plan: &Plan, link: &SimulatedLink) -> Vec<Trace> {
 }
 
 /// A scenario that was played, with what it left.
-pub(super) struct Played {
-    pub(super) outcome: Outcome,
-    pub(super) traces: Vec<Trace>,
+pub(crate) struct Played {
+    pub(crate) outcome: Outcome,
+    pub(crate) traces: Vec<Trace>,
 }
 
 /// Plays a scenario on simulated rings.
-pub(super) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
+pub(crate) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
     let Some(plan) = &entry.plan else {
         return Played {
             outcome: Outcome::skipped(no_bus(entry)),
@@ -238,11 +238,11 @@ fn records(outcome: &Outcome) -> String {
 }
 
 /// How many drives the rings of a scenario have: `3+1`.
-pub(super) fn drives(entry: &Entry) -> String {
+pub(crate) fn drives(entry: &Entry) -> String {
     entry.drives()
 }
 
-pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
+pub(crate) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
     let drives = drives(entry);
     format!(
         "{} {:44} {:>5} drives {:>12}  {}\n",
@@ -255,7 +255,7 @@ pub(super) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String 
 }
 
 /// What there is to say about a scenario beside its line, for people.
-pub(super) fn details(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
+pub(crate) fn details(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     for remark in &outcome.remarks {
@@ -309,7 +309,7 @@ fn place(entry: &Entry, finding: &Finding) -> String {
     format!("{}:{line}:{column}", entry.name)
 }
 
-pub(super) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
+pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {
     let target = if shown && length > 1 {
         ProgressDrawTarget::stderr()
     } else {

@@ -23,23 +23,23 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// What is to be done.
-pub(super) struct Job {
-    pub(super) purpose: &'static str,
-    pub(super) allow_motion: bool,
-    pub(super) wait: Duration,
-    pub(super) evidence: Option<PathBuf>,
-    pub(super) records: bool,
-    pub(super) require_all: bool,
+pub(crate) struct Job {
+    pub(crate) purpose: &'static str,
+    pub(crate) allow_motion: bool,
+    pub(crate) wait: Duration,
+    pub(crate) evidence: Option<PathBuf>,
+    pub(crate) records: bool,
+    pub(crate) require_all: bool,
     /// Where the verdicts go as JUnit's XML, beside the evidence.
-    pub(super) junit: Option<PathBuf>,
+    pub(crate) junit: Option<PathBuf>,
     /// Also settle what the manual leaves open, and name the deviations.
-    pub(super) qualify: bool,
+    pub(crate) qualify: bool,
     /// The key to sign the evidence with.
-    pub(super) sign: Option<PathBuf>,
+    pub(crate) sign: Option<PathBuf>,
 }
 
 /// Why work ends early.
-pub(super) enum Stop {
+pub(crate) enum Stop {
     Session(SessionError),
     Evidence(EvidenceError),
     Output(std::io::Error),
@@ -64,7 +64,7 @@ impl From<std::io::Error> for Stop {
 }
 
 /// Does it, and gives the rig back in its safe state.
-pub(super) fn work(
+pub(crate) fn work(
     rig: &Rig,
     entries: &[Entry],
     job: &Job,
@@ -116,7 +116,7 @@ pub(super) fn work(
 
 /// Ends the folder and writes the page; false where that failed, which has been said then. The page of a run with a folder is
 /// the folder's.
-pub(super) fn reports(
+pub(crate) fn reports(
     rig: &Rig,
     folder: Option<Folder>,
     page: Option<Page>,
@@ -242,7 +242,7 @@ fn all(
 }
 
 /// Plays a scenario, into the folder where there is one.
-pub(super) fn play(
+pub(crate) fn play(
     run: &mut Run<'_>,
     entry: &Entry,
     folder: Option<&mut Folder>,
@@ -272,7 +272,7 @@ pub(super) fn play(
 }
 
 /// Whether nothing more can or may be played.
-pub(super) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
+pub(crate) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
     let session = run.session();
     if session.overdue() {
         output.complain("the rig's file allows no longer run (max_run)");

@@ -6,7 +6,7 @@ use super::output::Output;
 use crate::{evidence, rig};
 
 /// Prints a schema.
-pub(super) fn schema(name: SchemaName, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn schema(name: SchemaName, output: &mut Output) -> std::io::Result<Exit> {
     let schema = match name {
         SchemaName::Record => evidence::schema(),
         SchemaName::Rig => rig::schema(),

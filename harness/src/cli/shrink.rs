@@ -41,7 +41,7 @@ pub struct ShrinkArguments {
 }
 
 /// Makes a finding small, and writes what came of it beside it.
-pub(super) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
     let (finding, path) = match Finding::read(&arguments.finding) {
         Ok(read) => read,
         Err(error) => return Ok(tell(&error, output)),

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 
 /// The verdicts of a run so far.
 #[derive(Debug, Default)]
-pub(super) struct Tally {
+pub(crate) struct Tally {
     verdicts: Vec<Verdict>,
     took: Span,
     /// Why scenarios were skipped, and how many for each reason, in the order in which the reasons came up.
@@ -45,7 +45,7 @@ fn unlock(why: &str) -> Option<String> {
 
 impl Tally {
     /// Counts a scenario, and the tables that it pins.
-    pub(super) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
+    pub(crate) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
         let judged = outcome.verdict != Verdict::Skipped;
         for source in &entry.scenario.sources {
             *self.tables.entry(source.text.clone()).or_default() |= judged;
@@ -70,13 +70,13 @@ impl Tally {
     }
 
     /// Counts a scenario that the run did not come to; without it the run is incomplete.
-    pub(super) fn not_reached(&mut self, entry: &Entry, outcome: &Outcome) {
+    pub(crate) fn not_reached(&mut self, entry: &Entry, outcome: &Outcome) {
         self.note(entry, outcome);
         self.ended_early = true;
     }
 
     /// The exit code; `require_all` counts skipped scenarios as missing.
-    pub(super) fn exit(&self, require_all: bool) -> Exit {
+    pub(crate) fn exit(&self, require_all: bool) -> Exit {
         Exit::of(&self.verdicts, require_all || self.ended_early)
     }
 
@@ -101,7 +101,7 @@ impl Tally {
     }
 
     /// The counts in a line, and others for what was not played and what was covered.
-    pub(super) fn summary(&self) -> String {
+    pub(crate) fn summary(&self) -> String {
         let count = |wanted: Verdict| self.verdicts.iter().filter(|v| **v == wanted).count();
         let mut text = format!(
             "{} passed, {} failed",

@@ -20,7 +20,7 @@ use std::io::{BufWriter, Write};
 const WIRES: usize = 20;
 
 /// Plays a scenario and prints every byte.
-pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io::Result<Exit> {
     let sources = match sources(std::slice::from_ref(&arguments.file)) {
         Ok(sources) => sources,
         Err(error) => {
@@ -64,15 +64,15 @@ pub(super) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
 }
 
 /// A run that is to be shown.
-pub(super) struct Shown<'s> {
-    pub(super) title: &'s str,
-    pub(super) traces: &'s [Trace],
-    pub(super) rate: Rate,
-    pub(super) records: &'s [Record],
+pub(crate) struct Shown<'s> {
+    pub(crate) title: &'s str,
+    pub(crate) traces: &'s [Trace],
+    pub(crate) rate: Rate,
+    pub(crate) records: &'s [Record],
 }
 
 /// Whether a form can go where it is to go: what is no text is kept from a terminal.
-pub(super) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut Output) -> bool {
+pub(crate) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut Output) -> bool {
     if format == TraceFormat::Pcapng && showing.output.is_none() && output.terminal {
         output.complain(
             "pcapng is no text, and standard output is a terminal; add `--output FILE`, or send it on with `|` or `>`",
@@ -83,7 +83,7 @@ pub(super) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut O
 }
 
 /// Shows a run; false where the file could not be written, which has been said then.
-pub(super) fn show(
+pub(crate) fn show(
     shown: &Shown<'_>,
     format: TraceFormat,
     showing: &Showing,

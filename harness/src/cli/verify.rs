@@ -6,7 +6,7 @@ use super::output::Output;
 use crate::evidence::{Signer, verify as judge_again};
 
 /// Judges a folder again.
-pub(super) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::io::Result<Exit> {
     let signer = arguments
         .allowed_signers
         .as_deref()

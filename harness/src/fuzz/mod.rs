@@ -5,14 +5,14 @@
 //! [`coverage`] holds the kept inputs against the matrix of protocol transitions and sums up what they reach, [`distil`](mod@distil) chooses
 //! what is worth keeping.
 
-pub mod coverage;
-pub mod distil;
 pub mod input;
-mod noted;
 mod text;
 
 pub use text::{rig, scenario};
 
+use crate::buses::novobus::fuzz::noted;
+/// The targets that reach transitions of the one bus that is fuzzed today.
+pub use crate::buses::novobus::fuzz::{coverage, distil};
 use harness_sim::novobus::fuzz::{NOTING, Noting, TARGETS, Target};
 
 /// The targets whose bodies need the whole bench.

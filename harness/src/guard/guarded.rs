@@ -1,8 +1,8 @@
 //! A line or a link behind a guard.
 
 use super::Watch;
-use super::safe_state::telegram;
 use crate::buses::novobus::driver::Axis;
+use crate::buses::novobus::guard::safe_state::telegram;
 use crate::link::{
     Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus,
     Trouble,
@@ -110,7 +110,7 @@ impl<L: Line> Guarded<L> {
         self.trouble().is_none() && self.rings.iter().all(|ring| ring.guard.at_rest())
     }
 
-    /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](super::safe_state).
+    /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](crate::buses::novobus::guard::safe_state).
     pub fn reset_after_denial(&mut self) {
         if !matches!(self.trouble, Some(Trouble::Interlock(_))) {
             self.trouble = None;
@@ -121,17 +121,17 @@ impl<L: Line> Guarded<L> {
     }
 
     /// What it allows.
-    pub(super) const fn limits(&self) -> &Limits {
+    pub(crate) const fn limits(&self) -> &Limits {
         &self.limits
     }
 
     /// The rings.
-    pub(super) fn sizes(&self) -> Vec<RingSize> {
+    pub(crate) fn sizes(&self) -> Vec<RingSize> {
         self.rings.iter().map(|ring| ring.size).collect()
     }
 
     /// Learns what was read of a drive.
-    pub(super) fn learn_of(&mut self, axis: Axis, found: &Found) {
+    pub(crate) fn learn_of(&mut self, axis: Axis, found: &Found) {
         let Some(ring) = self.rings.get_mut(axis.ring()) else {
             return;
         };

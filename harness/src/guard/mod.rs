@@ -8,11 +8,11 @@
 //! of a byte, and nothing else passes.
 
 mod guarded;
-mod learn;
-mod safe_state;
 mod watch;
 
+pub use crate::buses::novobus::guard::safe_state::{
+    NotSafe, SafeState, SafeStep, Standing, blind_stop, safe_state,
+};
 pub use guarded::Guarded;
 pub use harness_proto::novobus::guard::{Denial, Found, Guard, Limits, Need};
-pub use safe_state::{NotSafe, SafeState, SafeStep, Standing, blind_stop, safe_state};
 pub use watch::Watch;

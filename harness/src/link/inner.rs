@@ -58,20 +58,20 @@ type Waiting = (Instant, Outgoing, time::Instant);
 /// An inner link that the bench has a port at.
 #[derive(Debug)]
 pub struct InnerLink {
-    pub(super) ring: usize,
+    pub(crate) ring: usize,
     /// Counted from the master's outgoing link.
-    pub(super) place: usize,
+    pub(crate) place: usize,
     ports: Ports,
-    pub(super) tamper: Tamper,
+    pub(crate) tamper: Tamper,
     queue: VecDeque<Waiting>,
     free: Instant,
     last_arrival: Instant,
-    pub(super) log: Vec<LineByte>,
-    pub(super) carried: u64,
+    pub(crate) log: Vec<LineByte>,
+    pub(crate) carried: u64,
     /// Bytes that an interposer has taken from the ring, and those that it has given back, since the ring was last at
     /// rest.
-    pub(super) taken: u64,
-    pub(super) given: u64,
+    pub(crate) taken: u64,
+    pub(crate) given: u64,
     delay: Delay,
 }
 
@@ -107,7 +107,7 @@ impl InnerLink {
         self.delay
     }
 
-    pub(super) fn shows_errors(&self) -> bool {
+    pub(crate) fn shows_errors(&self) -> bool {
         match &self.ports {
             Ports::Tap(wire) | Ports::Interposer(wire) => wire.abilities().shows_errors,
             Ports::TwoPortInterposer(up, down) => {
@@ -116,7 +116,7 @@ impl InnerLink {
         }
     }
 
-    pub(super) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
+    pub(crate) fn poll_fds(&self) -> impl Iterator<Item = PollFd<'_>> {
         let (first, second) = match &self.ports {
             Ports::Tap(wire) | Ports::Interposer(wire) => (wire, None),
             Ports::TwoPortInterposer(up, down) => (up, Some(down)),
@@ -124,7 +124,7 @@ impl InnerLink {
         std::iter::once(first).chain(second).map(Wire::poll_fd)
     }
 
-    pub(super) fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.tamper = Tamper::default();
         self.queue.clear();
         self.free = Instant::START;
@@ -135,21 +135,21 @@ impl InnerLink {
     }
 
     /// The ring is at rest: nothing is under way.
-    pub(super) fn rest(&mut self) {
+    pub(crate) fn rest(&mut self) {
         (self.taken, self.given) = (0, 0);
     }
 
     /// When something waits to be passed on.
-    pub(super) fn due(&self) -> Option<Instant> {
+    pub(crate) fn due(&self) -> Option<Instant> {
         self.queue.front().map(|(start, ..)| *start)
     }
 
-    pub(super) fn busy(&self) -> bool {
+    pub(crate) fn busy(&self) -> bool {
         !self.queue.is_empty()
     }
 
     /// Takes what has come and passes on what is due.
-    pub(super) fn pump(
+    pub(crate) fn pump(
         &mut self,
         now: Instant,
         byte_time: Span,

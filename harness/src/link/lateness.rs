@@ -8,14 +8,14 @@ const HALF: Duration = Duration::from_millis(500);
 
 /// The worst that has been seen, forgotten little by little.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lateness {
+pub(crate) struct Lateness {
     worst: Span,
     seen: Instant,
 }
 
 impl Lateness {
     /// Nothing has been late.
-    pub(super) fn new(now: Instant) -> Self {
+    pub(crate) fn new(now: Instant) -> Self {
         Self {
             worst: Span::ZERO,
             seen: now,
@@ -23,7 +23,7 @@ impl Lateness {
     }
 
     /// Somebody who wanted to be woken at `due` is awake `now`.
-    pub(super) fn woken(&mut self, due: Instant, now: Instant) {
+    pub(crate) fn woken(&mut self, due: Instant, now: Instant) {
         let late = now.saturating_duration_since(due).as_nanos();
         let late = Span::from_nanos(u64::try_from(late).unwrap_or(u64::MAX));
         if late >= self.at(now) {
@@ -35,7 +35,7 @@ impl Lateness {
     }
 
     /// By how much whoever wants to be woken may be late now.
-    pub(super) fn at(&self, now: Instant) -> Span {
+    pub(crate) fn at(&self, now: Instant) -> Span {
         let halves = now.saturating_duration_since(self.seen).as_millis() / HALF.as_millis();
         let left = self.worst.as_nanos() >> halves.min(63);
         Span::from_nanos(left)

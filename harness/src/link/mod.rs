@@ -8,17 +8,16 @@ mod lateness;
 mod record;
 mod replay;
 mod ring;
-mod sim;
 mod stamp;
 mod stream;
 mod tamper;
 
+pub use crate::buses::novobus::link::SimulatedLink;
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use inner::{Delay, InnerLink, Ports};
 pub use record::{Event, Look, Recording, Sink};
 pub use replay::Replay;
-pub use sim::SimulatedLink;
 pub use stream::{StreamLink, TOLERANCE};
 pub use tamper::{needs_line_errors, only_simulated};
 

@@ -13,34 +13,34 @@ use std::collections::VecDeque;
 const AHEAD: Span = Span::from_millis(100);
 
 /// Bytes of a conversation that are recorded on each link; more are counted only.
-pub(super) const MOST_RECORDED: usize = 4_000_000;
+pub(crate) const MOST_RECORDED: usize = 4_000_000;
 
 /// One ring's two ends at the master.
 #[derive(Debug)]
-pub(super) struct Ring {
-    pub(super) wire: Wire,
-    pub(super) drives: u8,
+pub(crate) struct Ring {
+    pub(crate) wire: Wire,
+    pub(crate) drives: u8,
     /// What has not been given to the operating system, with the time at which its start bit is due, and whether
     /// it must not be sooner.
-    pub(super) queue: VecDeque<(Instant, bool, Outgoing)>,
+    pub(crate) queue: VecDeque<(Instant, bool, Outgoing)>,
     /// When the line is free for the next byte.
-    pub(super) free: Instant,
+    pub(crate) free: Instant,
     /// When what somebody waits for comes home.
-    pub(super) attended: Option<Instant>,
-    pub(super) received: VecDeque<(Instant, Received)>,
-    pub(super) last_arrival: Instant,
+    pub(crate) attended: Option<Instant>,
+    pub(crate) received: VecDeque<(Instant, Received)>,
+    pub(crate) last_arrival: Instant,
     /// Bytes sent and received since the ring was last at rest.
-    pub(super) sent: u64,
-    pub(super) came: u64,
-    pub(super) outgoing: Tamper,
-    pub(super) incoming: Tamper,
-    pub(super) log: [Vec<LineByte>; 2],
-    pub(super) carried: u64,
-    pub(super) unplaced: u64,
+    pub(crate) sent: u64,
+    pub(crate) came: u64,
+    pub(crate) outgoing: Tamper,
+    pub(crate) incoming: Tamper,
+    pub(crate) log: [Vec<LineByte>; 2],
+    pub(crate) carried: u64,
+    pub(crate) unplaced: u64,
 }
 
 impl Ring {
-    pub(super) fn new(wire: Wire, drives: u8) -> Self {
+    pub(crate) fn new(wire: Wire, drives: u8) -> Self {
         Self {
             wire,
             drives,
@@ -59,7 +59,7 @@ impl Ring {
         }
     }
 
-    pub(super) fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.queue.clear();
         self.free = Instant::START;
         self.attended = None;
@@ -72,7 +72,7 @@ impl Ring {
     }
 
     /// Queues a byte of the master's.
-    pub(super) fn send(&mut self, now: Instant, byte: u8, byte_time: Span, recording: bool) {
+    pub(crate) fn send(&mut self, now: Instant, byte: u8, byte_time: Span, recording: bool) {
         let start = self.free.max(now);
         let passed = self.outgoing.pass(Received::good(byte), start);
         let begun = start + passed.delay;
@@ -103,7 +103,7 @@ impl Ring {
     }
 
     /// Gives the operating system what is due.
-    pub(super) fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {
+    pub(crate) fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {
         while let Some(&(start, exact, outgoing)) = self.queue.front() {
             let lead = if exact { Span::ZERO } else { AHEAD };
             if start > now + lead {
@@ -116,7 +116,7 @@ impl Ring {
     }
 
     /// Takes what has come.
-    pub(super) fn collect(
+    pub(crate) fn collect(
         &mut self,
         (told, now): (Instant, Instant),
         byte_time: Span,

@@ -5,7 +5,7 @@ use harness_proto::time::{Instant, Span};
 
 /// Bytes that were read together, each with the time at which it came: the last one now, each before it a byte time
 /// sooner, and none before the one that was read last.
-pub(super) fn stamped(
+pub(crate) fn stamped(
     bytes: Vec<Received>,
     now: Instant,
     byte_time: Span,

@@ -36,7 +36,7 @@ const LEAD: Span = Span::from_millis(16);
 const ADAPTER: Span = Span::from_millis(4);
 
 /// How much later than the ring itself needs a byte may come back: adapters, a busy computer.
-pub(super) const SLACK: Span = Span::from_millis(30);
+pub(crate) const SLACK: Span = Span::from_millis(30);
 
 /// How exact times are where the rig's file says nothing.
 pub const TOLERANCE: Span = Span::from_millis(5);

@@ -13,21 +13,21 @@ use std::collections::BTreeMap;
 
 /// What becomes of a byte.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Passed {
+pub(crate) struct Passed {
     /// What goes on in front of it.
     inserted: Vec<Received>,
     /// The byte itself, unless it is lost.
     own: Option<Received>,
     twice: bool,
     /// How long the first of them is held back.
-    pub(super) delay: Span,
+    pub(crate) delay: Span,
     /// How long the line is held at 0 in place of the byte.
-    pub(super) hold: Option<Span>,
+    pub(crate) hold: Option<Span>,
 }
 
 impl Passed {
     /// What goes on, in order.
-    pub(super) fn bytes(&self) -> impl Iterator<Item = Received> + '_ {
+    pub(crate) fn bytes(&self) -> impl Iterator<Item = Received> + '_ {
         let inserted = self.inserted.iter().copied();
         inserted.chain(self.own).chain(self.again())
     }
@@ -37,7 +37,7 @@ impl Passed {
     }
 
     /// The wire's bytes for a record, the first of which ends at `at`: what was sent, and what arrives.
-    pub(super) fn seen(
+    pub(crate) fn seen(
         &self,
         sent: u8,
         at: Instant,
@@ -64,7 +64,7 @@ impl Passed {
 
 /// One link's faults.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tamper {
+pub(crate) struct Tamper {
     count: u64,
     armed: BTreeMap<u64, Vec<LinkFault>>,
     cut: bool,
@@ -73,17 +73,17 @@ pub(super) struct Tamper {
 
 impl Tamper {
     /// How many bytes have come.
-    pub(super) fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         self.count
     }
 
     /// Arms a fault for the `byte`-th byte.
-    pub(super) fn arm(&mut self, byte: u64, fault: LinkFault) {
+    pub(crate) fn arm(&mut self, byte: u64, fault: LinkFault) {
         self.armed.entry(byte).or_default().push(fault);
     }
 
     /// Lets a fault happen now; what needs a byte takes the next one.
-    pub(super) fn suffer(&mut self, fault: LinkFault) {
+    pub(crate) fn suffer(&mut self, fault: LinkFault) {
         match fault {
             LinkFault::Cut => self.cut = true,
             LinkFault::Join => self.cut = false,
@@ -92,7 +92,7 @@ impl Tamper {
     }
 
     /// Faults whose byte has not come.
-    pub(super) fn unused(&self) -> impl Iterator<Item = (u64, LinkFault)> + '_ {
+    pub(crate) fn unused(&self) -> impl Iterator<Item = (u64, LinkFault)> + '_ {
         let each = |(byte, faults): (&u64, &Vec<LinkFault>)| {
             let byte = *byte;
             let faults: Vec<_> = faults.iter().map(|fault| (byte, *fault)).collect();
@@ -102,7 +102,7 @@ impl Tamper {
     }
 
     /// A byte that goes on at `start`.
-    pub(super) fn pass(&mut self, byte: Received, start: Instant) -> Passed {
+    pub(crate) fn pass(&mut self, byte: Received, start: Instant) -> Passed {
         self.count += 1;
         let mut passed = Passed::default();
         let mut whole = Some(byte);

@@ -46,7 +46,7 @@ pub fn explaining<'h, E>(
 }
 
 /// How well a twin explains conversations; none where a byte differs.
-pub(super) fn judge(
+pub(crate) fn judge(
     mut twin: Twin,
     conversations: &[Conversation],
     exactness: Exactness,

@@ -1,6 +1,6 @@
 //! A finding, shown as the manual's table with the first byte that differs, expected beside received.
 
-use super::table::{LEGEND, Part, table};
+use crate::report::table::{LEGEND, Part, table};
 use crate::scenario::run::{Difference, Finding, Shown, show};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;

@@ -1,8 +1,8 @@
 //! The page that a scenario leaves: verdict, table and plots. Snapshots of scenarios are such pages.
 
 use super::plot::plots;
-use super::table::{LEGEND, Part, table, wires};
 use crate::library::Entry;
+use crate::report::table::{LEGEND, Part, table, wires};
 use crate::scenario::run::Outcome;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;

@@ -20,7 +20,7 @@
 //! drawn one behind the other.
 
 use super::pcapng::name;
-use super::walk::{Reader, State};
+use crate::report::walk::{Reader, State};
 use harness_proto::line::{LineError, Rate};
 use harness_sim::record::LineByte;
 use harness_sim::record::{LinkTrace, Trace};

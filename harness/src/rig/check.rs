@@ -110,7 +110,7 @@ pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, P
 }
 
 /// A bound of an interlock, in the unit of its cell's scale.
-pub(super) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
+pub(crate) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     let wrong = |message: String, expected: &str| ValueError {
         message,
         expected: expected.to_owned(),
@@ -134,19 +134,19 @@ pub(super) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     }
 }
 
-pub(super) struct Check<'a> {
+pub(crate) struct Check<'a> {
     table: &'a Spanned<DeTable<'a>>,
-    pub(super) file: &'a RigFile,
-    pub(super) problems: Vec<Problem>,
+    pub(crate) file: &'a RigFile,
+    pub(crate) problems: Vec<Problem>,
 }
 
 impl Check<'_> {
     /// The place of a value, or of the nearest table around it that is there.
-    pub(super) fn place(&self, path: &[Step<'_>]) -> Span {
+    pub(crate) fn place(&self, path: &[Step<'_>]) -> Span {
         place(self.table, path)
     }
 
-    pub(super) fn wrong(
+    pub(crate) fn wrong(
         &mut self,
         path: &[Step<'_>],
         message: impl Into<String>,

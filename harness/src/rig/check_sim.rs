@@ -10,7 +10,7 @@ use crate::scenario::source::Source;
 
 impl Check<'_> {
     /// The profile that the rig's file names.
-    pub(super) fn profile(&mut self, find: &FindProfile<'_>) -> Option<KnownProfile> {
+    pub(crate) fn profile(&mut self, find: &FindProfile<'_>) -> Option<KnownProfile> {
         let named = self.file.rig.profile.as_ref()?;
         let profile = find(named).and_then(|source| {
             let profile = Profile::parse(&source.text);
@@ -31,7 +31,7 @@ impl Check<'_> {
     }
 
     /// The lines of `[sim]` make drives, together with what stands in front of them.
-    pub(super) fn setup(&mut self, source: &Source, profile: Option<&KnownProfile>) {
+    pub(crate) fn setup(&mut self, source: &Source, profile: Option<&KnownProfile>) {
         let none = Sim::default();
         let sim = self.file.sim.as_ref().unwrap_or(&none);
         let (lines, before) = lines(self.file, profile, &[]);

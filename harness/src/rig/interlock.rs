@@ -14,7 +14,7 @@ use harness_proto::time::{Instant, Span};
 
 /// The interlocks of a rig, and when each is looked at next.
 #[derive(Debug)]
-pub(super) struct Interlocks {
+pub(crate) struct Interlocks {
     all: Vec<Entry>,
 }
 
@@ -37,7 +37,7 @@ struct Entry {
 
 impl Interlocks {
     /// Those of a rig; `None` where it has none.
-    pub(super) fn of(rig: &Rig) -> Option<Self> {
+    pub(crate) fn of(rig: &Rig) -> Option<Self> {
         let plan = rig.plan().ok()?;
         let entry = |entry: &file::Interlock| {
             let ring = usize::from(entry.ring.checked_sub(1)?);
@@ -62,7 +62,7 @@ impl Interlocks {
     ///
     /// # Errors
     /// The first that does not hold, or whose drive does not answer, in a sentence.
-    pub(super) fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), String> {
+    pub(crate) fn look_at_all(&mut self, line: &mut dyn Line) -> Result<(), String> {
         for entry in &mut self.all {
             if entry.look(line)?.is_none() {
                 return Err(format!(

@@ -264,7 +264,7 @@ fn of_the_drive<'h>(finding: &Finding, heard: &Heard<'h>) -> Option<&'h Own> {
 }
 
 /// Whether a known deviation is none that the simulator has.
-pub(super) fn by_hand(entry: &Deviation) -> bool {
+pub(crate) fn by_hand(entry: &Deviation) -> bool {
     deviation::deviation(&entry.name).is_none()
 }
 

@@ -52,9 +52,9 @@ pub enum OpenRigError {
 
 /// Open ends, and the locks of their ports.
 #[derive(Debug)]
-pub(super) struct Opened {
-    pub(super) ends: Ends,
-    pub(super) locks: Vec<PortLock>,
+pub(crate) struct Opened {
+    pub(crate) ends: Ends,
+    pub(crate) locks: Vec<PortLock>,
 }
 
 /// The rate of a rig's line.
@@ -67,7 +67,7 @@ pub(crate) fn line_rate(rig: &Rig) -> Rate {
 }
 
 /// Opens a rig's ends; nothing is sent.
-pub(super) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
+pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
     if rig.is_simulated() {
         let mut link = simulate::bench(&rig.plan()?);
         run_until_warm(&mut link);

@@ -4,9 +4,7 @@ use super::Rig;
 use super::around::{self, Around};
 use super::ends::Ends;
 use super::file;
-use super::health::{self, Health, Unhealthy, examine};
 use super::interlock::Interlocks;
-use super::line_test::{self, Cause};
 use super::lock::{PortLock, RigLock};
 use super::open::open;
 use super::session_error::SessionError;
@@ -15,6 +13,8 @@ use super::watchdog::{Alarm, Watchdog};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, StreamLink, Trouble};
+use crate::rig::health::{self, Health, Unhealthy, examine};
+use crate::rig::line_test::{self, Cause};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::Limits;
@@ -501,7 +501,7 @@ impl Session {
     }
 
     /// The same inside a conversation that goes on, so that its clock counts the time that this takes.
-    pub(super) fn ask_interlocks(&mut self) {
+    pub(crate) fn ask_interlocks(&mut self) {
         if let Some(mut interlocks) = Interlocks::of(&self.rig) {
             self.link.look(|line| interlocks.look_at_all(line));
         }

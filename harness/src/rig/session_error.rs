@@ -1,11 +1,11 @@
 //! Why a rig cannot be used.
 
-use super::health::Unhealthy;
 use super::hook::HookError;
-use super::line_test::Cause;
 use super::lock::LockError;
 use super::open::OpenRigError;
 use super::session::End;
+use crate::rig::health::Unhealthy;
+use crate::rig::line_test::Cause;
 
 /// Why a rig cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -54,7 +54,7 @@ impl Rig {
 
 /// The header lines of a rig: the types of its devices, its profile, those of `[sim]`, and more; and how many stand in front of those
 /// of `[sim]`.
-pub(super) fn lines(
+pub(crate) fn lines(
     file: &RigFile,
     profile: Option<&KnownProfile>,
     more: &[String],
@@ -72,7 +72,7 @@ pub(super) fn lines(
 }
 
 /// Settles header lines for a rig's rings. The places of mistakes are in the lines joined by line ends.
-pub(super) fn settle(name: &str, file: &RigFile, lines: &[String]) -> Result<Plan, Problems> {
+pub(crate) fn settle(name: &str, file: &RigFile, lines: &[String]) -> Result<Plan, Problems> {
     let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
     let sizes: Vec<_> = rings.map(|ring| ring.drives).collect();
     let source = Source {

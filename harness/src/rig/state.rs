@@ -155,7 +155,7 @@ fn make(folder: PathBuf, mode: u32) -> io::Result<PathBuf> {
 }
 
 /// Reads at most 64 KiB of a file of ours.
-pub(super) fn read(file: &File) -> io::Result<Vec<u8>> {
+pub(crate) fn read(file: &File) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.take(MAX_SIZE).read_to_end(&mut bytes)?;
     Ok(bytes)

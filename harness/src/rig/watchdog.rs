@@ -59,14 +59,14 @@ impl LastBeat {
 
 /// A watchdog on duty; it leaves when this is dropped.
 #[derive(Debug)]
-pub(super) struct Watchdog {
+pub(crate) struct Watchdog {
     _leash: Sender<()>,
 }
 
 impl Watchdog {
     /// Watches a count that goes up while the program lives. Where it stands still for `limit`, every wire gets its last words,
     /// `then` is done, and the alarm sounds.
-    pub(super) fn start(
+    pub(crate) fn start(
         beats: Arc<AtomicU64>,
         limit: Duration,
         words: Vec<LastWords>,

@@ -1,6 +1,6 @@
 //! Keys: what each does to the view.
 
-use super::state::{Entry, Top};
+use crate::top::{Entry, Top};
 
 /// The longest text to filter by, in characters.
 const MOST: usize = 60;

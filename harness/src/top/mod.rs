@@ -6,9 +6,11 @@
 
 pub mod keys;
 pub mod screen;
-pub mod state;
 pub mod view;
 
+pub use crate::buses::novobus::top::{
+    Disturbance, DriveReading, Heading, Reading, RingReading, Top,
+};
+pub(crate) use crate::buses::novobus::top::{Entry, Row};
 pub use keys::{Key, Press};
 pub use screen::Screen;
-pub use state::{Disturbance, DriveReading, Heading, Reading, RingReading, Top};

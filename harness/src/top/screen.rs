@@ -3,8 +3,8 @@
 //! There is one screen a process, as there is one terminal.
 
 use super::keys::Key;
-use super::state::Top;
 use super::view;
+use crate::top::Top;
 use ratatui_core::terminal::Terminal;
 use ratatui_crossterm::CrosstermBackend;
 use ratatui_crossterm::crossterm::cursor::Show;

@@ -1,7 +1,7 @@
 //! The page: a pure function of the view's state and of the size of the terminal.
 
 use super::keys::HELP;
-use super::state::{Entry, RingReading, Row, Top};
+use crate::top::{Entry, RingReading, Row, Top};
 use harness_proto::time::Span;
 use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;

@@ -1,8 +1,18 @@
 //! NOVOBUS: what the bench knows of this bus alone (ND21 8 to 11).
 
+pub mod campaign;
+pub mod capture;
+pub(crate) mod cli;
 pub mod driver;
 pub mod explore;
+pub mod fuzz;
+pub mod guard;
 pub mod language;
+pub mod link;
 pub mod locate;
+pub mod probes;
+pub mod report;
+pub mod rig;
 pub mod simulate;
+pub mod top;
 pub mod twin;

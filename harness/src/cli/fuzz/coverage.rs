@@ -81,7 +81,7 @@ impl<'a> Table<'a> {
 }
 
 /// Plays the inputs and shows what they reach.
-pub(super) fn coverage(
+pub(crate) fn coverage(
     arguments: &CoverageArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {

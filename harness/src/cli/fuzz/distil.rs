@@ -27,7 +27,7 @@ pub struct DistilArguments {
 }
 
 /// Chooses, makes small, and writes a file an input; what is there stays as it is.
-pub(super) fn distil(arguments: &DistilArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn distil(arguments: &DistilArguments, output: &mut Output) -> std::io::Result<Exit> {
     match chosen(arguments) {
         Ok(text) => {
             output.result(&text)?;

@@ -12,7 +12,7 @@ use super::exit::Exit;
 use super::output::Output;
 use clap::Subcommand;
 
-pub(super) use rig::{Use, on_ports, scope, sizes, tell};
+pub(crate) use rig::{Use, on_ports, scope, sizes, tell};
 
 /// The commands of `fuzz`.
 #[derive(Debug, Subcommand)]
@@ -30,7 +30,7 @@ pub enum FuzzCommand {
 }
 
 /// Does it.
-pub(super) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Result<Exit> {
     match command {
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay::replay(arguments, output),

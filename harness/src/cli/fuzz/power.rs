@@ -127,7 +127,7 @@ impl<'a> Table<'a> {
 }
 
 /// Shows the tables.
-pub(super) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn power(arguments: &PowerArguments, output: &mut Output) -> std::io::Result<Exit> {
     let filter = arguments.filter.as_deref().unwrap_or_default();
     let wanted: Vec<_> = deviations()
         .filter(|own| own.name.contains(filter))

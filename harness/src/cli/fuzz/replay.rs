@@ -43,7 +43,7 @@ pub struct ReplayArguments {
 }
 
 /// Replays.
-pub(super) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::io::Result<Exit> {
     let Some(rig) = find_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };

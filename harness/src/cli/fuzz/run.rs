@@ -112,7 +112,7 @@ fn k_of_n(text: &str) -> Result<(u8, u8), String> {
 }
 
 /// Explores.
-pub(super) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io::Result<Exit> {
+pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io::Result<Exit> {
     if let Some(path) = &arguments.html
         && writable(path, output).is_err()
     {

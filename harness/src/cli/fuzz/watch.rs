@@ -9,16 +9,16 @@ use std::time::{Duration, Instant};
 const PAUSE: Duration = Duration::from_secs(1);
 
 /// Tells it: findings on standard output, all else on standard error.
-pub(super) struct Telling<'o> {
-    pub(super) output: &'o mut Output,
+pub(crate) struct Telling<'o> {
+    pub(crate) output: &'o mut Output,
     /// Where the files of findings stand.
-    pub(super) folder: Option<PathBuf>,
+    pub(crate) folder: Option<PathBuf>,
     /// Whether rounds are told.
-    pub(super) rounds: bool,
+    pub(crate) rounds: bool,
     /// When the progress was told last.
-    pub(super) told: Option<Instant>,
+    pub(crate) told: Option<Instant>,
     /// Why standard output could not be written.
-    pub(super) failed: Option<std::io::Error>,
+    pub(crate) failed: Option<std::io::Error>,
 }
 
 impl Watcher for Telling<'_> {
@@ -62,7 +62,7 @@ impl Watcher for Telling<'_> {
 }
 
 /// The last line of a run.
-pub(super) fn summary(campaign: &Campaign, end: &End) -> String {
+pub(crate) fn summary(campaign: &Campaign, end: &End) -> String {
     let progress = campaign.progress();
     let (confirmed, flaky) = campaign.findings();
     let why = match end {

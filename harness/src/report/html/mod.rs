@@ -15,11 +15,9 @@
 //! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it does for whoever points at a byte |
 
-mod diagram;
 mod lines;
 mod page;
 mod scenario;
-mod sequence;
 mod summary;
 mod write;
 

@@ -1,11 +1,11 @@
 //! The section of a scenario: what came of it, what was expected beside what was received, and its pictures.
 
-use super::diagram::diagram;
 use super::lines::lines;
 use super::page::{Part, Section};
-use super::sequence::sequence;
 use super::summary::{Row, Shown, colour};
 use super::write::Html;
+use crate::buses::novobus::report::diagram::diagram;
+use crate::buses::novobus::report::sequence::sequence;
 use crate::scenario::run::{Difference, Finding, Outcome, Shown as Byte, show};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;

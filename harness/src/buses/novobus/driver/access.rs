@@ -7,7 +7,7 @@ use harness_proto::time::Span;
 use std::collections::VecDeque;
 
 /// The numbers that a read brings have the width of the cell.
-pub(super) fn narrow<T: TryFrom<u32>>(value: Option<u32>) -> Result<T, Error> {
+pub(crate) fn narrow<T: TryFrom<u32>>(value: Option<u32>) -> Result<T, Error> {
     value
         .and_then(|value| T::try_from(value).ok())
         .ok_or(Error::Open(
@@ -94,7 +94,7 @@ impl Bus<'_> {
 
     /// Runs commands, of one drive or of many, without waiting for an answer before the next is sent; what
     /// they read, in their order.
-    pub(super) fn run_commands(
+    pub(crate) fn run_commands(
         &self,
         commands: impl IntoIterator<Item = (Axis, Command)>,
     ) -> Result<Vec<Option<u32>>, Error> {
@@ -103,7 +103,7 @@ impl Bus<'_> {
     }
 
     /// The same, and how each of them ended.
-    pub(super) fn run_outcomes(
+    pub(crate) fn run_outcomes(
         &self,
         commands: impl IntoIterator<Item = (Axis, Command)>,
     ) -> Result<Vec<Outcome>, Error> {
@@ -189,7 +189,7 @@ impl Bus<'_> {
     }
 
     /// Reads a byte until `done` says that it is as it should be.
-    pub(super) fn poll_byte(
+    pub(crate) fn poll_byte(
         &self,
         axis: Axis,
         address: u16,

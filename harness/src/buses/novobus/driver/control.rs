@@ -66,7 +66,7 @@ impl Bus<'_> {
     }
 
     /// Refuses what cannot be done while the drive is in reset or in error mode.
-    pub(super) fn check_ready(&self, axis: Axis) -> Result<(), Error> {
+    pub(crate) fn check_ready(&self, axis: Axis) -> Result<(), Error> {
         let byte = self.read_byte(axis, ram::STATUS)?;
         if byte & status::RESET != 0 {
             return Err(Error::InReset { axis });

@@ -87,7 +87,7 @@ pub enum Error {
 
 /// An error code with its printed name.
 #[must_use]
-pub(super) fn in_words(code: u16) -> String {
+pub(crate) fn in_words(code: u16) -> String {
     match (ErrorCode::from_code(code), display_digits(code)) {
         (Some(error), _) => format!("{error}: {}", error.meaning()),
         (None, _) => format!("{code:04X}"),

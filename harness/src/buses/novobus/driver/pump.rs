@@ -34,7 +34,7 @@ struct Ring {
 }
 
 /// The masters of one or two rings over one link.
-pub(super) struct Pump<'l> {
+pub(crate) struct Pump<'l> {
     link: Box<dyn Line + 'l>,
     rings: Vec<Ring>,
     /// What happened that no job reports, oldest first, with the number of the ring.
@@ -42,7 +42,7 @@ pub(super) struct Pump<'l> {
 }
 
 impl<'l> Pump<'l> {
-    pub(super) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: &Options) -> Self {
+    pub(crate) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: &Options) -> Self {
         let now = link.now();
         // A byte that is only late must not count as lost: the recovery stops every drive.
         let own = master::Options {
@@ -71,23 +71,23 @@ impl<'l> Pump<'l> {
         }
     }
 
-    pub(super) fn now(&self) -> Instant {
+    pub(crate) fn now(&self) -> Instant {
         self.link.now()
     }
 
-    pub(super) fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+    pub(crate) fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
         self.link.permits(ring, drive, command)
     }
 
-    pub(super) fn sizes(&self) -> Vec<RingSize> {
+    pub(crate) fn sizes(&self) -> Vec<RingSize> {
         self.rings.iter().map(|ring| ring.master.ring()).collect()
     }
 
-    pub(super) fn phases(&self) -> impl Iterator<Item = Phase> + '_ {
+    pub(crate) fn phases(&self) -> impl Iterator<Item = Phase> + '_ {
         self.rings.iter().map(|ring| ring.master.phase())
     }
 
-    pub(super) fn counters(&self) -> Vec<Counters> {
+    pub(crate) fn counters(&self) -> Vec<Counters> {
         self.rings
             .iter()
             .map(|ring| ring.master.counters())
@@ -95,19 +95,19 @@ impl<'l> Pump<'l> {
     }
 
     /// Why nothing goes on any more, if so: a ring has been stopped, or the link carries nothing.
-    pub(super) fn halt(&self) -> Option<Error> {
+    pub(crate) fn halt(&self) -> Option<Error> {
         let stop = self.rings.iter().find_map(|ring| ring.stopped);
         let trouble = || self.trouble().map(Error::Link);
         stop.map(Error::Stopped).or_else(trouble)
     }
 
     /// Why the link carries nothing, if so.
-    pub(super) fn trouble(&self) -> Option<Trouble> {
+    pub(crate) fn trouble(&self) -> Option<Trouble> {
         self.link.trouble().cloned()
     }
 
     /// Takes a job; `None` where there is no such ring.
-    pub(super) fn submit(&mut self, ring: usize, job: Job) -> Option<Result<JobId, Refused>> {
+    pub(crate) fn submit(&mut self, ring: usize, job: Job) -> Option<Result<JobId, Refused>> {
         let ring = self.rings.get_mut(ring)?;
         let id = ring.master.submit(job);
         if let Ok(id) = id {
@@ -118,31 +118,31 @@ impl<'l> Pump<'l> {
     }
 
     /// The master of a ring; `None` where there is no such ring.
-    pub(super) fn master(&mut self, ring: usize) -> Option<&mut AnyMaster> {
+    pub(crate) fn master(&mut self, ring: usize) -> Option<&mut AnyMaster> {
         Some(&mut self.rings.get_mut(ring)?.master)
     }
 
     /// The master of a ring has something to say from now on that is no job.
-    pub(super) fn speak(&mut self, ring: usize) {
+    pub(crate) fn speak(&mut self, ring: usize) {
         if let Some(ring) = self.rings.get_mut(ring) {
             ring.idle = false;
         }
     }
 
     /// The outcome of a job has come.
-    pub(super) fn has(&self, ring: usize, id: JobId) -> bool {
+    pub(crate) fn has(&self, ring: usize, id: JobId) -> bool {
         let result = self.rings.get(ring).and_then(|ring| ring.results.get(&id));
         matches!(result, Some(Some(_)))
     }
 
     /// The job was started here, and its outcome has not been fetched.
-    pub(super) fn knows(&self, ring: usize, id: JobId) -> bool {
+    pub(crate) fn knows(&self, ring: usize, id: JobId) -> bool {
         self.rings
             .get(ring)
             .is_some_and(|ring| ring.results.contains_key(&id))
     }
 
-    pub(super) fn take(&mut self, ring: usize, id: JobId) -> Option<Outcome> {
+    pub(crate) fn take(&mut self, ring: usize, id: JobId) -> Option<Outcome> {
         if !self.has(ring, id) {
             return None;
         }
@@ -150,18 +150,18 @@ impl<'l> Pump<'l> {
     }
 
     /// Nobody will ask for this outcome.
-    pub(super) fn forget(&mut self, ring: usize, id: JobId) {
+    pub(crate) fn forget(&mut self, ring: usize, id: JobId) {
         if let Some(ring) = self.rings.get_mut(ring) {
             ring.results.remove(&id);
         }
     }
 
-    pub(super) fn take_log(&mut self) -> Vec<(usize, Event)> {
+    pub(crate) fn take_log(&mut self) -> Vec<(usize, Event)> {
         std::mem::take(&mut self.log)
     }
 
     /// Takes what has come and does what is due, without letting time pass. Says whether a master has reported something.
-    pub(super) fn poll(&mut self) -> bool {
+    pub(crate) fn poll(&mut self) -> bool {
         let now = self.link.now();
         let mut news = false;
         for (index, ring) in self.rings.iter_mut().enumerate() {
@@ -195,17 +195,17 @@ impl<'l> Pump<'l> {
 
     /// Sends what the lines are free for and lets time pass until the next byte is due or something is reported, at most until `end`.
     /// Whoever calls waits for a report.
-    pub(super) fn step(&mut self, end: Instant) {
+    pub(crate) fn step(&mut self, end: Instant) {
         self.work(end, true);
     }
 
     /// The same where nobody waits for anything but `end`.
-    pub(super) fn pass(&mut self, end: Instant) {
+    pub(crate) fn pass(&mut self, end: Instant) {
         self.work(end, false);
     }
 
     /// Where time is real, hands over what keeps the line for a while without this program.
-    pub(super) fn keep(&mut self) {
+    pub(crate) fn keep(&mut self) {
         if self.link.lead() != Lead::NONE {
             self.work(self.link.now(), false);
         }
@@ -278,12 +278,12 @@ impl<'l> Pump<'l> {
     }
 
     /// When the link wants a pause next.
-    pub(super) fn pause_due(&self) -> Option<Instant> {
+    pub(crate) fn pause_due(&self) -> Option<Instant> {
         self.link.pause_due()
     }
 
     /// Where the link wants a pause and no job is on its way, lets what is under way come home and gives it one.
-    pub(super) fn pause(&mut self) {
+    pub(crate) fn pause(&mut self) {
         let now = self.link.now();
         let due = self.link.pause_due().is_some_and(|due| due <= now);
         if due && self.rings.iter().all(|ring| ring.master.jobs() == 0) {
@@ -293,7 +293,7 @@ impl<'l> Pump<'l> {
     }
 
     /// Sends nothing more and lets what is under way come home, at most until `end`.
-    pub(super) fn drain(&mut self, end: Instant) {
+    pub(crate) fn drain(&mut self, end: Instant) {
         let under_way = |ring: &Ring| ring.master.under_way() > 0;
         self.poll();
         while self.halt().is_none() && self.rings.iter().any(under_way) && self.link.now() < end {

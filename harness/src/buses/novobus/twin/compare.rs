@@ -48,26 +48,26 @@ impl Rows<'_> {
 }
 
 /// What is compared, ring by ring.
-pub(super) struct Comparer<'a> {
-    pub(super) exactness: Exactness,
+pub(crate) struct Comparer<'a> {
+    pub(crate) exactness: Exactness,
     /// Cells that were written in the rig's session: of these the model knows what they hold.
-    pub(super) written: &'a mut BTreeSet<(usize, u8, u16)>,
+    pub(crate) written: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells that were written in the present attempt.
-    pub(super) written_now: &'a mut BTreeSet<(usize, u8, u16)>,
+    pub(crate) written_now: &'a mut BTreeSet<(usize, u8, u16)>,
     /// Cells taken over.
-    pub(super) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
+    pub(crate) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
     /// Where the incoming process data (14.10.3) of a drive go, in page FF, where the master has written it.
-    pub(super) targets: &'a mut BTreeMap<(usize, u8), u8>,
+    pub(crate) targets: &'a mut BTreeMap<(usize, u8), u8>,
     /// Drives whose outgoing process data (14.10.3) change by themselves.
-    pub(super) moving: BTreeSet<(usize, u8)>,
+    pub(crate) moving: BTreeSet<(usize, u8)>,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
-    pub(super) recording: BTreeSet<(usize, u8)>,
-    pub(super) comparison: Comparison,
+    pub(crate) recording: BTreeSet<(usize, u8)>,
+    pub(crate) comparison: Comparison,
 }
 
 impl Comparer<'_> {
     /// Compares what came from a ring with what its twin received.
-    pub(super) fn ring(
+    pub(crate) fn ring(
         &mut self,
         ring: usize,
         size: RingSize,

@@ -89,7 +89,7 @@ impl Conversation {
     }
 
     /// The bytes sent into a ring, and whether they went round whole.
-    pub(super) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
+    pub(crate) fn sent_in(&self, ring: usize) -> Vec<(u8, bool)> {
         let mut damaged = BTreeSet::new();
         let mut sent = Vec::new();
         let own = self.done.iter().filter(|(at, _)| *at == ring);
@@ -113,7 +113,7 @@ impl Conversation {
     }
 
     /// When each byte sent into a ring began.
-    pub(super) fn sent_at(&self, ring: usize) -> Vec<Instant> {
+    pub(crate) fn sent_at(&self, ring: usize) -> Vec<Instant> {
         let own = self.done.iter().filter(|(at, _)| *at == ring);
         let starts = own.filter_map(|(_, done)| match done {
             Done::Sent(at, _) => Some(*at),
@@ -144,7 +144,7 @@ impl Conversation {
     }
 
     /// The bytes received from a ring.
-    pub(super) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
+    pub(crate) fn received_in(&self, ring: usize) -> Vec<(Instant, Received)> {
         let own = self.received.iter().filter(|(at, ..)| *at == ring);
         own.map(|(_, at, byte)| (*at, *byte)).collect()
     }

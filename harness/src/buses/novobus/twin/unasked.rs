@@ -14,21 +14,21 @@ type Heard = (Instant, Received);
 
 /// Where a race of clocks begins: at the first byte that was sent unasked.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Race {
+pub(crate) struct Race {
     /// Its place among the bytes received.
-    pub(super) first: usize,
+    pub(crate) first: usize,
     /// Whether it is unasked both in the ring and in the model: then its value and its time are compared.
-    pub(super) in_both: bool,
+    pub(crate) in_both: bool,
     /// A byte from there on that no order of the clocks explains, and how it differs.
-    pub(super) fault: Option<(usize, What)>,
+    pub(crate) fault: Option<(usize, What)>,
 }
 
 /// When the bytes of the master's that are answered were sent, in order, and the other bytes.
-pub(super) struct Sent<'a> {
+pub(crate) struct Sent<'a> {
     /// When each byte that is answered began.
-    pub(super) answered: &'a [Instant],
+    pub(crate) answered: &'a [Instant],
     /// When every byte began.
-    pub(super) all: &'a [Instant],
+    pub(crate) all: &'a [Instant],
 }
 
 impl Sent<'_> {
@@ -43,7 +43,7 @@ impl Sent<'_> {
 
     /// The first byte that was sent unasked, by the ring or by its model, and what is wrong from there to the next byte of the master's.
     /// `None` where the model sends none: no drive may then (ND21 9.9).
-    pub(super) fn judge(
+    pub(crate) fn judge(
         &self,
         size: RingSize,
         (answer, received): (&Expected, &[Heard]),

@@ -11,7 +11,7 @@ use harness_proto::novobus::properties::ReadLongAnswer;
 use harness_proto::novobus::sync::{PAUSE, SYNCO, SyncByte};
 
 /// Commands with a wrong byte at each place: what they would have done is not done, and the ring says which drive it was (9.6, 9.7).
-pub(super) fn refused(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn refused(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let mut groups = Vec::new();
     for round in 0..3_u8 {
         for kind in 0..7 {
@@ -100,7 +100,7 @@ fn between_error_and_recovery(tour: &Tour<'_>, dice: &mut Dice) -> Vec<Act> {
 }
 
 /// Every byte that is no command (9.5), with what would be right behind commands of each form.
-pub(super) fn codes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn codes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let unknown = (0..=u8::MAX).filter(|code| layout(*code, ReadLongAnswer::FourData).is_none());
     let forms = unknown.flat_map(|code| [(code, 0), (code, 1), (code, 2)]);
     let own = tour.share(drive, shuffled(forms.collect(), &mut Dice::new(1)));
@@ -134,7 +134,7 @@ pub(super) fn codes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
 }
 
 /// Every code of the outputs, proper or not (10.4).
-pub(super) fn outputs(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn outputs(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let wrong = tour.share(drive, (4..=u8::MAX).collect());
     let all = (0..4).chain(wrong).collect();
     let groups = shuffled(all, dice).into_iter().map(|code| {
@@ -149,7 +149,7 @@ pub(super) fn outputs(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
 }
 
 /// Commands whose sum is 0, for which 01 stands, and answers of which the same is true (9.6).
-pub(super) fn sums_of_zero(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn sums_of_zero(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let mut groups = Vec::new();
     for round in 0..12 {
         let cell = spare(dice);
@@ -186,7 +186,7 @@ pub(super) fn sums_of_zero(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
 }
 
 /// Every byte that is no sync byte, and what stands behind it (9.2, 9.7).
-pub(super) fn sync_bytes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn sync_bytes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let bad = (0..=u8::MAX).filter(|byte| SyncByte::decode(*byte).is_err());
     let own = tour.share(drive, bad.collect());
     let groups = shuffled(own, dice).into_iter().map(|byte| {
@@ -202,7 +202,7 @@ pub(super) fn sync_bytes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec
 }
 
 /// Check sequences that break off at each place, by each kind of byte, and begin again; with too few zeros and enough (9.8).
-pub(super) fn broken_sequences(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn broken_sequences(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let mut all = Vec::new();
     for (broken, due) in SEQUENCE.into_iter().enumerate().skip(1) {
         for breaker in [0xFF, 0x00, SYNCO, 0x44, 0x41, due ^ 0x20] {
@@ -234,7 +234,7 @@ pub(super) fn broken_sequences(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> V
 }
 
 /// Commands that are cut at each place, with nothing, idle bytes or other telegrams between their parts (9.2, 9.5).
-pub(super) fn cuts(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn cuts(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let mut groups = Vec::new();
     for kind in 0..7 {
         for room in 2..=5 {
@@ -301,7 +301,7 @@ fn between(tour: &Tour<'_>, drive: u8, gap: u8, dice: &mut Dice) -> Vec<u8> {
 }
 
 /// Bytes of telegrams that arrive with a line error, at each place: a good zero counts, a bad one does not (9.7).
-pub(super) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let Some(link) = tour.ring.links.first().copied() else {
         return Vec::new();
     };
@@ -364,7 +364,7 @@ pub(super) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
 }
 
 /// A reset that is refused keeps what the cells hold; one that is carried out is answered (10.5).
-pub(super) fn resets(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn resets(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let mut cases = Vec::new();
     for at in [1, 2, 2] {
         let cell = spare(dice);

@@ -10,7 +10,7 @@ use harness_proto::novobus::memory::{ROM_BYTES, ROM_WORDS, in_range};
 
 /// All spare RAM with values of its own, upwards and downwards, by bytes and by words, each cell read before it is written again: a bit that
 /// is stuck, cells that are one, writes that are lost (ND21 10.1, 10.2).
-pub(super) fn march(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn march(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let words: Vec<u16> = own::SPARE.step_by(2).collect();
     let content: Vec<u16> = words.iter().map(|_| dice.word()).collect();
     let all = || words.iter().copied().zip(content.iter().copied());
@@ -47,7 +47,7 @@ pub(super) fn march(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
 }
 
 /// The ROM: what it holds is the drive's choice, but it holds it, whichever command reads (10.1).
-pub(super) fn rom(tour: &Tour<'_>, drive: u8, _: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn rom(tour: &Tour<'_>, drive: u8, _: &mut Dice) -> Vec<Vec<Act>> {
     let word = |cell| vec![talk(drive, &[Command::ReadWord { cell }])];
     let byte = |cell| vec![talk(drive, &[Command::ReadByte { cell }])];
     let words = ROM_WORDS.step_by(2).map(word);
@@ -55,7 +55,7 @@ pub(super) fn rom(tour: &Tour<'_>, drive: u8, _: &mut Dice) -> Vec<Vec<Act>> {
 }
 
 /// Every value of a byte, written and read (10.1, 10.2).
-pub(super) fn values(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn values(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let all = shuffled((0..=u8::MAX).collect(), dice);
     let groups = all.into_iter().map(|data| {
         let cell = spare(dice) + dice.below(2) as u16;
@@ -72,7 +72,7 @@ pub(super) fn values(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act
 }
 
 /// Every mask of both bit commands over bits of each kind (10.3).
-pub(super) fn masks(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn masks(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let all = shuffled((0..=u8::MAX).collect(), dice);
     let groups = all.into_iter().map(|data| {
         let cell = page_cell(dice);
@@ -100,7 +100,7 @@ pub(super) fn masks(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
 }
 
 /// Process data with and without commands, in and out of the same cells and of others, of telegrams behind one another (9.4, 14.10.3).
-pub(super) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let mut cases = Vec::new();
     for round in 0..24_u16 {
         let first = ram::NKP + (round & 1);
@@ -165,7 +165,7 @@ pub(super) fn process_data(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
 
 /// Every kind of command at the first and last addresses that it may touch, and beside them (10.1 to 10.3). What was refused has changed
 /// nothing.
-pub(super) fn edges(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
+pub(crate) fn edges(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     const PLACES: [u16; 24] = [
         0x2EFE, 0x2EFF, 0x2F00, 0x2FBC, 0x2FBE, 0x2FBF, 0x2FC0, 0x2FDC, 0x2FDE, 0x2FDF, 0x2FE0,
         0xFD7C, 0xFD7E, 0xFD7F, 0xFD80, 0xFF7A, 0xFF7C, 0xFF7D, 0xFF7E, 0xFF7F, 0xFF80, 0xFF81,

@@ -1,0 +1,238 @@
+//! A conversation of the driver: its master packs telegrams, compares every byte, names the fault and repairs the ring
+//! (`bus`, ND21 11.5). What it reports is taken for what it knows.
+
+use super::class::{Evidence, Wrong, named};
+use super::sound::{Sound, all_back};
+use crate::buses::novobus::driver::{Axis, Bus, Error, Options};
+use crate::campaign::fault::Case;
+use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use crate::scenario::plan::PlannedCall;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::{Event, Job};
+use harness_proto::time::{Instant, Span};
+
+/// A cell that every drive has and no conversation should write: it is read in the end, so that half a command or a
+/// telegram without an end does not stay unseen. It belongs to the oscilloscope's picture (ND21 14.2.1).
+const QUIET: u16 = 0xFD90;
+
+/// Calls of the driver that are ready to be disturbed.
+#[derive(Clone, Debug)]
+pub struct ByDriver {
+    start: SimulatedLink,
+    calls: Vec<Vec<(u8, PlannedCall)>>,
+    sound: Sound,
+    /// What the jobs bring without a fault.
+    answers: Vec<Option<u32>>,
+    /// What the master sends in doing so.
+    sent: Vec<u8>,
+}
+
+/// A command for a drive, as a job.
+fn job(call: &(u8, PlannedCall)) -> Option<(Axis, Job)> {
+    match call {
+        (drive, PlannedCall::Command(command, _)) => {
+            Some((Axis::new(0, *drive)?, Job::new(*drive, *command)))
+        }
+        _ => None,
+    }
+}
+
+impl ByDriver {
+    /// Lets the driver do it without a fault. `None` where a call is not one command, or where it fails without any fault.
+    #[must_use]
+    pub fn new(start: SimulatedLink, calls: Vec<Vec<(u8, PlannedCall)>>) -> Option<Self> {
+        if calls.iter().flatten().any(|call| job(call).is_none()) {
+            return None;
+        }
+        let mut by_driver = Self {
+            sound: Sound::new(start.clone()),
+            start,
+            calls,
+            answers: Vec::new(),
+            sent: Vec::new(),
+        };
+        let mut link = Spied {
+            link: by_driver.start.clone(),
+            sound: Some(by_driver.sound.clone()),
+            sent: Vec::new(),
+            quiet: false,
+        };
+        let (evidence, answers) = by_driver.play_on(&mut link);
+        if evidence.noticed || !evidence.confirmed {
+            return None;
+        }
+        by_driver.sent = link.sent;
+        by_driver.sound = link.sound?;
+        by_driver.answers = answers;
+        Some(by_driver)
+    }
+
+    /// What the master sends without a fault, up to the end of the last job.
+    #[must_use]
+    pub fn sent(&self) -> &[u8] {
+        &self.sent
+    }
+
+    /// Plays a case.
+    #[must_use]
+    pub fn play(&self, case: &Case) -> Evidence {
+        let mut link = Spied {
+            link: self.start.clone(),
+            sound: None,
+            sent: Vec::new(),
+            quiet: false,
+        };
+        for fault in case.faults() {
+            for (distance, what) in fault.what.on_link() {
+                let placed = PlacedFault::Link(fault.link, what);
+                link.link
+                    .inject(0, placed, Moment::Byte(fault.byte + distance));
+            }
+        }
+        self.play_on(&mut link).0
+    }
+
+    fn play_on(&self, link: &mut Spied) -> (Evidence, Vec<Option<u32>>) {
+        let mut evidence = Evidence {
+            confirmed: true,
+            ..Evidence::default()
+        };
+        let mut answers = Vec::new();
+        for calls in &self.calls {
+            self.step(link, calls, &mut evidence, &mut answers);
+            settle(&mut link.link);
+        }
+        link.quiet = true;
+        evidence.wrong = self.sound.wrong(&link.link, evidence.confirmed);
+        let both = answers.iter().zip(&self.answers);
+        for ((value, expected), (drive, _)) in both.zip(self.calls.iter().flatten()) {
+            if let (Some(value), Some(expected)) = (*value, *expected)
+                && value != expected
+            {
+                let drive = *drive;
+                evidence.wrong.push(Wrong::Answer {
+                    drive,
+                    value,
+                    expected,
+                });
+            }
+        }
+        // What is left half-done shows at the next telegram.
+        let quiet = |drive| {
+            (
+                drive,
+                PlannedCall::Command(Command::ReadByte { address: QUIET }, Vec::new()),
+            )
+        };
+        let every: Vec<_> = (0..link.link.drives(0)).map(quiet).collect();
+        self.step(link, &every, &mut evidence, &mut Vec::new());
+        settle(&mut link.link);
+        evidence.all_back = all_back(&link.link);
+        (evidence, answers)
+    }
+
+    /// One step of the scenario, played as the scenario's player does.
+    fn step(
+        &self,
+        link: &mut Spied,
+        calls: &[(u8, PlannedCall)],
+        evidence: &mut Evidence,
+        answers: &mut Vec<Option<u32>>,
+    ) {
+        let drives = link.link.drives(0);
+        let Ok(size) = RingSize::new(u64::from(drives)) else {
+            return;
+        };
+        let bus = match Bus::open(Box::new(&mut *link), &[size], Options::default()) {
+            Ok(bus) => bus,
+            Err(error) => {
+                evidence.fails(&error);
+                return;
+            }
+        };
+        let jobs = calls.iter().filter_map(job);
+        let orders: Vec<_> = jobs.map(|(axis, job)| bus.start(axis, |_| job)).collect();
+        for order in orders {
+            match order.and_then(|order| bus.result(order)) {
+                Ok(answer) => answers.push(answer),
+                Err(error) => {
+                    evidence.fails(&error);
+                    answers.push(None);
+                }
+            }
+        }
+        evidence.hear(bus.take_events(), drives);
+        bus.close();
+    }
+}
+
+impl Evidence {
+    /// A job was not confirmed, and the driver says so.
+    fn fails(&mut self, error: &Error) {
+        self.noticed = true;
+        self.confirmed = false;
+        if let Error::Stopped(stop) = error {
+            self.diagnosis.get_or_insert(stop.fault);
+        }
+    }
+
+    /// What the master reported: the first fault that it named counts.
+    fn hear(&mut self, events: Vec<(usize, Event)>, drives: u8) {
+        for (_, event) in events {
+            if let Event::Disturbed { fault, .. } = event {
+                self.noticed = true;
+                self.sequences += 1;
+                if self.diagnosis.is_none() {
+                    self.diagnosis = Some(fault);
+                    self.named = named(fault, drives);
+                }
+            }
+        }
+    }
+}
+
+/// Lets everything come home.
+fn settle(link: &mut SimulatedLink) {
+    let end = link.now() + Span::from_millis(3_600_000);
+    while link.busy() && link.now() < end && link.wait(end) {}
+    while link.receive(0).is_some() {}
+}
+
+/// A link that keeps what the master sends and notes what drives hold.
+struct Spied {
+    link: SimulatedLink,
+    sound: Option<Sound>,
+    sent: Vec<u8>,
+    /// Nothing is kept any more.
+    quiet: bool,
+}
+
+impl Line for Spied {
+    fn byte_time(&self) -> Span {
+        self.link.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.link.now()
+    }
+
+    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+        if !self.quiet {
+            self.sent.extend_from_slice(bytes);
+        }
+        self.link.send(ring, bytes)
+    }
+
+    fn receive(&mut self, ring: usize) -> Option<(Instant, harness_proto::line::Received)> {
+        self.link.receive(ring)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        let more = self.link.wait(until);
+        if let Some(sound) = self.sound.as_mut().filter(|_| !self.quiet) {
+            sound.note(&self.link);
+        }
+        more
+    }
+}

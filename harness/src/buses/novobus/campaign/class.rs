@@ -1,0 +1,210 @@
+//! What can come of a fault.
+
+use crate::campaign::fault::link_index;
+use harness_proto::novobus::master::{End, Fault};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What came of a case, in order of gravity. Every case is exactly one of these.
+///
+/// *Noticed* means that the master saw something that was not the conversation without a fault: a byte, a line
+/// error, a byte too many, a byte that did not come. *Named* is the link that it then blamed: by the number that the ring
+/// spells out (ND21 9.7), or by its own receiver. *Back* means that all drives are out of the error mode (9.8) and that
+/// every job has been confirmed by a right answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// Nobody noticed anything, and nothing is different: every drive holds what it should and waits as it should.
+    Harmless,
+    /// Noticed, the damaged link named, everything back, every cell right.
+    Located,
+    /// Noticed and no link named; everything back, every cell right.
+    Recovered,
+    /// Noticed and a sound link named; everything back, every cell right.
+    Mislocated,
+    /// Noticed, and not everything is back: a drive stays in the error mode, or a job is not confirmed. The master says so,
+    /// and no cell holds what it never should.
+    NotRecovered,
+    /// Noticed, but a cell holds what it never should, and nothing that the master saw says which: a wrong
+    /// drive or a wrong cell was written before something else was found to be wrong.
+    Corrupted,
+    /// Nobody noticed anything, and a cell holds another value than it should, or a job brought a wrong value.
+    SilentCorruption,
+}
+
+impl Class {
+    /// All of them, in order of gravity.
+    pub const ALL: [Self; 7] = [
+        Self::Harmless,
+        Self::Located,
+        Self::Recovered,
+        Self::Mislocated,
+        Self::NotRecovered,
+        Self::Corrupted,
+        Self::SilentCorruption,
+    ];
+
+    /// The name in files and tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Harmless => "harmless",
+            Self::Located => "located",
+            Self::Recovered => "recovered",
+            Self::Mislocated => "mislocated",
+            Self::NotRecovered => "not-recovered",
+            Self::Corrupted => "corrupted",
+            Self::SilentCorruption => "silent-corruption",
+        }
+    }
+
+    /// What it means, in a line.
+    #[must_use]
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Harmless => "nobody noticed, nothing is different",
+            Self::Located => "the damaged link named, all back",
+            Self::Recovered => "no link named, all back",
+            Self::Mislocated => "a sound link named, all back",
+            Self::NotRecovered => "noticed, not all back",
+            Self::Corrupted => "noticed and repaired, but a cell is wrong",
+            Self::SilentCorruption => "nobody noticed, and a value is wrong",
+        }
+    }
+}
+
+impl fmt::Display for Class {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A value that is wrong when everything is over.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Wrong {
+    /// A cell of a drive.
+    Cell {
+        /// Which drive.
+        drive: u8,
+        /// Which cell.
+        address: u16,
+        /// What it holds.
+        value: u8,
+        /// What it holds without the fault.
+        expected: u8,
+    },
+    /// What a job brought.
+    Answer {
+        /// Which drive was asked.
+        drive: u8,
+        /// What it brought.
+        value: u32,
+        /// What it brings without the fault.
+        expected: u32,
+    },
+}
+
+/// What was seen of a case.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Evidence {
+    /// Whether the master noticed anything.
+    pub noticed: bool,
+    /// The link that it named, counted from the master's outgoing one.
+    pub named: Option<usize>,
+    /// What it made of it, where it says more than a link.
+    pub diagnosis: Option<Fault>,
+    /// Check sequences that were sent.
+    pub sequences: u32,
+    /// Whether every job was confirmed.
+    pub confirmed: bool,
+    /// Whether no drive is in the error mode.
+    pub all_back: bool,
+    /// What is wrong in the end, in order.
+    pub wrong: Vec<Wrong>,
+}
+
+impl Evidence {
+    /// The class of a case whose faults were on these links.
+    ///
+    /// # Errors
+    /// What fits no class, in a sentence: the bench contradicts itself.
+    pub fn class(&self, links: &[usize]) -> Result<Class, &'static str> {
+        let noticed = self.noticed;
+        if !noticed && (self.named.is_some() || self.sequences > 0) {
+            return Err("a link was named or a check sequence sent, and nothing had been noticed");
+        }
+        if self.confirmed && !self.all_back {
+            return Err("every job was confirmed, and a drive is in the error mode");
+        }
+        if !noticed && !self.confirmed {
+            return Err("nothing was noticed, and a job was not confirmed");
+        }
+        Ok(match self.named {
+            _ if !self.wrong.is_empty() && noticed => Class::Corrupted,
+            _ if !self.wrong.is_empty() => Class::SilentCorruption,
+            _ if !self.confirmed => Class::NotRecovered,
+            _ if !noticed => Class::Harmless,
+            None => Class::Recovered,
+            Some(link) if links.contains(&link) => Class::Located,
+            Some(_) => Class::Mislocated,
+        })
+    }
+}
+
+/// The link that a master's diagnosis names, if it names one.
+#[must_use]
+pub fn named(fault: Fault, drives: u8) -> Option<usize> {
+    let (Fault::Damaged(link) | Fault::Broken(link)) = fault else {
+        return None;
+    };
+    match link.to {
+        End::Drive(drive) => link_index(drives, drive),
+        End::Master => Some(usize::from(drives)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every combination of what can be seen is one class or a contradiction, and nothing else decides.
+    #[test]
+    fn classes_exclude_each_other() {
+        let wrong = Wrong::Answer {
+            drive: 0,
+            value: 1,
+            expected: 2,
+        };
+        let mut seen = std::collections::BTreeMap::new();
+        for bits in 0..32u8 {
+            let bit = |n: u8| bits >> n & 1 == 1;
+            for named in [None, Some(1), Some(2)] {
+                let evidence = Evidence {
+                    noticed: bit(0),
+                    named,
+                    diagnosis: None,
+                    sequences: u32::from(bit(1)),
+                    confirmed: bit(2),
+                    all_back: bit(3),
+                    wrong: if bit(4) { vec![wrong.clone()] } else { vec![] },
+                };
+                if let Ok(class) = evidence.class(&[1]) {
+                    *seen.entry(class).or_insert(0) += 1;
+                }
+            }
+        }
+        let seen: Vec<_> = seen.into_iter().collect();
+        assert_eq!(
+            seen,
+            [
+                (Class::Harmless, 1),
+                (Class::Located, 2),
+                (Class::Recovered, 2),
+                (Class::Mislocated, 2),
+                (Class::NotRecovered, 12),
+                (Class::Corrupted, 18),
+                (Class::SilentCorruption, 1),
+            ]
+        );
+    }
+}

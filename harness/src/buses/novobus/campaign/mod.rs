@@ -1,0 +1,8 @@
+//! Campaigns on the ring: how a case is played, and what became of it.
+
+pub mod by_driver;
+pub mod by_manual;
+pub mod class;
+pub mod conversation;
+pub mod report;
+pub mod sound;

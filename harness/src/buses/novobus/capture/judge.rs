@@ -1,0 +1,159 @@
+//! A capture beside the model: what was done to the ring is done to a simulated one, and what both answer is compared.
+
+use super::scenario::{Options, SketchError, scenario, unforeseen};
+use crate::capture::Capture;
+use crate::capture::diff::{Run, Summary, compare};
+use crate::library::Entry;
+use crate::link::Link;
+use crate::scenario::problem::Problems;
+use crate::scenario::run::{AtFinding, play};
+use crate::scenario::simulate::simulated;
+use crate::scenario::source::{Source, SourceError};
+use crate::scenario::verdict::Verdict;
+use harness_proto::line::Received;
+use harness_proto::time::Span;
+use harness_sim::record::LineByte;
+use harness_sim::record::LinkTrace;
+
+/// What came of a judgement.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// Passed where the last link of every ring carried what the model says; inconclusive where no last link was captured.
+    pub verdict: Verdict,
+    /// The last links: what the master received.
+    pub master: Summary,
+    /// Every link that was captured: where the rings differ first.
+    pub links: Summary,
+    /// How many cells hold what their first answers say: the model cannot know it.
+    pub adopted: usize,
+    /// How many bytes are data that changed by themselves, and were not compared.
+    pub unforeseen: usize,
+    /// The drive that the captured ring spells out at its end (ND21 9.7), with its ring.
+    pub located: Option<(usize, u8)>,
+    /// What is worth saying.
+    pub remarks: Vec<String>,
+}
+
+/// Why there is no judgement.
+#[derive(Debug, thiserror::Error)]
+pub enum JudgeError {
+    /// No scenario can be made of the capture.
+    #[error(transparent)]
+    Sketch(#[from] SketchError),
+    /// It has mistakes: with a setup for other rings, or it is longer than a scenario may be.
+    #[error("the capture as a scenario: {}", first(.0))]
+    Mistakes(#[from] Box<Problems>),
+    /// It is longer than a scenario may be.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// It could not be played to its end.
+    #[error("the model could not play the capture: {0}")]
+    Aborted(String),
+}
+
+/// What is wrong first; the text is nobody's to look at.
+fn first(problems: &Problems) -> String {
+    let first = problems.all().first();
+    first.map_or_else(|| problems.to_string(), |first| first.message.clone())
+}
+
+/// Judges a capture; times are compared as far as the tolerance.
+///
+/// # Errors
+/// [`JudgeError`].
+pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeError> {
+    let (model, remarks) = model(capture, options)?;
+    let told = unforeseen(capture);
+    let model = only_captured(&model, capture);
+    let behind = |ring: usize, own: &LinkTrace, index: usize| {
+        // Behind the drive data that nobody foresees are those of the last link at the same place.
+        own.from.is_some()
+            && told
+                .get(ring)
+                .is_some_and(|told| told.unforeseen.contains(&index))
+    };
+    let tolerance = Span::from_units(options.tolerance.units().max(6));
+    let (left, right) = (
+        Run {
+            name: "capture",
+            capture,
+        },
+        Run {
+            name: "model",
+            capture: &model,
+        },
+    );
+    let end = Some(capture.end());
+    let inner =
+        |ring: usize, own: &LinkTrace, index: usize| own.to.is_some() || behind(ring, own, index);
+    let master = compare(left, right, tolerance, &inner, end);
+    let links = compare(left, right, tolerance, &behind, end);
+    let last =
+        |trace: &harness_sim::record::Trace| trace.links.iter().any(|link| link.to.is_none());
+    let verdict = if !capture.traces.iter().all(last) {
+        Verdict::Inconclusive
+    } else if master.differ > 0 {
+        Verdict::Failed
+    } else {
+        Verdict::Passed
+    };
+    Ok(Judged {
+        verdict,
+        master,
+        links,
+        adopted: match options.setup {
+            Some(_) => 0,
+            None => told.iter().map(|told| told.cells.len()).sum(),
+        },
+        unforeseen: told.iter().map(|told| told.unforeseen.len()).sum(),
+        located: located(capture),
+        remarks,
+    })
+}
+
+/// What the model does where the same is done to it.
+fn model(capture: &Capture, options: &Options<'_>) -> Result<(Capture, Vec<String>), JudgeError> {
+    let text = scenario(capture, options)?;
+    let source = Source::from_bytes("the capture".to_owned(), text.into_bytes())?;
+    let entry = Entry::new(source, None)?;
+    let Some(plan) = &entry.plan else {
+        return Err(JudgeError::Aborted("it is of another bus".to_owned()));
+    };
+    let mut link = simulated(plan);
+    let outcome = play(plan, &mut link, AtFinding::GoOn);
+    if matches!(
+        outcome.verdict,
+        Verdict::Aborted | Verdict::Skipped | Verdict::RigError
+    ) {
+        let found = outcome.finding.map(|finding| finding.message);
+        let why = found.or(outcome.remarks.first().cloned());
+        return Err(JudgeError::Aborted(why.unwrap_or_default()));
+    }
+    let capture = Capture {
+        rate: plan.rate,
+        traces: (0..plan.rings.len()).map(|ring| link.trace(ring)).collect(),
+    };
+    Ok((capture, outcome.remarks))
+}
+
+/// The model's links, as far as they were captured.
+fn only_captured(model: &Capture, capture: &Capture) -> Capture {
+    let mut model = model.clone();
+    for (trace, own) in model.traces.iter_mut().zip(&capture.traces) {
+        let ends = |link: &LinkTrace| (link.from, link.to);
+        trace
+            .links
+            .retain(|link| own.links.iter().any(|o| ends(o) == ends(link)));
+    }
+    model
+}
+
+/// The drive that a ring spells out at the end.
+fn located(capture: &Capture) -> Option<(usize, u8)> {
+    capture.traces.iter().enumerate().find_map(|(ring, trace)| {
+        let last = trace.links.iter().find(|link| link.to.is_none())?;
+        let received: Vec<Received> = last.bytes.iter().filter_map(LineByte::arrival).collect();
+        let found = crate::buses::novobus::locate::locate(&received, trace.drives)?;
+        Some((ring, found.drive))
+    })
+}

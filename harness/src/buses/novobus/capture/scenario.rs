@@ -1,0 +1,276 @@
+//! A capture as a scenario: what the master sent at its times, what was damaged on the way, what came back.
+
+use super::stimuli::{Told, told};
+use crate::capture::Capture;
+use crate::capture::faults::faults;
+use crate::scenario::parse::parse;
+use crate::scenario::problem::Problems;
+use crate::scenario::source::Source;
+use harness_proto::line::{Rate, Received};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::LineByte;
+use harness_sim::record::{LinkTrace, Trace};
+use std::fmt::Write as _;
+
+/// Bytes on a line of a scenario, where it is not a long one.
+const A_LINE: usize = 16;
+/// The most lines that a scenario has (see its language), but for some of the header.
+const LINES: usize = 19_000;
+/// The most bytes on a line: 10,000 characters.
+const MOST_A_LINE: usize = 3_000;
+/// The longest title.
+const TITLE: usize = 100;
+
+/// How a scenario is made of a capture.
+#[derive(Clone, Debug)]
+pub struct Options<'o> {
+    /// What it is called; any text.
+    pub title: &'o str,
+    /// A scenario whose header says how the drives are: models, cells, properties. Without one they are plain, and hold what they
+    /// first say of their cells.
+    pub setup: Option<&'o Source>,
+    /// Bytes sent with a smaller gap than this go out without one: real clocks are not exact.
+    pub tolerance: Span,
+}
+
+/// Why there is no scenario in a capture.
+#[derive(Debug, thiserror::Error)]
+pub enum SketchError {
+    /// What the master sent is not there.
+    #[error(
+        "the capture has no link {0}: what the master sent is not known, and nothing can be played"
+    )]
+    NoMaster(String),
+    /// There is nothing to play.
+    #[error("the master sent nothing in this capture: there is nothing to play")]
+    Silent,
+    /// A ring that cannot be.
+    #[error("{0}")]
+    Ring(String),
+    /// It is longer than a scenario may be.
+    #[error(
+        "{0} lines: a scenario has at most {LINES}; give a tolerance for gaps (--tolerance), or import a part"
+    )]
+    TooLong(usize),
+    /// The scenario with the setup has mistakes.
+    #[error("the setup: {0}")]
+    Setup(#[from] Box<Problems>),
+}
+
+/// The scenario's text.
+///
+/// # Errors
+/// [`SketchError`].
+pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, SketchError> {
+    let mut rings = Vec::new();
+    for (index, trace) in capture.traces.iter().enumerate() {
+        rings.push(Ring::of(index, trace)?);
+    }
+    if rings.iter().all(|ring| ring.first.bytes.is_empty()) {
+        return Err(SketchError::Silent);
+    }
+    let bytes: usize = rings
+        .iter()
+        .map(|r| r.first.bytes.len() + r.received.len())
+        .sum();
+    let width = (bytes * 2 / LINES).clamp(A_LINE, MOST_A_LINE);
+    let mut lines = head(capture, options, &rings)?;
+    for (index, trace) in capture.traces.iter().enumerate() {
+        for link in &trace.links {
+            lines.extend(faults(index, link, capture.rate));
+        }
+    }
+    lines.extend(sends(&rings, capture.rate, options.tolerance, width));
+    for (index, ring) in rings.iter().enumerate() {
+        lines.extend(receives(index, ring, width));
+    }
+    if lines.len() > LINES {
+        return Err(SketchError::TooLong(lines.len()));
+    }
+    Ok(lines.join("\n") + "\n")
+}
+
+/// What matters of a ring.
+struct Ring<'c> {
+    size: RingSize,
+    first: &'c LinkTrace,
+    /// What arrived at the master.
+    received: Vec<Received>,
+    told: Told,
+}
+
+impl<'c> Ring<'c> {
+    fn of(index: usize, trace: &'c Trace) -> Result<Self, SketchError> {
+        let size = RingSize::new(u64::from(trace.drives))
+            .map_err(|error| SketchError::Ring(error.to_string()))?;
+        let first = trace.links.iter().find(|link| link.from.is_none());
+        let Some(first) = first else {
+            let ring = if index == 0 { "" } else { "2:" };
+            let name = format!("{ring}master->{}", size.first());
+            return Err(SketchError::NoMaster(name));
+        };
+        let last = trace.links.iter().find(|link| link.to.is_none());
+        let last = last.map_or(&[][..], |link| &link.bytes);
+        Ok(Self {
+            size,
+            first,
+            received: last.iter().filter_map(LineByte::arrival).collect(),
+            told: told(size, trace),
+        })
+    }
+}
+
+fn head(
+    capture: &Capture,
+    options: &Options<'_>,
+    rings: &[Ring<'_>],
+) -> Result<Vec<String>, SketchError> {
+    let mut lines = vec![
+        format!("title   {}", title(options.title)),
+        format!(
+            "ring    {}",
+            rings
+                .iter()
+                .map(|ring| ring.size.drives().to_string())
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+    ];
+    if capture.rate != Rate::default() {
+        lines.push(format!("line    {}", capture.rate.bits_per_second()));
+    }
+    // Whatever the gaps are, the byte behind them is waited for.
+    let millis = capture.end().since_start().as_nanos() / 1_000_000 + 1_000;
+    lines.push(format!("deadline {}ms", millis.min(600_000)));
+    match options.setup {
+        // Who says how the drives are knows what their cells hold.
+        Some(setup) => lines.extend(setup_lines(setup)?),
+        None => lines.extend(cells(rings)),
+    }
+    lines.push(String::new());
+    Ok(lines)
+}
+
+/// What cells held before, as far as the drives said it.
+fn cells(rings: &[Ring<'_>]) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (index, ring) in rings.iter().enumerate() {
+        let prefix = if index == 0 { "" } else { "2:" };
+        let mut cells = ring.told.cells.iter().peekable();
+        while let Some(((drive, address), value)) = cells.next() {
+            let mut bytes = format!("{value:02X}");
+            let mut next = address.checked_add(1);
+            while let Some(((_, _), value)) =
+                cells.next_if(|((d, a), _)| d == drive && Some(*a) == next)
+            {
+                // Writing to a String cannot fail.
+                let _infallible = write!(bytes, " {value:02X}");
+                next = next.and_then(|next| next.checked_add(1));
+            }
+            lines.push(format!(
+                "drive {prefix}{drive} memory {address:04X} = {bytes}"
+            ));
+        }
+    }
+    lines
+}
+
+/// One line without what a scenario takes for a comment.
+fn title(text: &str) -> String {
+    let kept = text
+        .chars()
+        .map(|c| if c.is_control() || c == '#' { ' ' } else { c });
+    let kept: String = kept.take(TITLE).collect();
+    match kept.trim() {
+        "" => "A capture".to_owned(),
+        title => title.to_owned(),
+    }
+}
+
+/// The lines of a header that say how drives are.
+fn setup_lines(setup: &Source) -> Result<Vec<String>, SketchError> {
+    let scenario = parse(setup).map_err(Box::new)?;
+    let steps = scenario.steps.first().map(|step| step.span.start);
+    let header = setup.text.get(..steps.unwrap_or(setup.text.len()));
+    let own = header.unwrap_or_default().lines().filter(|line| {
+        let word = line.split_whitespace().next();
+        word == Some("drive")
+    });
+    Ok(own.map(str::to_owned).collect())
+}
+
+/// What the master sent, each run of bytes at its time.
+fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<String> {
+    // Times are cut off to nanoseconds.
+    let gap = tolerance.units().max(6);
+    let byte_time = rate.byte_time();
+    let mut runs: Vec<(Instant, usize, Vec<u8>)> = Vec::new();
+    for (index, ring) in rings.iter().enumerate() {
+        let mut free = Instant::START;
+        for byte in &ring.first.bytes {
+            let Some(sent) = byte.sent else { continue };
+            let start = byte.at - byte_time;
+            let behind = start.since(free).units() <= gap;
+            match runs.last_mut() {
+                Some((_, own, run)) if behind && *own == index => run.push(sent),
+                _ => runs.push((if behind { free } else { start }, index, vec![sent])),
+            }
+            free = if behind { free + byte_time } else { byte.at };
+        }
+    }
+    runs.sort_by_key(|(at, ..)| *at);
+    let mut lines = Vec::new();
+    for (at, ring, run) in runs {
+        let arrow = if ring == 0 { ">" } else { "2>" };
+        // To the nearest nanosecond.
+        let at = at + Span::from_units(1);
+        let mut when = match at.since_start().as_nanos() {
+            0 => String::new(),
+            nanos => format!("@{nanos}ns "),
+        };
+        for bytes in run.chunks(width) {
+            lines.push(format!("{when}{arrow} {}", hex(bytes)));
+            when.clear();
+        }
+    }
+    lines
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let digits: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    digits.join(" ")
+}
+
+/// What came back, up to the first byte that the master received with a line error: no line can ask for one.
+fn receives(index: usize, ring: &Ring<'_>, width: usize) -> Vec<String> {
+    let arrow = if index == 0 { "<" } else { "2<" };
+    let good = ring.received.iter().position(|byte| byte.error.is_some());
+    let end = good.unwrap_or(ring.received.len());
+    let mut lines = Vec::new();
+    for (chunk, bytes) in ring.received[..end].chunks(width).enumerate() {
+        let shown = bytes.iter().enumerate().map(|(place, byte)| {
+            match ring.told.unforeseen.contains(&(chunk * width + place)) {
+                true => "xx".to_owned(),
+                false => format!("{:02X}", byte.byte),
+            }
+        });
+        let shown: Vec<_> = shown.collect();
+        lines.push(format!("{arrow} {}", shown.join(" ")));
+    }
+    if end < ring.received.len() {
+        lines.push(format!(
+            "# byte {} arrived with a line error; what follows is not asked for",
+            end + 1
+        ));
+    }
+    lines
+}
+
+/// Bytes received, counted from 0, that cannot be foretold, ring by ring.
+pub(crate) fn unforeseen(capture: &Capture) -> Vec<Told> {
+    let rings = capture.traces.iter().enumerate();
+    rings
+        .map(|(index, trace)| Ring::of(index, trace).map_or_else(|_| Told::default(), |r| r.told))
+        .collect()
+}

@@ -1,0 +1,167 @@
+//! What a capture tells of the drives: what their cells held before, and which bytes nobody can foretell.
+
+use crate::report::meaning::{self, Observer};
+use harness_proto::line::Received;
+use harness_proto::nd21::cells::{Access, cell_at};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::PAUSE;
+use harness_sim::record::{LinkTrace, Trace};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a ring's first and last link tell.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Told {
+    /// What cells held before: drive and address.
+    pub(crate) cells: BTreeMap<(u8, u16), u8>,
+    /// Bytes received, counted from 0, that are data which changed by themselves, or their checking byte.
+    pub(crate) unforeseen: BTreeSet<usize>,
+}
+
+/// Reads what was sent on the first link beside what came on the last, and what each drive itself sent, as far as that
+/// was captured.
+pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
+    let first = trace.links.iter().find(|link| link.from.is_none());
+    let sent: Vec<_> = first
+        .iter()
+        .flat_map(|link| &link.bytes)
+        .filter_map(|byte| {
+            Some((
+                byte.sent?,
+                byte.error.is_none() && byte.sent == byte.received,
+            ))
+        })
+        .collect();
+    // PAUSE gets no answer (9.2).
+    let asked: Vec<_> = roles(size, &sent)
+        .into_iter()
+        .zip(&sent)
+        .filter(|(role, (byte, _))| !(*role == Role::Idle && *byte == PAUSE))
+        .map(|(role, _)| role)
+        .collect();
+    let mut told = Told::default();
+    for link in trace.links.iter().filter(|link| link.from.is_some()) {
+        let own = of_link(link, &asked);
+        let last = link.to.is_none();
+        for (cell, value) in own.cells {
+            // A drive's own link tells of it what no later link can have damaged.
+            if link.from == Some(cell.0) {
+                told.cells.insert(cell, value);
+            } else if last {
+                told.cells.entry(cell).or_insert(value);
+            }
+        }
+        if last {
+            told.unforeseen = own.unforeseen;
+        }
+    }
+    told
+}
+
+/// Reads a link beside what was asked.
+fn of_link(link: &LinkTrace, asked: &[Role]) -> Told {
+    let mut reader = Reader {
+        told: Told::default(),
+        own: link.from.filter(|_| link.to.is_some()),
+        now: BTreeMap::new(),
+        open: BTreeMap::new(),
+    };
+    let mut observer = Observer::new(link.from, link.to);
+    let bytes = link.bytes.iter().filter_map(|byte| match link.to {
+        None => byte.arrival(),
+        Some(_) => byte.sent.map(Received::good),
+    });
+    for ((index, byte), role) in bytes.enumerate().zip(asked) {
+        let seen = observer.see(Some(byte.byte), byte.error);
+        // In the error mode bytes are not the answers to those of the master's. Where bytes were lost, answers do not stand
+        // beside what was asked: then both seldom speak of the same drive.
+        if *role == Role::Foreign || seen.section() == "9.7" {
+            reader.open.clear();
+        } else if role.drive() == seen.drive {
+            let is_data = seen.role == meaning::Role::Data;
+            reader.read(index, byte.byte, *role, is_data, seen.fits);
+        }
+    }
+    reader.told
+}
+
+struct Reader {
+    told: Told,
+    /// The drive that sends on this link, where what was sent is read, and not what arrived.
+    own: Option<u8>,
+    /// What a cell holds now: `None` where it was written, and nobody knows how it took that.
+    now: BTreeMap<(u8, u16), Option<u8>>,
+    /// Data of the answer that each drive is giving: where they stand, the cell, the value.
+    open: BTreeMap<u8, Vec<(usize, u16, u8)>>,
+}
+
+impl Reader {
+    fn read(&mut self, index: usize, byte: u8, role: Role, is_data: bool, fits: Option<bool>) {
+        match role {
+            Role::Data {
+                drive: Some(drive),
+                address,
+            } if is_data => {
+                let open = self.open.entry(drive).or_default();
+                open.push((index, address, byte));
+                // ReadLong has no checking byte (10.1). What a drive itself sent is not damaged yet, but a zero may be one of
+                // the error mode.
+                if open.len() == 4 || self.own == Some(drive) && byte != 0 {
+                    self.settle(drive, None);
+                }
+            }
+            Role::Check {
+                drive: Some(drive),
+                writes,
+                ..
+            } => {
+                if fits == Some(true) {
+                    self.settle(drive, Some(index));
+                }
+                self.open.remove(&drive);
+                if let Some((address, width)) = writes {
+                    for offset in 0..u16::from(width) {
+                        self.now.insert((drive, address.wrapping_add(offset)), None);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes over the data of an answer that is whole.
+    fn settle(&mut self, drive: u8, check: Option<usize>) {
+        let mut changed = false;
+        for (index, address, value) in self.open.remove(&drive).unwrap_or_default() {
+            match self.now.get(&(drive, address)) {
+                None => {
+                    self.now.insert((drive, address), Some(value));
+                    if cell_exists(address) {
+                        self.told.cells.insert((drive, address), value);
+                    }
+                }
+                Some(None) if !measured(address) => {
+                    self.now.insert((drive, address), Some(value));
+                }
+                Some(Some(known)) if *known == value => {}
+                Some(_) => {
+                    changed = true;
+                    self.told.unforeseen.insert(index);
+                }
+            }
+        }
+        if changed {
+            self.told.unforeseen.extend(check);
+        }
+    }
+}
+
+/// Where a drive has memory (ND21 10.1).
+fn cell_exists(address: u16) -> bool {
+    matches!(address, 0x2F00..=0x2FDF | 0xFD80..=0xFFFF)
+}
+
+/// Whether the drive itself writes a cell (14.2: read only).
+fn measured(address: u16) -> bool {
+    cell_at(address).is_some_and(|cell| cell.access != Access::Write)
+}

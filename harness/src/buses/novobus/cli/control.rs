@@ -1,0 +1,178 @@
+//! `drivebench go`, `stop`, `block`, `reset`, `delete-error`: the modes of drives (ND21 11.8, 14.10).
+
+use super::args::{DeleteErrorArguments, MoveArguments, SelectArguments};
+use super::axes;
+use super::failure::Failure;
+use super::rig::{self, Bench, RigName, Use};
+use crate::buses::novobus::driver::{Axis, Bus, Error};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::link::Line;
+use crate::rig::Session;
+use crate::scenario::run::reset_drives;
+use harness_proto::time::Span;
+
+/// How long a drive is given before it is looked at: some of its cycles of 432 us (4.1).
+const CYCLES: Span = Span::from_millis(5);
+/// The same after a reset.
+const RESET: Span = Span::from_millis(200);
+
+type Call = fn(&Bus<'_>, Axis) -> Result<(), Error>;
+
+/// Lets drives run.
+pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
+    with_leave(arguments, output, "go", |bus, axis| bus.go(axis), CYCLES)
+}
+
+/// Resets drives.
+pub(crate) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
+    let Some(RigName::Named(_)) = &arguments.select.rig.rig else {
+        let reset: Call = |bus, axis| bus.reset(axis);
+        return with_leave(arguments, output, "reset", reset, RESET);
+    };
+    let first = |session: &mut Session, output: &mut Output| {
+        let drives = axes::select(&arguments.select.drives, &session.axes())?;
+        warn(arguments, &drives, "reset", output)?;
+        let drives: Vec<_> = drives
+            .iter()
+            .map(|axis| (axis.ring(), axis.drive()))
+            .collect();
+        // Behind a reset nobody knows where drives are: the check sequence (9.8) follows, which is not the master's to send.
+        reset_drives(session.link(), &drives).map_err(|why| denied(session, why.to_string()))
+    };
+    let what = leave_to(arguments, "reset");
+    rig::on_after(
+        &arguments.select.rig,
+        what,
+        output,
+        first,
+        |bench, output| {
+            let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
+            each(bench, &drives, output, |_, _| Ok(()), CYCLES)
+        },
+    )
+}
+
+/// Why a reset came to nothing.
+fn denied(session: &mut Session, why: String) -> Failure {
+    match session.link().trouble() {
+        Some(trouble) => Error::Link(trouble.clone()).into(),
+        None => Failure::drive(why),
+    }
+}
+
+fn leave_to(arguments: &MoveArguments, purpose: &'static str) -> Use {
+    Use {
+        purpose,
+        moves: arguments.leave,
+        holds: arguments.hold.hold,
+    }
+}
+
+/// Stops drives.
+pub(crate) fn stop(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
+    quietly(arguments, output, Use::look("stop"), |bus, axis| {
+        bus.stop(axis)
+    })
+}
+
+/// Blocks drives.
+pub(crate) fn block(arguments: &SelectArguments, output: &mut Output) -> Result<Exit, Failure> {
+    quietly(arguments, output, Use::look("block"), |bus, axis| {
+        bus.block(axis)
+    })
+}
+
+/// Confirms errors.
+pub(crate) fn delete_error(
+    arguments: &DeleteErrorArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let what = Use {
+        moves: arguments.leave,
+        ..Use::look("delete-error")
+    };
+    quietly(&arguments.select, output, what, |bus, axis| {
+        bus.delete_error(axis)
+    })
+}
+
+/// For what makes no motor turn.
+fn quietly(
+    arguments: &SelectArguments,
+    output: &mut Output,
+    what: Use,
+    call: Call,
+) -> Result<Exit, Failure> {
+    rig::on(&arguments.rig, what, output, |bench, output| {
+        let drives = axes::select(&arguments.drives, &bench.bus.axes())?;
+        each(bench, &drives, output, call, CYCLES)
+    })
+}
+
+/// Says what can move before it can, and refuses it without a leave.
+fn with_leave(
+    arguments: &MoveArguments,
+    output: &mut Output,
+    what: &'static str,
+    call: Call,
+    wait: Span,
+) -> Result<Exit, Failure> {
+    let as_what = leave_to(arguments, what);
+    rig::on(&arguments.select.rig, as_what, output, |bench, output| {
+        let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
+        warn(arguments, &drives, what, output)?;
+        each(bench, &drives, output, call, wait)
+    })
+}
+
+/// Says what can move, and refuses it without a leave.
+fn warn(
+    arguments: &MoveArguments,
+    drives: &[Axis],
+    what: &str,
+    output: &mut Output,
+) -> Result<(), Failure> {
+    let names: Vec<_> = drives.iter().map(Axis::to_string).collect();
+    let (s, their) = if drives.len() == 1 {
+        ("", "its motor")
+    } else {
+        ("s", "their motors")
+    };
+    let warning = format!("{what}: drive{s} {}: {their} may turn", names.join(", "));
+    if !arguments.leave {
+        return Err(Failure::refused(format!(
+            "{warning}; nothing was done, add --move to allow it"
+        )));
+    }
+    output.say(&format!("{warning}\n"));
+    Ok(())
+}
+
+/// Orders it of every drive first, and then says how each is. One that does not answer does not keep the
+/// others from being stopped.
+fn each(
+    bench: &Bench,
+    drives: &[Axis],
+    output: &mut Output,
+    call: Call,
+    wait: Span,
+) -> Result<Exit, Failure> {
+    let bus = &bench.bus;
+    let done: Vec<_> = drives.iter().map(|axis| call(bus, *axis)).collect();
+    bus.run(wait);
+    let mut exit = Exit::Passed;
+    for (axis, done) in drives.iter().zip(done) {
+        let after = done.and_then(|()| bus.state(*axis));
+        match after {
+            Err(error) => exit = exit.max(Failure::from(error).tell(output)),
+            Ok(after) => {
+                let error = after.error_in_words();
+                let error = error.map_or(String::new(), |error| format!(", error {error}"));
+                let mode = after.mode();
+                output.result(&format!("drive {axis} is in {mode}{error}\n"))?;
+            }
+        }
+    }
+    Ok(exit)
+}

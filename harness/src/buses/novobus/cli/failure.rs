@@ -1,0 +1,99 @@
+//! Why a command on a bus came to no good end, and which exit code that is.
+
+use crate::buses::novobus::driver;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::library::LibraryError;
+use crate::link::Trouble;
+use crate::scenario::problem::Problems;
+
+/// Why a command ended early.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Standard output cannot be written to.
+    Output(std::io::Error),
+    /// What is wrong, in a sentence, with the exit code for it.
+    Said(Exit, String),
+    /// What is wrong has been told.
+    Told(Exit),
+    /// There is no file, or it has mistakes.
+    File(LibraryError),
+    /// The driver gave up.
+    Bus(driver::Error),
+}
+
+impl Failure {
+    /// Something was asked for that cannot be, or that needs a leave that was not given.
+    pub(crate) fn refused(message: impl Into<String>) -> Self {
+        Self::Said(Exit::Usage, message.into())
+    }
+
+    /// A drive is or did otherwise than asked.
+    pub(crate) fn drive(message: impl Into<String>) -> Self {
+        Self::Said(Exit::Failed, message.into())
+    }
+
+    /// Says what is wrong and gives the exit code for it.
+    pub(crate) fn tell(&self, output: &mut Output) -> Exit {
+        match self {
+            Self::Output(error) => output.unwritable(error),
+            Self::Said(exit, message) => {
+                output.complain(message);
+                *exit
+            }
+            Self::Told(exit) => *exit,
+            Self::File(error) => {
+                output.library_error(error);
+                Exit::Usage
+            }
+            Self::Bus(error) => {
+                output.complain(&error.to_string());
+                exit(error)
+            }
+        }
+    }
+}
+
+/// A drive's fault, the bench's, or that of whoever asked.
+fn exit(error: &driver::Error) -> Exit {
+    match error {
+        driver::Error::DriveError { .. }
+        | driver::Error::InReset { .. }
+        | driver::Error::Interrupted { .. }
+        | driver::Error::NotSet { .. }
+        | driver::Error::TimeOut { .. } => Exit::Failed,
+        driver::Error::Refused(_) | driver::Error::Value(_) | driver::Error::Open(_) => Exit::Usage,
+        driver::Error::Link(Trouble::Interrupted) => Exit::Interrupted,
+        driver::Error::Link(Trouble::Interlock(_)) => Exit::Interlock,
+        driver::Error::Link(Trouble::Denied(_)) => Exit::Usage,
+        driver::Error::Link(_)
+        | driver::Error::Unknown(_)
+        | driver::Error::Disturbed { .. }
+        | driver::Error::Stopped(_)
+        | driver::Error::NoSuchOrder => Exit::RigError,
+    }
+}
+
+impl From<driver::Error> for Failure {
+    fn from(error: driver::Error) -> Self {
+        Self::Bus(error)
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+impl From<Problems> for Failure {
+    fn from(problems: Problems) -> Self {
+        Self::File(Box::new(problems).into())
+    }
+}
+
+impl From<LibraryError> for Failure {
+    fn from(error: LibraryError) -> Self {
+        Self::File(error)
+    }
+}

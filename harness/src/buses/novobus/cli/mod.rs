@@ -1,0 +1,53 @@
+//! Commands on a bus: one file a command, over the driver [`crate::buses::novobus::driver`].
+
+mod args;
+mod axes;
+mod cell;
+mod control;
+mod failure;
+mod file;
+mod info;
+mod params;
+mod params_file;
+mod position;
+mod read;
+mod recover;
+mod rig;
+mod scope;
+mod signal;
+mod sim;
+mod top;
+mod watch;
+mod write;
+
+pub(crate) use args::DriveCommand;
+
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use failure::Failure;
+
+/// Does what a command says; what stands in its way is told.
+pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
+    let end = match command {
+        DriveCommand::Read(arguments) => read::read(arguments, output),
+        DriveCommand::Write(arguments) => write::write(arguments, output),
+        DriveCommand::Info(arguments) => info::info(arguments, output),
+        DriveCommand::Watch(arguments) => watch::watch(arguments, output),
+        DriveCommand::Top(arguments) => top::top(arguments, output),
+        DriveCommand::Params(command) => params::params(command, output),
+        DriveCommand::Scope(arguments) => scope::scope(arguments, output),
+        DriveCommand::Position(arguments) => position::position(arguments, output),
+        DriveCommand::Go(arguments) => control::go(arguments, output),
+        DriveCommand::Stop(arguments) => control::stop(arguments, output),
+        DriveCommand::Block(arguments) => control::block(arguments, output),
+        DriveCommand::Reset(arguments) => control::reset(arguments, output),
+        DriveCommand::DeleteError(arguments) => control::delete_error(arguments, output),
+        DriveCommand::Recover(arguments) => recover::recover(arguments, output),
+        DriveCommand::Sim(arguments) => sim::sim(arguments, output),
+    };
+    match end {
+        Ok(exit) => Ok(exit),
+        Err(Failure::Output(error)) => Err(error),
+        Err(failure) => Ok(failure.tell(output)),
+    }
+}

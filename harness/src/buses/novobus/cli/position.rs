@@ -1,0 +1,211 @@
+//! `drivebench position`: a referencing run, a positioning, or both (ND21 13.2).
+
+use super::args::PositionArguments;
+use super::axes;
+use super::cell::find;
+use super::failure::Failure;
+use super::rig::{self, Bench, Use};
+use crate::buses::novobus::driver::Axis;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::scenario::argument::{Location, cells};
+use crate::scenario::quantity::Quantity;
+use harness_proto::nd21::bits::{self, ps_status};
+use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::ram;
+use harness_proto::nd21::units::{Drive, UnitError, speed_from_raw, speed_to_raw};
+use indicatif::{ProgressBar, ProgressDrawTarget};
+
+/// A run, settled before anything moves.
+struct Run {
+    axis: Axis,
+    units: Drive,
+    target: Option<Position>,
+    /// `ps_v0`.
+    speed: Option<u16>,
+    reference: bool,
+    init: bool,
+    /// What it is, in words.
+    words: String,
+}
+
+/// Takes a drive to a position.
+pub(crate) fn position(
+    arguments: &PositionArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let what = Use {
+        purpose: "position",
+        moves: arguments.leave,
+        holds: arguments.hold.hold,
+    };
+    rig::on(&arguments.rig, what, output, |bench, output| {
+        turn(arguments, bench, output)
+    })
+}
+
+fn turn(
+    arguments: &PositionArguments,
+    bench: &Bench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
+    let run = settle(arguments, axis, bench.units(axis)?)?;
+    let [place, speed] = [
+        run.cell(bench, "position")?,
+        match arguments.speed {
+            Some(speed) => speed.to_string(),
+            None => run.cell(bench, "ps_v0")?,
+        },
+    ];
+    let warning = format!(
+        "drive {axis} stands at {place} and will turn: {}, at most at {speed} (ps_v0)",
+        run.words
+    );
+    if !arguments.leave {
+        return Err(Failure::refused(format!(
+            "{warning}; nothing was moved, add --move to allow it"
+        )));
+    }
+    run.check(bench)?;
+    output.say(&format!("{warning}\n"));
+    let bar = spinner(output.progress);
+    let start = bench.bus.now();
+    let before = bench.bus.read_word(axis, ram::PS_V0)?;
+    let end = run.play(bench, &bar, before);
+    bar.finish_and_clear();
+    if let Err(failure) = end {
+        // The motor must not go on turning. Where this stop fails too, the rig is given back in its safe state, which says whether the
+        // drives stand.
+        if bench.bus.stop(axis).is_ok() {
+            output.say(&format!("drive {axis} was stopped (software stop)\n"));
+        }
+        return Err(failure);
+    }
+    let took = bench.bus.now().since(start);
+    let place = run.cell(bench, "position")?;
+    let speed = bench.bus.read_word(axis, ram::PS_V0)?;
+    if speed != before {
+        let [now, before] = [speed, before].map(|raw| run.speed_in_words(raw));
+        output.say(&format!(
+            "drive {axis}: ps_v0 stays at {now}: the rig's [limits] do not let {before} be written back\n"
+        ));
+    }
+    output.result(&format!("drive {axis} stands at {place} after {took}\n"))?;
+    Ok(Exit::Passed)
+}
+
+fn settle(arguments: &PositionArguments, axis: Axis, units: Drive) -> Result<Run, Failure> {
+    let wrong = |error: UnitError| Failure::refused(error.to_string());
+    let position = |mode, quantity: Quantity| Position::from_turns(mode, quantity.value);
+    let (target, words) = match (arguments.to, arguments.by) {
+        (Some(to), _) => (Some(position(Mode::Absolute, to)), Some(format!("to {to}"))),
+        (None, Some(by)) => (Some(position(Mode::Relative, by)), Some(format!("by {by}"))),
+        (None, None) => (None, None),
+    };
+    let speed = arguments
+        .speed
+        .map(|speed| speed_to_raw(speed.value, units.range));
+    let speed = speed.transpose().map_err(wrong)?;
+    if speed.is_some_and(|speed| speed <= 0) {
+        return Err(Failure::refused("--speed must be more than 0 rpm"));
+    }
+    let first = arguments.reference.then(|| "a referencing run".to_owned());
+    let words: Vec<_> = first.into_iter().chain(words).collect();
+    Ok(Run {
+        axis,
+        units,
+        target: target.transpose().map_err(wrong)?,
+        speed: speed.map(i16::cast_unsigned),
+        reference: arguments.reference,
+        init: arguments.init,
+        words: words.join(", then "),
+    })
+}
+
+impl Run {
+    /// The value of a cell in words.
+    fn cell(&self, bench: &Bench, name: &str) -> Result<String, Failure> {
+        let locations: Vec<Location> = cells(&[name.to_owned()])?;
+        let mut text = String::new();
+        for location in &locations {
+            text = find(&bench.bus, (self.axis, self.units), location)?.value();
+        }
+        Ok(text)
+    }
+
+    /// Refuses a run that would end at once, or never begin.
+    fn check(&self, bench: &Bench) -> Result<(), Failure> {
+        let axis = self.axis;
+        let state = bench.bus.state(axis)?;
+        let error = state.error_in_words().map(|error| format!(": {error}"));
+        if state.mode() != "go" {
+            return Err(Failure::drive(format!(
+                "drive {axis} is in {}{}; it must be in go: see `drivebench go`, `delete-error` and the inputs \
+                 GPIN3 and GPIN5 (ND21 5.3.3)",
+                state.mode(),
+                error.unwrap_or_default()
+            )));
+        }
+        let status = bench.bus.read_byte(axis, ram::PS_STATUS)?;
+        if !self.reference && !self.init && status & ps_status::FINISHED == 0 {
+            return Err(Failure::drive(format!(
+                "drive {axis}: the positioning controller is not initialised (ps_status {status:02X}); add \
+                 --reference for a referencing run or --init to take the place where it stands (ND21 13.2.1)"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Does it; `before` is `ps_v0`, which another speed is for this run only.
+    fn play(&self, bench: &Bench, bar: &ProgressBar, before: u16) -> Result<(), Failure> {
+        let (bus, axis) = (&bench.bus, self.axis);
+        if self.reference {
+            bus.reference_showing(axis, |flags2| show(bar, ram::FLAGS2, flags2))?;
+        }
+        if self.init {
+            bus.init_ps(axis)?;
+        }
+        let Some(target) = self.target else {
+            return Ok(());
+        };
+        if let Some(speed) = self.speed {
+            bus.write_word(axis, ram::PS_V0, speed)?;
+        }
+        let end = bus
+            .write_ps(axis, target)
+            .and_then(|()| bus.start_ps(axis))
+            .and_then(|()| {
+                bus.wait_for_end_showing(axis, |status| show(bar, ram::PS_STATUS, status))
+            });
+        let restored = match self.speed {
+            Some(_) => bus.restore_ps_v0(axis, before).map(|_| ()),
+            None => Ok(()),
+        };
+        Ok(end.and(restored)?)
+    }
+
+    /// A raw `ps_v0` in words.
+    fn speed_in_words(&self, raw: u16) -> String {
+        let rpm = speed_from_raw(raw.cast_signed(), self.units.range).to_f64();
+        format!("{rpm:.2} rpm")
+    }
+}
+
+/// The phase of a run in the manual's words.
+fn show(bar: &ProgressBar, cell: u16, byte: u8) {
+    let names: Vec<_> = bits::set_in(cell, byte).collect();
+    bar.set_message(names.join(", "));
+    bar.tick();
+}
+
+fn spinner(shown: bool) -> ProgressBar {
+    let target = if shown {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let bar = ProgressBar::new_spinner();
+    bar.set_draw_target(target);
+    bar
+}

@@ -1,0 +1,112 @@
+//! `drivebench read`: cells of drives, with their units and bits.
+
+use super::args::{Form, ReadArguments};
+use super::axes;
+use super::cell::{Found, find};
+use super::failure::Failure;
+use super::rig::{self, Bench, Use};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::scenario::argument::{Location, Memory, cells};
+use serde_json::json;
+
+/// Reads cells and shows them.
+pub(crate) fn read(arguments: &ReadArguments, output: &mut Output) -> Result<Exit, Failure> {
+    let cells = cells(&arguments.cells)?;
+    let look = Use::look("read");
+    rig::on(&arguments.rig, look, output, |bench, output| {
+        show(arguments, &cells, bench, output)
+    })
+}
+
+fn show(
+    arguments: &ReadArguments,
+    cells: &[Location],
+    bench: &Bench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let drives = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
+    let mut found = Vec::new();
+    for axis in drives {
+        let units = bench.units(axis)?;
+        for cell in cells {
+            found.push(find(&bench.bus, (axis, units), cell)?);
+        }
+    }
+    match arguments.format {
+        Form::Text => output.result(&table(&found))?,
+        Form::Json => {
+            let cells: Vec<_> = found.iter().map(object).collect();
+            output.result(&format!("{}\n", json!({"schema": 1, "cells": cells})))?;
+        }
+    }
+    Ok(Exit::Passed)
+}
+
+/// Drive, name, address, bytes, value or bits, section and meaning.
+fn table(found: &[Found<'_>]) -> String {
+    let row = |found: &Found<'_>| {
+        let cell = found.location.cell();
+        [
+            found.axis.to_string(),
+            found.location.name(),
+            address(found),
+            found.raw(),
+            found.words(),
+            cell.map_or(String::new(), |cell| cell.section.to_owned()),
+            cell.map_or(String::new(), |cell| cell.english.to_owned()),
+        ]
+    };
+    let heading = [
+        "drive", "cell", "address", "raw", "value", "section", "meaning",
+    ];
+    columns(&heading, &found.iter().map(row).collect::<Vec<_>>())
+}
+
+fn address(found: &Found<'_>) -> String {
+    let address = found.location.address();
+    match found.location.memory {
+        Memory::Ram => format!("{address:04X}"),
+        Memory::Eeprom => format!("ee:{address:02X}"),
+    }
+}
+
+fn object(found: &Found<'_>) -> serde_json::Value {
+    let memory = match found.location.memory {
+        Memory::Ram => "ram",
+        Memory::Eeprom => "eeprom",
+    };
+    json!({
+        "axis": found.axis.to_string(),
+        "name": found.location.name(),
+        "memory": memory,
+        "address": format!("{:04X}", found.location.address()),
+        "raw": found.raw(),
+        "value": found.number(),
+        "unit": found.unit(),
+        "bits": found.bits(),
+        "section": found.location.cell().map(|cell| cell.section),
+    })
+}
+
+/// A table with a heading; each column is as wide as what stands in it.
+pub(crate) fn columns<const N: usize>(heading: &[&str; N], rows: &[[String; N]]) -> String {
+    let width = |column: usize| {
+        let of_rows = rows.iter().map(|row| row[column].chars().count());
+        of_rows.chain([heading[column].len()]).max().unwrap_or(0)
+    };
+    let widths: [usize; N] = std::array::from_fn(width);
+    let line = |cells: [&str; N]| {
+        let padded: Vec<_> = cells
+            .iter()
+            .zip(widths)
+            .map(|(cell, width)| format!("{cell:width$}"))
+            .collect();
+        format!("{}\n", padded.join("  ").trim_end())
+    };
+    let mut text = line(*heading);
+    for row in rows {
+        text.push_str(&line(std::array::from_fn(|column| row[column].as_str())));
+    }
+    text
+}

@@ -1,0 +1,101 @@
+//! `drivebench recover`: a ring is brought back from the error mode (ND21 9.7, 9.8) and its drives are counted
+//! (9.3).
+
+use super::args::{Form, RecoverArguments};
+use super::failure::Failure;
+use super::rig::{self, RigName, Use};
+use crate::buses::novobus::driver::{self, Axis, Recovery};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::link::Line;
+use serde_json::json;
+
+/// Brings every ring of a bench back.
+pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Result<Exit, Failure> {
+    let Some(RigName::Named(name)) = &arguments.rig.rig else {
+        let (plan, mut link) = rig::link(&arguments.rig, output)?;
+        return show(arguments, &every(&mut link, plan.rings.len()), output);
+    };
+    let rig = rig::named(name, &arguments.rig, output)?;
+    let mut session = rig::take(&rig, &arguments.rig, Use::look("recover"), true)?;
+    let rings = session.rings().len();
+    let before = session.opening().cloned();
+    let mut found = every(session.link(), rings);
+    // What drives spelled out before the rig was opened.
+    for (ring, drive) in before.into_iter().flat_map(|health| health.reported) {
+        if let Some(recovery) = found.get_mut(ring) {
+            recovery.before = recovery.before.or(Some(drive));
+        }
+    }
+    let trouble = session.link().trouble().cloned();
+    for remark in session.release().remarks {
+        output.complain(&remark);
+    }
+    match trouble {
+        Some(trouble) => Err(driver::Error::Link(trouble).into()),
+        None => show(arguments, &found, output),
+    }
+}
+
+fn every(link: &mut dyn Line, rings: usize) -> Vec<Recovery> {
+    (0..rings).map(|ring| driver::recover(link, ring)).collect()
+}
+
+fn show(
+    arguments: &RecoverArguments,
+    found: &[Recovery],
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    match arguments.format {
+        Form::Text => {
+            for (ring, recovery) in found.iter().enumerate() {
+                output.result(&text(ring, recovery))?;
+            }
+        }
+        Form::Json => {
+            let rings: Vec<_> = found
+                .iter()
+                .map(|recovery| {
+                    json!({
+                        "reported": recovery.before,
+                        "drives": recovery.drives.map(|size| size.drives()),
+                        "still": recovery.after,
+                    })
+                })
+                .collect();
+            output.result(&format!("{}\n", json!({"schema": 1, "rings": rings})))?;
+        }
+    }
+    if found.iter().all(|recovery| recovery.drives.is_some()) {
+        Ok(Exit::Passed)
+    } else {
+        Ok(Exit::RigError)
+    }
+}
+
+fn text(ring: usize, recovery: &Recovery) -> String {
+    let name = |drive: u8| Axis::new(ring, drive).map_or(String::new(), |axis| axis.to_string());
+    let fault = |drive: u8| {
+        format!(
+            "drive {} spells out its address: the fault is in front of it, on its link or in the sender there (ND21 9.7, 9.9)",
+            name(drive)
+        )
+    };
+    let before = match (recovery.before, recovery.drives) {
+        (Some(drive), _) => fault(drive),
+        (None, Some(_)) => "no fault reported".to_owned(),
+        (None, None) => "no drive reports".to_owned(),
+    };
+    let behind = match (recovery.drives, recovery.after) {
+        (Some(size), _) => {
+            let drives = size.drives();
+            let s = if drives == 1 { "" } else { "s" };
+            format!("behind the check sequence {drives} drive{s} answer")
+        }
+        (None, Some(drive)) => format!("behind the check sequence still: {}", fault(drive)),
+        (None, None) => "nothing comes back behind the check sequence: the ring is broken, or the \
+             drive in front of the master has no power (ND21 9.9)"
+            .to_owned(),
+    };
+    format!("ring {}: {before}; {behind}\n", ring + 1)
+}

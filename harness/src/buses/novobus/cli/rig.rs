@@ -1,0 +1,304 @@
+//! The benches that commands on drives work on: `sim:3`, and `sim:2,3` with two rings, set up anew for every command; or a rig by its
+//! file or name, taken and given back as `run --rig` does.
+
+use super::args::RigArguments;
+use super::failure::Failure;
+use crate::buses::novobus::driver::{Axis, Bus, Options};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
+use crate::link::{Line, SimulatedLink, Trouble};
+use crate::rig::sim::all_nd21;
+use crate::rig::{self, Rig, Session, Shared};
+use crate::scenario::parse::parse_setup;
+use crate::scenario::plan::{Plan, plan};
+use crate::scenario::simulate;
+use crate::scenario::source::Source;
+use crate::signals::interrupt_flag;
+use harness_proto::nd21::ram;
+use harness_proto::nd21::units::{Drive, SpeedRange};
+use harness_proto::novobus::error::BusError;
+use harness_proto::time::Span;
+use std::path::Path;
+use std::str::FromStr;
+use std::time::Duration;
+
+/// The drives of a simulated bench of which nothing else is said: released and started by their inputs.
+const RELEASED: &str = "drive 0..last input GPIN3 GPIN5 high\n";
+
+/// How long a simulated bench has been switched on when a command comes to it: the self-tests are over (11.8).
+const WARM: Span = Span::from_millis(200);
+
+/// How long a drive is given to take a confirmation: some of its cycles of 432 us (4.1).
+const CYCLES: Span = Span::from_millis(5);
+
+/// The name of a bench.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RigName {
+    /// Simulated rings of so many drives.
+    Simulated(Vec<u8>),
+    /// A file, or a name that `rig list` shows.
+    Named(String),
+}
+
+impl FromStr for RigName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.strip_prefix("sim:") {
+            Some(sizes) => crate::rig::find::sizes(sizes).map(Self::Simulated),
+            None => Ok(Self::Named(text.to_owned())),
+        }
+    }
+}
+
+/// What a command does with a bench.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Use {
+    /// Its name; others who want the bench are told.
+    pub(crate) purpose: &'static str,
+    /// Motors may turn, as far as the command line goes.
+    pub(crate) moves: bool,
+    /// The drives stay as they are behind a good end: nothing was changed, or so it was asked for.
+    pub(crate) holds: bool,
+}
+
+impl Use {
+    /// For a command that changes nothing.
+    pub(crate) const fn look(purpose: &'static str) -> Self {
+        Self {
+            purpose,
+            moves: false,
+            holds: true,
+        }
+    }
+}
+
+/// A bench that has been opened.
+pub(crate) struct Bench {
+    pub(crate) bus: Bus<'static>,
+    plan: Plan,
+    /// The rig in use, if it is none that was set up for this command.
+    rig: Option<Shared>,
+}
+
+impl Bench {
+    /// What the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds,
+    /// which the drive is asked for (14.3.2).
+    pub(crate) fn units(&self, axis: Axis) -> Result<Drive, Failure> {
+        Ok(Drive {
+            range: self.bus.speed_range(axis)?,
+            ..self.plan.units(axis.ring(), axis.drive())
+        })
+    }
+
+    /// The same without asking the drive: `range` is what it said of its range of speeds.
+    pub(crate) fn units_with(&self, axis: Axis, range: SpeedRange) -> Drive {
+        Drive {
+            range,
+            ..self.plan.units(axis.ring(), axis.drive())
+        }
+    }
+
+    /// Does something with the rig in use, if it is one; the bus carries nothing meanwhile.
+    pub(crate) fn with_rig<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
+        self.rig.as_ref()?.with(act)
+    }
+
+    /// The zeros of the check sequence (9.8), with which a rig is opened, put every drive in error. Before a command that may
+    /// move drives it is confirmed, with a nominal speed of 0: a drive that was in go stands there, released.
+    fn confirm_bus_errors(&self, as_what: Use, output: &mut Output) -> Result<(), Failure> {
+        let mut confirmed = Vec::new();
+        for axis in self.bus.axes() {
+            let error = self.bus.state(axis)?.error;
+            if BusError::from_code(error).is_none() {
+                continue;
+            }
+            if as_what.moves {
+                self.bus.write_word(axis, ram::NSOLL, 0)?;
+                self.bus.delete_error(axis)?;
+            }
+            confirmed.push(axis.to_string());
+        }
+        if confirmed.is_empty() {
+            return Ok(());
+        }
+        let end = match as_what.moves {
+            true => "; it was confirmed, and their nominal speed is 0 now",
+            false => "",
+        };
+        output.say(&format!(
+            "the check sequence has put drive {} in error 0504 (ND21 9.8){end}\n",
+            confirmed.join(", ")
+        ));
+        // `Status` follows in the drive's next cycles.
+        self.bus.run(CYCLES);
+        Ok(())
+    }
+}
+
+/// Opens a bench, does something on it, and gives it back: with its drives as they are where `as_what` says so and all went
+/// well, or where nothing was done; in its safe state otherwise.
+pub(crate) fn on(
+    arguments: &RigArguments,
+    as_what: Use,
+    output: &mut Output,
+    act: impl FnOnce(&Bench, &mut Output) -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    on_after(arguments, as_what, output, |_, _| Ok(()), act)
+}
+
+/// The same, with something done to a rig before its master begins: what leaves no master knowing where the drives are.
+pub(crate) fn on_after(
+    arguments: &RigArguments,
+    as_what: Use,
+    output: &mut Output,
+    first: impl FnOnce(&mut Session, &mut Output) -> Result<(), Failure>,
+    act: impl FnOnce(&Bench, &mut Output) -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    let Some(RigName::Named(name)) = &arguments.rig else {
+        let (plan, link) = link(arguments, output)?;
+        let bus = Bus::open(Box::new(link), &plan.rings, Options::default())?;
+        bus.run(WARM);
+        let rig = None;
+        return act(&Bench { bus, plan, rig }, output);
+    };
+    let rig = named(name, arguments, output)?;
+    let plan = rig.plan()?;
+    let mut session = take(&rig, arguments, as_what, false)?;
+    let done = first(&mut session, output);
+    let sizes = session.rings().to_vec();
+    let shared = Shared::new(session);
+    let result = done.and_then(|()| {
+        let bus = Bus::open(Box::new(shared.line()), &sizes, Options::default())?;
+        let bench = Bench {
+            bus,
+            plan,
+            rig: Some(shared.clone()),
+        };
+        let ready = bench.confirm_bus_errors(as_what, output);
+        let result = ready.and_then(|()| act(&bench, output));
+        bench.bus.close();
+        result
+    });
+    Ok(give_back(&shared, as_what, result, output))
+}
+
+/// Takes a rig for a command.
+pub(crate) fn take(
+    rig: &Rig,
+    arguments: &RigArguments,
+    as_what: Use,
+    ill_as_well: bool,
+) -> Result<Session, Failure> {
+    let options = rig::Options {
+        purpose: as_what.purpose.to_owned(),
+        wait: Duration::from_nanos(arguments.patience.as_nanos()),
+        allow_motion: as_what.moves,
+        ill_as_well,
+        interrupt: interrupt_flag(),
+        alarm: alarm(),
+    };
+    Session::open(rig, &options).map_err(|error| Failure::Said(exit_of(&error), error.to_string()))
+}
+
+/// The rig of this name.
+pub(crate) fn named(
+    name: &str,
+    arguments: &RigArguments,
+    output: &mut Output,
+) -> Result<Rig, Failure> {
+    if arguments.setup.is_some() {
+        return Err(Failure::refused(
+            "--setup is for sim:N; what stands in a rig's file is set up by its [sim] setup",
+        ));
+    }
+    find_rig(name, output).ok_or(Failure::Told(Exit::Usage))
+}
+
+/// Gives a rig back and tells how.
+fn give_back(
+    rig: &Shared,
+    as_what: Use,
+    result: Result<Exit, Failure>,
+    output: &mut Output,
+) -> Exit {
+    let trouble = rig
+        .with(|session| session.link().trouble().cloned())
+        .flatten();
+    let sound = trouble.is_none();
+    let interrupted = trouble == Some(Trouble::Interrupted);
+    let (exit, leave) = match result {
+        Ok(exit) => (exit, as_what.holds),
+        // What cannot be or has no leave was refused before anything was done.
+        Err(failure @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
+            (failure.tell(output), true)
+        }
+        Err(failure) => (failure.tell(output), false),
+    };
+    let exit = if interrupted { Exit::Interrupted } else { exit };
+    let end = if leave && sound {
+        rig.release()
+    } else {
+        rig.close(matches!(exit, Exit::RigError | Exit::Interlock))
+    };
+    end.map_or(exit, |end| tell_end(&end, exit, output))
+}
+
+/// The simulated drives of a bench, with nothing sent to them. A rig with ports is stood in for by its simulated likeness.
+pub(crate) fn link(
+    arguments: &RigArguments,
+    output: &mut Output,
+) -> Result<(Plan, SimulatedLink), Failure> {
+    let given = match &arguments.rig {
+        Some(RigName::Named(name)) => {
+            let plan = named(name, arguments, output)?.plan()?;
+            let mut link = simulate::bench(&plan);
+            link.stop_recording();
+            return Ok((plan, link));
+        }
+        Some(RigName::Simulated(sizes)) => Some(sizes),
+        None => None,
+    };
+    let sizes = given.cloned().unwrap_or_else(|| vec![3]);
+    let source = match &arguments.setup {
+        Some(path) => read(path)?,
+        None => released(&sizes),
+    };
+    let mut scenario = parse_setup(&source, &sizes)?;
+    if let Some(sizes) = given {
+        if sizes.len() != scenario.rings.len() {
+            return Err(Failure::refused(format!(
+                "{} is for {} ring(s), the bench has {}",
+                source.name,
+                scenario.rings.len(),
+                sizes.len()
+            )));
+        }
+        for (range, size) in scenario.rings.iter_mut().zip(sizes) {
+            range.default = *size;
+        }
+    }
+    all_nd21(&mut scenario);
+    let plan = plan(&scenario, &source, None)?;
+    let mut link = simulate::bench(&plan);
+    link.stop_recording();
+    Ok((plan, link))
+}
+
+fn read(path: &Path) -> Result<Source, Failure> {
+    Source::read(path).map_err(|error| Failure::File(error.into()))
+}
+
+/// The header of a bench of which nothing is said.
+fn released(sizes: &[u8]) -> Source {
+    let second = RELEASED.replace("0..last", "2:0..last");
+    let text = match sizes {
+        [_, _] => format!("{RELEASED}{second}"),
+        _ => RELEASED.to_owned(),
+    };
+    Source {
+        name: "the simulated bench".to_owned(),
+        text: text.into(),
+    }
+}

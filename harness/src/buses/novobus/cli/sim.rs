@@ -1,0 +1,225 @@
+//! `drivebench sim`: simulated rings for anyone's master.
+
+use super::args::RigArguments;
+use super::failure::Failure;
+use super::rig;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::rig::values::Wire;
+use crate::scenario::argument::duration;
+use crate::serve::{
+    ControlPlace, End, Host, Inner, Job, Marks, Pace, Place, Role, ServeError, Server, serve,
+};
+use clap::{ArgGroup, Args, ValueEnum};
+use harness_proto::time::Span;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+pub(crate) const SIM_HELP: &str = "\
+On standard output stands a line for each ring once all are ready, `ring 1: 3 drives at 127.0.0.1:40123`, then with
+--control ADDRESS a line `control at 127.0.0.1:40124`; with --control - the answers follow. What clients do is told on
+standard error.
+
+Lines of control are lines of the scenario language that need no byte of the master's, done at once:
+  ! 1->0: flip 0                  a fault; `byte n` and times are counted from the start, and a byte that has passed
+                                  means the next one
+  drive 0 input GPIN5 low         something happens to drives from outside the bus
+  ? drive 0 nist = 0rpm +-5rpm    a check that looks at drives or at the error mode
+  state 0                         mode, outputs, error of the bus; `state 2:0 nist FF08:2`: these cells
+Each is answered by a line: `ok` (and the state), `no: ` and what was found, or `error: ` and why.
+
+--tap and --cut take a link, `=`, and a place: a path (with a `/` in it) for a pseudo terminal, HOST:PORT for a socket.
+Links of the second ring are written with `2:` in front, `2:2->1`. Each has its line too, `tap 2->1 at /tmp/tap`.
+
+A pseudo terminal carries no parity and no rate, and cannot turn a second program away. Without --marks in-band every
+byte of the client's is a good one, and of a damaged one that comes back only its eight bits are left.
+
+Ends at SIGINT, SIGTERM, SIGHUP or SIGQUIT (exit code 130), after --for, or with --once when the clients have gone.";
+
+/// For `sim`.
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("place").required(true)))]
+pub struct SimArguments {
+    /// Serve a ring on a socket: HOST:PORT, port 0 for a free one. One client at a time; a second one is turned
+    /// away. Twice for two rings, in their order.
+    #[arg(long, value_name = "ADDRESS", group = "place")]
+    pub tcp: Vec<String>,
+    /// Serve a ring on a pseudo terminal, with a link to it at this path while it is served. Twice for two rings.
+    #[arg(long, value_name = "PATH", group = "place", conflicts_with = "tcp")]
+    pub pty: Vec<PathBuf>,
+    /// Let a client listen on a link: `2->1=ADDRESS` or `2->1=PATH`. What it sends is dropped.
+    #[arg(long, value_name = "LINK=PLACE")]
+    pub tap: Vec<InnerPlace>,
+    /// Cut a link open: the client there hears the drive in front and feeds the drive behind, which hears nothing
+    /// else. With two places, `2->1=PLACE,PLACE`, the first hears and the second feeds.
+    #[arg(long, value_name = "LINK=PLACE")]
+    pub cut: Vec<InnerPlace>,
+    /// How fast time passes.
+    #[arg(long, value_enum, default_value_t = Speed::Line)]
+    pub pace: Speed,
+    /// How the stream carries line errors.
+    #[arg(long, value_enum, default_value_t = MarksForm::None)]
+    pub marks: MarksForm,
+    /// Take lines of control from standard input (-) or from a socket that listens (HOST:PORT).
+    #[arg(long, value_name = "-|ADDRESS")]
+    pub control: Option<String>,
+    /// Let sockets listen at addresses that other machines reach.
+    #[arg(long)]
+    pub allow_remote: bool,
+    /// End when the client has gone (with two rings, when none is left).
+    #[arg(long)]
+    pub once: bool,
+    /// How long it goes on.
+    #[arg(long = "for", value_name = "TIME", value_parser = duration)]
+    pub length: Option<Span>,
+    /// Which bench.
+    #[command(flatten)]
+    pub rig: RigArguments,
+}
+
+/// How fast time passes in a served ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Speed {
+    /// As on the line: a byte takes 286 us at 38400 bit/s.
+    Line,
+    /// As fast as possible while bytes of the client's are under way.
+    Free,
+}
+
+/// How a stream carries line errors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MarksForm {
+    /// Not at all.
+    None,
+    /// As PARMRK does: FF 00 x is x with an error, FF FF a good FF.
+    InBand,
+}
+
+/// A link and its places, as written.
+#[derive(Clone, Debug)]
+pub struct InnerPlace {
+    text: String,
+    ring: usize,
+    wire: Wire,
+    places: Vec<Place>,
+}
+
+impl FromStr for InnerPlace {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = "a link and a place expected: 2->1=/tmp/link or 2->1=127.0.0.1:4001";
+        let (link, places) = text.split_once('=').ok_or(expected)?;
+        let (ring, link) = match link.split_once(':') {
+            None | Some(("1", _)) => (0, link.trim_start_matches("1:")),
+            Some(("2", link)) => (1, link),
+            Some((ring, _)) => return Err(format!("there is no ring {ring}: 1 or 2 expected")),
+        };
+        let wire: Wire = link.parse().map_err(|error| format!("{error}"))?;
+        let place = |text: &str| match text {
+            "" => Err(expected.to_owned()),
+            path if path.contains('/') => Ok(Place::Pty(path.into())),
+            address => Ok(Place::Tcp(address.to_owned())),
+        };
+        let places = places.split(',').map(place).collect::<Result<_, _>>()?;
+        Ok(Self {
+            text: text.to_owned(),
+            ring,
+            wire,
+            places,
+        })
+    }
+}
+
+/// The seats at inner links with their places, in the order of the command line: taps first.
+fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, Place)>, Failure> {
+    let mut all: Vec<(Inner, Place)> = Vec::new();
+    let taps = arguments.tap.iter().map(|place| (place, &[Role::Tap][..]));
+    let cuts = arguments.cut.iter().map(|place| match place.places.len() {
+        1 => (place, &[Role::Cut][..]),
+        _ => (place, &[Role::Upstream, Role::Downstream][..]),
+    });
+    for (given, roles) in taps.chain(cuts) {
+        let text = &given.text;
+        let refused = |why: &str| Failure::refused(format!("{text}: {why}"));
+        let drives = *sizes
+            .get(given.ring)
+            .ok_or_else(|| refused("the bench has one ring"))?;
+        let Some(from) = given.wire.from.filter(|_| given.wire.to.is_some()) else {
+            return Err(refused(
+                "the master's own links are the ring's port; a link between two drives expected",
+            ));
+        };
+        if !given.wire.is_in(drives) {
+            return Err(refused(&format!(
+                "a ring of {drives} has no such link; bytes go from a drive to the next lower one"
+            )));
+        }
+        let link = usize::from(drives - from);
+        if all
+            .iter()
+            .any(|(other, _)| (other.ring, other.link) == (given.ring, link))
+        {
+            return Err(refused("somebody sits at this link already"));
+        }
+        if given.places.len() != roles.len() {
+            return Err(refused(
+                "one place expected for a tap, one or two for a cut",
+            ));
+        }
+        for (&role, place) in roles.iter().zip(&given.places) {
+            let ring = given.ring;
+            all.push((Inner { ring, link, role }, place.clone()));
+        }
+    }
+    Ok(all)
+}
+
+/// Serves the rings of a simulated bench.
+pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
+    let (plan, link) = rig::link(&arguments.rig, output)?;
+    let pace = match arguments.pace {
+        Speed::Line => Pace::Line,
+        Speed::Free => Pace::Free,
+    };
+    let marks = match arguments.marks {
+        MarksForm::None => Marks::None,
+        MarksForm::InBand => Marks::InBand,
+    };
+    let tcp = arguments.tcp.iter().cloned().map(Place::Tcp);
+    let pty = arguments.pty.iter().cloned().map(Place::Pty);
+    let sizes: Vec<u8> = plan.rings.iter().map(|ring| ring.drives()).collect();
+    let inner = inner(arguments, &sizes)?;
+    let mut server = Server::new(plan, link, pace, marks);
+    inner.iter().for_each(|(inner, _)| server.add(*inner));
+    let places = inner.into_iter().map(|(_, place)| place);
+    let job = Job {
+        places: tcp.chain(pty).chain(places).collect(),
+        control: arguments.control.as_deref().map(|place| match place {
+            "-" => ControlPlace::Standard,
+            address => ControlPlace::Tcp(address.to_owned()),
+        }),
+        allow_remote: arguments.allow_remote,
+        once: arguments.once,
+        length: arguments.length,
+    };
+    let end = serve(server, &job, output).map_err(|error| match error {
+        ServeError::Output(error) => Failure::Output(error),
+        ServeError::Wait(_) => Failure::Said(Exit::RigError, error.to_string()),
+        error => Failure::refused(error.to_string()),
+    })?;
+    Ok(match end {
+        End::Interrupted => Exit::Interrupted,
+        End::TimeOver | End::ClientsGone => Exit::Passed,
+    })
+}
+
+impl Host for Output {
+    fn tell(&mut self, line: &str) -> std::io::Result<()> {
+        self.result(&format!("{line}\n"))
+    }
+
+    fn say(&mut self, line: &str) {
+        Output::say(self, &format!("{line}\n"));
+    }
+}

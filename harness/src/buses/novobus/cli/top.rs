@@ -1,0 +1,413 @@
+//! `drivebench top`: all drives live.
+//!
+//! Two threads, so that a terminal that is slow or held does not keep the ring waiting: a drive with monitoring reports a time-out
+//! after 10 ms without a byte (ND21 9.9). This one reads drives and lets the bus work, the other draws and takes keys.
+
+use super::args::TopArguments;
+use super::failure::Failure;
+use super::rig::{self, Bench, RigName, Use};
+use crate::buses::novobus::driver::{Axis, Error, State, Width};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::link::Trouble;
+use crate::signals::interrupt_flag;
+use crate::top::screen::{Input, leave};
+use crate::top::{DriveReading, Heading, Press, Reading, RingReading, Screen, Top, view};
+use harness_proto::nd21::ram;
+use harness_proto::nd21::units::{Drive, SpeedRange};
+use harness_proto::novobus::master::{Counters, Event};
+use harness_proto::time::{Instant, Span};
+use std::collections::VecDeque;
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, SyncSender, TryRecvError, channel, sync_channel,
+};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant as Moment};
+
+/// Drives that are asked side by side: what is shown comes piece by piece, and the end does not wait for a long ring.
+const SIDE_BY_SIDE: usize = 8;
+/// Rates are those of so much time.
+const WINDOW: Span = Span::from_millis(2_000);
+/// The most marks within it.
+const MARKS: usize = 256;
+/// The longest step of the bus at a time, and how long a key may wait.
+const STEP: Span = Span::from_millis(50);
+const KEYS: Duration = Duration::from_millis(50);
+/// The page of `--once`, in characters.
+const WIDTH: u16 = 120;
+
+/// What is read of a drive, in the order of the words in [`reading`].
+///
+/// Whole turns stand on both sides of the angle: between two commands the counter may have gone on.
+const CELLS: [(u16, Width); 9] = [
+    (ram::STATUS, Width::Byte),
+    (ram::FLAGS, Width::Word),
+    (ram::ERRORCODE, Width::Word),
+    (ram::NIST, Width::Word),
+    (ram::UMDRIST, Width::Word),
+    (ram::LAGEIST, Width::Word),
+    (ram::UMDRIST, Width::Word),
+    (ram::MSOLL, Width::Word),
+    (ram::SW_VERSION2, Width::Byte),
+];
+
+/// Shows drives until a key ends it.
+pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit, Failure> {
+    if arguments.every == Span::ZERO {
+        return Err(Failure::refused("--every must be longer than nothing"));
+    }
+    let terminal = output.terminal && std::io::stdin().is_terminal();
+    if !arguments.once && !terminal {
+        return Err(Failure::refused(
+            "`top` needs a terminal; for a pipe or a file there are `top --once`, `watch` and `info --format json`",
+        ));
+    }
+    let name = match &arguments.rig.rig {
+        Some(RigName::Named(name)) => name.clone(),
+        Some(RigName::Simulated(sizes)) => {
+            let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
+            format!("sim:{}", sizes.join(","))
+        }
+        None => "sim:3".to_owned(),
+    };
+    rig::on(&arguments.rig, Use::look("top"), output, |bench, output| {
+        let heading = heading(&name, bench);
+        let mut reader = Reader::new(bench);
+        match arguments.once {
+            true => once(&mut reader, heading, output),
+            false => live(&mut reader, heading, arguments.every, output),
+        }
+    })
+}
+
+/// What stands above everything.
+fn heading(name: &str, bench: &Bench) -> Heading {
+    let mut sizes = Vec::new();
+    for axis in bench.bus.axes() {
+        match sizes.get_mut(axis.ring()) {
+            Some(size) => *size += 1,
+            None => sizes.push(1),
+        }
+    }
+    let s = |n: usize| if n == 1 { "" } else { "s" };
+    let places = bench.with_rig(|session| {
+        let rings = session.rig().rings();
+        let place = |ring: &crate::rig::file::Ring| match &ring.endpoint.port {
+            Some(port) => format!(
+                "{} {port}, {} 8O1",
+                ring.endpoint.transport.name(),
+                ring.endpoint.line.baud()
+            ),
+            None => format!(
+                "{}, {} 8O1",
+                ring.endpoint.transport.name(),
+                ring.endpoint.line.baud()
+            ),
+        };
+        (
+            session.rig().id().to_owned(),
+            rings.map(|(_, ring)| place(ring)).collect(),
+        )
+    });
+    let (rig, places): (String, Vec<String>) =
+        places.unwrap_or_else(|| (name.to_owned(), vec!["simulated".to_owned(); sizes.len()]));
+    let rings = sizes.iter().zip(places);
+    Heading {
+        rig,
+        rings: rings
+            .map(|(size, place)| format!("{size} drive{}, {place}", s(*size)))
+            .collect(),
+    }
+}
+
+/// One page as plain text.
+fn once(reader: &mut Reader<'_>, heading: Heading, output: &mut Output) -> Result<Exit, Failure> {
+    while !reader.read_some()? {}
+    let mut top = Top::new(heading);
+    top.take(reader.reading());
+    output.result(&view::page(&mut top, WIDTH))?;
+    Ok(Exit::Passed)
+}
+
+/// Why the view ends.
+enum Leave {
+    Quit,
+    Interrupt,
+    Broken(std::io::Error),
+}
+
+/// The page until its end; the terminal is given back before anything is told.
+fn live(
+    reader: &mut Reader<'_>,
+    heading: Heading,
+    every: Span,
+    output: &Output,
+) -> Result<Exit, Failure> {
+    let flag = interrupt_flag();
+    let screen = Screen::enter(output.colours())?;
+    let (news, readings) = sync_channel(1);
+    let (why, asked) = channel();
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopped = Arc::clone(&stop);
+    let desk = std::thread::spawn(move || {
+        let end = desk(screen, Top::new(heading), &readings, &stopped);
+        // Nobody listens where the bus has ended by itself.
+        let _ended = why.send(end);
+    });
+    let end = pump(reader, every, &flag, &news, &asked);
+    stop.store(true, Ordering::Relaxed);
+    drop(news);
+    wait_for(desk);
+    end
+}
+
+/// Waits until the terminal has been given back; not for ever where it takes nothing more, as the drives wait for their safe
+/// state.
+fn wait_for(desk: JoinHandle<()>) {
+    if ended(&desk) {
+        if let Err(panic) = desk.join() {
+            std::panic::resume_unwind(panic);
+        }
+    } else {
+        ended(&std::thread::spawn(leave));
+    }
+}
+
+/// Whether a thread ends in time.
+fn ended(thread: &JoinHandle<()>) -> bool {
+    let end = Moment::now() + Duration::from_secs(2);
+    while !thread.is_finished() && Moment::now() < end {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    thread.is_finished()
+}
+
+/// Draws what comes and takes keys, until its end.
+fn desk(
+    mut screen: Screen,
+    mut top: Top,
+    readings: &Receiver<Reading>,
+    stop: &AtomicBool,
+) -> Leave {
+    let mut stale = true;
+    loop {
+        loop {
+            match readings.try_recv() {
+                Ok(reading) => {
+                    top.take(reading);
+                    stale = true;
+                }
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return Leave::Quit,
+            }
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Leave::Quit;
+        }
+        if stale && let Err(error) = screen.draw(&mut top) {
+            return Leave::Broken(error);
+        }
+        stale = match screen.input(KEYS) {
+            Ok(Input::Key(key)) => match top.press(key) {
+                Press::Stay => true,
+                Press::Quit => return Leave::Quit,
+                Press::Interrupt => return Leave::Interrupt,
+            },
+            Ok(Input::Redraw) => true,
+            Ok(Input::Nothing) => false,
+            Err(error) => return Leave::Broken(error),
+        };
+    }
+}
+
+/// Reads drives again and again and lets the bus work, as long as the view is wanted.
+fn pump(
+    reader: &mut Reader<'_>,
+    every: Span,
+    interrupted: &AtomicBool,
+    news: &SyncSender<Reading>,
+    asked: &Receiver<Leave>,
+) -> Result<Exit, Failure> {
+    let interrupt = || Failure::Bus(Error::Link(Trouble::Interrupted));
+    let begun = Moment::now();
+    let mut next = reader.start;
+    loop {
+        if reader.bench.bus.now() >= next && reader.read_some()? {
+            // What is slower than the time given is read as often as it can be.
+            next = (next + every).max(reader.bench.bus.now());
+        }
+        if let Some(halt) = reader.bench.bus.halted() {
+            return Err(halt.into());
+        }
+        // Who has not drawn the last page yet gets a later one; who has gone says why by `asked`.
+        let _not_now = news.try_send(reader.reading());
+        if interrupted.load(Ordering::Relaxed) {
+            return Err(interrupt());
+        }
+        match asked.recv_timeout(reader.idle(begun, next)) {
+            Ok(Leave::Quit) => return Ok(Exit::Passed),
+            Ok(Leave::Interrupt) => return Err(interrupt()),
+            Ok(Leave::Broken(error)) => return Err(Failure::Output(error)),
+            Err(RecvTimeoutError::Timeout) => {}
+            // A panic, which `wait_for` hands on.
+            Err(RecvTimeoutError::Disconnected) => return Ok(Exit::RigError),
+        }
+    }
+}
+
+/// What has been read, and what comes next.
+struct Reader<'b> {
+    bench: &'b Bench,
+    start: Instant,
+    axes: Vec<Axis>,
+    /// The first drive of the next piece.
+    next: usize,
+    reading: Reading,
+    /// What the masters had done, oldest first.
+    marks: VecDeque<(Instant, Vec<Counters>)>,
+}
+
+impl<'b> Reader<'b> {
+    fn new(bench: &'b Bench) -> Self {
+        let start = bench.bus.now();
+        Self {
+            bench,
+            start,
+            axes: bench.bus.axes(),
+            next: 0,
+            reading: Reading::default(),
+            marks: VecDeque::from([(start, bench.bus.counters())]),
+        }
+    }
+
+    /// Reads some drives, and says whether they were the last.
+    fn read_some(&mut self) -> Result<bool, Failure> {
+        let some: Vec<Axis> = self
+            .axes
+            .iter()
+            .skip(self.next)
+            .take(SIDE_BY_SIDE)
+            .copied()
+            .collect();
+        let cells = some
+            .iter()
+            .flat_map(|axis| CELLS.map(|(address, width)| (*axis, address, width)));
+        let words = self.bench.bus.read_many(cells)?;
+        for (axis, words) in some.iter().zip(words.chunks_exact(CELLS.len())) {
+            if let Some(drive) = reading(self.bench, *axis, words) {
+                self.reading.drive(drive);
+            }
+        }
+        self.next += some.len();
+        let last = self.next >= self.axes.len();
+        if last {
+            self.next = 0;
+        }
+        Ok(last)
+    }
+
+    /// All that is known now.
+    fn reading(&mut self) -> Reading {
+        let bus = &self.bench.bus;
+        let now = bus.now();
+        self.reading.at = now.since(self.start);
+        for (ring, event) in bus.take_events() {
+            if let Event::Disturbed { fault, .. } = event {
+                self.reading.disturbed(ring, fault.to_string());
+            }
+        }
+        let counters = bus.counters();
+        let oldest = |marks: &VecDeque<(Instant, _)>| marks.get(1).map(|(at, _)| *at);
+        while oldest(&self.marks).is_some_and(|at| now.since(at) >= WINDOW)
+            || self.marks.len() >= MARKS
+        {
+            self.marks.pop_front();
+        }
+        if let Some((at, before)) = self.marks.front() {
+            let span = now.since(*at);
+            let rings = before.iter().zip(&counters);
+            self.reading.rings = rings
+                .map(|(before, now)| RingReading::between(before, now, span))
+                .collect();
+        }
+        self.marks.push_back((now, counters));
+        let unplaced = self.bench.with_rig(|session| {
+            let ports = session.ports();
+            ports.map_or(0, |ports| ports.take_unplaced())
+        });
+        self.reading.unplaced += unplaced.unwrap_or(0);
+        self.reading.clone()
+    }
+
+    /// Lets the bus work until the next drives are due, and says how long to wait beside it: where time is virtual it would run
+    /// away from whoever looks.
+    fn idle(&self, begun: Moment, next: Instant) -> Duration {
+        let bus = &self.bench.bus;
+        let now = bus.now();
+        let real = Span::from_nanos(u64::try_from(begun.elapsed().as_nanos()).unwrap_or(u64::MAX));
+        let ahead = now
+            .since(self.start)
+            .as_nanos()
+            .saturating_sub(real.as_nanos());
+        let ports = self.bench.with_rig(|session| session.ports().is_some());
+        if ports != Some(true) && ahead > 0 {
+            return Duration::from_nanos(ahead).min(KEYS);
+        }
+        if next > now {
+            bus.run(next.since(now).min(STEP));
+        }
+        Duration::ZERO
+    }
+}
+
+fn reading(bench: &Bench, axis: Axis, words: &[u16]) -> Option<DriveReading> {
+    let &[
+        status,
+        flags,
+        error,
+        speed,
+        before,
+        angle,
+        behind,
+        torque,
+        range,
+    ] = words
+    else {
+        return None;
+    };
+    let low = |word: u16| word.to_be_bytes()[1];
+    let [flags, flags2] = flags.to_be_bytes();
+    let units = bench.units_with(axis, SpeedRange::from_sw_version2(low(range)));
+    let [before, behind] = [before, behind].map(u16::cast_signed);
+    let upwards = behind.wrapping_sub(before) > 0;
+    let turns = match upwards == (angle < 0x8000) {
+        true => behind,
+        false => before,
+    };
+    Some(DriveReading {
+        axis,
+        state: State {
+            status: low(status),
+            flags,
+            flags2,
+            error,
+        },
+        speed: value("nist", speed, units),
+        position: Some(f64::from(turns) + f64::from(angle) / 65_536.0),
+        torque: value("msoll", torque, units),
+    })
+}
+
+/// The value of a word cell in the manual's unit (14.5).
+fn value(cell: &str, word: u16, units: Drive) -> Option<f64> {
+    use harness_proto::nd21::units::Value;
+    let cell = harness_proto::nd21::cells::cell(cell)?;
+    match cell.value(&word.to_be_bytes(), units)?.ok()? {
+        Value::Exact(number) => Some(number.to_f64()),
+        Value::Approximate(number) => Some(number),
+        Value::Off | Value::Date(_) => None,
+    }
+}

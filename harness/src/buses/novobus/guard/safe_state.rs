@@ -1,0 +1,403 @@
+//! The safe state of a bench: every drive stopped, standing and blocked, and read back.
+
+use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Order, recover};
+use crate::link::{Lead, Line, Trouble};
+use harness_proto::line::Received;
+use harness_proto::nd21::bits::{flags, status};
+use harness_proto::nd21::ram;
+use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::master::Job;
+use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
+use harness_proto::time::{Instant, Span};
+use std::fmt;
+
+/// How often a ring is brought back before it counts as lost (ND21 9.8; three are the most that were ever needed).
+const ATTEMPTS: u8 = 3;
+
+/// What a drive is told on its way to the safe state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SafeStep {
+    /// To stop on its ramp, and to stand.
+    Stop,
+    /// To give no torque, with a nominal speed of 0.
+    Block,
+}
+
+/// How drives are taken to their safe state, and when they count as standing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// What they are told, in this order.
+    pub order: Vec<SafeStep>,
+    /// The speed below which a motor counts as standing, in rpm.
+    pub rpm: f64,
+    /// How long it may take to stand.
+    pub within: Span,
+}
+
+impl Default for Standing {
+    fn default() -> Self {
+        Self {
+            order: vec![SafeStep::Stop, SafeStep::Block],
+            rpm: 5.0,
+            within: Span::from_millis(5_000),
+        }
+    }
+}
+
+/// Whether the bench is in its safe state.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[must_use]
+pub enum SafeState {
+    /// Every drive answered that it is stopped, blocked and standing: so many drives a ring.
+    Confirmed(Vec<RingSize>),
+    /// Of these drives nobody knows; the others are.
+    NotConfirmed(Vec<NotSafe>),
+}
+
+/// A drive that was not confirmed to stand.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NotSafe {
+    /// The drive.
+    pub axis: Axis,
+    /// Why.
+    pub why: String,
+}
+
+impl fmt::Display for SafeState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Confirmed(rings) => {
+                let drives: u32 = rings.iter().map(|size| u32::from(size.drives())).sum();
+                write!(
+                    f,
+                    "safe state: {drives} drives are stopped, standing and blocked"
+                )
+            }
+            Self::NotConfirmed(drives) => {
+                f.write_str("the safe state is NOT confirmed; use the emergency stop")?;
+                for drive in drives {
+                    write!(f, "\n  drive {}: {}", drive.axis, drive.why)?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Brings every drive of the rings to its safe state and reads it back; a guarded line lets all of it pass, behind a
+/// denial after [`Guarded::reset_after_denial`](crate::guard::Guarded::reset_after_denial).
+///
+/// A ring is brought back first (9.8), whatever was half-sent. Then all drives get the first of the steps, each is seen to do it, and
+/// the next follows, on a drive that does not stand as well. The software stop ends every motion on its ramp (11.8); with the
+/// software block goes the nominal speed 0. Confirmed is a drive whose `Flags` show what it was told (14.4.2) and
+/// that stands. A ring that does not answer is given the stops all the same, as drives in front of a break hear
+/// them.
+///
+/// It ends within about 15 seconds a ring, and the time to stand a step for a drive that does not stop.
+pub fn safe_state(line: &mut dyn Line, rings: &[RingSize], standing: &Standing) -> SafeState {
+    let mut not_safe = Vec::new();
+    for (ring, &size) in rings.iter().enumerate() {
+        not_safe.extend(ring_to_safe_state(line, ring, size, standing));
+    }
+    if not_safe.is_empty() {
+        SafeState::Confirmed(rings.to_vec())
+    } else {
+        SafeState::NotConfirmed(not_safe)
+    }
+}
+
+fn ring_to_safe_state(
+    line: &mut dyn Line,
+    ring: usize,
+    size: RingSize,
+    standing: &Standing,
+) -> Vec<NotSafe> {
+    let all = |why: String| {
+        let axes = (0..size.drives()).filter_map(|drive| Axis::new(ring, drive));
+        let not_safe = axes.map(|axis| NotSafe {
+            axis,
+            why: why.clone(),
+        });
+        not_safe.collect()
+    };
+    if let Err(why) = bring_back(line, ring, size) {
+        stop_blindly(line, ring, size);
+        return all(why);
+    }
+    let options = Options {
+        patience: Span::from_millis(2_000),
+        ..Options::default()
+    };
+    let line = OneRing { line, ring };
+    let bus = match Bus::open(Box::new(line), &[size], options) {
+        Ok(bus) => bus,
+        Err(error) => return all(error.to_string()),
+    };
+    // The bus has one ring, whichever it is of the bench.
+    let axes = (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
+    let mut drives: Vec<_> = axes.map(Told::new).collect();
+    let mut told = 0;
+    for step in &standing.order {
+        for command in step.commands() {
+            let answers = together(&bus, &drives, command);
+            for (drive, answer) in drives.iter_mut().zip(answers) {
+                drive.note(answer.err());
+            }
+        }
+        told |= step.flag();
+        wait_until_seen(&bus, &mut drives, told, standing);
+    }
+    bus.close();
+    let not_safe = drives.into_iter().filter_map(|drive| {
+        Some(NotSafe {
+            axis: Axis::new(ring, drive.axis.drive())?,
+            why: drive.why?,
+        })
+    });
+    not_safe.collect()
+}
+
+/// A drive on its way to the safe state.
+struct Told {
+    axis: Axis,
+    /// Why it is not there.
+    why: Option<String>,
+    /// Since when it has been standing.
+    stood: Option<Instant>,
+    seen: bool,
+}
+
+impl Told {
+    const fn new(axis: Axis) -> Self {
+        Self {
+            axis,
+            why: None,
+            stood: None,
+            seen: false,
+        }
+    }
+
+    fn note(&mut self, why: Option<String>) {
+        self.why = self.why.take().or(why);
+    }
+}
+
+/// One command for every drive, all on their way at once: the last drive of a long ring must not wait for the answers of the
+/// others. Where one answer does not come, nobody waits for those behind it.
+fn together(bus: &Bus<'_>, drives: &[Told], command: Command) -> Vec<Result<Option<u32>, String>> {
+    let start = |drive: &Told| bus.start(drive.axis, |k| Job::new(k, command));
+    let orders: Vec<_> = drives.iter().map(start).collect();
+    let mut lost: Option<String> = None;
+    let result = |order: Result<Order, Error>| match (&lost, order) {
+        (Some(lost), _) => Err(lost.clone()),
+        (None, order) => order.and_then(|order| bus.result(order)).map_err(|error| {
+            let text = error.to_string();
+            lost = Some(text.clone());
+            text
+        }),
+    };
+    orders.into_iter().map(result).collect()
+}
+
+/// Waits until every drive shows what it was told, and stands. One that did not stop before is not waited for again.
+fn wait_until_seen(bus: &Bus<'_>, drives: &mut [Told], told: u8, standing: &Standing) {
+    let read = |drives: &[Told], address, whole| {
+        let command = match whole {
+            true => Command::ReadWord { address },
+            false => Command::ReadByte { address },
+        };
+        together(bus, drives, command)
+    };
+    let ranges = read(drives, ram::SW_VERSION2, false);
+    let begin = bus.now();
+    for drive in drives.iter_mut() {
+        (drive.seen, drive.stood) = (false, None);
+    }
+    loop {
+        let found = read(drives, ram::FLAGS, false);
+        let speeds = read(drives, ram::NIST, true);
+        let now = bus.now();
+        let answers = ranges.iter().zip(found).zip(speeds);
+        for (drive, ((range, found), speed)) in drives.iter_mut().zip(answers) {
+            if drive.seen {
+                continue;
+            }
+            let (range, found, raw) = match (range.clone(), found, speed) {
+                (Ok(Some(range)), Ok(Some(found)), Ok(Some(speed))) => {
+                    let [.., range] = range.to_be_bytes();
+                    let [.., found] = found.to_be_bytes();
+                    let [_, _, high, low] = speed.to_be_bytes();
+                    (range, found, i16::from_be_bytes([high, low]))
+                }
+                (Err(why), ..) | (_, Err(why), _) | (.., Err(why)) => {
+                    drive.note(Some(why));
+                    drive.seen = true;
+                    continue;
+                }
+                _ => continue,
+            };
+            let range = SpeedRange::from_sw_version2(range);
+            let speed = speed_from_raw(raw, range).to_f64();
+            let stands = speed.abs() <= standing.rpm;
+            drive.stood = stands.then(|| drive.stood.unwrap_or(now));
+            if stands && found & told == told {
+                drive.seen = true;
+                continue;
+            }
+            let within = match drive.why {
+                None => standing.within,
+                Some(_) => FLAGS,
+            };
+            let late = match drive.stood {
+                None => now >= begin + within,
+                Some(stood) => now >= stood + FLAGS,
+            };
+            if late {
+                drive.seen = true;
+                drive.note(Some(format!(
+                    "waited {} for drive {} to do as told and to stand (Flags are {found:02X}, {told:02X} of them told; nist is {speed:.1} rpm)",
+                    now.since(begin),
+                    drive.axis
+                )));
+            }
+        }
+        if drives.iter().all(|drive| drive.seen) {
+            return;
+        }
+    }
+}
+
+/// Ends what was half-sent and brings the ring back (ND21 9.8).
+fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), String> {
+    let mut why = String::new();
+    for _ in 0..ATTEMPTS {
+        let sent = line.send(ring, &CHECK_SEQUENCE);
+        while line.now() < sent && line.wait(sent) {}
+        let recovery = recover(line, ring);
+        if recovery.drives == Some(size) {
+            return Ok(());
+        }
+        let reported = recovery.after.or(recovery.before);
+        why = match (line.trouble(), recovery.drives, reported) {
+            (Some(trouble), ..) => return Err(trouble.to_string()),
+            (None, Some(found), _) => format!(
+                "the ring has {} drives, not {} as expected",
+                found.drives(),
+                size.drives()
+            ),
+            (None, None, Some(drive)) => {
+                format!("the ring is broken in front of drive {drive} (ND21 9.7, 9.9)")
+            }
+            (None, None, None) => "the ring does not answer".to_owned(),
+        };
+    }
+    Err(why)
+}
+
+/// The check sequence (9.8) and the software stop for every drive of a ring (14.10): for whoever can wait for no answer.
+#[must_use]
+pub fn blind_stop(size: RingSize) -> Vec<u8> {
+    let mut bytes = CHECK_SEQUENCE.to_vec();
+    let stop = Command::Or {
+        address_low: ram::STATUS.to_be_bytes()[1],
+        data: status::STOP,
+    };
+    for drive in 0..size.drives() {
+        bytes.extend(telegram(size, drive, stop));
+    }
+    bytes
+}
+
+/// A telegram with a command and nothing else to a drive of a ring, its address spelled out (ND21 9.2); empty for a drive that the ring
+/// does not have.
+pub(crate) fn telegram(size: RingSize, drive: u8, command: Command) -> Vec<u8> {
+    let net = command.encode();
+    let length = u8::try_from(net.len()).unwrap_or(u8::MAX);
+    let header = Header::new(Addressing::AddressFollows, false, length);
+    let (Ok(header), Ok(address)) = (header, size.address_byte(drive)) else {
+        return Vec::new();
+    };
+    let mut bytes = vec![SyncByte::Telegram(header).encode(), address];
+    bytes.extend(&net[..]);
+    bytes
+}
+
+fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
+    if matches!(line.trouble(), Some(Trouble::Lost(_))) {
+        return;
+    }
+    let sent = line.send(ring, &blind_stop(size));
+    while line.now() < sent && line.wait(sent) {}
+}
+
+/// How long `Flags` may take to follow: they do in the drive's next cycle.
+const FLAGS: Span = Span::from_millis(500);
+
+impl SafeStep {
+    /// What a drive is told (11.8, 14.10).
+    fn commands(self) -> Vec<Command> {
+        let status = |data| Command::Or {
+            address_low: ram::STATUS.to_be_bytes()[1],
+            data,
+        };
+        let stand = Command::WriteWord {
+            address: ram::NSOLL,
+            data: 0,
+        };
+        match self {
+            Self::Stop => vec![status(status::STOP)],
+            Self::Block => vec![stand, status(status::BLOCK)],
+        }
+    }
+
+    /// What `Flags` show of it (14.4.2).
+    const fn flag(self) -> u8 {
+        match self {
+            Self::Stop => flags::STOP,
+            Self::Block => flags::BLOCK,
+        }
+    }
+}
+
+/// One ring of a line, as a line of its own.
+struct OneRing<'l> {
+    line: &'l mut dyn Line,
+    ring: usize,
+}
+
+impl Line for OneRing<'_> {
+    fn byte_time(&self) -> Span {
+        self.line.byte_time()
+    }
+
+    fn now(&self) -> Instant {
+        self.line.now()
+    }
+
+    fn send(&mut self, _: usize, bytes: &[u8]) -> Instant {
+        self.line.send(self.ring, bytes)
+    }
+
+    fn receive(&mut self, _: usize) -> Option<(Instant, Received)> {
+        self.line.receive(self.ring)
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.line.wait(until)
+    }
+
+    fn attend(&mut self, _: usize, at: Instant) {
+        self.line.attend(self.ring, at);
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.line.trouble()
+    }
+
+    fn lead(&self) -> Lead {
+        self.line.lead()
+    }
+}

@@ -1,0 +1,344 @@
+//! The probes: a conversation for each property that the manual leaves open, and its possible values.
+
+use crate::buses::novobus::twin::Look;
+use crate::library::Entry;
+use crate::link::link_name;
+use crate::qualify::hypothesis::Hypothesis;
+use crate::scenario::plan::Exchange;
+use crate::scenario::problem::Problems;
+use crate::scenario::source::Source;
+use harness_proto::nd21::bits::{flags2, ps_status, status};
+use harness_proto::nd21::ram;
+use harness_proto::novobus::command::Command;
+use harness_proto::novobus::properties::PROPERTIES;
+use harness_sim::nd21::PROPERTIES as OF_THE_DRIVE;
+use include_dir::{Dir, include_dir};
+use std::collections::BTreeSet;
+
+static FILES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/novobus");
+
+static OF_DRIVES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/nd21");
+
+static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/novobus");
+
+/// What stands for a drive's number in a conversation that is played for several: the first ones, the middle one and the
+/// last one.
+const EACH: &str = "{drive}";
+
+/// What stands for a silence, and what is put there: halves, since computers are not on time.
+const GAP: &str = "{gap}";
+const GAPS: [&str; 3] = ["12.5ms", "15.5ms", "18.5ms"];
+
+/// What stands for telegrams that switch the monitoring of time-outs on or off in every drive (14.10.2), one behind the other: while the
+/// last drives are told, the first ones miss their bytes already where there is a gap (9.9).
+const MONITORING: [(&str, u8); 2] = [
+    ("{monitoring on}", flags2::MONITORING),
+    ("{monitoring off}", 0),
+];
+
+/// Times that a time-out may have, in milliseconds (ND21 9.9: 10 to 20).
+const TIME_OUTS: std::ops::RangeInclusive<u64> = 10..=20;
+
+/// Times that a drive may wait behind it, in milliseconds, the manual's first (9.9).
+const WAITS: [u64; 11] = [10, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15];
+
+/// A probe for a ring of a given size.
+#[derive(Clone, Debug)]
+pub struct Probe {
+    /// The property that it settles.
+    pub property: &'static str,
+    /// The section that leaves it open.
+    pub section: &'static str,
+    /// What the property decides.
+    pub about: &'static str,
+    /// Who is asked.
+    pub asked: Asked,
+    /// What is taken for granted: the header lines of the scenario language that make it so.
+    pub assumed: Vec<String>,
+    /// The conversations.
+    pub entries: Vec<Entry>,
+}
+
+/// Who is asked by a probe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// The whole ring: every drive answers with its end of the bus.
+    Ring,
+    /// One drive, by these cells.
+    Drive(u8, &'static [Look]),
+}
+
+/// The cells by which a drive is asked for a property of its own.
+const LOOKS: &[(&str, &[Look])] = &[
+    ("eeprom-read-time", &[look(ram::EEPROM_CONTROL, 0x20)]),
+    ("eeprom-write-time", &[look(ram::EEPROM_CONTROL, 0x10)]),
+    ("self-test-time", &[look(ram::STATUS, status::RESET)]),
+    ("self-test-bus", &[]),
+    (
+        "ps-calculation-time",
+        &[look(ram::PS_STATUS, ps_status::CALCULATED)],
+    ),
+    // The limit of the current that holds now is imax, and i0 behind the property's time; and the motor must have had all of it.
+    (
+        "i2t-time",
+        &[
+            look(ram::MMAX, 0xFF),
+            look(ram::STATUS, status::CURRENT_LIMIT),
+        ],
+    ),
+    ("s-ramp-wire", &[look(ram::PS_STATUS, 0xFF)]),
+    // 4096 turns are to be told from 28,672 of them, some more or less.
+    ("ps-position", &[look(ram::PS_UMDREHUNG, 0x60)]),
+    (
+        "bus-errors",
+        &[
+            look(ram::STATUS, status::ERROR),
+            look(ram::ERRORCODE, 0xFF),
+            look(ram::ERRORCODE + 1, 0xFF),
+        ],
+    ),
+];
+
+const fn look(address: u16, mask: u8) -> Look {
+    Look { address, mask }
+}
+
+/// The drives of a ring that are asked one by one: the first ones, the middle one and the last one.
+fn some_drives(drives: u8) -> BTreeSet<u8> {
+    let some = [0, 1, drives / 2, drives.saturating_sub(1)];
+    some.into_iter().filter(|drive| *drive < drives).collect()
+}
+
+/// The conversation of a property.
+fn text(files: &'static Dir<'_>, property: &str) -> Option<&'static str> {
+    files.get_file(format!("{property}.scn"))?.contents_utf8()
+}
+
+/// The probes for a ring of `drives`: those of the bus, then those of the drives behind it.
+///
+/// # Errors
+/// A probe has mistakes.
+pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
+    let mut probes = Vec::new();
+    for property in &PROPERTIES {
+        let Some(text) = text(&FILES, property.name) else {
+            continue;
+        };
+        let entries = match text.contains(GAP) {
+            true => {
+                let each = GAPS.iter().map(|gap| {
+                    let name = format!("{}-{gap}", property.name);
+                    probe(&name, &text.replace(GAP, gap), drives)
+                });
+                each.collect::<Result<_, _>>()?
+            }
+            false => vec![probe(property.name, text, drives)?],
+        };
+        probes.push(Probe {
+            property: property.name,
+            section: property.section,
+            about: property.about,
+            asked: Asked::Ring,
+            assumed: Vec::new(),
+            entries,
+        });
+    }
+    for property in &OF_THE_DRIVE {
+        let looks = LOOKS.iter().find(|(name, _)| *name == property.name);
+        let Some((text, (_, looks))) = text(&OF_DRIVES, property.name).zip(looks) else {
+            continue;
+        };
+        for drive in some_drives(drives) {
+            let name = format!("{}-drive-{drive}", property.name);
+            let text = text.replace(EACH, &drive.to_string());
+            probes.push(Probe {
+                property: property.name,
+                section: property.section,
+                about: property.about,
+                asked: Asked::Drive(drive, looks),
+                // 5.3.3: the two inputs that release and start a drive, of which the bus shows nothing.
+                assumed: vec![format!("drive {drive} input GPIN3 GPIN5 high")],
+                entries: vec![probe(&name, &text, drives)?],
+            });
+        }
+    }
+    Ok(probes)
+}
+
+fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
+    let mut text = text.to_owned();
+    for (stands, data) in MONITORING {
+        if text.contains(stands) {
+            text = text.replace(stands, &telegrams(drives, ram::FLAGS2, data));
+        }
+    }
+    let source = Source {
+        name: format!("probe-{name}"),
+        text: text.into(),
+    };
+    Entry::new(source, Some(drives))
+}
+
+/// The telegrams that write a byte to a cell of every drive (9.1, 10.2), the first drive behind the master first, as a scenario has bytes.
+fn telegrams(drives: u8, address: u16, data: u8) -> String {
+    let command = Command::WriteByte { address, data };
+    let all = (0..drives).rev();
+    let all = all.filter_map(|drive| Exchange::new(drives, drive, command));
+    let bytes = all.flat_map(|exchange| exchange.bytes);
+    let bytes: Vec<_> = bytes.map(|byte| format!("{byte:02X}")).collect();
+    bytes.join(" ")
+}
+
+/// The longest silence before a drive sends zeros that the manual allows, in milliseconds: 20 and 10 (9.9).
+const LONGEST_SILENCE: u64 = 30;
+
+/// What stands for a link in a conversation that is played for every link that faults can be put on, and for the drive behind it.
+const LINK: &str = "{link}";
+const RECEIVER: &str = "{receiver}";
+
+/// The conversations of a qualification, for a ring of `drives`, by their names; `reaches` says on which links faults can be put.
+///
+/// # Errors
+/// One of them has mistakes.
+pub fn conversations(
+    drives: u8,
+    reaches: &dyn Fn(usize) -> bool,
+) -> Result<Vec<Entry>, Box<Problems>> {
+    let mut files: Vec<_> = CONVERSATIONS.files().collect();
+    files.sort_by_key(|file| file.path().to_owned());
+    let named = files.into_iter().filter_map(|file| {
+        let name = file.path().file_stem()?.to_str()?;
+        Some((name, file.contents_utf8()?))
+    });
+    let mut entries = Vec::new();
+    for (name, text) in named {
+        if text.contains(LINK) {
+            // Places are counted from the master's outgoing link; behind the last drive there is no drive that would locate a fault.
+            for place in (0..drives).filter(|place| reaches(usize::from(*place))) {
+                let link = link_name(0, drives, usize::from(place));
+                let receiver = (drives - 1 - place).to_string();
+                let source = Source {
+                    name: format!("qualify-{name}-{}", link.replace("->", "-to-")),
+                    text: text
+                        .replace(LINK, &link)
+                        .replace(RECEIVER, &receiver)
+                        .into(),
+                };
+                entries.push(Entry::new(source, Some(drives))?);
+            }
+            continue;
+        }
+        let each = match text.contains(EACH) {
+            false => BTreeSet::from([0]),
+            true => some_drives(drives),
+        };
+        for drive in each {
+            let several = text.contains(EACH);
+            let source = Source {
+                name: match several {
+                    true => format!("qualify-{name}-drive-{drive}"),
+                    false => format!("qualify-{name}"),
+                },
+                text: text.replace(EACH, &drive.to_string()).into(),
+            };
+            entries.push(Entry::new(source, Some(drives))?);
+        }
+    }
+    Ok(entries)
+}
+
+/// What a property of the bus may be: every drive alike, and then one drive otherwise than the others.
+#[must_use]
+pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
+    let known = PROPERTIES.iter().find(|known| known.name == property);
+    let values: Vec<String> = match (property, known.map(|known| known.values)) {
+        (_, None) => return Vec::new(),
+        ("time-out", _) => return time_outs(),
+        ("time-out-wait", _) => WAITS.iter().map(|ms| format!("{ms}ms")).collect(),
+        (_, Some(words)) => words.iter().map(|&word| word.to_owned()).collect(),
+    };
+    let mut hypotheses: Vec<_> = values.iter().map(|value| alike(property, value)).collect();
+    let differing = values.iter().flat_map(|value| {
+        let others = values.iter().filter(move |other| *other != value);
+        others.flat_map(move |other| {
+            (0..drives).map(move |drive| (value.clone(), other.clone(), drive))
+        })
+    });
+    // More than this tells nothing that a person would read.
+    let times = values.len() > 2;
+    let differing = differing.take(if drives > 1 && !times { 1_000 } else { 0 });
+    hypotheses.extend(differing.map(|(value, other, drive)| Hypothesis {
+        name: format!("{value}, but drive {drive} {other}"),
+        lines: vec![
+            format!("drive 0..last property {property} = {value}"),
+            format!("drive {drive} property {property} = {other}"),
+        ],
+    }));
+    hypotheses
+}
+
+fn alike(property: &str, value: &str) -> Hypothesis {
+    Hypothesis {
+        name: value.to_owned(),
+        lines: vec![format!("drive 0..last property {property} = {value}")],
+    }
+}
+
+/// When drives may miss their bytes: with the manual's wait behind it and an answer, then with what else the two other
+/// properties of a time-out may be, since all three show together.
+fn time_outs() -> Vec<Hypothesis> {
+    let mut hypotheses = Vec::new();
+    // The first is what a drive does where nothing is said.
+    let waits = std::iter::once(None).chain(WAITS.into_iter().skip(1).map(Some));
+    for wait in waits {
+        for silent in [false, true] {
+            let longest = LONGEST_SILENCE - wait.unwrap_or(10);
+            for ms in TIME_OUTS.filter(|ms| *ms <= longest) {
+                let mut hypothesis = alike("time-out", &format!("{ms}ms"));
+                let wait = wait.map(|ms| alike("time-out-wait", &format!("{ms}ms")));
+                let silent = silent.then(|| alike("time-out-answer", "silent"));
+                for more in wait.into_iter().chain(silent) {
+                    hypothesis.lines.extend(more.lines);
+                }
+                hypotheses.push(hypothesis);
+            }
+        }
+    }
+    hypotheses
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ND21 9.7: the drive that a damaged byte comes to spells out its address.
+    #[test]
+    fn every_reachable_link_is_located() {
+        let names = |drives, reaches: &dyn Fn(usize) -> bool| -> Vec<String> {
+            let entries = conversations(drives, reaches).expect("no mistakes");
+            let names = entries.iter().map(|entry| entry.short_name().to_owned());
+            names.filter(|name| name.contains("location")).collect()
+        };
+        let own = names(3, &|place| place == 0);
+        assert_eq!(own, ["qualify-location-master-to-2"]);
+        let inner = names(3, &|place| place < 2);
+        assert_eq!(
+            inner,
+            ["qualify-location-master-to-2", "qualify-location-2-to-1"]
+        );
+        assert_eq!(names(250, &|_| true).len(), 250);
+    }
+
+    #[test]
+    fn every_property_has_a_probe() {
+        let probes = probes(3).expect("no mistakes");
+        let asked = probes.iter().map(|probe| probe.property);
+        let asked: BTreeSet<_> = asked.collect();
+        let of_the_bus = PROPERTIES.iter().map(|property| property.name);
+        let of_drives = OF_THE_DRIVE.iter().map(|property| property.name);
+        let all: BTreeSet<_> = of_the_bus.chain(of_drives).collect();
+        assert_eq!(asked, all);
+        assert_eq!(hypotheses("read-long", 3).len(), 2 + 2 * 3);
+        assert_eq!(hypotheses("read-long", 1).len(), 2);
+    }
+}

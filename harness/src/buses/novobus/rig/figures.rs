@@ -1,0 +1,192 @@
+//! What a rig shows of itself: who its drives are, how long a byte takes round its rings, and what went wrong meanwhile.
+
+use super::line_test;
+use crate::buses::novobus::driver::{self, Axis, Bus, Identity, State};
+use crate::link::{Line, Link};
+use crate::rig::Rig;
+use crate::rig::session::{End, Session};
+use crate::rig::shared::Shared;
+use harness_proto::line::Rate;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::sync::SYNCO;
+use harness_proto::time::Span;
+
+/// How many SYNCO go round one by one.
+const ROUNDS: usize = 64;
+/// How much longer than the ring needs a byte may take before it counts as lost.
+const PATIENCE: Span = Span::from_millis(300);
+/// Drives that are asked for their EEPROM at a time.
+const SIDE_BY_SIDE: usize = 25;
+
+/// What was measured on a ring.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RingFigures {
+    /// How many drives answer.
+    pub size: RingSize,
+    /// The rate at which SYNCO without a gap comes back (ND21 8.3, 9.2).
+    pub rate: Rate,
+    /// How long the ring itself needs for a byte, by the rule that each drive takes one byte time (ND21 8.2).
+    pub nominal: Span,
+    /// How long it took: from the shortest to the longest, sorted; what does not come back is missing.
+    pub rounds: Vec<Span>,
+    /// SYNCO that did not come back, or not as such (9.2).
+    pub lost: usize,
+    /// Bytes that came with a line error, and errors that the transport told of without their bytes.
+    pub line_errors: u64,
+}
+
+impl RingFigures {
+    /// The shortest, the middle and the longest time round the ring; `None` where nothing came back.
+    #[must_use]
+    pub fn spread(&self) -> Option<[Span; 3]> {
+        let first = *self.rounds.first()?;
+        let last = *self.rounds.last()?;
+        Some([first, self.rounds[self.rounds.len() / 2], last])
+    }
+}
+
+/// A drive as it shows itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DriveFigures {
+    /// Which.
+    pub axis: Axis,
+    /// What its EEPROM says of it (14.8).
+    pub identity: Identity,
+    /// Its mode and error.
+    pub state: State,
+    /// What the rig's file says otherwise, in a sentence.
+    pub contradiction: Option<String>,
+}
+
+/// What a rig shows.
+#[derive(Clone, Debug)]
+pub struct Figures {
+    /// Its rings, in order.
+    pub rings: Vec<RingFigures>,
+    /// Its drives, in order.
+    pub drives: Vec<DriveFigures>,
+    /// Errors on the rings that were corrected while drives were read (11.5).
+    pub corrected: u64,
+    /// Drives that reported a fault before the ring was brought back: ring and drive.
+    pub reported: Vec<(usize, u8)>,
+}
+
+/// Measures a rig in use and gives it back with its drives as they are, or, where one does not answer, in its safe state. `told`
+/// hears of every drive that has been read.
+pub fn measure(
+    mut session: Session,
+    told: &mut dyn FnMut(Axis),
+) -> (Result<Figures, driver::Error>, Option<End>) {
+    let reported = session.opening().map(|health| health.reported.clone());
+    let sizes = session.rings().to_vec();
+    let rings = (0..)
+        .zip(&sizes)
+        .map(|(ring, size)| round(&mut session, ring, *size));
+    let rings: Vec<_> = rings.collect();
+    let rig = session.rig().clone();
+    let shared = Shared::new(session);
+    match drives(&shared, &rig, &sizes, told) {
+        Ok((drives, corrected)) => {
+            let figures = Figures {
+                rings,
+                drives,
+                corrected,
+                reported: reported.unwrap_or_default(),
+            };
+            (Ok(figures), shared.release())
+        }
+        Err(error) => (Err(error), shared.close(true)),
+    }
+}
+
+/// Sends SYNCO one by one and waits for each.
+fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
+    let simulated = session.rig().is_simulated();
+    let stated = session.rig().file.ring.first.endpoint.line.into();
+    let link = session.link();
+    let rate = line_test::slower(link, ring, stated).unwrap_or(stated);
+    link.begin();
+    let nominal = link.byte_time() * u64::from(size.drives());
+    let mut rounds = Vec::new();
+    let (mut lost, mut line_errors) = (0, 0);
+    for _ in 0..ROUNDS {
+        let sent = link.send(ring, &[SYNCO]);
+        let end = sent + nominal + PATIENCE;
+        let back = loop {
+            match link.receive(ring) {
+                Some(back) => break Some(back),
+                None if link.now() >= end || link.trouble().is_some() => break None,
+                None => {
+                    link.wait(end);
+                }
+            }
+        };
+        match back {
+            Some((at, byte)) if byte.is(SYNCO) => rounds.push(at.since(sent)),
+            Some((_, byte)) => {
+                line_errors += u64::from(byte.error.is_some());
+                lost += 1;
+            }
+            None => lost += 1,
+        }
+        if link.trouble().is_some() {
+            break;
+        }
+    }
+    link.begin();
+    if !simulated && let Some(ports) = session.ports() {
+        line_errors += ports.take_unplaced();
+    }
+    rounds.sort_unstable();
+    RingFigures {
+        size,
+        rate,
+        nominal,
+        rounds,
+        lost,
+        line_errors,
+    }
+}
+
+fn drives(
+    shared: &Shared,
+    rig: &Rig,
+    sizes: &[RingSize],
+    told: &mut dyn FnMut(Axis),
+) -> Result<(Vec<DriveFigures>, u64), driver::Error> {
+    let bus = Bus::open(Box::new(shared.line()), sizes, driver::Options::default())?;
+    let mut drives = Vec::new();
+    for some in bus.axes().chunks(SIDE_BY_SIDE) {
+        for (axis, identity) in some.iter().zip(bus.identities(some)?) {
+            let state = bus.state(*axis)?;
+            let contradiction = contradiction(rig, *axis, &identity);
+            drives.push(DriveFigures {
+                axis: *axis,
+                identity,
+                state,
+                contradiction,
+            });
+            told(*axis);
+        }
+    }
+    let corrected = bus.corrected_errors();
+    bus.close();
+    Ok((drives, corrected))
+}
+
+/// What the rig's file says of a drive and the drive does not.
+fn contradiction(rig: &Rig, axis: Axis, identity: &Identity) -> Option<String> {
+    let own = |entry: &&crate::rig::file::DriveEntry| {
+        usize::from(entry.ring) == axis.ring() + 1 && entry.address == axis.drive()
+    };
+    let stated = rig.file.drive.iter().find(own)?.serial.as_deref()?;
+    let found = identity.serial_number;
+    // Written with leading zeros or without.
+    if stated.parse().ok() == found && found.is_some() {
+        return None;
+    }
+    let found = found.map_or("none".to_owned(), |found| format!("{found:06}"));
+    Some(format!(
+        "its serial number is {found}, the rig's file says {stated}"
+    ))
+}
