@@ -8,7 +8,7 @@ use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run_rig::{Job, reports, work};
 use super::tally::Tally;
-use crate::evidence::{About, EvidenceError, Folder, no_bus, too_large};
+use crate::evidence::{About, EvidenceError, Folder, too_large};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::{Link, Recording, SimulatedLink};
 use crate::report::html::Head;
@@ -16,7 +16,7 @@ use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
-use crate::scenario::run::{AtFinding, Finding, Outcome, play};
+use crate::scenario::run::{AtFinding, Finding, Outcome, Skip, play};
 use crate::scenario::simulate::simulated;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -219,7 +219,7 @@ pub(crate) struct Played {
 pub(crate) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
     let Some(plan) = &entry.plan else {
         return Played {
-            outcome: Outcome::skipped(no_bus(entry)),
+            outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
             traces: Vec::new(),
         };
     };

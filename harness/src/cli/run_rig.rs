@@ -15,7 +15,7 @@ use crate::link::{Line, Trouble};
 use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Options, Played, Rig, Run, Session, SessionError};
-use crate::scenario::run::Outcome;
+use crate::scenario::run::{Outcome, Skip, Why};
 use crate::scenario::verdict::Verdict;
 use crate::signals::interrupt_flag;
 use harness_proto::line::Rate;
@@ -214,7 +214,7 @@ fn all(
     }
     bar.finish_and_clear();
     for entry in left {
-        let outcome = Outcome::skipped("the run ended before it".to_owned());
+        let outcome = Outcome::skipped(Why::RunEnded.into());
         tally.not_reached(entry, &outcome);
         cases.note(entry, &outcome);
     }
@@ -249,7 +249,7 @@ pub(crate) fn play(
 ) -> Result<Played, Stop> {
     let Some(plan) = &entry.plan else {
         return Ok(Played {
-            outcome: Outcome::skipped("the rig has no such bus".to_owned()),
+            outcome: Outcome::skipped(Skip::not_on_rig(entry.scenario.bus)),
             attempts: Vec::new(),
         });
     };

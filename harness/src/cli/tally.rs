@@ -3,10 +3,10 @@
 
 use super::exit::Exit;
 use crate::library::Entry;
-use crate::scenario::run::Outcome;
+use crate::scenario::run::{Outcome, Unlock};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 /// The verdicts of a run so far.
@@ -18,29 +18,10 @@ pub(crate) struct Tally {
     skipped: Vec<(String, usize)>,
     /// Tables and examples of the manual that the selected scenarios pin, each with whether a scenario of it was judged.
     tables: BTreeMap<String, bool>,
-    /// What would let more scenarios be played, and how many each.
-    unlocks: BTreeMap<String, usize>,
+    /// What together would let more scenarios be played, and how many each.
+    unlocks: BTreeMap<BTreeSet<Unlock>, usize>,
     /// Some were selected and not reached.
     ended_early: bool,
-}
-
-/// What would let a scenario be played, from why it was skipped.
-fn unlock(why: &str) -> Option<String> {
-    if let Some(lacks) = why.strip_prefix("the rig has no ") {
-        // Looks into a drive, its plugs and its power need the simulator, whatever else is missing.
-        let place = lacks.strip_prefix("interposer at ");
-        let interposer = place.map(|place| format!("an interposer at {place}"));
-        return Some(interposer.unwrap_or_else(|| match lacks {
-            "interposer" => "interposers".to_owned(),
-            _ => "a simulated rig".to_owned(),
-        }));
-    }
-    let other = [
-        ("it is for", "rings of other sizes"),
-        ("the rig's [limits]", "more permissions in [limits]"),
-    ];
-    let found = other.iter().find(|(start, _)| why.starts_with(start));
-    found.map(|(_, what)| (*what).to_owned())
 }
 
 impl Tally {
@@ -50,10 +31,9 @@ impl Tally {
         for source in &entry.scenario.sources {
             *self.tables.entry(source.text.clone()).or_default() |= judged;
         }
-        if let Some(what) = outcome.remarks.first().and_then(|why| unlock(why))
-            && !judged
-        {
-            *self.unlocks.entry(what).or_default() += 1;
+        let unlocks = outcome.skip.as_ref().map(|skip| &skip.unlocks);
+        if let Some(unlocks) = unlocks.filter(|unlocks| !unlocks.is_empty()) {
+            *self.unlocks.entry(unlocks.clone()).or_default() += 1;
         }
         self.count(outcome);
     }
@@ -61,10 +41,10 @@ impl Tally {
     fn count(&mut self, outcome: &Outcome) {
         self.verdicts.push(outcome.verdict);
         self.took = self.took + outcome.took;
-        if let Some(reason) = outcome.reason_to_skip() {
-            match self.skipped.iter_mut().find(|(own, _)| own == reason) {
+        if let Some(reason) = outcome.skip.as_ref().map(|skip| skip.why.group()) {
+            match self.skipped.iter_mut().find(|(own, _)| *own == reason) {
                 Some((_, count)) => *count += 1,
-                None => self.skipped.push((reason.to_owned(), 1)),
+                None => self.skipped.push((reason, 1)),
             }
         }
     }
@@ -90,9 +70,13 @@ impl Tally {
         );
         let mut unlocks: Vec<_> = self.unlocks.iter().collect();
         unlocks.sort_by_key(|(what, count)| (std::cmp::Reverse(**count), *what));
+        let together = |what: &BTreeSet<Unlock>| {
+            let what: Vec<_> = what.iter().map(Unlock::to_string).collect();
+            what.join(" and ")
+        };
         let unlocks: Vec<_> = unlocks
             .iter()
-            .map(|(what, count)| format!("{what} ({count})"))
+            .map(|(what, count)| format!("{} ({count})", together(what)))
             .collect();
         if !unlocks.is_empty() {
             let _infallible = writeln!(text, "more scenarios with: {}", unlocks.join(", "));
@@ -131,7 +115,10 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::link::Capability;
+    use crate::scenario::run::{Skip, Why};
     use crate::scenario::source::Source;
+    use harness_proto::novobus::guard::Setting;
 
     fn of(outcomes: &[Outcome]) -> Tally {
         let mut tally = Tally::default();
@@ -146,42 +133,53 @@ mod tests {
         tally
     }
 
-    fn skipped(why: &str) -> Outcome {
-        Outcome::skipped(why.to_owned())
+    fn lacks(missing: &[Capability], unlocks: impl IntoIterator<Item = Unlock>) -> Outcome {
+        Outcome::skipped(Skip::from(Why::Lacks(missing.to_vec())).and(unlocks))
+    }
+
+    fn no_interposer(place: &str) -> Outcome {
+        let place = place.to_owned();
+        let why = Skip::from(Why::NoInterposer(place.clone()));
+        Outcome::skipped(why.and([Unlock::Interposer(place)]))
     }
 
     fn passed() -> Outcome {
         Outcome {
             verdict: Verdict::Passed,
-            ..skipped("")
+            ..Outcome::rig_error(String::new())
         }
     }
 
     #[test]
     fn what_was_not_played_is_named_in_groups() {
+        let limits = [Setting::Reset, Setting::Motion].map(Unlock::Limit);
+        let denied = Skip::from(Why::Denied("ring 1: byte 4".to_owned())).and(limits);
         let tally = of(&[
-            skipped("the rig has no interposer at 1->0"),
+            no_interposer("1->0"),
             passed(),
-            skipped("the rig has no power, no tap"),
-            skipped("the rig has no interposer at 2->1"),
-            skipped("it is for rings of another size (100 drives, the rig has 3)"),
-            skipped("the rig's [limits] do not let it be played to its end: ring 1: byte 4"),
+            lacks(
+                &[Capability::Power, Capability::Motion],
+                [Unlock::Simulated, Unlock::Limit(Setting::Motion)],
+            ),
+            no_interposer("2->1"),
+            Outcome::skipped(Skip::other_size(vec![100], vec![3])),
+            Outcome::skipped(denied),
         ]);
         assert_eq!(
             tally.summary(),
             "1 passed, 0 failed, 5 skipped (6 scenarios, 0.000 ms on the line)\n\
-             not played: 2 (the rig has no interposer), 1 (the rig has no power, no tap), \
+             not played: 2 (the rig has no interposer), 1 (the rig has no power, no motion), \
              1 (it is for rings of another size), 1 (the rig's [limits] do not let it be played to its end)\n\
              covered: 1 of 6 tables and examples of the manual that the selected scenarios pin\n\
-             more scenarios with: a simulated rig (1), an interposer at 1->0 (1), an interposer at 2->1 (1), \
-             more permissions in [limits] (1), rings of other sizes (1)\n"
+             more scenarios with: `allow_motion` in [limits] with --allow-motion and `allow_reset` in [limits] (1), an interposer at 1->0 (1), \
+             an interposer at 2->1 (1), rings of other sizes (1), a simulated rig (1)\n"
         );
         assert_eq!(of(&[passed()]).summary().lines().count(), 1);
     }
 
     #[test]
     fn a_run_that_ended_early_is_incomplete() {
-        let mut tally = of(&[passed(), skipped("the rig has no tap")]);
+        let mut tally = of(&[passed(), lacks(&[Capability::Tap], [])]);
         assert_eq!(tally.exit(false), Exit::Passed);
         assert_eq!(tally.exit(true), Exit::Incomplete);
         tally.ended_early = true;

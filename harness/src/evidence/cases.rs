@@ -5,11 +5,10 @@ use super::record::Line;
 use super::verify::{Judged, Opened};
 use crate::library::Entry;
 use crate::link::Replay;
-use crate::rig::run::{DENIED, not_played};
-use crate::rig::{Again as Retries, Attempt, Played, Rig, other_size};
-use crate::scenario::run::Outcome;
+use crate::rig::run::not_played;
+use crate::rig::{Again as Retries, Attempt, Played, Rig};
+use crate::scenario::run::{DENIED, Outcome, Skip, Why};
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Bus;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 
@@ -207,8 +206,8 @@ impl Opened {
     fn skipped(&self, entry: &Entry, remarks: &[String]) -> Option<Outcome> {
         let header = &self.header;
         let why = match (&entry.plan, header.own_rings) {
-            (None, true) => no_bus(entry),
-            (None, false) => "the rig has no such bus".to_owned(),
+            (None, true) => Skip::no_bus(entry.scenario.bus),
+            (None, false) => Skip::not_on_rig(entry.scenario.bus),
             (Some(_), true) => too_large(entry, &self.rig)?,
             (Some(plan), false) => {
                 let link = Replay::new(
@@ -221,10 +220,10 @@ impl Opened {
                 .reaching(super::attempt::reached(&self.rig, header));
                 // What the guard knew of the drives is not in the record.
                 let limited = !header.limits.allow_everything();
-                let denied = remarks
-                    .first()
-                    .filter(|own| limited && own.starts_with(DENIED));
-                not_played(plan, &link, &header.rings).or_else(|| denied.cloned())?
+                let words = remarks.first().and_then(|own| own.strip_prefix(DENIED));
+                let denied = words.filter(|_| limited);
+                let denied = denied.map(|words| Why::Denied(words.to_owned()).into());
+                not_played(plan, &link, &header.rings).or(denied)?
             }
         };
         Some(Outcome::skipped(why))
@@ -233,18 +232,9 @@ impl Opened {
 
 /// Why a scenario does not fit the rings of a rig on which each scenario has rings of its own; `None` where it does.
 #[must_use]
-pub fn too_large(entry: &Entry, rig: &Rig) -> Option<String> {
+pub fn too_large(entry: &Entry, rig: &Rig) -> Option<Skip> {
     let plan = entry.plan.as_ref()?;
     let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
     let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
-    (own != sizes).then(|| other_size(&own, &sizes))
-}
-
-/// What is said of a scenario for a bus that the bench does not have.
-#[must_use]
-pub fn no_bus(entry: &Entry) -> String {
-    let bus = entry.scenario.bus;
-    let name = Bus::NAMES.iter().find(|(_, known)| *known == bus);
-    let bus = name.map_or("", |(name, _)| name);
-    format!("the bench has no bus `{bus}` yet")
+    (own != sizes).then(|| Skip::other_size(own, sizes))
 }

@@ -260,6 +260,7 @@ fn show(
         took: case.took,
         records: judged.map_or_else(Vec::new, |outcome| outcome.records.clone()),
         unready: None,
+        skip: None,
     };
     let again = match attempt {
         Some(attempt) => format!(

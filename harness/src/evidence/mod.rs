@@ -30,7 +30,7 @@ mod rerun;
 mod signature;
 mod verify;
 
-pub use cases::{no_bus, too_large};
+pub use cases::too_large;
 pub use derive::{Derived, derive};
 pub use files::{PAGE, RIG};
 pub use folder::{About, EvidenceError, Folder, Kept};

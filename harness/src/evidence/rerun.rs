@@ -6,7 +6,7 @@ use super::record::Line;
 use super::verify::{Opened, text_of};
 use crate::link::{Event, Sink};
 use crate::rig::{Alarm, Attempt, Keeper, Options, Played, Run, Session};
-use crate::scenario::run::Outcome;
+use crate::scenario::run::{Outcome, Skip};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -87,7 +87,7 @@ fn scenario(
     // A run of an earlier version has begun what the limits deny, and its record has the attempt.
     run.rehearse(lines.len() == 1);
     let outcome = match &entry.plan {
-        None => Outcome::skipped("the rig has no such bus".to_owned()),
+        None => Outcome::skipped(Skip::not_on_rig(entry.scenario.bus)),
         Some(plan) => match run.play(plan, Some(&mut tape)) {
             Ok(Played { outcome, .. }) => outcome,
             Err(error) => Outcome::rig_error(error.to_string()),

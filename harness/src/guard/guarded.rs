@@ -14,7 +14,7 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
-use harness_proto::novobus::guard::{Denial, Found, Guard, Limits};
+use harness_proto::novobus::guard::{Cause, Denial, Found, Guard, Limits, Setting};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -30,6 +30,8 @@ pub struct Guarded<L> {
     rings: Vec<Ring>,
     limits: Limits,
     trouble: Option<Trouble>,
+    /// The settings that denied what is the trouble.
+    denying: Vec<Setting>,
     capabilities: Vec<Capability>,
     /// When the present conversation began, on the guard's clock, which is never set back.
     origin: Instant,
@@ -77,6 +79,7 @@ impl<L: Line> Guarded<L> {
             rings: sizes.iter().map(ring).collect(),
             limits,
             trouble: None,
+            denying: Vec::new(),
             capabilities: Vec::new(),
             origin: Instant::START,
             refused: 0,
@@ -215,9 +218,17 @@ impl<L: Line> Guarded<L> {
         self.origin + at.since_start()
     }
 
-    fn deny(&mut self, text: String) {
+    /// The settings of the rig's `[limits]` that have denied something; empty where it is denied whatever they are.
+    #[must_use]
+    pub fn denying(&self) -> &[Setting] {
+        &self.denying
+    }
+
+    fn deny(&mut self, text: String, cause: Option<Cause>) {
         if self.trouble.is_none() {
             self.trouble = Some(Trouble::Denied(text));
+            let denying = cause.map(|cause| self.limits.denying(cause).collect());
+            self.denying = denying.unwrap_or_default();
         }
     }
 }
@@ -321,7 +332,7 @@ impl<L: Line> Line for Guarded<L> {
         let now = self.inner.now();
         let guard_time = self.on_guard_clock(now);
         let Some(state) = self.rings.get_mut(ring) else {
-            self.deny(format!("ring {} is not in the rig's file", ring + 1));
+            self.deny(format!("ring {} is not in the rig's file", ring + 1), None);
             return now;
         };
         self.refused = bytes.len();
@@ -342,7 +353,7 @@ impl<L: Line> Line for Guarded<L> {
         self.refused = bytes.len() - admitted;
         let end = self.inner.send(ring, &bytes[..admitted]);
         if let Some(denial) = denial {
-            self.deny(format!("ring {}: {denial}", ring + 1));
+            self.deny(format!("ring {}: {denial}", ring + 1), Some(denial.cause));
         }
         end
     }
@@ -433,11 +444,12 @@ impl<L: Link> Link for Guarded<L> {
                     }
                 }
                 Verdict::Open => {
-                    self.deny(format!(
+                    let why = format!(
                         "ring {}: the fault {fault:?} is not made: what drives take changed or lost bytes for cannot be \
                          judged, so it needs everything allowed in the rig's [limits], --allow-motion, and no `max_speed`",
                         ring + 1
-                    ));
+                    );
+                    self.deny(why, Some(Cause::InDoubt));
                     return;
                 }
             }
@@ -455,7 +467,7 @@ impl<L: Link> Link for Guarded<L> {
         }
         let mut guard = state.guard.clone();
         if let Err(denial) = (0..count).try_for_each(|_| guard.admit(now, SYNCO, false)) {
-            self.deny(format!("ring {}: {denial}", ring + 1));
+            self.deny(format!("ring {}: {denial}", ring + 1), Some(denial.cause));
             return Vec::new();
         }
         // A simulated link probes a copy of itself.

@@ -41,7 +41,6 @@ pub(crate) use open::line_rate;
 pub(crate) use played::Again;
 pub use played::{Attempt, Played};
 pub use profile::{KnownProfile, Profile, ProfileError, Settled};
-pub(crate) use run::other_size;
 pub use run::{Keeper, Run, Way, play_one};
 pub use schema::schema;
 pub(crate) use session::limits;

@@ -2,7 +2,7 @@
 
 use super::driven::Driven;
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
-use crate::scenario::run::{Outcome, Unready};
+use crate::scenario::run::{Outcome, Skip, Unready, Why};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
@@ -85,9 +85,9 @@ pub struct Played {
 }
 
 impl Played {
-    pub(crate) fn skipped(why: String) -> Self {
+    pub(crate) fn skipped(skip: Skip) -> Self {
         Self {
-            outcome: Outcome::skipped(why),
+            outcome: Outcome::skipped(skip),
             attempts: Vec::new(),
         }
     }
@@ -96,7 +96,7 @@ impl Played {
     /// played and each time another drive gave no answer, it may have been the computer.
     pub(crate) fn of(attempts: Vec<Attempt>) -> Self {
         let mut played = Self {
-            outcome: Outcome::skipped("it was not played".to_owned()),
+            outcome: Outcome::skipped(Why::RunEnded.into()),
             attempts,
         };
         // What could not be played again takes nothing back.
@@ -242,7 +242,7 @@ mod tests {
                     DIFFERS => Some(Unready::Differs),
                     _ => None,
                 },
-                ..Outcome::skipped(remark.to_owned())
+                ..Outcome::rig_error(remark.to_owned())
             },
             conversations: Vec::new(),
             comparisons: Vec::new(),

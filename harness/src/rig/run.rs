@@ -13,9 +13,12 @@ use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
 use crate::rig::health::{Unhealthy, examine};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
-use crate::scenario::run::{AtFinding, Outcome, come_home, lacks, play_over_bus, start_anew};
+use crate::scenario::run::{
+    AtFinding, Outcome, Skip, Unlock, Why, come_home, lacks, play_over_bus, start_anew,
+};
 use crate::scenario::simulate;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::guard::{Limits, Setting};
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::MasterDeviation;
 use std::sync::Arc;
@@ -129,12 +132,9 @@ impl<'s> Run<'s> {
         let mut forgotten: Vec<Event> = Vec::new();
         let way = self.way();
         let recording = Recording::new(self.session.link(), &mut forgotten);
-        let why = not_played(plan, &recording, &way.rings).or_else(|| {
-            let why = self.denied(plan)?;
-            Some(format!("{DENIED}{why}"))
-        });
-        if let Some(why) = why {
-            return Ok(Played::skipped(why));
+        let lacks = not_played(plan, &recording, &way.rings);
+        if let Some(skip) = self.denied(plan, lacks) {
+            return Ok(Played::skipped(skip));
         }
         let mut attempts = Vec::new();
         let most = usize::from(self.session.rig().file.retry.attempts.max(self.least));
@@ -232,12 +232,16 @@ impl<'s> Run<'s> {
     /// How attempts go on this rig.
     #[must_use]
     pub fn way(&self) -> Way {
-        let limits = self.session.limits();
         Way {
             rings: self.session.rings().to_vec(),
             attempts: self.session.rig().examinations(),
-            anew: limits.reset && limits.motion && !self.as_they_are,
+            anew: self.resets(self.session.limits()),
         }
+    }
+
+    /// Whether every drive is reset before a scenario.
+    fn resets(&self, limits: Limits) -> bool {
+        limits.reset && limits.motion && !self.as_they_are
     }
 
     /// Whether a scenario is played on the model first, and skipped where the guard denies a byte of it there. By default it is.
@@ -253,23 +257,54 @@ impl<'s> Run<'s> {
         }
     }
 
-    /// What the guard refuses of a plan on the model.
-    fn denied(&self, plan: &Plan) -> Option<String> {
-        let rig = self.session.rig();
-        if !self.rehearses || self.session.limits().allow_everything() {
+    /// Why a plan is skipped that `lacks` something, or that the guard denies on the model; with all that would let it be played.
+    fn denied(&self, plan: &Plan, lacks: Option<Skip>) -> Option<Skip> {
+        let within_reach = |skip: &Skip| {
+            let never = [Unlock::Simulated, Unlock::OtherSize];
+            !never.iter().any(|own| skip.unlocks.contains(own))
+        };
+        if !self.rehearses || !lacks.as_ref().is_none_or(within_reach) {
+            return lacks;
+        }
+        let mut limits = self.session.limits();
+        let mut skip = lacks;
+        // Each turn changes a setting.
+        for _ in Setting::ALL {
+            let Some((why, denying)) = self.denied_within(plan, limits) else {
+                break;
+            };
+            let denied = skip.unwrap_or_else(|| Why::Denied(why).into());
+            skip = Some(denied.and(denying.iter().copied().map(Unlock::Limit)));
+            let allowed = denying.iter().fold(limits, |all, own| all.without(*own));
+            if allowed == limits {
+                break;
+            }
+            limits = allowed;
+        }
+        skip
+    }
+
+    /// What the guard refuses of a plan on the model, and by which settings.
+    fn denied_within(&self, plan: &Plan, limits: Limits) -> Option<(String, Vec<Setting>)> {
+        if limits.allow_everything() && limits.bytes_per_second.is_none() {
             return None;
         }
+        let rig = self.session.rig();
         // A simulated drive that is wrong on purpose is rehearsed as a right one too.
         let model = twin(rig, &known(rig)).ok()?.into_link();
-        let mut guarded = Guarded::new(model, self.session.limits());
+        let mut guarded = Guarded::new(model, limits);
         // The model's drives have just been made.
         guarded.assume_fresh();
         guarded.know_as(self.session.guarded());
         let mut forgotten: Vec<Event> = Vec::new();
         let mut recording = Recording::new(&mut guarded, &mut forgotten);
-        let _outcome = play_one(&mut recording, plan, &self.way());
+        let way = Way {
+            anew: self.resets(limits),
+            ..self.way()
+        };
+        let _outcome = play_one(&mut recording, plan, &way);
         match guarded.trouble() {
-            Some(Trouble::Denied(why)) => Some(why.clone()),
+            Some(Trouble::Denied(why)) => Some((why.clone(), guarded.denying().to_vec())),
             _ => None,
         }
     }
@@ -368,16 +403,13 @@ pub(crate) fn opening(
     })
 }
 
-/// What is said of a scenario that the rig's limits do not let be played to its end; why stands behind it.
-pub(crate) const DENIED: &str = "the rig's [limits] do not let it be played to its end: ";
-
 /// Why a scenario is not played on rings of these sizes; `None` where it is, unless the rig's limits deny it.
-pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<String> {
-    let sizes = |rings: &[RingSize]| -> Vec<u8> { rings.iter().map(|r| r.drives()).collect() };
+pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Option<Skip> {
+    let sizes = |rings: &[RingSize]| rings.iter().map(|r| r.drives()).collect();
     // The size first: a link of another ring may have the number of one that there is.
     match plan.rings == rings {
         true => lacks(plan, link),
-        false => Some(other_size(&sizes(&plan.rings), &sizes(rings))),
+        false => Some(Skip::other_size(sizes(&plan.rings), sizes(rings))),
     }
 }
 
@@ -453,14 +485,4 @@ pub(crate) fn twin(rig: &Rig, lines: &[String]) -> Result<Twin, Problems> {
     let mut twin = Twin::new(simulate::bench(&plan), &plan.rings);
     twin.rest_through_self_tests();
     Ok(twin)
-}
-
-/// Why a scenario for rings of these sizes does not fit a rig.
-pub(crate) fn other_size(own: &[u8], rig: &[u8]) -> String {
-    let sizes = |rings: &[u8]| {
-        let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();
-        sizes.join(" and ")
-    };
-    let (own, rig) = (sizes(own), sizes(rig));
-    format!("it is for rings of another size ({own} drives, the rig has {rig})")
 }

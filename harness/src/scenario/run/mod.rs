@@ -5,6 +5,7 @@ pub(crate) mod halt;
 pub(crate) mod now;
 pub(crate) mod outcome;
 pub(crate) mod player;
+pub(crate) mod skip;
 
 pub use crate::buses::novobus::language::run::over_bus::{
     NotReady, play_over_bus, reset_drives, start_anew,
@@ -14,4 +15,6 @@ pub use crate::buses::novobus::language::run::record::{MAX_SAMPLES, Record, Samp
 pub use bytes::{Shown, show};
 pub use now::{Now, now};
 pub use outcome::{Difference, Finding, Outcome, Unready};
-pub use player::{AtFinding, lacks, needs, play, run};
+pub use player::{AtFinding, needs, play, run};
+pub(crate) use skip::DENIED;
+pub use skip::{Skip, Unlock, Why, lacks};

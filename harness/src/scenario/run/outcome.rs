@@ -4,6 +4,7 @@ use crate::buses::novobus::language::run::record::Record;
 use crate::link::Trouble;
 use crate::scenario::pattern::Expected;
 use crate::scenario::problem::Span;
+use crate::scenario::run::skip::Skip;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::time;
@@ -23,6 +24,8 @@ pub struct Outcome {
     pub records: Vec<Record>,
     /// Why no step was played although the rig has all that the scenario needs: a drive could not be made ready.
     pub unready: Option<Unready>,
+    /// Why it was skipped; `None` where it was not, and where this is read from a record.
+    pub skip: Option<Skip>,
 }
 
 /// How a drive could not be made ready for a scenario: reset, or set to hold what the header says. The first remark of the
@@ -38,8 +41,11 @@ pub enum Unready {
 impl Outcome {
     /// A scenario that is not played, and why.
     #[must_use]
-    pub fn skipped(remark: String) -> Self {
-        Self::not_played(Verdict::Skipped, remark)
+    pub fn skipped(skip: Skip) -> Self {
+        Self {
+            skip: Some(skip.clone()),
+            ..Self::not_played(Verdict::Skipped, skip.why.to_string())
+        }
     }
 
     /// A scenario that the bench could not play, and why.
@@ -77,17 +83,6 @@ impl Outcome {
         }
     }
 
-    /// Why it was skipped, without the place and other details, so that skipped scenarios can be counted by reason; `None` where it
-    /// was not skipped.
-    #[must_use]
-    pub fn reason_to_skip(&self) -> Option<&str> {
-        let why = self.remarks.first()?;
-        let details = [" at ", " (", ": "];
-        let end = details.iter().filter_map(|detail| why.find(detail)).min();
-        let reason = &why[..end.unwrap_or(why.len())];
-        (self.verdict == Verdict::Skipped).then_some(reason)
-    }
-
     fn not_played(verdict: Verdict, remark: String) -> Self {
         Self {
             verdict,
@@ -96,6 +91,7 @@ impl Outcome {
             took: time::Span::ZERO,
             records: Vec::new(),
             unready: None,
+            skip: None,
         }
     }
 }

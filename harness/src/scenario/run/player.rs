@@ -8,6 +8,7 @@ use crate::link::{Capability, Link, Moment};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
 use crate::scenario::problem::Span;
+use crate::scenario::run::skip::lacks;
 use crate::scenario::syntax::Ending;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
@@ -41,28 +42,6 @@ pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
     play(plan, link, AtFinding::Stop)
 }
 
-/// What a link lacks for a plan, in a sentence; `None` where the plan can be played.
-#[must_use]
-pub fn lacks(plan: &Plan, link: &dyn Link) -> Option<String> {
-    let missing: Vec<_> = plan
-        .needs
-        .iter()
-        .filter(|need| !link.capabilities().contains(need))
-        .map(|need| need.name())
-        .collect();
-    if !missing.is_empty() {
-        return Some(format!("the rig has no {}", missing.join(", no ")));
-    }
-    if let Some((ring, place)) = plan
-        .fault_links()
-        .find(|(ring, place)| !link.reaches(*ring, *place))
-    {
-        let place = plan.link_name(ring, place);
-        return Some(format!("the rig has no interposer at {place}"));
-    }
-    None
-}
-
 /// Plays a plan on a link. The outcome tells of the first line that was not met.
 pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome {
     if let Some(lacks) = lacks(plan, link) {
@@ -89,6 +68,7 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome 
         took,
         records: runner.recorder.records,
         unready: None,
+        skip: None,
     }
 }
 

@@ -52,7 +52,7 @@ pub struct Citation {
 }
 
 /// The buses of the product.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Bus {
     /// The ND21's ring.
     Novobus,

@@ -1,5 +1,6 @@
 //! What a rig allows, and what an act needs of it.
 
+use super::denial::Cause;
 use core::fmt;
 
 /// What a rig allows. Reading and stopping need no permission.
@@ -66,6 +67,49 @@ impl Limits {
             && self.max_speed.is_none()
     }
 
+    /// The same with one setting changed so that it denies nothing.
+    #[must_use]
+    pub const fn without(self, setting: Setting) -> Self {
+        let mut more = self;
+        match setting {
+            Setting::Motion => more.motion = true,
+            Setting::Eeprom => more.eeprom = true,
+            Setting::Reset => more.reset = true,
+            Setting::Outputs => more.outputs = true,
+            Setting::Monitoring => more.monitoring = true,
+            Setting::MaxSpeed => more.max_speed = None,
+            Setting::BytesPerSecond => more.bytes_per_second = None,
+        }
+        more
+    }
+
+    /// The settings that deny something for this reason.
+    pub fn denying(&self, cause: Cause) -> impl Iterator<Item = Setting> {
+        let limits = *self;
+        let need = match cause {
+            Cause::NotAllowed { missing, .. } => missing,
+            // Where everything is allowed, what cannot be followed passes.
+            Cause::InDoubt | Cause::NoAddress | Cause::CheckSequence => Need::EVERYTHING,
+            Cause::TooFast { .. }
+            | Cause::HalfSpeed { .. }
+            | Cause::Faster { .. }
+            | Cause::NotKnown { .. } => Need::ANY_SPEED,
+            Cause::TooMany { .. } | Cause::TooLong { .. } | Cause::Closed => Need::NONE,
+        };
+        let rate = matches!(cause, Cause::TooMany { .. });
+        Setting::ALL
+            .into_iter()
+            .filter(move |setting| match setting {
+                Setting::Motion => need.contains(Need::MOTION) && !limits.motion,
+                Setting::Eeprom => need.contains(Need::EEPROM) && !limits.eeprom,
+                Setting::Reset => need.contains(Need::RESET) && !limits.reset,
+                Setting::Outputs => need.contains(Need::OUTPUTS) && !limits.outputs,
+                Setting::Monitoring => need.contains(Need::MONITORING) && !limits.monitoring,
+                Setting::MaxSpeed => need.contains(Need::ANY_SPEED) && limits.max_speed.is_some(),
+                Setting::BytesPerSecond => rate,
+            })
+    }
+
     /// What of `need` is not allowed.
     #[must_use]
     pub const fn missing(&self, need: Need) -> Need {
@@ -92,6 +136,53 @@ impl Limits {
     }
 }
 
+/// A setting of a rig's `[limits]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Setting {
+    /// [`Limits::motion`].
+    Motion,
+    /// [`Limits::eeprom`].
+    Eeprom,
+    /// [`Limits::reset`].
+    Reset,
+    /// [`Limits::outputs`].
+    Outputs,
+    /// [`Limits::monitoring`].
+    Monitoring,
+    /// [`Limits::max_speed`].
+    MaxSpeed,
+    /// [`Limits::bytes_per_second`].
+    BytesPerSecond,
+}
+
+impl Setting {
+    /// All, in the order of a rig's file.
+    pub const ALL: [Self; 7] = [
+        Self::Motion,
+        Self::Eeprom,
+        Self::Reset,
+        Self::Outputs,
+        Self::Monitoring,
+        Self::MaxSpeed,
+        Self::BytesPerSecond,
+    ];
+}
+
+/// The change of the setting that permits more.
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Motion => "`allow_motion` in [limits] with --allow-motion",
+            Self::Eeprom => "`allow_eeprom` in [limits]",
+            Self::Reset => "`allow_reset` in [limits]",
+            Self::Outputs => "`allow_outputs` in [limits]",
+            Self::Monitoring => "`allow_monitoring` in [limits]",
+            Self::MaxSpeed => "no `max_speed` in [limits]",
+            Self::BytesPerSecond => "a higher `max_bytes_per_second` in [limits]",
+        })
+    }
+}
+
 /// What an act needs the rig's permission for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Need(u8);
@@ -109,6 +200,8 @@ impl Need {
     pub const OUTPUTS: Self = Self(1 << 3);
     /// [`Limits::monitoring`].
     pub const MONITORING: Self = Self(1 << 5);
+    /// Any speed: no [`Limits::max_speed`].
+    const ANY_SPEED: Self = Self(1 << 4);
     /// All of them and no `max_speed`: the manual does not say what it does, or it changes what this guard relies on.
     pub const EVERYTHING: Self = Self(0b11_1111);
 
@@ -151,7 +244,7 @@ impl fmt::Display for Need {
                 first = false;
             }
         }
-        if self.0 & (1 << 4) != 0 {
+        if self.contains(Self::ANY_SPEED) {
             let and = if first { "" } else { ", " };
             write!(
                 f,

@@ -52,5 +52,5 @@ pub use denial::{Cause, Denial};
 pub use effect::Act;
 pub use gate::Guard;
 pub use known::{Configuration, Facts, Found};
-pub use limits::{Limits, Need};
+pub use limits::{Limits, Need, Setting};
 pub use stage::Stage;

@@ -10,7 +10,7 @@ use crate::library::Entry;
 use crate::link::Link;
 use crate::report::html::{Played, Shown, section};
 use crate::scenario::problem::Span;
-use crate::scenario::run::{self, AtFinding, Outcome};
+use crate::scenario::run::{self, AtFinding, Outcome, Skip};
 use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -165,7 +165,11 @@ fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>)
     };
     let entry = Entry::new(source, None)?;
     let Some(plan) = &entry.plan else {
-        return Ok((text, Outcome::skipped(String::new()), Vec::new()));
+        return Ok((
+            text,
+            Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
+            Vec::new(),
+        ));
     };
     let mut link = simulated(plan);
     let outcome = run::play(plan, &mut link, AtFinding::GoOn);

@@ -1,0 +1,204 @@
+//! Why a scenario is not played on a rig, and what would let it be played.
+
+use crate::link::{Capability, Link};
+use crate::scenario::plan::Plan;
+use crate::scenario::syntax::Bus;
+use harness_proto::novobus::guard::Setting;
+use std::collections::BTreeSet;
+use std::fmt;
+
+/// A scenario that is not played.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Skip {
+    /// Why, as far as one obstacle hides others: the first of them.
+    pub why: Why,
+    /// All that would let it be played, together; empty where nothing on this rig would.
+    pub unlocks: BTreeSet<Unlock>,
+}
+
+/// The first obstacle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Why {
+    /// The rig cannot do this.
+    Lacks(Vec<Capability>),
+    /// A fault is to be put on this link, where the rig has no interposer.
+    NoInterposer(String),
+    /// It is for rings with these numbers of drives, and the rig has those.
+    OtherSize(Vec<u8>, Vec<u8>),
+    /// The rig's limits deny a byte or a fault of it, in the guard's words.
+    Denied(String),
+    /// The bench knows no such bus.
+    NoBus(Bus),
+    /// The rig has no such bus.
+    NotOnRig,
+    /// The run ended before it.
+    RunEnded,
+}
+
+/// One thing that would let scenarios be played, together with others.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Unlock {
+    /// A change of this setting in the rig's `[limits]`.
+    Limit(Setting),
+    /// An interposer at this link.
+    Interposer(String),
+    /// Ports that send and show line errors.
+    LineErrors,
+    /// Rings with other numbers of drives.
+    OtherSize,
+    /// Drives that are simulated in the program.
+    Simulated,
+    /// A rig with this bus.
+    Bus(Bus),
+}
+
+impl Skip {
+    /// A scenario for another bus than the rig's.
+    #[must_use]
+    pub fn not_on_rig(bus: Bus) -> Self {
+        Self {
+            why: Why::NotOnRig,
+            unlocks: [Unlock::Bus(bus)].into(),
+        }
+    }
+
+    /// A scenario for a bus that the bench does not know.
+    #[must_use]
+    pub fn no_bus(bus: Bus) -> Self {
+        Why::NoBus(bus).into()
+    }
+
+    /// A scenario for rings of these sizes, on a rig of those.
+    #[must_use]
+    pub fn other_size(own: Vec<u8>, rig: Vec<u8>) -> Self {
+        Self {
+            why: Why::OtherSize(own, rig),
+            unlocks: [Unlock::OtherSize].into(),
+        }
+    }
+
+    /// The same with more that it needs. What needs the simulator needs nothing else.
+    #[must_use]
+    pub fn and(mut self, more: impl IntoIterator<Item = Unlock>) -> Self {
+        self.unlocks.extend(more);
+        if self.unlocks.contains(&Unlock::Simulated) {
+            self.unlocks = [Unlock::Simulated].into();
+        }
+        self
+    }
+}
+
+impl From<Why> for Skip {
+    fn from(why: Why) -> Self {
+        Self {
+            why,
+            unlocks: BTreeSet::new(),
+        }
+    }
+}
+
+impl Why {
+    /// The reason without places and other details, so that skipped scenarios can be counted by it.
+    #[must_use]
+    pub fn group(&self) -> String {
+        match self {
+            Self::NoInterposer(_) => "the rig has no interposer".to_owned(),
+            Self::OtherSize(..) => "it is for rings of another size".to_owned(),
+            Self::Denied(_) => DENIED.trim_end_matches(": ").to_owned(),
+            Self::Lacks(_) | Self::NoBus(_) | Self::NotOnRig | Self::RunEnded => self.to_string(),
+        }
+    }
+}
+
+/// What a denial begins with in a record; the guard's words stand behind it.
+pub(crate) const DENIED: &str = "the rig's [limits] do not let it be played to its end: ";
+
+impl fmt::Display for Why {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sizes = |sizes: &[u8]| {
+            let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
+            sizes.join(" and ")
+        };
+        match self {
+            Self::Lacks(missing) => {
+                let names: Vec<_> = missing.iter().map(|own| own.name()).collect();
+                write!(f, "the rig has no {}", names.join(", no "))
+            }
+            Self::NoInterposer(place) => write!(f, "the rig has no interposer at {place}"),
+            Self::OtherSize(own, rig) => write!(
+                f,
+                "it is for rings of another size ({} drives, the rig has {})",
+                sizes(own),
+                sizes(rig)
+            ),
+            Self::Denied(words) => write!(f, "{DENIED}{words}"),
+            Self::NoBus(bus) => write!(f, "the bench has no bus `{}` yet", name(*bus)),
+            Self::NotOnRig => f.write_str("the rig has no such bus"),
+            Self::RunEnded => f.write_str("the run ended before it"),
+        }
+    }
+}
+
+impl fmt::Display for Unlock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Limit(setting) => write!(f, "{setting}"),
+            Self::Interposer(place) => write!(f, "an interposer at {place}"),
+            Self::LineErrors => f.write_str("ports that show line errors"),
+            Self::OtherSize => f.write_str("rings of other sizes"),
+            Self::Simulated => f.write_str("a simulated rig"),
+            Self::Bus(bus) => write!(f, "a rig with the bus `{}`", name(*bus)),
+        }
+    }
+}
+
+fn name(bus: Bus) -> &'static str {
+    let own = Bus::NAMES.iter().find(|(_, known)| *known == bus);
+    own.map_or("", |(name, _)| name)
+}
+
+/// What a link lacks for a plan; `None` where the plan can be played.
+#[must_use]
+pub fn lacks(plan: &Plan, link: &dyn Link) -> Option<Skip> {
+    let able = |need: &Capability| link.capabilities().contains(need);
+    let missing: Vec<_> = plan
+        .needs
+        .iter()
+        .copied()
+        .filter(|need| !able(need))
+        .collect();
+    let unreached: BTreeSet<_> = plan
+        .fault_links()
+        .filter(|(ring, place)| !link.reaches(*ring, *place))
+        .collect();
+    let mut unreached = unreached
+        .iter()
+        .map(|(ring, place)| plan.link_name(*ring, *place));
+    let place = plan
+        .fault_links()
+        .find(|(ring, place)| !link.reaches(*ring, *place))
+        .map(|(ring, place)| plan.link_name(ring, place));
+    let why = match (missing.as_slice(), place) {
+        ([], None) => return None,
+        ([], Some(place)) => Why::NoInterposer(place),
+        (missing, _) => Why::Lacks(missing.to_vec()),
+    };
+    let unlocks = missing.iter().filter_map(|own| unlock(*own));
+    Some(Skip::from(why).and(unlocks.chain(unreached.by_ref().map(Unlock::Interposer))))
+}
+
+/// What gives a rig a capability; `None` for interposers, whose places are known.
+fn unlock(missing: Capability) -> Option<Unlock> {
+    Some(match missing {
+        Capability::Interposer => return None,
+        Capability::Motion => Unlock::Limit(Setting::Motion),
+        Capability::Eeprom => Unlock::Limit(Setting::Eeprom),
+        Capability::Reset => Unlock::Limit(Setting::Reset),
+        Capability::LineErrors => Unlock::LineErrors,
+        Capability::TwoRings => Unlock::OtherSize,
+        // Looks into a drive, its plugs and its power.
+        Capability::Tap | Capability::Memory | Capability::Power | Capability::Simulator => {
+            Unlock::Simulated
+        }
+    })
+}
