@@ -3,7 +3,7 @@
 
 use super::exit::Exit;
 use crate::library::Entry;
-use crate::scenario::run::{Outcome, Unlock};
+use crate::scenario::run::{Outcome, Unlock, together};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::collections::{BTreeMap, BTreeSet};
@@ -70,10 +70,6 @@ impl Tally {
         );
         let mut unlocks: Vec<_> = self.unlocks.iter().collect();
         unlocks.sort_by_key(|(what, count)| (std::cmp::Reverse(**count), *what));
-        let together = |what: &BTreeSet<Unlock>| {
-            let what: Vec<_> = what.iter().map(Unlock::to_string).collect();
-            what.join(" and ")
-        };
         let unlocks: Vec<_> = unlocks
             .iter()
             .map(|(what, count)| format!("{} ({count})", together(what)))
@@ -168,10 +164,10 @@ mod tests {
         assert_eq!(
             tally.summary(),
             "1 passed, 0 failed, 5 skipped (6 scenarios, 0.000 ms on the line)\n\
-             not played: 2 (the rig has no interposer), 1 (the rig has no power, no motion), \
+             not played: 2 (the rig has no interposer), 1 (the rig has no simulator), \
              1 (it is for rings of another size), 1 (the rig's [limits] do not let it be played to its end)\n\
              covered: 1 of 6 tables and examples of the manual that the selected scenarios pin\n\
-             more scenarios with: `allow_motion` in [limits] with --allow-motion and `allow_reset` in [limits] (1), an interposer at 1->0 (1), \
+             more scenarios with: `allow_motion` and `allow_reset` in [limits] and --allow-motion (1), an interposer at 1->0 (1), \
              an interposer at 2->1 (1), rings of other sizes (1), a simulated rig (1)\n"
         );
         assert_eq!(of(&[passed()]).summary().lines().count(), 1);

@@ -17,4 +17,4 @@ pub use now::{Now, now};
 pub use outcome::{Difference, Finding, Outcome, Unready};
 pub use player::{AtFinding, needs, play, run};
 pub(crate) use skip::DENIED;
-pub use skip::{Skip, Unlock, Why, lacks};
+pub use skip::{Skip, Unlock, Why, lacks, together};

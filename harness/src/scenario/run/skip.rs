@@ -105,6 +105,10 @@ impl Why {
             Self::NoInterposer(_) => "the rig has no interposer".to_owned(),
             Self::OtherSize(..) => "it is for rings of another size".to_owned(),
             Self::Denied(_) => DENIED.trim_end_matches(": ").to_owned(),
+            // Whatever else is missing, a simulated rig has it.
+            Self::Lacks(missing) if missing.iter().any(|own| simulated(*own)) => {
+                "the rig has no simulator".to_owned()
+            }
             Self::Lacks(_) | Self::NoBus(_) | Self::NotOnRig | Self::RunEnded => self.to_string(),
         }
     }
@@ -139,10 +143,34 @@ impl fmt::Display for Why {
     }
 }
 
+/// What is needed together, in words.
+#[must_use]
+pub fn together(unlocks: &BTreeSet<Unlock>) -> String {
+    let setting = |own: &Unlock| match own {
+        Unlock::Limit(setting) => Some(*setting),
+        _ => None,
+    };
+    let settings: Vec<_> = unlocks.iter().filter_map(setting).collect();
+    let everything = |all: &[Setting]| all.iter().all(|own| settings.contains(own));
+    let limits = match everything(&Setting::PERMISSIONS) {
+        true => vec!["every permission".to_owned()],
+        false => settings.iter().map(Setting::to_string).collect(),
+    };
+    let limits = (!limits.is_empty()).then(|| format!("{} in [limits]", limits.join(" and ")));
+    let motion = settings.contains(&Setting::Motion);
+    let option = motion.then(|| "--allow-motion".to_owned());
+    let others = unlocks.iter().filter(|own| setting(own).is_none());
+    let all = limits
+        .into_iter()
+        .chain(option)
+        .chain(others.map(Unlock::to_string));
+    all.collect::<Vec<_>>().join(" and ")
+}
+
 impl fmt::Display for Unlock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Limit(setting) => write!(f, "{setting}"),
+            Self::Limit(setting) => write!(f, "{setting} in [limits]"),
             Self::Interposer(place) => write!(f, "an interposer at {place}"),
             Self::LineErrors => f.write_str("ports that show line errors"),
             Self::OtherSize => f.write_str("rings of other sizes"),
@@ -196,9 +224,13 @@ fn unlock(missing: Capability) -> Option<Unlock> {
         Capability::Reset => Unlock::Limit(Setting::Reset),
         Capability::LineErrors => Unlock::LineErrors,
         Capability::TwoRings => Unlock::OtherSize,
-        // Looks into a drive, its plugs and its power.
         Capability::Tap | Capability::Memory | Capability::Power | Capability::Simulator => {
             Unlock::Simulated
         }
     })
+}
+
+/// Whether only drives that are simulated in the program have it: looks into a drive, its plugs and its power.
+fn simulated(missing: Capability) -> bool {
+    unlock(missing) == Some(Unlock::Simulated)
 }

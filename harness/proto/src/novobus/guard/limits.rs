@@ -156,6 +156,14 @@ pub enum Setting {
 }
 
 impl Setting {
+    /// Those that permit something.
+    pub const PERMISSIONS: [Self; 5] = [
+        Self::Motion,
+        Self::Eeprom,
+        Self::Reset,
+        Self::Outputs,
+        Self::Monitoring,
+    ];
     /// All, in the order of a rig's file.
     pub const ALL: [Self; 7] = [
         Self::Motion,
@@ -172,13 +180,13 @@ impl Setting {
 impl fmt::Display for Setting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Motion => "`allow_motion` in [limits] with --allow-motion",
-            Self::Eeprom => "`allow_eeprom` in [limits]",
-            Self::Reset => "`allow_reset` in [limits]",
-            Self::Outputs => "`allow_outputs` in [limits]",
-            Self::Monitoring => "`allow_monitoring` in [limits]",
-            Self::MaxSpeed => "no `max_speed` in [limits]",
-            Self::BytesPerSecond => "a higher `max_bytes_per_second` in [limits]",
+            Self::Motion => "`allow_motion`",
+            Self::Eeprom => "`allow_eeprom`",
+            Self::Reset => "`allow_reset`",
+            Self::Outputs => "`allow_outputs`",
+            Self::Monitoring => "`allow_monitoring`",
+            Self::MaxSpeed => "no `max_speed`",
+            Self::BytesPerSecond => "a higher `max_bytes_per_second`",
         })
     }
 }
