@@ -22,11 +22,10 @@ use std::path::Path;
 use std::time::Duration;
 
 /// The dissector for Wireshark and tshark.
-const DISSECTOR: &str = include_str!("../report/novobus.lua");
 
 /// Prints the dissector.
 pub(crate) fn dissector(output: &mut Output) -> std::io::Result<Exit> {
-    output.result(DISSECTOR)?;
+    output.result(crate::report::DISSECTOR)?;
     Ok(Exit::Passed)
 }
 

@@ -1,13 +1,11 @@
 //! The command line of `drivebench`: standard output is for results, standard error for people.
 
-mod args;
+pub(crate) mod args;
 mod campaign;
-mod cells;
 mod check;
-mod deviations;
 pub(crate) mod exit;
 mod findings;
-mod fuzz;
+pub(crate) mod fuzz;
 mod import;
 mod junit;
 mod list;
@@ -18,8 +16,7 @@ mod page;
 mod promote;
 mod qualify;
 mod report;
-mod rig;
-mod rig_check;
+pub(crate) mod rig;
 pub(crate) mod rig_failure;
 pub(crate) mod run;
 mod run_rig;
@@ -74,7 +71,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector => import::dissector(output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
-        Command::Cells(arguments) => cells::cells(&arguments, output),
+        Command::Cells(arguments) => crate::buses::novobus::cli::cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify(arguments) => verify::verify(&arguments, output),
         Command::Report(arguments) => report::report(&arguments, output),
@@ -84,7 +81,9 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Promote(arguments) => promote::promote(&arguments, output),
         Command::Rig { command } => rig::rig(&command, output),
         Command::Campaign(arguments) => campaign::campaign(&arguments, output),
-        Command::Deviations(arguments) => deviations::deviations(&arguments, output),
+        Command::Deviations(arguments) => {
+            crate::buses::novobus::cli::deviations::deviations(&arguments, output)
+        }
         Command::Drive(command) => crate::buses::novobus::cli::drive(&command, output),
         Command::Completions { shell } => man::completions(shell, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),

@@ -3,11 +3,11 @@
 use super::files::{RIG, sum};
 use super::record::{Line, capabilities};
 use crate::buses::novobus::twin::Exactness;
+use crate::guard::Limits;
 use crate::link::{Capability, SimulatedLink};
 use crate::rig::{Rig, Way, limits, line_rate};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 
 /// What a record is judged by.

@@ -4,8 +4,8 @@ pub mod html;
 pub mod mismatch;
 pub mod page;
 pub mod pcapng;
-pub mod plot;
 pub mod vcd;
 
+pub(crate) use crate::buses::novobus::report::{DISSECTOR, diagram, sequence};
 /// How the one bus that is shown today reads its bytes, and its own tables and pictures.
-pub use crate::buses::novobus::report::{csv, json, meaning, svg, table, walk};
+pub use crate::buses::novobus::report::{csv, json, meaning, plot, svg, table, walk};

@@ -1,7 +1,7 @@
 //! The page that a scenario leaves: verdict, table and plots. Snapshots of scenarios are such pages.
 
-use super::plot::plots;
 use crate::library::Entry;
+use crate::report::plot::plots;
 use crate::report::table::{LEGEND, Part, table, wires};
 use crate::scenario::run::Outcome;
 use harness_sim::record::Trace;

@@ -5,16 +5,13 @@
 //! that is kept, and which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
 
 mod around;
-mod check;
+pub(crate) mod check;
 mod check_sim;
 mod driven;
 mod ends;
 pub mod file;
 pub mod find;
 pub mod hook;
-mod interlock;
-pub(crate) mod judge;
-mod left_open;
 pub mod lock;
 mod open;
 mod played;
@@ -51,4 +48,4 @@ pub use watchdog::Alarm;
 
 /// How the one bus that is driven today is examined when a bench is opened.
 pub use crate::buses::novobus::rig::figures;
-pub(crate) use crate::buses::novobus::rig::{health, line_test};
+pub(crate) use crate::buses::novobus::rig::{health, interlock, judge, line_test};

@@ -3,7 +3,6 @@
 
 use super::Rig;
 use super::driven::Driven;
-use super::judge::{Heard, by_hand, judge};
 use super::played::{Again, Attempt, Played};
 use super::session::Session;
 use super::session_error::SessionError;
@@ -11,6 +10,7 @@ use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin};
 use crate::guard::Guarded;
 use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
 use crate::rig::health::{Unhealthy, examine};
+use crate::rig::judge::{Heard, by_hand, judge};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{

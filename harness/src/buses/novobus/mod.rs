@@ -10,7 +10,7 @@ pub mod guard;
 pub mod language;
 pub mod link;
 pub mod locate;
-pub mod probes;
+pub mod qualify;
 pub mod report;
 pub mod rig;
 pub mod simulate;

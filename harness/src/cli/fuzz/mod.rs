@@ -2,9 +2,8 @@
 
 mod coverage;
 mod distil;
-mod power;
 mod replay;
-mod rig;
+pub(crate) mod rig;
 mod run;
 mod watch;
 
@@ -22,7 +21,7 @@ pub enum FuzzCommand {
     /// Try the conversations that a run has kept, or those of a corpus, the ones that show most first.
     Replay(replay::ReplayArguments),
     /// Show how many cases it takes to find each planned deviation of a drive.
-    Power(power::PowerArguments),
+    Power(crate::buses::novobus::cli::power::PowerArguments),
     /// Show which protocol transitions the kept inputs reach, and what those of each target reach; exit code 1 where a reachable transition is missing.
     Coverage(coverage::CoverageArguments),
     /// Choose from a grown corpus the few small inputs that reach what the kept ones do not, and put them beside those.
@@ -34,7 +33,9 @@ pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
     match command {
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
-        FuzzCommand::Power(arguments) => power::power(arguments, output),
+        FuzzCommand::Power(arguments) => {
+            crate::buses::novobus::cli::power::power(arguments, output)
+        }
         FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
         FuzzCommand::Distil(arguments) => distil::distil(arguments, output),
     }

@@ -10,10 +10,10 @@ use crate::explore::{
     About, Act, Bounds, Campaign, Case, ExploreError, Line, MOST_BYTES, OnRig, OnSim, Setup,
     Target, What, by_novelty, read,
 };
+use crate::guard::Limits;
 use crate::regular::{self, Links};
 use crate::rig::Rig;
 use clap::Args;
-use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

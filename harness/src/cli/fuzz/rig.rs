@@ -4,12 +4,12 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, give_back};
 use crate::explore::{ExploreError, RingScope, Scope, Setup, Spice};
+use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
 use crate::rig::{Options, Rig, Run, Session};
 use crate::scenario::run::start_anew;
 use crate::signals::interrupt_flag;
-use harness_proto::novobus::guard::Limits;
 use std::time::Duration;
 
 /// How a rig is used.

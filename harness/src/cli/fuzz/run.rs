@@ -11,9 +11,9 @@ use crate::explore::{
     About, Bounds, Campaign, ExploreError, Kept, OnRig, OnSim, Planted, Record, Scope, Setup,
     Target, page, read,
 };
+use crate::guard::Limits;
 use crate::rig::{Rig, state};
 use clap::Args;
-use harness_proto::novobus::guard::Limits;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation;
 use std::path::PathBuf;

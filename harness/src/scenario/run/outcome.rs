@@ -1,6 +1,6 @@
 //! What comes of playing: outcome, finding, and why playing stops.
 
-use crate::buses::novobus::language::run::record::Record;
+use super::Record;
 use crate::link::Trouble;
 use crate::scenario::pattern::Expected;
 use crate::scenario::problem::Span;

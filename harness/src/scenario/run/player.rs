@@ -1,8 +1,8 @@
 //! Step by step.
 
-use super::bytes::{Shown, matches, resolve, show};
 use super::halt::Halt;
 use super::outcome::{Difference, Outcome, Stop};
+use super::{Shown, matches, resolve, show};
 use crate::buses::novobus::language::run::record::Recorder;
 use crate::link::{Capability, Link, Moment};
 use crate::scenario::pattern::Expected;

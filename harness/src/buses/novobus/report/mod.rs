@@ -4,7 +4,11 @@ pub mod csv;
 pub(crate) mod diagram;
 pub mod json;
 pub mod meaning;
+pub mod plot;
 pub(crate) mod sequence;
 pub mod svg;
 pub mod table;
 pub mod walk;
+
+/// The dissector for Wireshark.
+pub(crate) const DISSECTOR: &str = include_str!("novobus.lua");

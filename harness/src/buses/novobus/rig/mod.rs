@@ -2,4 +2,7 @@
 
 pub mod figures;
 pub(crate) mod health;
+pub(crate) mod interlock;
+pub(crate) mod judge;
+pub(crate) mod left_open;
 pub(crate) mod line_test;

@@ -1,10 +1,10 @@
 //! What can be seen of drives, beside what must hold.
 
+use crate::buses::novobus::language::run::bytes::{Shown as Byte, matches};
 use crate::link::{Mode, Shown};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{CellTest, PlannedCell, PlannedCondition, PlannedDriveCheck, number};
 use crate::scenario::quantity::{Quantity, Tolerance, Unit};
-use crate::scenario::run::bytes::{Shown as Byte, matches};
 use crate::scenario::run::player::Runner;
 use crate::scenario::syntax::{Relation, Showing};
 use harness_proto::line::Received;

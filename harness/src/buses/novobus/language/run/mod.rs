@@ -1,5 +1,6 @@
 //! The bus's words, played.
 
+pub(crate) mod bytes;
 pub(crate) mod check;
 pub(crate) mod drives;
 pub(crate) mod look;

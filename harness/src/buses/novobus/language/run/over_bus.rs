@@ -3,11 +3,11 @@
 //! What is read to answer a check stands beside the conversation: its bytes are not counted, and no line asks for
 //! them.
 
+use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::twin::unknowable;
 use crate::link::{Line, Link, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
-use crate::scenario::run::bytes::{matches, resolve};
 use crate::scenario::run::outcome::{Outcome, Unready};
 use crate::scenario::run::player::{AtFinding, Runner, play};
 use crate::scenario::run::skip::lacks;

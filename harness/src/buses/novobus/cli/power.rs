@@ -1,8 +1,8 @@
 //! `drivebench fuzz power`: how many cases it takes to find each planned deviation, of a drive and of the master.
 
-use super::rig::{simulated, tell};
 use crate::buses::novobus::explore::masters;
 use crate::cli::exit::Exit;
+use crate::cli::fuzz::rig::{simulated, tell};
 use crate::cli::output::Output;
 use crate::explore::{
     About, Bounds, Campaign, ExploreError, Finding, OnSim, Planted, Pool, Progress, Setup, Swarm,
@@ -16,9 +16,9 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-const FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/deviations.toml");
+const FOUND_BY_SCENARIOS: &str = include_str!("../../../../../corpora/deviations.toml");
 
-const MASTERS_FOUND_BY_SCENARIOS: &str = include_str!("../../../../corpora/masters.toml");
+const MASTERS_FOUND_BY_SCENARIOS: &str = include_str!("../../../../../corpora/masters.toml");
 
 /// How many drives the ring has; one of them deviates, another one with each seed.
 const DRIVES: u8 = 3;

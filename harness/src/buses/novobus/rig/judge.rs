@@ -1,11 +1,11 @@
 //! The verdict of an attempt beside its twin.
 
-use super::check::Rig;
-use super::file::Deviation;
 use super::left_open;
-use super::run::{Way, known, play_one, twin};
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
 use crate::link::{Event, Recording};
+use crate::rig::check::Rig;
+use crate::rig::file::Deviation;
+use crate::rig::run::{Way, known, play_one, twin};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{Finding, Outcome};
 use crate::scenario::verdict::Verdict;

@@ -1,11 +1,11 @@
 //! `drivebench rig check`: a bench is opened, its drives are counted and read, its line is measured.
 
-use super::exit::Exit;
-use super::output::Output;
-use super::rig::ListFormat;
-use super::rig_failure::{alarm, exit_of, find_rig, tell_end};
-use super::run::progress_bar;
 use crate::buses::novobus::driver::Error;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::cli::rig::ListFormat;
+use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
+use crate::cli::run::progress_bar;
 use crate::link::Trouble;
 use crate::rig::figures::{Figures, RingFigures, measure};
 use crate::rig::{Options, Rig, Session};
@@ -22,7 +22,7 @@ pub struct CheckRigArguments {
     /// A name, a file, or sim:N.
     pub rig: String,
     /// How long to wait for a rig that somebody else has, such as 30s.
-    #[arg(long, value_name = "TIME", value_parser = super::args::duration)]
+    #[arg(long, value_name = "TIME", value_parser = crate::cli::args::duration)]
     pub wait: Option<Duration>,
     /// In which form.
     #[arg(long, value_enum, default_value_t = ListFormat::Text)]

@@ -1,11 +1,11 @@
 //! Verdicts of attempts on rings in virtual time that are seen as through a port.
 
-use super::super::check::parse;
-use super::super::run::{Way, known, play_one, twin};
 use super::{Heard, judge};
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::Entry;
 use crate::link::{Event, Line, Recording};
+use crate::rig::check::parse;
+use crate::rig::run::{Way, known, play_one, twin};
 use crate::scenario::run::Outcome;
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;

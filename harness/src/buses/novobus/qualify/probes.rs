@@ -1,9 +1,9 @@
 //! The probes: a conversation for each property that the manual leaves open, and its possible values.
 
+use super::hypothesis::Hypothesis;
 use crate::buses::novobus::twin::Look;
 use crate::library::Entry;
 use crate::link::link_name;
-use crate::qualify::hypothesis::Hypothesis;
 use crate::scenario::plan::Exchange;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;

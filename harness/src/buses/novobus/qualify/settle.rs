@@ -1,7 +1,7 @@
 //! What the answers to a probe say of its property.
 
 use super::hypothesis::{Evidence, Hypothesis, explaining};
-use crate::buses::novobus::probes::{Asked, Probe, hypotheses};
+use super::probes::{Asked, Probe, hypotheses};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness_proto::novobus::role::Role;
 use harness_proto::time::Span;

@@ -1,8 +1,8 @@
 //! `drivebench deviations`: the wrong drives and the wrong masters that a scenario can ask for.
 
-use super::args::{DeviationsArguments, Format};
-use super::exit::Exit;
-use super::output::Output;
+use crate::cli::args::{DeviationsArguments, Format};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
 use harness_sim::novobus::deviation::{
     Deviation, MasterDeviation, deviations as all, master_deviations,
 };

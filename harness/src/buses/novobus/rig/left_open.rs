@@ -2,10 +2,10 @@
 //!
 //! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
 
-use super::check::Rig;
 use super::judge::Heard;
-use super::run::{known, twin};
 use crate::buses::novobus::twin::Divergence;
+use crate::rig::check::Rig;
+use crate::rig::run::{known, twin};
 use harness_proto::novobus::properties;
 use harness_proto::time::Span;
 use harness_sim::nd21;
@@ -42,7 +42,7 @@ impl fmt::Display for Choice {
 
 /// The choices that explain every byte of an attempt, in words; `None` where the model's defaults explain them as well, or where no
 /// choice does.
-pub(super) fn explanation(heard: &Heard<'_>) -> Option<String> {
+pub(crate) fn explanation(heard: &Heard<'_>) -> Option<String> {
     let real = heard.exactness.tolerance > Span::ZERO && !heard.exactness.knows_cells;
     if !real {
         return None;

@@ -1,0 +1,11 @@
+//! The hypotheses about drives of a ring, and the probes that settle them.
+
+mod diagnose;
+mod hypothesis;
+mod probes;
+mod settle;
+
+pub use diagnose::{Named, Seen, Whose, deviating_masters, name};
+pub use hypothesis::{Evidence, Hypothesis, explaining};
+pub use probes::{Asked, Probe, conversations, hypotheses, probes};
+pub use settle::{Answer, answer};
