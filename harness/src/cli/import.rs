@@ -21,8 +21,6 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
-/// The dissector for Wireshark and tshark.
-
 /// Prints the dissector.
 pub(crate) fn dissector(output: &mut Output) -> std::io::Result<Exit> {
     output.result(crate::report::DISSECTOR)?;
