@@ -2,8 +2,9 @@
 
 use super::output::Output;
 use crate::buses::novobus::twin::{Conversation, Exactness};
-use crate::qualify::{Named, Seen};
-use crate::rig::{Driven, Played};
+use crate::link::Line as _;
+use crate::qualify::{Culprit, Meant, Named, Seen, Sighting, Trial, agreed, culprit};
+use crate::rig::{Attempt, Driven, Played, Run};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
@@ -14,9 +15,20 @@ const MOST_TOLD: usize = 8;
 /// The most scenarios and probes listed that were not compared, or not equal.
 const MOST_LISTED: usize = 12;
 
+/// The most sections that are told of a drive whose deviation has no name.
+const MOST_SECTIONS: usize = 3;
+
 /// What was played, and what of it differed from the model.
 #[derive(Default)]
 pub(crate) struct Findings {
+    /// How many drives the ring has, the time of a byte, and how far times may be apart.
+    drives: u8,
+    byte_time: Span,
+    tolerance: Span,
+    /// Where attempts differed, each with the name of its scenario.
+    sightings: Vec<(String, Sighting)>,
+    /// What came of those that were tried with the drives' roles exchanged.
+    trials: Vec<Trial>,
     /// The conversations of each attempt that differed.
     differing: Vec<Vec<Conversation>>,
     /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
@@ -43,14 +55,24 @@ pub(crate) struct Findings {
 }
 
 impl Findings {
-    /// Notes what came of a scenario on a rig that states this tolerance of times.
-    pub(crate) fn note(&mut self, name: &str, played: &Played, tolerance: Span) {
+    /// Those of a rig on which nothing was played yet.
+    pub(crate) fn new(run: &mut Run<'_>) -> Self {
+        Self {
+            drives: run.session().rig().file.ring.first.drives,
+            byte_time: run.session().link().byte_time(),
+            tolerance: run.exactness().tolerance,
+            ..Self::default()
+        }
+    }
+
+    /// Notes what came of a scenario.
+    pub(crate) fn note(&mut self, name: &str, played: &Played) {
         let verdict = played.outcome.verdict;
         let Some(last) = played.last_played() else {
             self.skipped += 1;
             return;
         };
-        self.note_attempts(played, tolerance);
+        self.note_attempts(name, played);
         self.played += 1;
         for comparison in &last.comparisons {
             let own = comparison.measured + comparison.adopted.len() as u64;
@@ -81,12 +103,15 @@ impl Findings {
     }
 
     /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
-    pub(crate) fn note_attempts(&mut self, played: &Played, tolerance: Span) {
+    pub(crate) fn note_attempts(&mut self, name: &str, played: &Played) {
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());
             self.master_is_wrong |= !attempt.master_is_right;
+            let sighting = self.sighting(attempt);
+            self.sightings
+                .extend(sighting.map(|own| (name.to_owned(), own)));
         }
-        let Some((attempt, divergences)) = played.telling(tolerance) else {
+        let Some((attempt, divergences)) = played.telling(self.tolerance) else {
             return;
         };
         let own = match attempt.driven {
@@ -102,6 +127,54 @@ impl Findings {
         self.suspects.dedup();
     }
 
+    /// Where an attempt differed.
+    fn sighting(&self, attempt: &Attempt) -> Option<Sighting> {
+        let mut comparisons = attempt.comparisons.iter().enumerate();
+        let found = comparisons.find_map(|(at, own)| Some((at, own.divergence.as_ref()?)));
+        let (at, divergence) = found.filter(|_| attempt.outcome.verdict == Verdict::Failed)?;
+        let conversations = &attempt.conversations;
+        Sighting::of(conversations, at, divergence, self.drives, self.byte_time)
+    }
+
+    /// Where attempts differed, each with the name of its scenario.
+    pub(crate) fn sightings(&self) -> &[(String, Sighting)] {
+        &self.sightings
+    }
+
+    /// Notes an attempt with the drives' roles exchanged: to whom the byte belonged at which it differed, if it did. `None` where it says
+    /// nothing.
+    pub(crate) fn note_exchanged(&mut self, played: &Played) -> Option<Option<Meant>> {
+        let last = played.last_played().filter(|own| own.was_played())?;
+        let differs = |attempt: &Attempt| {
+            let mut comparisons = attempt.comparisons.iter();
+            comparisons.any(|own| own.divergence.is_some())
+        };
+        let found = match (differs(last), self.sighting(last)) {
+            (true, Some(sighting)) => Some(sighting.meant),
+            (true, None) => Some(Meant::Nobody),
+            (false, _) => None,
+        };
+        let conversations = last.conversations.clone();
+        match played.telling(self.tolerance) {
+            Some(_) => self.differing.push(conversations),
+            None if found.is_none() => self.alike.push(conversations),
+            None => return None,
+        }
+        Some(found)
+    }
+
+    /// Notes what came of sightings that were tried with the roles exchanged.
+    pub(crate) fn note_trials(&mut self, trials: Vec<Trial>) {
+        self.trials.extend(trials);
+    }
+
+    /// The drive that alone explains where attempts differed, as far as the bytes and the trials say.
+    fn culprit(&self) -> Option<Culprit> {
+        // What was seen once may have been a byte that was damaged on its way.
+        let seen: Vec<_> = self.sightings.iter().map(|(_, own)| own.meant).collect();
+        culprit(self.drives, &seen, &self.trials).filter(|_| seen.len() > 1)
+    }
+
     /// Notes a probe that was asked.
     pub(crate) fn note_probe(&mut self) {
         self.probes += 1;
@@ -114,7 +187,7 @@ impl Findings {
 
     /// Whether something differed that a drive is to blame for.
     pub(crate) fn differ(&self) -> bool {
-        !self.differing.is_empty() || !self.with_driver.is_empty()
+        !self.differing.is_empty() || !self.with_driver.is_empty() || self.culprit().is_some()
     }
 
     /// Whether something was not compared, or not equal.
@@ -176,16 +249,22 @@ impl Findings {
                 "deviations: the drives differ from the model; the run ended before an explanation was looked for: {count}"
             );
         } else if let Some(named) = named.filter(|_| self.differ()) {
+            let (culprit, named) = agreed(self.culprit(), named);
             for one in named.iter().take(MOST_TOLD) {
                 let _infallible = writeln!(text, "deviation: {one}");
             }
             match named.len() {
-                0 => text.push_str("deviations: the drives differ from the model, and no single known deviation explains every byte; not known which drive\n"),
+                0 => text.push_str(&self.unnamed(culprit)),
                 1 => {}
-                2..=MOST_TOLD => text.push_str("each of these explains every byte: the bytes do not say which it is\n"),
+                2..=MOST_TOLD => text.push_str(
+                    "each of these explains every byte: the bytes do not say which it is\n",
+                ),
                 more => {
                     let more = more - MOST_TOLD;
-                    let _infallible = writeln!(text, "each of these, and {more} more, explains every byte: the bytes do not say which it is");
+                    let _infallible = writeln!(
+                        text,
+                        "each of these, and {more} more, explains every byte: the bytes do not say which it is"
+                    );
                 }
             }
             let _infallible = writeln!(text, "compared: {count}");
@@ -207,6 +286,31 @@ impl Findings {
             );
         }
         text
+    }
+
+    /// What is said where no known deviation explains every byte.
+    fn unnamed(&self, culprit: Option<Culprit>) -> String {
+        let Some(culprit) = culprit else {
+            return "deviations: the drives differ from the model, and no single known deviation explains every byte; not known which drive\n".to_owned();
+        };
+        let mut sections: Vec<(&str, usize, &(String, Sighting))> = Vec::new();
+        for own in &self.sightings {
+            match sections
+                .iter_mut()
+                .find(|(known, ..)| *known == own.1.section)
+            {
+                Some((_, count, _)) => *count += 1,
+                None => sections.push((own.1.section, 1, own)),
+            }
+        }
+        sections.sort_by_key(|(_, count, _)| std::cmp::Reverse(*count));
+        let lines = sections.iter().take(MOST_SECTIONS).map(|(section, count, (name, own))| {
+            format!(
+                "deviation: {culprit}: no known deviation explains it (ND21 {section}): seen in {count} attempts, one of them at {name}: {}\n",
+                own.about
+            )
+        });
+        lines.collect()
     }
 
     /// How much was compared.

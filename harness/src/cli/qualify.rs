@@ -10,9 +10,10 @@ use super::rig_failure::find_rig;
 use super::run::{details, line, select};
 use super::run_rig::{Job, Stop, over, play, work};
 use crate::evidence::Folder;
+use crate::library::Entry;
 use crate::link::Link as _;
 use crate::qualify::{
-    Answer, Asked, Probe, Profile, answer, conversations, deviating_masters, name, probes,
+    Answer, Asked, Probe, Profile, answer, conversations, deviating_masters, exchange, name, probes,
 };
 use crate::rig::{Run, state};
 use harness_proto::time::Span;
@@ -76,7 +77,6 @@ pub(crate) fn settle(
     output: &mut Output,
 ) -> Result<Exit, Stop> {
     let drives = run.session().rig().file.ring.first.drives;
-    let tolerance = run.exactness().tolerance;
     let mut ended = false;
     if ill {
         findings.note_open("the ring is ill: nothing more was played".to_owned());
@@ -90,7 +90,7 @@ pub(crate) fn settle(
             let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
             output.result(&line(&entry, &played.outcome, output))?;
             output.say(&details(&entry, &played.outcome, traces));
-            findings.note(entry.short_name(), &played, tolerance);
+            findings.note(entry.short_name(), &played);
             if over(run, output) {
                 ended = true;
                 break;
@@ -104,6 +104,9 @@ pub(crate) fn settle(
             (Some(profile), settled)
         }
     };
+    if !ill && !ended {
+        exchange_roles(run, findings, folder.as_deref_mut(), output)?;
+    }
     if ended || over(run, output) {
         findings.note_open(ENDED.to_owned());
         ended = true;
@@ -149,6 +152,30 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
     );
     output.result(&text)?;
     Ok(text)
+}
+
+/// Plays again what differed, with the drives' roles exchanged, so that it shows which drive it was. Only where every drive is reset before:
+/// what was written to one must not stay.
+fn exchange_roles(
+    run: &mut Run<'_>,
+    findings: &mut Findings,
+    mut folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<(), Stop> {
+    let drives = run.session().rig().file.ring.first.drives;
+    if !run.way().anew || drives < 2 {
+        return Ok(());
+    }
+    let sightings = findings.sightings().to_vec();
+    let trials = exchange(drives, sightings, &mut |entry: &Entry| {
+        if over(run, output) {
+            return Ok(None);
+        }
+        let played = play(run, entry, folder.as_deref_mut())?;
+        Ok::<_, Stop>(findings.note_exchanged(&played))
+    })?;
+    findings.note_trials(trials);
+    Ok(())
 }
 
 /// The deviations that explain every byte, and what was compared. The drives of the model have the properties of the bus that these header
@@ -266,11 +293,11 @@ fn ask(
         for entry in &probe.entries {
             let played = play(run, entry, folder.as_deref_mut())?;
             let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
-                findings.note_attempts(&played, exactness.tolerance);
+                findings.note_attempts(entry.short_name(), &played);
                 return Ok(Asking::Not(played.outcome.remarks.join("; ")));
             };
             conversations.push(attempt.conversations.clone());
-            last.push(played);
+            last.push((entry.short_name(), played));
         }
         let twin = |lines: &[String]| run.twin_with(&[known, lines].concat());
         match answer(probe, drives, &conversations, exactness, &twin) {
@@ -283,6 +310,6 @@ fn ask(
         }
     }
     last.iter()
-        .for_each(|played| findings.note_attempts(played, exactness.tolerance));
+        .for_each(|(name, played)| findings.note_attempts(name, played));
     Ok(Asking::Answer(Answer::Unexplained))
 }

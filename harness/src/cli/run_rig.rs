@@ -170,8 +170,7 @@ fn all(
         *folder = Some(Folder::create(path, &about(&mut run, job))?);
     }
     let bar = progress_bar(entries.len(), output.progress);
-    let mut findings = Findings::default();
-    let tolerance = run.exactness().tolerance;
+    let mut findings = Findings::new(&mut run);
     let name = run.session().rig().id().to_owned();
     let mut cases = Cases::new(&name, job.junit.as_deref());
     let mut tally = Tally::default();
@@ -202,7 +201,7 @@ fn all(
             page.add(entry, outcome, traces);
         }
         bar.inc(1);
-        findings.note(entry.short_name(), &played, tolerance);
+        findings.note(entry.short_name(), &played);
         ill = played.outcome.verdict == Verdict::RigError
             && played
                 .attempts

@@ -4,7 +4,8 @@
 //! that the real ring gave.
 
 pub use crate::buses::novobus::qualify::{
-    Answer, Asked, Evidence, Hypothesis, Named, Probe, Seen, Whose, answer, conversations,
-    deviating_masters, explaining, hypotheses, name, probes,
+    Answer, Asked, Culprit, Evidence, Hypothesis, Meant, Named, Probe, Seen, Sighting, Trial,
+    Whose, agreed, answer, conversations, culprit, deviating_masters, exchange, explaining,
+    hypotheses, name, probes,
 };
 pub use crate::rig::{Profile, ProfileError, Settled};

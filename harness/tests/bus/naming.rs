@@ -6,7 +6,8 @@ use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Event, Line, Recording, SimulatedLink};
 use harness::qualify::{
-    Answer, Named, Seen, Whose, answer, conversations, hypotheses, name, probes,
+    Answer, Culprit, Meant, Named, Seen, Sighting, Whose, agreed, answer, conversations, culprit,
+    exchange, hypotheses, name, probes,
 };
 use harness::rig::{Way, play_one};
 use harness::scenario::plan::Plan;
@@ -116,28 +117,73 @@ fn played(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
     all
 }
 
-/// The names that a qualification gives to a ring with these lines, and whether it differed from the model at all.
-fn names(lines: &[String]) -> (bool, Vec<Named>) {
-    let way = as_they_are();
-    let link = twin(lines).expect("a ring").into_link();
-    let (mut differing, mut alike) = (Vec::new(), Vec::new());
-    for plan in plans() {
-        let (conversations, _) = way.compared(played(plan, &link), THROUGH_A_PORT);
+/// What a qualification makes of a ring.
+#[derive(Debug, Default)]
+struct Verdict {
+    /// Whether it differed from the model at all.
+    differs: bool,
+    named: Vec<Named>,
+    /// The drive that is to blame, whatever it does.
+    culprit: Option<Culprit>,
+}
+
+/// What a ring was seen to do.
+#[derive(Default)]
+struct Play {
+    differing: Vec<Vec<Conversation>>,
+    alike: Vec<Vec<Conversation>>,
+}
+
+impl Play {
+    /// Plays a scenario on such a ring, and gives where it differed from the model.
+    fn play(&mut self, link: &SimulatedLink, plan: &Plan) -> (bool, Option<Sighting>) {
+        let (way, byte_time) = (as_they_are(), link.byte_time());
+        let (conversations, _) = way.compared(played(plan, link), THROUGH_A_PORT);
         let mut right = twin(&[]).expect("a ring");
         let (comparisons, _) = right.follow_all(&conversations, THROUGH_A_PORT);
-        match comparisons.iter().any(|own| own.divergence.is_some()) {
-            true => differing.push(conversations),
-            false => alike.push(conversations),
+        let mut found = comparisons.iter().enumerate();
+        let found = found.find_map(|(at, own)| Some((at, own.divergence.as_ref()?)));
+        let sighting =
+            found.and_then(|(at, own)| Sighting::of(&conversations, at, own, DRIVES, byte_time));
+        let differs = found.is_some();
+        match differs {
+            true => self.differing.push(conversations),
+            false => self.alike.push(conversations),
         }
+        (differs, sighting)
     }
-    let seen = Seen {
+}
+
+/// What a qualification makes of a ring with these lines.
+fn verdict(lines: &[String]) -> Verdict {
+    let link = twin(lines).expect("a ring").into_link();
+    let mut play = Play::default();
+    let mut sightings = Vec::new();
+    for (number, plan) in plans().iter().enumerate() {
+        let (_, sighting) = play.play(&link, plan);
+        sightings.extend(sighting.map(|own| (number.to_string(), own)));
+    }
+    let seen: Vec<_> = sightings.iter().map(|(_, own)| own.meant).collect();
+    let trials = exchange(DRIVES, sightings, &mut |entry: &Entry| {
+        let plan = entry.plan.as_ref().expect("novobus");
+        let (differs, sighting) = play.play(&link, plan);
+        let meant = sighting.map_or(Meant::Nobody, |own| own.meant);
+        Ok::<_, ()>(Some(differs.then_some(meant)))
+    });
+    let seen_all = Seen {
         drives: DRIVES,
         suspects: &[],
-        differing: &differing,
-        alike: &alike,
+        differing: &play.differing,
+        alike: &play.alike,
         exactness: THROUGH_A_PORT,
     };
-    (!differing.is_empty(), name(&seen, &twin))
+    let culprit = culprit(DRIVES, &seen, &trials.expect("no errors"));
+    let (_, named) = agreed(culprit, &name(&seen_all, &twin));
+    Verdict {
+        differs: !play.differing.is_empty(),
+        named,
+        culprit,
+    }
 }
 
 /// How a deviation that was planted is named.
@@ -153,10 +199,22 @@ enum End {
     NotSeen,
 }
 
-fn end(planted: &Deviation, whose: Option<u8>) -> End {
+/// How a deviation is named, and whether its drive is blamed for it whatever it is.
+fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
     let drives = whose.map_or("0..last".to_owned(), |drive| drive.to_string());
     let lines = [format!("drive {drives} deviates {}", planted.name)];
-    let (differs, named) = names(&lines);
+    let Verdict {
+        differs,
+        named,
+        culprit,
+    } = verdict(&lines);
+    if let Some(culprit) = culprit {
+        assert_eq!(
+            Some(culprit.drive),
+            whose,
+            "{lines:?}: another drive is blamed"
+        );
+    }
     let is_it = |named: &&Named| {
         let drive = match (&named.whose, whose) {
             (Whose::OneOf(drives), Some(drive)) => drives.contains(&drive),
@@ -166,7 +224,7 @@ fn end(planted: &Deviation, whose: Option<u8>) -> End {
         named.deviation.name == planted.name && drive
     };
     let right = named.iter().find(is_it);
-    match (right, named.len()) {
+    let end = match (right, named.len()) {
         (Some(right), 1) if matches!(&right.whose, Whose::OneOf(drives) if drives.len() > 1) => {
             End::AmongOthers
         }
@@ -175,16 +233,19 @@ fn end(planted: &Deviation, whose: Option<u8>) -> End {
         (None, 0) if differs => End::NotNamed,
         (None, 0) => End::NotSeen,
         (None, _) => panic!("{lines:?}: only others are named: {named:?}"),
-    }
+    };
+    (end, culprit.is_some())
 }
 
-/// Each in a drive of its own, in turn.
+/// Each in a drive of its own, in turn. No other drive is blamed, and where only that drive's own answers differ, it is: as it would be for
+/// a deviation that has no name.
 #[test]
 fn planted_in_turn() {
-    let mut ends = BTreeMap::new();
+    let (mut ends, mut blamed) = (BTreeMap::new(), 0);
     let of_the_bus = deviations().filter(|own| !own.behind_the_bus);
     for (planted, drive) in of_the_bus.zip((0..DRIVES).cycle()) {
-        let end = end(planted, Some(drive));
+        let (end, is_blamed) = end(planted, Some(drive));
+        blamed += usize::from(is_blamed);
         *ends.entry(end).or_insert(0) += 1;
     }
     let count = |end| ends.get(&end).copied().unwrap_or(0);
@@ -192,12 +253,34 @@ fn planted_in_turn() {
         count(End::Alone) + count(End::AmongOthers) >= 30,
         "{ends:?}"
     );
+    assert!(blamed >= 12, "{blamed}");
 }
 
 #[test]
 fn right_drives_have_no_names() {
-    let (differs, named) = names(&[]);
-    assert!(!differs && named.is_empty(), "{named:?}");
+    let right = verdict(&[]);
+    assert!(
+        !right.differs && right.named.is_empty() && right.culprit.is_none(),
+        "{right:?}"
+    );
+}
+
+/// In every drive: it is named for all of them, or for none.
+#[test]
+fn planted_in_every_drive() {
+    for planted in deviations().filter(|own| !own.behind_the_bus) {
+        let lines = [format!("drive 0..last deviates {}", planted.name)];
+        let own = verdict(&lines);
+        let of_all = |named: &Named| named.whose == Whose::Every || named.perhaps_of_all;
+        assert!(
+            own.named.is_empty() || own.named.iter().any(of_all),
+            "{lines:?}: {own:?}"
+        );
+        assert!(
+            own.culprit.is_none_or(|culprit| culprit.perhaps_of_all) || !own.named.is_empty(),
+            "{lines:?}: {own:?}"
+        );
+    }
 }
 
 /// ND21 9.9: the time-outs of the drives, and their waits, lie 0.3 ms apart at most. No drive is named, and what the probes of these times
@@ -216,8 +299,8 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
         let lines: Vec<_> = (0..6)
             .map(|place| own(place, time_outs[usize::from(place >= 3)]))
             .collect();
-        let (differs, named) = names(&lines);
-        assert!(!differs && named.is_empty(), "{lines:?}: {named:?}");
+        let own = verdict(&lines);
+        assert!(!own.differs && own.named.is_empty(), "{lines:?}: {own:?}");
         let link = twin(&lines).expect("a ring").into_link();
         for probe in probes
             .iter()

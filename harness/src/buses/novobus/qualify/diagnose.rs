@@ -4,6 +4,7 @@ use super::hypothesis::{Evidence, judge};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::rig::Driven;
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation, deviations, master_deviations};
+use std::collections::BTreeSet;
 use std::fmt;
 
 /// Largest ring whose drives are all tried one by one; in larger ones only those that telegrams named are.
@@ -22,6 +23,8 @@ pub struct Named {
     pub deviation: &'static Deviation,
     /// Whose it is.
     pub whose: Whose,
+    /// Whether every byte is the same if all drives have it: it is that drive's, and perhaps others'.
+    pub perhaps_of_all: bool,
 }
 
 /// Which drives have a deviation, as far as the bytes tell.
@@ -41,7 +44,11 @@ impl fmt::Display for Named {
             about,
             ..
         } = self.deviation;
-        let what = format!("{name} (ND21 {section}): {about}");
+        let more = match self.perhaps_of_all {
+            true => "; the bytes do not say whether other drives do the same",
+            false => "",
+        };
+        let what = format!("{name} (ND21 {section}): {about}{more}");
         match &self.whose {
             Whose::Every => write!(f, "every drive: {what}"),
             Whose::OneOf(drives) => match drives.as_slice() {
@@ -162,6 +169,8 @@ fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
     if candidates.iter().any(|own| own.timely) {
         candidates.retain(|own| own.timely);
     }
+    let of_all = candidates.iter().filter(|own| own.drive.is_none());
+    let of_all: BTreeSet<&str> = of_all.map(|own| own.deviation.name).collect();
     if candidates.iter().any(|own| own.drive.is_some()) {
         candidates.retain(|own| own.drive.is_some());
     }
@@ -170,6 +179,7 @@ fn simplest(mut candidates: Vec<Candidate>) -> Vec<Named> {
         let drives: Vec<u8> = own.iter().filter_map(|own| own.drive).collect();
         Named {
             deviation: own[0].deviation,
+            perhaps_of_all: !drives.is_empty() && of_all.contains(own[0].deviation.name),
             whose: match drives.is_empty() {
                 true => Whose::Every,
                 false => Whose::OneOf(drives),

@@ -1,0 +1,420 @@
+//! Which drive differs from the manual where no known deviation explains what it does.
+//!
+//! Between the sync byte of a telegram and its end only the addressed drive changes a byte (ND21 9.3). A byte that is otherwise there is that
+//! drive's, unless another one damages what it passes on: then it is otherwise in telegrams to any drive. So the attempt is played again
+//! with the drives' roles exchanged.
+
+use super::diagnose::{Named, Whose};
+use super::exchange::{EEPROM, Sent, begin};
+use crate::buses::novobus::twin::{Conversation, Divergence};
+use crate::library::Entry;
+use crate::scenario::source::Source;
+use harness_proto::nd21::ram;
+use harness_proto::novobus::checksum::Checksum;
+use harness_proto::novobus::role::Role;
+use harness_proto::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte};
+use harness_proto::time::Span;
+use std::collections::BTreeSet;
+use std::fmt;
+
+/// How the byte at which an attempt differed belongs to a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Meant {
+    /// It stands in a telegram with the address of this drive.
+    Own(u8),
+    /// It stands behind such a telegram with an error in it, and nothing but SYNCO between: this drive and those behind it are in the error
+    /// mode (9.7).
+    Behind(u8),
+    /// The bytes do not say.
+    Nobody,
+}
+
+/// An attempt that differed from the model.
+#[derive(Clone, Debug)]
+pub struct Sighting {
+    /// To whom the byte belongs.
+    pub meant: Meant,
+    /// The section of the rule that is broken there.
+    pub section: &'static str,
+    /// What was seen, in a sentence.
+    pub about: String,
+    sent: Sent,
+    /// How many bytes are sent until it is seen, and the telegram is whole.
+    count: usize,
+}
+
+impl Sighting {
+    /// The byte of a conversation at which an attempt on a ring of `drives` differed from the model; `None` where the attempt cannot be
+    /// sent again, or no other value came.
+    #[must_use]
+    pub fn of(
+        attempt: &[Conversation],
+        place: usize,
+        found: &Divergence,
+        drives: u8,
+        byte_time: Span,
+    ) -> Option<Self> {
+        // A byte that is missing or late may be the computer's fault; another value is none.
+        let values = found.expected.zip(found.received);
+        if found.ring != 0 || values.is_none_or(|((_, due), (_, came))| due.byte == came.byte) {
+            return None;
+        }
+        let first = begin(attempt, drives);
+        let before = match place.checked_sub(1) {
+            _ if place < first => return None,
+            Some(before) if before >= first => {
+                Sent::of(attempt, before, drives, byte_time)?.bytes.len()
+            }
+            _ => 0,
+        };
+        let sent = Sent::of(attempt, place, drives, byte_time)?;
+        let all = sent.roles.iter().zip(&sent.bytes).enumerate().skip(before);
+        let mut answered =
+            all.filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE));
+        let (index, _) = answered.nth(found.byte.checked_sub(1)?)?;
+        let (meant, end) = sent.meant(index);
+        Some(Self {
+            meant,
+            section: sent.section(index),
+            about: found.to_string(),
+            count: end.max(index + 1).min(sent.bytes.len()),
+            sent,
+        })
+    }
+}
+
+/// A sighting that was sent again with the roles exchanged, step by step, and to whom the byte belonged at which that differed, if it did.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// To whom it belonged in the attempt.
+    pub meant: Meant,
+    /// How many addresses on, and what came of it; one for each other drive.
+    pub steps: Vec<(u8, Option<Meant>)>,
+}
+
+/// How many attempts that differed are played again with the drives' roles exchanged.
+const MOST_TRIED: usize = 3;
+
+/// With how many drives at most the roles are exchanged.
+const MOST_EXCHANGED: u8 = 8;
+
+/// Plays a scenario, and gives to whom the byte belonged at which it differed from the model, if it did; `None` where it says nothing.
+type Ask<'a, E> = &'a mut dyn FnMut(&Entry) -> Result<Option<Option<Meant>>, E>;
+
+/// Plays again what differed, with the drives' roles exchanged, the clearest and shortest first; each sighting has the name of its scenario.
+/// `ask` plays them.
+///
+/// # Errors
+/// Those of `ask`.
+pub fn exchange<E>(
+    drives: u8,
+    mut sightings: Vec<(String, Sighting)>,
+    ask: Ask<'_, E>,
+) -> Result<Vec<Trial>, E> {
+    sightings.retain(|(_, own)| own.meant != Meant::Nobody);
+    sightings.sort_by_key(|(_, own)| (matches!(own.meant, Meant::Behind(_)), own.count));
+    let mut trials: Vec<Trial> = Vec::new();
+    let mut tried = BTreeSet::new();
+    for (name, sighting) in &sightings {
+        if trials.len() == MOST_TRIED || !tried.insert(name) {
+            continue;
+        }
+        let mut steps = Vec::new();
+        for step in 1..drives.min(MOST_EXCHANGED) {
+            let text = sighting.sent.exchanged(sighting.count, drives, step);
+            let Some(text) = text else { break };
+            let source = Source {
+                name: format!("exchanged-{name}-by-{step}"),
+                text: text.into(),
+            };
+            let Ok(entry) = Entry::new(source, Some(drives)) else {
+                break;
+            };
+            let Some(found) = ask(&entry)? else { break };
+            steps.push((step, found));
+        }
+        if !steps.is_empty() && steps.len() + 1 == usize::from(drives.min(MOST_EXCHANGED)) {
+            let meant = sighting.meant;
+            trials.push(Trial { meant, steps });
+        }
+    }
+    Ok(trials)
+}
+
+/// A drive that is to blame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Culprit {
+    /// Which.
+    pub drive: u8,
+    /// Whether every drive of the ring may be as wrong as this one.
+    pub perhaps_of_all: bool,
+}
+
+impl fmt::Display for Culprit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let more = match self.perhaps_of_all {
+            true => " (the bytes do not say whether other drives do the same)",
+            false => "",
+        };
+        write!(f, "drive {}{more}", self.drive)
+    }
+}
+
+/// The drive that explains where attempts differed: `seen` are all of them, and some were tried again with the roles exchanged.
+#[must_use]
+pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial]) -> Option<Culprit> {
+    if drives == 1 && !seen.is_empty() {
+        return Some(Culprit {
+            drive: 0,
+            perhaps_of_all: false,
+        });
+    }
+    let own = |meant: &Meant| match meant {
+        Meant::Own(drive) => Some(*drive),
+        _ => None,
+    };
+    let owners: BTreeSet<u8> = seen.iter().filter_map(own).collect();
+    if let Some(first) = owners.first().copied() {
+        let mut own_trials = trials
+            .iter()
+            .filter(|trial| trial.meant == Meant::Own(first));
+        let alone = |trial: &Trial| {
+            let mut steps = trial.steps.iter();
+            steps.all(|(_, found)| found.is_none_or(|found| found == Meant::Own(first)))
+        };
+        let tried = own_trials.clone().next().is_some();
+        let blamed = owners.len() == 1 && tried && own_trials.all(alone);
+        return blamed.then_some(Culprit {
+            drive: first,
+            perhaps_of_all: false,
+        });
+    }
+    let trials = trials.iter().filter_map(|trial| errors_of(drives, trial));
+    let trials: Vec<BTreeSet<u8>> = trials.collect();
+    let may_be = |drive: &u8| trials.iter().all(|wrong| may_be(drives, *drive, wrong));
+    let left: Vec<u8> = (0..drives).filter(may_be).collect();
+    let [drive] = left[..] else { return None };
+    (!trials.is_empty()).then_some(Culprit {
+        drive,
+        perhaps_of_all: trials
+            .iter()
+            .all(|wrong| wrong.len() == usize::from(drives)),
+    })
+}
+
+/// The drive to blame, and the deviations that agree with it. A known deviation that explains every byte says more than a drive, and where
+/// none agrees all are given, and no drive.
+#[must_use]
+pub fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culprit>, Vec<Named>) {
+    let Some(blamed) = culprit else {
+        return (None, named.to_vec());
+    };
+    let may_be =
+        |own: &&Named| matches!(&own.whose, Whose::OneOf(all) if all.contains(&blamed.drive));
+    let agreed: Vec<_> = named.iter().filter(may_be).cloned().collect();
+    if agreed.is_empty() && !named.is_empty() {
+        return (None, named.to_vec());
+    }
+    let of_it = agreed.into_iter().map(|own| Named {
+        whose: Whose::OneOf(vec![blamed.drive]),
+        ..own
+    });
+    (culprit, of_it.collect())
+}
+
+/// Behind errors of which drives a ring differed, where they were provoked in one drive after the other; `None` where that was not done for
+/// every drive, or something else differed.
+fn errors_of(drives: u8, trial: &Trial) -> Option<BTreeSet<u8>> {
+    let Meant::Behind(own) = trial.meant else {
+        return None;
+    };
+    let mut wrong = BTreeSet::from([own]);
+    for (_, found) in &trial.steps {
+        match found {
+            None => {}
+            Some(Meant::Behind(drive)) => {
+                wrong.insert(*drive);
+            }
+            Some(_) => return None,
+        }
+    }
+    (trial.steps.len() + 1 == usize::from(drives)).then_some(wrong)
+}
+
+/// Whether a drive alone may make a ring differ behind errors of these drives. The drives in front of an error pass everything on; those
+/// behind it follow into the error mode. A drive may be wrong as the first one, as a follower, or as both.
+fn may_be(drives: u8, drive: u8, wrong: &BTreeSet<u8>) -> bool {
+    let first = BTreeSet::from([drive]);
+    let follower: BTreeSet<u8> = (drive + 1..drives).collect();
+    [&first, &follower, &(&first | &follower)].contains(&wrong)
+}
+
+impl Sent {
+    /// To whom a byte belongs, and where the telegram ends that it stands in.
+    fn meant(&self, index: usize) -> (Meant, usize) {
+        let is_sync = |at: &usize| self.roles[*at] == Role::Sync;
+        let Some(start) = (0..=index).rev().find(is_sync) else {
+            return (Meant::Nobody, index + 1);
+        };
+        let Ok(SyncByte::Telegram(header)) = SyncByte::decode(self.bytes[start].0) else {
+            return (Meant::Nobody, index + 1);
+        };
+        let end = start + header.telegram_length();
+        let drive = match (header.addressing(), self.roles.get(start + 1)) {
+            (Addressing::AddressFollows, Some(Role::Address { drive: Some(drive) })) => *drive,
+            // Which drive a short address means, the drives before have decided.
+            _ => return (Meant::Nobody, end),
+        };
+        let whole = self.bytes[..=index]
+            .iter()
+            .skip(start)
+            .all(|(_, whole)| *whole);
+        let idle = |own: &(u8, bool)| own.0 == SYNCO;
+        let meant = match index {
+            _ if !whole || index < start + 2 => Meant::Nobody,
+            _ if index < end => Meant::Own(drive),
+            _ if self.bytes[end..=index].iter().all(idle) => Meant::Behind(drive),
+            _ => Meant::Nobody,
+        };
+        (meant, end)
+    }
+
+    /// The section of the rule that a byte obeys: for what a cell holds, that of the command by which it was written.
+    fn section(&self, index: usize) -> &'static str {
+        let role = self.roles[index];
+        match role {
+            Role::Data {
+                drive: Some(drive),
+                address,
+            } => self.of_cell(index, drive, address),
+            Role::Command { .. } | Role::Check { .. } if self.is_cut(index) => "9.5",
+            _ => role.rule().0,
+        }
+    }
+
+    /// The section of what a cell holds that is read at `index`.
+    fn of_cell(&self, index: usize, drive: u8, address: u16) -> &'static str {
+        match address {
+            0..0xFD80 => return "10.1",
+            ram::STATUS => return "14.10.1",
+            _ if (ram::ERRORCODE..ram::ERRORCODE + 2).contains(&address) => return "14.11.14",
+            _ if EEPROM.contains(&address) => return "14.10.5",
+            _ => {}
+        }
+        let mut was_right = false;
+        for at in (0..index).rev() {
+            match self.roles[at] {
+                Role::Data {
+                    drive: Some(own),
+                    address: read,
+                } if (own, read) == (drive, address) => {
+                    was_right = true;
+                }
+                Role::Check {
+                    drive: Some(own),
+                    writes,
+                    length,
+                } if own == drive => {
+                    let writes = writes.is_some_and(|(first, width)| {
+                        (first..first.saturating_add(u16::from(width))).contains(&address)
+                    });
+                    let section = match at.checked_sub(1).map(|before| self.roles[before]) {
+                        Some(Role::Command { section, .. }) => section,
+                        _ => "10.1",
+                    };
+                    let right = self.is_right(at, drive, length);
+                    match (section, right) {
+                        ("10.5", true) => return "10.5",
+                        // What was right a moment ago, and was not written since.
+                        (_, true) if writes && was_right => return "14.2.1",
+                        (_, true) if writes => return section,
+                        (_, false) if writes => return "9.6",
+                        _ => {}
+                    }
+                }
+                Role::ProcessData { drive: Some(own) } if own == drive && address >= 0xFF00 => {
+                    return "9.4";
+                }
+                _ => {}
+            }
+        }
+        "10.1"
+    }
+
+    /// Whether the checking byte of a command is right.
+    fn is_right(&self, check: usize, drive: u8, length: u8) -> bool {
+        let own = |at: &usize| {
+            matches!(self.roles[*at], Role::Command { .. } | Role::Data { .. })
+                && self.roles[*at].drive() == Some(drive)
+        };
+        let command = (0..check).rev().filter(own);
+        let command = command.take(usize::from(length).saturating_sub(1));
+        let sum = command.fold(Checksum::EMPTY, |sum, at| sum.with(self.bytes[at].0));
+        sum.plus() == self.bytes[check].0
+    }
+
+    /// Whether a command began in another telegram, or is not the first one of its telegram.
+    fn is_cut(&self, index: usize) -> bool {
+        let start = (0..index).rev().find(|at| self.roles[*at] == Role::Sync);
+        let Some(start) = start else { return false };
+        let here = &self.roles[start..index];
+        if here.iter().any(|role| matches!(role, Role::Check { .. })) {
+            return true;
+        }
+        // The first parameter byte of this telegram goes on with a command of an earlier one.
+        let drive = self.roles[index].drive();
+        let before = self.roles[..start].iter().rev();
+        let mut before = before.filter(|role| role.drive() == drive && drive.is_some());
+        let goes_on = |role: &Role| matches!(role, Role::Command { .. } | Role::Data { .. });
+        before.next().is_some_and(goes_on)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trial(meant: Meant, steps: &[(u8, Option<Meant>)]) -> Trial {
+        Trial {
+            meant,
+            steps: steps.to_vec(),
+        }
+    }
+
+    fn blamed(seen: &[Meant], trials: &[Trial]) -> Option<u8> {
+        culprit(3, seen, trials).map(|own| own.drive)
+    }
+
+    #[test]
+    fn a_drive_is_to_blame_that_differs_in_every_role_and_no_other_one_does() {
+        let own = Meant::Own(1);
+        let alone = trial(own, &[(1, None), (2, None)]);
+        assert_eq!(blamed(&[own, own], std::slice::from_ref(&alone)), Some(1));
+        // It is met in another place of the conversation, too.
+        let again = trial(own, &[(1, Some(own)), (2, None)]);
+        assert_eq!(blamed(&[own], &[again]), Some(1));
+        // Another drive differs in the same role.
+        let other = trial(own, &[(1, Some(Meant::Own(2))), (2, None)]);
+        assert_eq!(blamed(&[own], &[other]), None);
+        assert_eq!(blamed(&[own, Meant::Own(0)], &[alone]), None);
+        // Nothing was tried.
+        assert_eq!(blamed(&[own], &[]), None);
+    }
+
+    #[test]
+    fn in_the_error_mode_a_drive_is_to_blame_that_no_other_one_explains() {
+        let found = |at: &[u8]| {
+            let step = |step: u8| (step, at.contains(&step).then_some(Meant::Behind(step)));
+            let tried = trial(Meant::Behind(0), &[step(1), step(2)]);
+            culprit(3, &[Meant::Behind(0)], &[tried]).map(|own| (own.drive, own.perhaps_of_all))
+        };
+        // Drive 0 alone is in the error mode where the error is in drive 0.
+        assert_eq!(found(&[]), Some((0, false)));
+        assert_eq!(found(&[1, 2]), Some((0, true)));
+        let last = trial(Meant::Behind(2), &[(1, None), (2, None)]);
+        // The last one as the first in error, or the one behind it as a follower.
+        assert_eq!(blamed(&[Meant::Behind(2)], &[last]), None);
+        let middle = trial(Meant::Behind(1), &[(1, None), (2, None)]);
+        assert_eq!(blamed(&[Meant::Behind(1)], &[middle]), Some(1));
+    }
+}

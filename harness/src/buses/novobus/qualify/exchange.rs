@@ -1,0 +1,199 @@
+//! An attempt again with the drives' roles exchanged: every telegram goes so many addresses on. A drive that is wrong is wrong at other
+//! bytes then; what lies on the way of all telegrams, or in every drive, is wrong at the same byte again.
+
+use crate::buses::novobus::twin::{Conversation, Done};
+use crate::link::{Moment, PlacedFault, link_name};
+use harness_proto::nd21::ram;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::role::{Role, roles};
+use harness_proto::time::{Instant, Span};
+use harness_sim::fault::LinkFault;
+use std::fmt::Write as _;
+
+/// Bytes on a line at most.
+const BYTES_A_LINE: usize = 24;
+
+/// The most bytes of an attempt that is played again.
+const MOST_BYTES: usize = 12_000;
+
+/// The ports of the EEPROM (ND21 14.10.5): what is written there outlives a reset.
+pub(super) const EEPROM: std::ops::RangeInclusive<u16> = ram::EEPROM_BUFFER..=ram::EEPROM_CONTROL;
+
+/// What the master did in an attempt, in order.
+#[derive(Clone, Debug)]
+enum Piece {
+    Gap(Span),
+    Byte,
+    Fault(String),
+}
+
+/// What the master sent in an attempt, conversation behind conversation.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sent {
+    pieces: Vec<Piece>,
+    /// The bytes, and whether each went round whole.
+    pub(super) bytes: Vec<(u8, bool)>,
+    pub(super) roles: Vec<Role>,
+}
+
+impl Sent {
+    /// What was sent into a ring of `drives` behind the reset of the drives, up to the conversation `last`; `None` where it cannot be sent again as it was: into two rings, or
+    /// with faults elsewhere than at bytes of the master's own link.
+    pub(super) fn of(
+        attempt: &[Conversation],
+        last: usize,
+        drives: u8,
+        byte_time: Span,
+    ) -> Option<Self> {
+        let mut own = Self::default();
+        for conversation in attempt.get(begin(attempt, drives)..=last)? {
+            let before = own.bytes.len() as u64;
+            own.bytes.extend(conversation.sent_in(0));
+            let mut free = Instant::START;
+            for (ring, done) in &conversation.done {
+                match done {
+                    _ if *ring != 0 => return None,
+                    Done::Sent(at, _) => {
+                        own.gap(at.since(free));
+                        free = *at + byte_time;
+                        own.pieces.push(Piece::Byte);
+                    }
+                    Done::Fault(_, PlacedFault::Link(0, fault), Moment::Byte(number))
+                        if is_written_as_read(fault) =>
+                    {
+                        let place = link_name(0, drives, 0);
+                        let number = before + number;
+                        own.pieces
+                            .push(Piece::Fault(format!("! {place} byte {number}: {fault}")));
+                    }
+                    Done::Fault(..) => return None,
+                    Done::Step(_) => {}
+                }
+            }
+            own.gap(conversation.end.since(free));
+        }
+        own.roles = roles(RingSize::new(u64::from(drives)).ok()?, &own.bytes);
+        Some(own)
+    }
+
+    fn gap(&mut self, gap: Span) {
+        // What is shorter is the computer's own.
+        if gap < Span::from_micros(100) {
+            return;
+        }
+        match self.pieces.last_mut() {
+            Some(Piece::Gap(own)) => *own = *own + gap,
+            _ => self.pieces.push(Piece::Gap(gap)),
+        }
+    }
+
+    /// The text of a scenario that sends the first `count` bytes again, each telegram `step` addresses on in a ring of `drives`. `None` where it
+    /// would be another conversation: a short address does not go on from the last drive to the first, and what an EEPROM holds is not
+    /// exchanged.
+    pub(super) fn exchanged(&self, count: usize, drives: u8, step: u8) -> Option<String> {
+        let on = |drive: u8| {
+            let drive = (u16::from(drive) + u16::from(step)) % u16::from(drives);
+            u8::try_from(drive).ok()
+        };
+        let writes_eeprom = |role: &Role| match role {
+            Role::Check {
+                writes: Some((address, width)),
+                ..
+            } => (*address..address.saturating_add(u16::from(*width)))
+                .any(|cell| EEPROM.contains(&cell)),
+            _ => false,
+        };
+        let roles = self.roles.get(..count)?;
+        if count > MOST_BYTES || roles.iter().any(writes_eeprom) {
+            return None;
+        }
+        let mut new: Vec<(u8, bool)> = self.bytes[..count].to_vec();
+        for (role, (byte, _)) in roles.iter().zip(&mut new) {
+            if let Role::Address { drive: Some(drive) } = role {
+                *byte = on(*drive)?.wrapping_sub(drives);
+            }
+        }
+        let size = RingSize::new(u64::from(drives)).ok()?;
+        let meant = harness_proto::novobus::role::roles(size, &new);
+        let same = |(old, new): (&Role, &Role)| match (old.drive(), new.drive()) {
+            (None, None) => true,
+            (Some(old), Some(new)) => on(old) == Some(new),
+            _ => false,
+        };
+        if !roles.iter().zip(&meant).all(same) {
+            return None;
+        }
+        Some(self.text(&new, drives, step))
+    }
+
+    fn text(&self, bytes: &[(u8, bool)], drives: u8, step: u8) -> String {
+        let mut text = format!(
+            "title   The same conversation, each telegram {step} addresses on\nring    {drives}\n\n"
+        );
+        let mut left = bytes.iter();
+        let mut open = 0;
+        let end = |text: &mut String, open: &mut usize| {
+            if std::mem::take(open) > 0 {
+                text.push('\n');
+            }
+        };
+        // Writing to a String cannot fail.
+        for piece in &self.pieces {
+            match piece {
+                Piece::Byte => {
+                    let Some((byte, _)) = left.next() else { break };
+                    text.push_str(if open == 0 { ">" } else { "" });
+                    let _infallible = write!(text, " {byte:02X}");
+                    open += 1;
+                    if open == BYTES_A_LINE {
+                        end(&mut text, &mut open);
+                    }
+                }
+                Piece::Gap(gap) => {
+                    end(&mut text, &mut open);
+                    let us = gap.as_nanos() / 1_000;
+                    let _infallible = writeln!(text, "wait {us}us");
+                }
+                Piece::Fault(line) => {
+                    end(&mut text, &mut open);
+                    let _infallible = writeln!(text, "{line}");
+                }
+            }
+        }
+        end(&mut text, &mut open);
+        text
+    }
+}
+
+/// The first conversation behind the reset of the drives that comes before a scenario.
+pub(super) fn begin(attempt: &[Conversation], drives: u8) -> usize {
+    let Ok(size) = RingSize::new(u64::from(drives)) else {
+        return 0;
+    };
+    let is_reset = |role: &Role| {
+        matches!(
+            role,
+            Role::Command {
+                section: "10.5",
+                ..
+            }
+        )
+    };
+    let resets = |own: &Conversation| roles(size, &own.sent_in(0)).iter().any(is_reset);
+    let before = |own: &&Conversation| !own.has_steps();
+    let before = attempt.iter().take_while(before).count();
+    let last = attempt[..before].iter().rposition(resets);
+    last.map_or(0, |last| last + 1)
+}
+
+/// Whether the scenario language reads a fault as it is written.
+fn is_written_as_read(fault: &LinkFault) -> bool {
+    matches!(
+        fault,
+        LinkFault::Flip(_)
+            | LinkFault::Replace(_)
+            | LinkFault::Drop
+            | LinkFault::Duplicate
+            | LinkFault::Insert(_)
+    )
+}
