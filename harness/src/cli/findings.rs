@@ -84,6 +84,9 @@ impl Findings {
         let whole = last.comparisons.len() == last.conversations.len() && !left_out;
         let why = match verdict {
             Verdict::Skipped => "the drives could not be made ready",
+            Verdict::Inconclusive if differs => {
+                "a byte differed where the manual leaves the drive a choice"
+            }
             _ if differs => "a byte differed",
             Verdict::Failed => "it failed, although every byte is as the model says",
             Verdict::Inconclusive => "it settles nothing",

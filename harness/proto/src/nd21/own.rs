@@ -3,7 +3,7 @@
 //! A bench compares a cell that it has written only where no row of [`OWN`] names it. What any other cell holds before the first
 //! write is the drive's choice too, ROM and EEPROM included, but it must not change from one read to the next.
 
-use super::cells::{Access, cell_at};
+use super::cells::{Access, cell_at, changes_by_itself};
 use super::{PARAMETERS, ram};
 use core::ops::RangeInclusive;
 
@@ -54,12 +54,62 @@ pub const SCOPE: RangeInclusive<u16> = ram::SCOPE_STATUS..=ram::SCOPE_SIGNAL2;
 /// The buffer of the oscilloscope (ND21 14.10.6.6).
 pub const SCOPE_BUFFER: RangeInclusive<u16> = ram::SCOPE_PUFFER..=ram::STACK - 1;
 
+/// Whether a cell is one that the oscilloscope changes while it runs, and only then.
+#[must_use]
+pub fn is_of_the_scope(address: u16) -> bool {
+    let works_in = SCOPE.contains(&address) || SCOPE_BUFFER.contains(&address);
+    works_in && address != ram::SCOPE_STATUS
+}
+
 /// RAM that no function of the drive uses while the oscilloscope stands, of which tests may write every byte with any value: part of its
 /// buffer.
 pub const SPARE: RangeInclusive<u16> = 0xFE10..=0xFE97;
 
 /// The parameters (ND21 14.2.1): loaded from the EEPROM at a reset, and only read by the drive afterwards.
 pub const PARAMETER_CELLS: RangeInclusive<u16> = PARAMETERS..=ram::VCO_LIN_L;
+
+/// A part of the drive's program that writes its cells only while it works, and that a master starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Worker {
+    /// The positioning controller and the referencing run (ND21 13.2, 13.3).
+    Positioning,
+    /// The EEPROM controller (ND21 14.10.5).
+    Eeprom,
+    /// The oscilloscope (ND21 14.10.6).
+    Scope,
+}
+
+/// The bits of a cell that hold what the master has written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// The bits; 0 where the drive may write all of them at any time.
+    pub bits: u8,
+    /// They are the drive's own all the same once this part has been started.
+    pub unless: Option<Worker>,
+}
+
+/// The bits of a cell, where a master has read `value`, that the manual does not let the drive change by itself. A drive that reports an
+/// error or a reset in `Status` may block and stop itself (ND21 14.4.1).
+#[must_use]
+pub fn kept(address: u16, value: u8) -> Kept {
+    use crate::nd21::bits::{flags2, ps_status, status};
+    let kept = |bits, unless| Kept { bits, unless };
+    let positioning = Some(Worker::Positioning);
+    match address {
+        ram::STATUS if value & (status::ERROR | status::RESET) != 0 => kept(0, None),
+        ram::STATUS => kept(status::BLOCK | status::STOP, None),
+        // 14.4.3, 14.10.2: the drive ends what these bits have started, and never switches the monitoring.
+        ram::FLAGS2 => kept(flags2::MONITORING, None),
+        // 13.3.1: the other bits report.
+        ram::PS_STATUS => kept(ps_status::CALCULATE | ps_status::START, positioning),
+        ram::PS_POSITION_H..=ram::PS_DELTA => kept(0xFF, positioning),
+        ram::EEPROM_BUFFER..ram::EEPROM_CONTROL => kept(0xFF, Some(Worker::Eeprom)),
+        ram::SCOPE_STATUS => kept(0, None),
+        _ if is_of_the_scope(address) => kept(0xFF, Some(Worker::Scope)),
+        _ if is_own(address) || changes_by_itself(address) => kept(0, None),
+        _ => kept(0xFF, None),
+    }
+}
 
 /// Whether the drive's program may write a cell at any time, so that no model can say what it holds. ROM is not: the drive chooses what
 /// stands there once.
@@ -71,7 +121,7 @@ pub fn is_own(address: u16) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cells::{RAM, changes_by_itself};
+    use super::super::cells::RAM;
     use super::*;
 
     /// ND21 14.2.1, 14.5: what a drive changes as time goes on is its own, apart from the buffer of an oscilloscope that stands.

@@ -30,6 +30,13 @@ impl Watcher for Telling<'_> {
     }
 
     fn found(&mut self, finding: &Finding, file: &str) {
+        if finding.seen_again == 0 {
+            self.output.say(&format!(
+                "case {} differed once and not again in {} tries; the computer or the line may have been disturbed, so this is no finding: {}\n",
+                finding.number, finding.of, finding.difference.about
+            ));
+            return;
+        }
         let word = if finding.confirmed { "found" } else { "flaky" };
         let mut text = format!(
             "{word}: case {}, seen again {} of {} times: {}\n",

@@ -6,6 +6,7 @@ use crate::link::{Event, Recording};
 use crate::rig::check::Rig;
 use crate::rig::file::Deviation;
 use crate::rig::run::{Way, known, play_one, twin};
+use crate::scenario::pattern::Expected;
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{Finding, Outcome};
 use crate::scenario::verdict::Verdict;
@@ -250,7 +251,14 @@ fn of_the_drive<'h>(finding: &Finding, heard: &Heard<'h>) -> Option<&'h Own> {
     let about = |conversation: &Conversation, own: &Own| match &finding.difference {
         Some(difference) => {
             let asked_for = difference.index < difference.expected.len();
-            asked_for && difference.ring == own.ring && difference.at == Some(own.at)
+            let differs = match difference.expected.get(difference.index) {
+                Some(Expected::Byte(byte)) => byte ^ own.value,
+                _ => 0,
+            };
+            asked_for
+                && differs & own.known == 0
+                && difference.ring == own.ring
+                && difference.at == Some(own.at)
         }
         None => conversation.step_at(own.ring, own.place) == Some(finding.span.start),
     };

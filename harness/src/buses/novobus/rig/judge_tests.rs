@@ -2,14 +2,16 @@
 
 use super::{Heard, judge};
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
-use crate::library::Entry;
-use crate::link::{Event, Line, Recording};
+use crate::library::{Entry, sources};
+use crate::link::{Capability, Event, Line, Recording, SimulatedLink};
 use crate::rig::check::parse;
 use crate::rig::run::{Way, known, play_one, twin};
-use crate::scenario::run::Outcome;
+use crate::scenario::plan::Plan;
+use crate::scenario::run::{Outcome, lacks};
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict::{self, Failed, Inconclusive, Passed};
+use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 
 /// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.
@@ -24,46 +26,64 @@ fn judged_with(
     scenario: &str,
     change: &dyn Fn(&mut [Comparison]),
 ) -> Outcome {
-    let source = |text: String| Source {
-        name: "test".to_owned(),
-        text: text.into(),
-    };
-    let entry = |text: String| {
-        let entry = Entry::new(source(text), None).expect("no mistakes");
-        entry.plan.expect("novobus")
-    };
-    let rig = format!(
-        "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"in-band\"\n{rig}"
-    );
-    let rig = parse(&source(rig)).expect("a rig");
-    let plan = entry(format!("title x\nring 3\n{scenario}"));
+    let plan = plan(format!("title x\nring 3\n{scenario}"));
     let way = Way {
         rings: plan.rings.clone(),
         attempts: None,
         anew: false,
     };
-    let own = entry(format!(
+    judged_on(&mut link(ring), rig, (&plan, &way), change)
+}
+
+fn source(text: String) -> Source {
+    Source {
+        name: "test".to_owned(),
+        text: text.into(),
+    }
+}
+
+fn plan(text: String) -> Plan {
+    let entry = Entry::new(source(text), None).expect("no mistakes");
+    entry.plan.expect("novobus")
+}
+
+/// A ring of three with these header lines.
+fn link(ring: &str) -> SimulatedLink {
+    bench(&plan(format!(
         "title x\nring 3\ndrive 0..last model nd21\n{ring}\n> 80\n"
-    ));
-    let mut link = bench(&own);
+    )))
+}
+
+/// The verdict of a scenario that is played in this way.
+fn judged_on(
+    link: &mut SimulatedLink,
+    rig: &str,
+    (plan, way): (&Plan, &Way),
+    change: &dyn Fn(&mut [Comparison]),
+) -> Outcome {
+    let rig = format!(
+        "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"in-band\"\n{rig}"
+    );
+    let rig = parse(&source(rig)).expect("a rig");
     let byte_time = link.byte_time();
     let mut events: Vec<Event> = Vec::new();
-    let mut recording = Recording::new(&mut link, &mut events);
-    let mut outcome = play_one(&mut recording, &plan, &way).expect("it is not examined");
+    let mut recording = Recording::new(link, &mut events);
+    let mut outcome = play_one(&mut recording, plan, way).expect("it is not examined");
     let exactness = Exactness {
         tolerance: Span::from_millis(3),
         line_errors: true,
         knows_cells: false,
         looks: None,
     };
-    let conversations = Conversation::all(&events, byte_time, true);
+    let all = Conversation::all(&events, byte_time, true);
+    let (conversations, _) = way.compared(all, exactness);
     let mut twin = twin(&rig, &known(&rig)).expect("a twin");
     let (mut comparisons, _) = twin.follow_all(&conversations, exactness);
     change(&mut comparisons);
     let heard = Heard {
         rig: &rig,
-        plan: &plan,
-        way: &way,
+        plan,
+        way,
         exactness,
         conversations: &conversations,
         comparisons: &comparisons,
@@ -254,4 +274,117 @@ fn a_choice_of_the_drives_is_not_blamed() {
         &format!("{broken}read-byte 1 FE13\n"),
         Failed,
     );
+}
+
+/// ND21 13.3, 14.4: what the master has written to a cell of the drive's program is known as long as the manual does not let the drive
+/// change it.
+#[test]
+fn written_cells_of_the_drive_excuse_nothing() {
+    let reads = |address: &str, written: &str, expected: &str| {
+        format!("write-byte 1 {address} = {written}\nread-byte 1 {address} = {expected}\n")
+    };
+    let ignored = "drive 1 deviates writes-ignored";
+    for (address, written, other) in [
+        ("FF44", "12", "13"),
+        ("FF43", "00", "40"),
+        ("FD89", "34", "35"),
+    ] {
+        check("", "", &reads(address, written, written), Passed);
+        check("", "", &reads(address, written, other), Failed);
+    }
+    check(ignored, "", &reads("FF44", "12", "12"), Failed);
+    check("", "", &reads("FF57", "00", "04"), Failed);
+    // Bits 7 and 0 of Status are the master's, the others the drive's.
+    check("", "", &reads("FF00", "01", "80"), Failed);
+    let drives = "write-byte 1 FF00 = 01\n> 88 FE C0 00 FF BF\n< 88 01 C0 00 7F xx\n";
+    check("", "", drives, Inconclusive);
+    // 13.3.2.2: once a calculation has been started, the cells are the controller's.
+    let started = format!("write-byte 1 FF43 = 40\n{}", reads("FF48", "12", "13"));
+    check("", "", &started, Inconclusive);
+}
+
+/// ND21 10.3: And and Or leave bits of a cell that are the drive's choice.
+#[test]
+fn masks_on_cells_that_were_not_set_accuse_no_drive() {
+    let holds = "drive 1 memory FF74 = 5A";
+    let scenario = "or 1 FF74 = 0F\nread-byte 1 FF74\n";
+    check(holds, "", scenario, Passed);
+    let wrong = "drive 1 memory FF74 = 5A\ndrive 1 deviates or-is-exclusive-or";
+    check(wrong, "", scenario, Failed);
+}
+
+/// ND21 14.10.3: `DataIn` is known behind every command that writes it.
+#[test]
+fn every_command_that_sets_data_in_is_followed() {
+    let swapped = "drive 1 deviates process-data-in-swapped";
+    for sets in [
+        "write-word 1 FF32 = 6C00\n",
+        "and 1 FF32 = 00\nor 1 FF32 = 6C\n",
+        "write-byte 1 FF32 = 6E\nand 1 FF32 = FC\n",
+    ] {
+        let scenario = format!("{sets}exchange 1 0102\nread-byte 1 FF6C = 01\n");
+        check("", "", &scenario, Passed);
+        check(swapped, "", &scenario, Failed);
+    }
+}
+
+/// Every built-in scenario on drives that are right and not as the model: other contents, other clocks, other choices. None fails.
+#[test]
+fn no_right_drive_is_accused() {
+    let ring = "\
+drive 0..last eeprom 5C = A1 B2 C3 D4
+drive 0 property time-out = 10.2ms
+drive 1 property time-out = 10.1ms
+drive 2 property time-out-wait = 10.3ms
+drive 0..last property bus-errors = time-out-only
+drive 0..last property self-test-time = 140ms
+drive 0..last property eeprom-write-time = 4ms
+drive 0..last memory FE10 = 5A 3C 11 EE 77*100
+drive 0..last memory FDA0 = A5*100
+drive 0..last memory FF32 = 74 00 72
+drive 0..last memory FF72 = 12 34 56 78
+";
+    let right = link(ring);
+    let mut judged = Vec::new();
+    for source in sources(&[]).expect("built-in scenarios") {
+        let name = source.name.clone();
+        let Some(plan) = Entry::new(source, Some(3))
+            .ok()
+            .and_then(|entry| entry.plan)
+        else {
+            continue;
+        };
+        let way = Way {
+            rings: vec![RingSize::new(3).expect("a size")],
+            attempts: None,
+            anew: true,
+        };
+        let mut link = right.clone();
+        let mut events: Vec<Event> = Vec::new();
+        let seen = Recording::new(&mut link, &mut events);
+        let fits = plan.rings == way.rings && !plan.needs.contains(&Capability::Interposer);
+        if !fits || lacks(&plan, &seen).is_some() {
+            continue;
+        }
+        let outcome = judged_on(&mut link, "", (&plan, &way), &|_| {});
+        judged.push((name, outcome));
+    }
+    let failed: Vec<_> = judged
+        .iter()
+        .filter(|(_, own)| own.verdict >= Failed)
+        .map(|(name, own)| {
+            (
+                name,
+                own.verdict,
+                &own.remarks,
+                own.finding.as_ref().map(|f| &f.message),
+            )
+        })
+        .collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    let passed = judged
+        .iter()
+        .filter(|(_, own)| own.verdict == Passed)
+        .count();
+    assert!(passed >= 36, "{passed} of {}", judged.len());
 }

@@ -2,18 +2,18 @@
 
 use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, Unasked, What};
 use super::follow::{Conversation, Expected};
+use super::known::{Knowledge, Place, Reading, writes};
 use super::unasked::Sent;
 use harness_proto::line::Received;
-use harness_proto::nd21::cells::{Access, cell_at, changes_by_itself};
+use harness_proto::nd21::cells::changes_by_itself;
 use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::checksum::Checksum;
-use harness_proto::novobus::command::{Field, Kind, PAGE, layout};
-use harness_proto::novobus::properties::ReadLongAnswer;
+use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// The longest run of one byte in which each counts: more than the 25 zeros of 9.7.
 const LONGEST_RUN: usize = 32;
@@ -26,6 +26,8 @@ struct Rows<'a> {
     ring: usize,
     /// What each byte is for, as far as that is known.
     roles: &'a [Role],
+    /// The bytes that the master sent, one for each role.
+    sent: &'a [u8],
     /// Up to which byte the roles stand at their places.
     known: usize,
     expected: &'a [(Instant, Received)],
@@ -35,6 +37,22 @@ struct Rows<'a> {
 impl Rows<'_> {
     fn role(&self, index: usize) -> Role {
         self.roles.get(index).copied().unwrap_or(Role::Foreign)
+    }
+
+    /// Whether a byte is the low byte of process data (ND21 9.4).
+    fn is_second_of_process_data(&self, index: usize) -> bool {
+        let sync_before = |back: usize| index.checked_sub(back).map(|before| self.role(before));
+        let own = Some(self.role(index));
+        sync_before(1) == own && sync_before(2) != own
+    }
+
+    /// The command whose checking byte the master sent at a place, if it is a right one.
+    fn command(&self, index: usize, drive: u8, length: u8) -> Option<Command> {
+        let before = answer_of(self.roles.get(..index)?, drive, length);
+        let mut bytes: Vec<u8> = before.map(|(place, _)| self.sent[place]).collect();
+        bytes.reverse();
+        bytes.push(*self.sent.get(index)?);
+        Command::decode(&bytes).value()
     }
 
     /// Whether the conversation ended before a byte that is missing could be called late. One that came although the twin does not send it,
@@ -50,16 +68,8 @@ impl Rows<'_> {
 /// What is compared, ring by ring.
 pub(crate) struct Comparer<'a> {
     pub(crate) exactness: Exactness,
-    /// Cells that were written in the rig's session: of these the model knows what they hold.
-    pub(crate) written: &'a mut BTreeSet<(usize, u8, u16)>,
-    /// Cells that were written in the present attempt.
-    pub(crate) written_now: &'a mut BTreeSet<(usize, u8, u16)>,
-    /// Cells taken over.
-    pub(crate) held: &'a mut BTreeMap<(usize, u8, u16), u8>,
-    /// Where the incoming process data (14.10.3) of a drive go, in page FF, where the master has written it.
-    pub(crate) targets: &'a mut BTreeMap<(usize, u8), u8>,
-    /// Drives whose outgoing process data (14.10.3) change by themselves.
-    pub(crate) moving: BTreeSet<(usize, u8)>,
+    /// What is known of the drives' cells.
+    pub(super) knowledge: &'a mut Knowledge,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
     pub(crate) recording: BTreeSet<(usize, u8)>,
     pub(crate) comparison: Comparison,
@@ -78,6 +88,7 @@ impl Comparer<'_> {
         let sent = conversation.sent_in(ring);
         let received = &conversation.received_in(ring);
         let (places, roles) = answered(size, &sent);
+        let answered: Vec<u8> = places.iter().map(|place| sent[*place].0).collect();
         // A ring that gives back a byte for a byte (9.1) has each role at its place.
         let aligned = received.len() == roles.len() && expected.len() == roles.len();
         let known = match aligned {
@@ -104,6 +115,7 @@ impl Comparer<'_> {
         let rows = Rows {
             ring,
             roles: &roles,
+            sent: &answered,
             known,
             expected,
             received,
@@ -210,10 +222,15 @@ impl Comparer<'_> {
         };
         let found_good = found.error.is_none() || !self.exactness.line_errors;
         let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
-        let same = wanted.byte == found.byte
-            || index < rows.known && self.may_differ(rows, (wanted.byte, found.byte), index);
+        let right = match index < rows.known {
+            true => self.is_right(rows, (wanted.byte, found.byte), index),
+            false => None,
+        };
+        // A command that the model refuses is answered with 00 in the place of data too (ND21 9.7).
+        let equal = wanted.byte == found.byte;
+        let same = right.is_some_and(|right| right || equal && !matches!(role, Role::Check { .. }))
+            || right.is_none() && equal;
         self.note_write(ring, rows, index);
-        self.note_reset(ring, rows.roles, index);
         match (same, wanted_good == found_good) {
             (true, true) => {
                 self.time((ring, index), role, step, ((due, wanted), (at, found)));
@@ -224,48 +241,29 @@ impl Comparer<'_> {
         }
     }
 
-    /// Whether a byte may be another one than the model's: it is data that the model cannot know, or their checking
-    /// byte.
-    fn may_differ(&mut self, rows: &Rows<'_>, (wanted, value): (u8, u8), index: usize) -> bool {
+    /// Whether a byte is right that need not be the model's: data that the model cannot know, or their checking byte. `None` for a byte
+    /// that must be the model's.
+    fn is_right(
+        &mut self,
+        rows: &Rows<'_>,
+        (wanted, value): (u8, u8),
+        index: usize,
+    ) -> Option<bool> {
         let Rows { ring, roles, .. } = *rows;
-        let looks_at = |drive, address| {
-            let (asked, looks) = self.exactness.looks?;
-            let mut own = looks.iter().filter(|_| asked == drive);
-            own.find(|look| look.address == address)
-        };
         match roles[index] {
             Role::Data {
                 drive: Some(drive),
                 address,
-            } => {
-                if let Some(look) = looks_at(drive, address) {
-                    return (value ^ wanted) & look.mask == 0;
-                }
-                let writes = !self.exactness.knows_cells && self.may_write(ring, drive, address);
-                if measured(address) || writes {
+            } => self.data_are_right((ring, drive, address), (wanted, value)),
+            Role::ProcessData { drive: Some(drive) } if !self.exactness.knows_cells => {
+                let pointer = self.knowledge.target(ring, drive, ram::DATA_OUT);
+                let Some(target) = pointer else {
                     self.comparison.measured += 1;
-                    return true;
-                }
-                let cell = (ring, drive, address);
-                if self.exactness.knows_cells || self.written.contains(&cell) {
-                    return false;
-                }
-                if let Some(held) = self.held.get(&cell) {
-                    return *held == value;
-                }
-                self.held.insert(cell, value);
-                self.comparison.adopted.push(Adopted {
-                    ring,
-                    drive,
-                    address,
-                    value,
-                });
-                true
-            }
-            Role::ProcessData { drive: Some(drive) } => {
-                let moves = !self.exactness.knows_cells && self.moving.contains(&(ring, drive));
-                self.comparison.measured += u64::from(moves);
-                moves
+                    return Some(true);
+                };
+                let second = u16::from(rows.is_second_of_process_data(index));
+                let place = (ring, drive, target.wrapping_add(second));
+                self.data_are_right(place, (wanted, value))
             }
             Role::Check {
                 drive: Some(drive),
@@ -278,22 +276,43 @@ impl Comparer<'_> {
                     |place: usize| rows.expected[place].1.byte != rows.received[place].1.byte;
                 let bytes = answer().map(|place| rows.received[place].1.byte);
                 let sum = bytes.fold(Checksum::EMPTY, Checksum::with);
-                sum.minus() == value && answer().any(other)
+                answer().any(other).then(|| sum.minus() == value)
             }
-            _ => false,
+            _ => None,
         }
     }
 
-    /// Whether a drive may have written to a cell by itself. The oscilloscope changes its buffer and its settings only while it runs.
-    fn may_write(&self, ring: usize, drive: u8, address: u16) -> bool {
-        let of_the_scope = own::SCOPE_BUFFER.contains(&address) || own::SCOPE.contains(&address);
-        match of_the_scope && address != ram::SCOPE_STATUS {
-            true => {
-                let status = (ring, drive, ram::SCOPE_STATUS);
-                self.recording.contains(&(ring, drive)) || self.written.contains(&status)
-            }
-            false => unknowable(address),
+    /// Whether a cell may hold a value, where the model's holds `wanted`; `None` where it must be the model's.
+    fn data_are_right(&mut self, place: Place, (wanted, value): (u8, u8)) -> Option<bool> {
+        let (ring, drive, address) = place;
+        if let Some((asked, looks)) = self.exactness.looks
+            && let Some(look) = looks.iter().find(|look| look.address == address)
+            && asked == drive
+        {
+            return Some((value ^ wanted) & look.mask == 0);
         }
+        if self.exactness.knows_cells {
+            return None;
+        }
+        match self.knowledge.read(place, wanted, value) {
+            _ if self.is_recorded(place) => self.comparison.measured += 1,
+            Reading::Wrong => return Some(false),
+            Reading::Own => self.comparison.measured += 1,
+            Reading::Right => {}
+            Reading::Learned if value == wanted => {}
+            Reading::Learned => self.comparison.adopted.push(Adopted {
+                ring,
+                drive,
+                address,
+                value,
+            }),
+        }
+        Some(true)
+    }
+
+    /// Whether a drive's oscilloscope may be writing to a cell (ND21 14.10.6).
+    fn is_recorded(&self, (ring, drive, address): Place) -> bool {
+        own::is_of_the_scope(address) && self.recording.contains(&(ring, drive))
     }
 
     /// Notes a byte whose value the drive decides.
@@ -305,18 +324,26 @@ impl Comparer<'_> {
             return;
         }
         let ring = rows.ring;
-        let is_own = |drive, address| {
-            measured(address)
-                || self.may_write(ring, drive, address)
-                || !self.written_now.contains(&(ring, drive, address))
+        let known = |drive, address, value| {
+            let place = (ring, drive, address);
+            let written = self.knowledge.written_now(place, value);
+            if self.is_recorded(place) { 0 } else { written }
         };
-        let (drive, address) = match rows.role(index) {
+        let value = rows.received[index].1.byte;
+        let (drive, address, known) = match rows.role(index) {
             Role::Data {
                 drive: Some(drive),
                 address,
-            } if is_own(drive, address) => (drive, Some(address)),
-            Role::ProcessData { drive: Some(drive) } if self.moving.contains(&(ring, drive)) => {
-                (drive, None)
+            } => (drive, Some(address), known(drive, address, value)),
+            Role::ProcessData { drive: Some(drive) } => {
+                match self.knowledge.target(ring, drive, ram::DATA_OUT) {
+                    Some(target) => {
+                        let second = u16::from(rows.is_second_of_process_data(index));
+                        let address = target.wrapping_add(second);
+                        (drive, Some(address), known(drive, address, value))
+                    }
+                    None => (drive, None, 0),
+                }
             }
             Role::Check {
                 drive: Some(drive),
@@ -324,79 +351,62 @@ impl Comparer<'_> {
                 ..
             } => {
                 let mut answer = answer_of(&rows.roles[..index], drive, length);
-                let own = answer.find_map(|(_, role)| match role {
-                    Role::Data { address, .. } if is_own(drive, *address) => Some(*address),
+                let own = answer.find_map(|(place, role)| match role {
+                    Role::Data { address, .. } => {
+                        let value = rows.received.get(place)?.1.byte;
+                        (known(drive, *address, value) != 0xFF).then_some(*address)
+                    }
                     _ => None,
                 });
                 match own {
-                    Some(address) => (drive, Some(address)),
+                    Some(address) => (drive, Some(address), 0),
                     None => return,
                 }
             }
             _ => return,
         };
+        if known == 0xFF {
+            return;
+        }
         self.comparison.own.push(Own {
             ring,
             at: *at,
             place,
             drive,
             address,
+            known,
+            value,
         });
     }
 
     /// Notes which cells the master has written, by a command or as process data.
     fn note_write(&mut self, ring: usize, rows: &Rows<'_>, index: usize) {
-        let before = index.checked_sub(1).map(|before| rows.role(before));
-        let (drive, address, width) = match rows.role(index) {
+        match rows.role(index) {
             Role::Check {
                 drive: Some(drive),
-                writes: Some((address, width)),
                 length,
+                ..
             } => {
-                if (address..address.saturating_add(width.into())).contains(&ram::DATA_IN) {
-                    match data_written(rows, index, drive, length) {
-                        Some(target) => self.targets.insert((ring, drive), target),
-                        None => self.targets.remove(&(ring, drive)),
-                    };
+                let Some(command) = rows.command(index, drive, length) else {
+                    return;
+                };
+                for (address, write) in writes(&command) {
+                    let place = (ring, drive, address);
+                    // Behind a fault it is not known which byte stands for which.
+                    match index < rows.known {
+                        true => self.knowledge.write(place, write),
+                        false => self.knowledge.may_write(place, write),
+                    }
                 }
-                (drive, address, width)
-            }
-            // The second of the two bytes.
-            Role::ProcessData { drive: Some(drive) } if before == Some(rows.role(index)) => {
-                match self.targets.get(&(ring, drive)) {
-                    Some(target) => (drive, PAGE | u16::from(*target), 2),
-                    None => return,
+                if command == Command::ResetH8 {
+                    self.knowledge.reset(ring, drive);
                 }
             }
-            _ => return,
-        };
-        for offset in 0..u16::from(width) {
-            let cell = (ring, drive, address.wrapping_add(offset));
-            self.written.insert(cell);
-            self.written_now.insert(cell);
-            self.held.remove(&cell);
-        }
-    }
-
-    /// Forgets what the cells of a drive hold where a `ResetH8` ends (ND21 10.5): they are loaded from its EEPROM, and how long the drive took
-    /// to write that is its choice (14.10.5).
-    fn note_reset(&mut self, ring: usize, roles: &[Role], index: usize) {
-        let command = index.checked_sub(1).and_then(|before| roles.get(before));
-        if let (
-            Some(Role::Check {
-                drive: Some(drive), ..
-            }),
-            Some(Role::Command {
-                drive: Some(of),
-                section: "10.5",
-            }),
-        ) = (roles.get(index), command)
-            && drive == of
-        {
-            let others = |cell: &(usize, u8, u16)| (cell.0, cell.1) != (ring, *drive);
-            self.written.retain(others);
-            self.held.retain(|cell, _| others(cell));
-            self.targets.remove(&(ring, *drive));
+            Role::ProcessData { drive: Some(drive) } if rows.is_second_of_process_data(index) => {
+                let data = [rows.sent[index - 1], rows.sent[index]];
+                self.knowledge.take_process_data(ring, drive, data);
+            }
+            _ => {}
         }
     }
 
@@ -436,20 +446,6 @@ fn answer_of(roles: &[Role], drive: u8, length: u8) -> impl Iterator<Item = (usi
     };
     let before = roles.iter().enumerate().rev().filter(own);
     before.take(usize::from(length).saturating_sub(1))
-}
-
-/// The byte that an echoed `WriteByte` (10.2) whose checking byte stands at `index` has written; `None` for any other command.
-fn data_written(rows: &Rows<'_>, index: usize, drive: u8, length: u8) -> Option<u8> {
-    let answer = answer_of(rows.roles.get(..index)?, drive, length);
-    let mut bytes: Vec<u8> = Vec::new();
-    for (place, _) in answer {
-        bytes.insert(0, rows.received.get(place)?.1.byte);
-    }
-    let layout = layout(*bytes.first()?, ReadLongAnswer::default())?;
-    let data = |field: &Field| matches!(field, Field::Data(0));
-    let data = layout.command.iter().position(data)?;
-    let byte = (layout.kind == Kind::WriteByte).then_some(data + 1)?;
-    bytes.get(byte).copied()
 }
 
 /// The bytes that are answered, by their places among those sent, and their roles: a PAUSE where a sync byte is due is swallowed (9.2).
@@ -511,11 +507,6 @@ fn collapsed(bytes: &[(Instant, Received)]) -> Vec<(Instant, Received)> {
 /// Whether no model knows what a cell of a real drive holds from one moment to the next.
 pub(crate) fn unknowable(address: u16) -> bool {
     own::is_own(address) || changes_by_itself(address)
-}
-
-/// Whether the drive itself writes a cell (14.2: read only), so that no model knows what it holds.
-fn measured(address: u16) -> bool {
-    cell_at(address).is_some_and(|cell| cell.access != Access::Write)
 }
 
 /// Whether a byte is another one, or one too many or too few.
@@ -593,7 +584,7 @@ mod tests {
         );
         let compared: Vec<_> = changed
             .iter()
-            .filter(|cell| !measured(**cell) && !changes_by_itself(**cell))
+            .filter(|cell| own::kept(**cell, 0).bits == 0xFF)
             .collect();
         assert!(compared.is_empty(), "{compared:04X?}");
     }

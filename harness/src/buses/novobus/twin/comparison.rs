@@ -138,7 +138,7 @@ pub struct Adopted {
     pub value: u8,
 }
 
-/// A byte received whose value the drive decides: a cell that it writes itself or that was not written since the attempt began, or the
+/// A byte received of which the drive decides bits: a cell that it writes itself or that was not written since the attempt began, or the
 /// checking byte behind one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Own {
@@ -150,8 +150,12 @@ pub struct Own {
     pub place: usize,
     /// The drive.
     pub drive: u8,
-    /// The cell, also of a checking byte behind it; none for process data.
+    /// The cell, also of a checking byte behind it; none for process data of a cell that is not known.
     pub address: Option<u16>,
+    /// The bits that the drive does not decide: the master has written them.
+    pub known: u8,
+    /// The byte.
+    pub value: u8,
 }
 
 /// The first byte in a conversation that a drive sent unasked (ND21 9.9).

@@ -1,16 +1,16 @@
 //! The twin itself, and what it is given.
 
-use super::compare::{Comparer, unknowable};
+use super::compare::Comparer;
 use super::comparison::{Comparison, Exactness};
+use super::known::Knowledge;
 use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::command::PAGE;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// How much longer than its conversation a twin in real time listens: a real clock is late now and then, and what a ring
 /// has sent may have come a moment sooner than its twin's.
@@ -176,11 +176,7 @@ impl Expected {
 pub struct Twin {
     link: SimulatedLink,
     sizes: Vec<RingSize>,
-    written: BTreeSet<(usize, u8, u16)>,
-    /// Of these, those of the present attempt.
-    written_now: BTreeSet<(usize, u8, u16)>,
-    held: BTreeMap<(usize, u8, u16), u8>,
-    targets: BTreeMap<(usize, u8), u8>,
+    knowledge: Knowledge,
 }
 
 impl Twin {
@@ -190,10 +186,7 @@ impl Twin {
         Self {
             link,
             sizes: sizes.to_vec(),
-            written: BTreeSet::new(),
-            written_now: BTreeSet::new(),
-            held: BTreeMap::new(),
-            targets: BTreeMap::new(),
+            knowledge: Knowledge::default(),
         }
     }
 
@@ -217,20 +210,15 @@ impl Twin {
     ) -> Comparison {
         let real_time = exactness.tolerance > Span::ZERO;
         let slack = if real_time { SLACK } else { Span::ZERO };
-        let (mut moving, mut recording) = (self.moving(), self.recording());
+        let mut recording = self.recording();
         let mut received = self.answer(conversation, slack);
         if real_time {
             self.add_later(conversation, exactness.tolerance, &mut received);
         }
-        moving.extend(self.moving());
         recording.extend(self.recording());
         let mut comparer = Comparer {
             exactness,
-            written: &mut self.written,
-            written_now: &mut self.written_now,
-            held: &mut self.held,
-            targets: &mut self.targets,
-            moving,
+            knowledge: &mut self.knowledge,
             recording,
             comparison: Comparison {
                 left_out: !left_out.is_empty(),
@@ -242,11 +230,6 @@ impl Twin {
             comparer.ring(ring, *size, conversation, expected);
         }
         comparer.comparison
-    }
-
-    /// Drives whose outgoing process data (ND21 14.10.3) come from a cell that changes by itself, as the actual speed does.
-    fn moving(&self) -> BTreeSet<(usize, u8)> {
-        self.drives(ram::DATA_OUT, |low| unknowable(PAGE | u16::from(low)))
     }
 
     /// Drives whose oscilloscope is not stopped (ND21 14.10.6.5).
@@ -281,7 +264,7 @@ impl Twin {
     ) -> (Vec<Comparison>, bool) {
         let mut comparisons: Vec<Comparison> = Vec::new();
         let mut left_out = BTreeSet::new();
-        self.written_now.clear();
+        self.knowledge.begin();
         for conversation in conversations {
             if left_out.len() == self.sizes.len() {
                 break;

@@ -8,6 +8,7 @@
 mod compare;
 mod comparison;
 mod follow;
+mod known;
 mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};

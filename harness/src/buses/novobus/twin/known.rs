@@ -1,0 +1,291 @@
+//! What is known of the cells of real drives: what the master wrote, and what it read.
+//!
+//! A bit that the master has written since the last reset holds what was written, unless the manual lets the drive change it
+//! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
+
+use harness_proto::nd21::bits::{flags2, ps_status};
+use harness_proto::nd21::own::{self, Worker};
+use harness_proto::nd21::ram;
+use harness_proto::novobus::command::{Command, PAGE};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A byte of a drive: its ring, counted from 0, the drive, and the address.
+pub(crate) type Place = (usize, u8, u16);
+
+/// What the master does to a byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Write {
+    /// It writes all bits.
+    Set(u8),
+    /// It clears the bits that are 0 here.
+    And(u8),
+    /// It sets the bits that are 1 here.
+    Or(u8),
+}
+
+impl Write {
+    /// The bits that it decides.
+    const fn bits(self) -> u8 {
+        match self {
+            Self::Set(_) => 0xFF,
+            Self::And(mask) => !mask,
+            Self::Or(mask) => mask,
+        }
+    }
+
+    /// What becomes of a byte.
+    const fn apply(self, byte: u8) -> u8 {
+        match self {
+            Self::Set(data) => data,
+            Self::And(mask) => byte & mask,
+            Self::Or(mask) => byte | mask,
+        }
+    }
+
+    /// Whether it may set one of these bits that were not set.
+    const fn sets(self, bits: u8) -> bool {
+        match self {
+            Self::Set(data) | Self::Or(data) => data & bits != 0,
+            Self::And(_) => false,
+        }
+    }
+}
+
+/// The bytes that a command writes (ND21 10.2, 10.3).
+pub(crate) fn writes(command: &Command) -> Vec<(u16, Write)> {
+    match *command {
+        Command::WriteByte { address, data } => vec![(address, Write::Set(data))],
+        Command::WriteWord { address, data } => {
+            let [high, low] = data.to_be_bytes();
+            vec![
+                (address, Write::Set(high)),
+                (address.wrapping_add(1), Write::Set(low)),
+            ]
+        }
+        Command::And { address_low, data } => {
+            vec![(PAGE | u16::from(address_low), Write::And(data))]
+        }
+        Command::Or { address_low, data } => {
+            vec![(PAGE | u16::from(address_low), Write::Or(data))]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// What is known of a byte.
+#[derive(Clone, Copy, Debug, Default)]
+struct Known {
+    /// The bits that the master has written.
+    written: u8,
+    /// The bits that it has written in the present attempt.
+    now: u8,
+    /// Whether the other bits have been read.
+    learned: bool,
+    /// The bits that are known.
+    value: u8,
+}
+
+/// What a byte that was read says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reading {
+    /// It is as it must be.
+    Right,
+    /// It is not.
+    Wrong,
+    /// Its value is the drive's choice, and the master has read it for the first time.
+    Learned,
+    /// Its value is the drive's choice at any time.
+    Own,
+}
+
+/// What is known of all drives.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Knowledge {
+    cells: BTreeMap<Place, Known>,
+    /// Parts of drives that the master has started: from then on they write their cells until the next reset.
+    started: BTreeSet<(usize, u8, Worker)>,
+}
+
+impl Knowledge {
+    /// An attempt begins.
+    pub(crate) fn begin(&mut self) {
+        self.cells.values_mut().for_each(|own| own.now = 0);
+    }
+
+    /// A drive was reset (ND21 10.5): its cells are loaded from its EEPROM, and how long the drive took to write that is its choice
+    /// (14.10.5).
+    pub(crate) fn reset(&mut self, ring: usize, drive: u8) {
+        self.cells
+            .retain(|cell, _| (cell.0, cell.1) != (ring, drive));
+        self.started.retain(|own| (own.0, own.1) != (ring, drive));
+    }
+
+    /// The master has written to a byte.
+    pub(crate) fn write(&mut self, place: Place, write: Write) {
+        let (ring, drive, address) = place;
+        let started = match address {
+            ram::FLAGS2 => write.sets(flags2::ORDERS | flags2::TEACH_IN),
+            ram::PS_STATUS => write.sets(ps_status::CALCULATE | ps_status::START),
+            _ => false,
+        };
+        // The cycle control may do anything (ND21 13.1.9.1, 14.3.1).
+        let ordered = (ram::PZ..=ram::AS_COMMAND).contains(&address) || address == ram::SW_VERSION;
+        let workers = [
+            (started || ordered, Worker::Positioning),
+            (address == ram::EEPROM_CONTROL || ordered, Worker::Eeprom),
+            (address == ram::SCOPE_STATUS, Worker::Scope),
+        ];
+        let workers = workers.into_iter().filter(|(starts, _)| *starts);
+        self.started
+            .extend(workers.map(|(_, worker)| (ring, drive, worker)));
+        let own = self.cells.entry(place).or_default();
+        own.written |= write.bits();
+        own.now |= write.bits();
+        own.value = write.apply(own.value);
+    }
+
+    /// Process data of the master's have come to a drive (ND21 9.4, 14.10.3), which writes them where `DataIn` says.
+    pub(crate) fn take_process_data(&mut self, ring: usize, drive: u8, data: [u8; 2]) {
+        match self.target(ring, drive, ram::DATA_IN) {
+            Some(target) => {
+                let [high, low] = data;
+                self.write((ring, drive, target), Write::Set(high));
+                self.write((ring, drive, target.wrapping_add(1)), Write::Set(low));
+            }
+            // Any cell of page FF, those that start something among them.
+            None => {
+                self.cells
+                    .retain(|cell, _| (cell.0, cell.1) != (ring, drive) || cell.2 < PAGE);
+                let all = [Worker::Positioning, Worker::Eeprom, Worker::Scope];
+                self.started.extend(all.map(|worker| (ring, drive, worker)));
+            }
+        }
+    }
+
+    /// The same as [`Self::write`] where it is not known whether the drive took it.
+    pub(crate) fn may_write(&mut self, place: Place, write: Write) {
+        self.write(place, write);
+        self.cells.remove(&place);
+    }
+
+    /// The cell that `DataIn` or `DataOut` of a drive points at (ND21 14.10.3), where that is known.
+    pub(crate) fn target(&self, ring: usize, drive: u8, pointer: u16) -> Option<u16> {
+        let known = self.cells.get(&(ring, drive, pointer))?;
+        let whole = known.learned || known.written == 0xFF;
+        whole.then_some(PAGE | u16::from(known.value))
+    }
+
+    /// The bits of a byte that the drive does not change by itself now; `value` is what was read.
+    fn kept(&self, place: Place, value: u8) -> u8 {
+        let (ring, drive, address) = place;
+        let kept = own::kept(address, value);
+        match kept.unless {
+            Some(worker) if self.started.contains(&(ring, drive, worker)) => 0,
+            _ => kept.bits,
+        }
+    }
+
+    /// The bits of a byte that hold what the master has written in the present attempt.
+    pub(crate) fn written_now(&self, place: Place, value: u8) -> u8 {
+        let written = self.cells.get(&place).map_or(0, |own| own.now);
+        written & self.kept(place, value)
+    }
+
+    /// Judges a byte that was read, where the model holds `wanted`.
+    pub(crate) fn read(&mut self, place: Place, wanted: u8, value: u8) -> Reading {
+        let kept = self.kept(place, value);
+        let own = self.cells.entry(place).or_default();
+        let written = own.written & kept;
+        let mut differ = (value ^ wanted) & written;
+        if kept != 0xFF || own::is_own(place.2) && !own::is_of_the_scope(place.2) {
+            return match (differ, written) {
+                (0, 0xFF) => Reading::Right,
+                (0, _) => Reading::Own,
+                _ => Reading::Wrong,
+            };
+        }
+        if own.learned {
+            differ |= (value ^ own.value) & !written;
+        }
+        if differ != 0 {
+            return Reading::Wrong;
+        }
+        if own.learned || written == 0xFF {
+            return Reading::Right;
+        }
+        own.learned = true;
+        own.value = value;
+        Reading::Learned
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CELL: Place = (0, 1, 0xFF74);
+
+    /// ND21 10.3: And and Or decide the bits of their masks, and no others.
+    #[test]
+    fn masks_decide_their_bits_only() {
+        let mut known = Knowledge::default();
+        known.write(CELL, Write::Or(0x0F));
+        assert_eq!(known.read(CELL, 0x0F, 0x5E), Reading::Wrong);
+        assert_eq!(known.read(CELL, 0x0F, 0x5F), Reading::Learned);
+        assert_eq!(known.read(CELL, 0x0F, 0x5F), Reading::Right);
+        assert_eq!(known.read(CELL, 0x0F, 0x4F), Reading::Wrong);
+        known.write(CELL, Write::And(0xF0));
+        assert_eq!(known.read(CELL, 0x00, 0x50), Reading::Right);
+        assert_eq!(known.read(CELL, 0x00, 0x51), Reading::Wrong);
+        known.write(CELL, Write::Set(0x12));
+        // What was learned before is replaced.
+        assert_eq!(known.read(CELL, 0x12, 0x50), Reading::Wrong);
+        assert_eq!(known.read(CELL, 0x12, 0x12), Reading::Right);
+        known.reset(0, 1);
+        assert_eq!(known.read(CELL, 0x00, 0x77), Reading::Learned);
+    }
+
+    /// ND21 14.10.3: where process data go is known from a write by any command, and from a read.
+    #[test]
+    fn process_data_are_followed() {
+        let data_in = (0, 1, ram::DATA_IN);
+        let written = |known: &Knowledge| known.written_now(CELL, 0);
+        let mut known = Knowledge::default();
+        known.write(data_in, Write::Set(0xF4));
+        known.write(data_in, Write::And(0x7F));
+        known.take_process_data(0, 1, [1, 2]);
+        assert_eq!(known.read(CELL, 1, 1), Reading::Right);
+        assert_eq!(written(&known), 0xFF);
+        known.reset(0, 1);
+        assert_eq!(known.read(data_in, 0, 0x74), Reading::Learned);
+        known.take_process_data(0, 1, [3, 4]);
+        assert_eq!(known.read(CELL, 3, 2), Reading::Wrong);
+        // Where nothing is known of `DataIn`, any cell of the page may have been written.
+        known.reset(0, 1);
+        known.write(CELL, Write::Set(9));
+        known.take_process_data(0, 1, [5, 6]);
+        assert_eq!(written(&known), 0);
+        assert_eq!(known.read(CELL, 9, 5), Reading::Learned);
+    }
+
+    /// ND21 13.3, 14.4: what the master wrote to cells of the drive's own program stays until that program is started.
+    #[test]
+    fn own_cells_hold_what_was_written_until_their_part_starts() {
+        let position = (0, 1, ram::PS_POSITION_H);
+        let mut known = Knowledge::default();
+        known.write(position, Write::Set(0x12));
+        assert_eq!(known.read(position, 0x12, 0x13), Reading::Wrong);
+        known.write((0, 1, ram::PS_STATUS), Write::Set(0x40));
+        assert_eq!(known.read(position, 0x12, 0x13), Reading::Own);
+        let flags = (0, 1, ram::FLAGS2);
+        known.write(flags, Write::Or(flags2::MONITORING));
+        assert_eq!(known.read(flags, 0x04, 0x00), Reading::Wrong);
+        assert_eq!(known.read(flags, 0x04, 0xFF), Reading::Own);
+        // A drive in error may block itself.
+        let status = (0, 1, ram::STATUS);
+        known.write(status, Write::Set(0x01));
+        assert_eq!(known.read(status, 0x01, 0x80), Reading::Wrong);
+        assert_eq!(known.read(status, 0x01, 0xA0), Reading::Own);
+        assert_eq!(known.read(status, 0x01, 0x05), Reading::Own);
+    }
+}
