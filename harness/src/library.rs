@@ -74,7 +74,7 @@ impl Entry {
     /// Its mistakes.
     pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
         let scenario = parse(&source)?;
-        let plan = if scenario.bus == crate::scenario::syntax::Bus::Novobus {
+        let plan = if scenario.bus.is_built() {
             Some(plan(&scenario, &source, size)?)
         } else {
             None

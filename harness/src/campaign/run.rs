@@ -147,7 +147,7 @@ impl Campaign {
             return Err(mistake(read.wrong(
                 &["scenario"],
                 message,
-                "a scenario of the NOVOBUS expected here",
+                "a scenario of a bus that is built is expected here",
             )));
         };
         let start = {
@@ -162,7 +162,7 @@ impl Campaign {
                     let message =
                         "said twice, the conversation leaves something else than said once";
                     let expected =
-                        "a conversation whose telegrams can be repeated expected there (ND21 9.8)";
+                        "a conversation whose telegrams can be repeated is expected there";
                     return Err(mistake(read.wrong(&["scenario"], message, expected)));
                 };
                 let shape = by_manual.answers().shape.clone();

@@ -204,7 +204,7 @@ fn words((trace, place): (&Trace, usize), index: usize) -> String {
         last = Some((readers[place].see(byte).meaning, byte.received));
     }
     match last.filter(|_| index < link.bytes.len()) {
-        Some((meaning, byte)) => format!("{}; ND21 {}", meaning.words(byte), meaning.section()),
+        Some((meaning, byte)) => format!("{}; {}", meaning.words(byte), meaning.citation()),
         None => "nothing".to_owned(),
     }
 }

@@ -6,7 +6,7 @@ use super::fuzz::FuzzCommand;
 use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shrink::ShrinkArguments;
-use crate::buses::novobus::cli::DriveCommand;
+use crate::buses::commands::DriveCommand;
 use crate::rig::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;

@@ -1,7 +1,7 @@
 //! What a qualification compared with the model, and what differed.
 
 use super::output::Output;
-use crate::buses::novobus::twin::{Conversation, Exactness};
+use crate::buses::twin::{Conversation, Exactness};
 use crate::link::Line as _;
 use crate::qualify::{Culprit, Meant, Named, Seen, Sighting, Trial, agreed, culprit};
 use crate::rig::{Attempt, Driven, Played, Run};

@@ -10,7 +10,6 @@ mod import;
 mod junit;
 mod list;
 mod man;
-mod manual;
 pub(crate) mod output;
 mod page;
 mod promote;
@@ -70,8 +69,8 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Import(arguments) => import::import(&arguments, output),
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector => import::dissector(output),
-        Command::Manual(arguments) => manual::manual(&arguments, output),
-        Command::Cells(arguments) => crate::buses::novobus::cli::cells::cells(&arguments, output),
+        Command::Manual(arguments) => crate::buses::commands::manual::manual(&arguments, output),
+        Command::Cells(arguments) => crate::buses::commands::cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify(arguments) => verify::verify(&arguments, output),
         Command::Report(arguments) => report::report(&arguments, output),
@@ -82,9 +81,9 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Rig { command } => rig::rig(&command, output),
         Command::Campaign(arguments) => campaign::campaign(&arguments, output),
         Command::Deviations(arguments) => {
-            crate::buses::novobus::cli::deviations::deviations(&arguments, output)
+            crate::buses::commands::deviations::deviations(&arguments, output)
         }
-        Command::Drive(command) => crate::buses::novobus::cli::drive(&command, output),
+        Command::Drive(command) => crate::buses::commands::drive(&command, output),
         Command::Completions { shell } => man::completions(shell, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),
     }

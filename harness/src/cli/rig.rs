@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::Output;
-use crate::buses::novobus::cli::rig_check::{CheckRigArguments, check};
+use crate::buses::commands::rig_check::{CheckRigArguments, check};
 use crate::rig::file::Quarantine;
 use crate::rig::find::{self, FindError, Place};
 use crate::rig::lock::{self, LockError, Standing};

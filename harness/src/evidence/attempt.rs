@@ -3,7 +3,7 @@
 use super::folder::capture;
 use super::header::Header;
 use super::record::Line;
-use crate::buses::novobus::twin::{Conversation, Twin};
+use crate::buses::twin::{Conversation, Twin};
 use crate::library::Entry;
 use crate::link::{
     Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,

@@ -6,7 +6,7 @@ use super::files::{
 };
 use super::record::{Line, SCHEMA, Writer};
 use super::signature;
-use crate::buses::novobus::twin::Exactness;
+use crate::buses::twin::Exactness;
 use crate::link::{Capability, Event, SimulatedLink, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};

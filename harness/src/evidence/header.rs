@@ -2,7 +2,7 @@
 
 use super::files::{RIG, sum};
 use super::record::{Line, capabilities};
-use crate::buses::novobus::twin::Exactness;
+use crate::buses::twin::Exactness;
 use crate::guard::Limits;
 use crate::link::{Capability, SimulatedLink};
 use crate::rig::{Rig, Way, limits, line_rate};

@@ -10,7 +10,6 @@ mod campaign;
 mod dice;
 mod error;
 pub(crate) mod files;
-pub mod promote;
 mod record;
 mod swarm;
 mod target;
@@ -27,6 +26,6 @@ pub use crate::buses::novobus::explore::{
     Act, Beside, Case, Command, Damage, Difference, Finding, Generator, Harm, MOST_ACTS,
     MOST_BYTES, MOST_KEPT, MOST_NET, OnRig, OnSim, Order, Planted, Pool, RingScope, Scope, Seen,
     Setup, Spoil, Talk, To, What, against_model, against_reference, against_witnesses, beside,
-    by_novelty, features, mutate, page, play, shrink, text,
+    by_novelty, features, mutate, page, play, promote, shrink, text,
 };
 pub(crate) use crate::buses::novobus::explore::{drive_name, tour};

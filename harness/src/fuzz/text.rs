@@ -5,7 +5,7 @@ use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Bus, Scenario};
+use crate::scenario::syntax::Scenario;
 
 /// The longest text that is looked at, in bytes; what lies behind is left out.
 const LONGEST: usize = 8_192;
@@ -80,7 +80,7 @@ fn with_newline(text: &str) -> Option<Source> {
 /// What a scenario is for each size, in one text.
 fn settled(scenario: &Scenario, source: &Source) -> String {
     let mut shown = format!("{scenario:?}");
-    if scenario.bus == Bus::Novobus {
+    if scenario.bus.is_built() {
         for size in SIZES {
             shown += &match plan(scenario, source, size) {
                 Ok(plan) => format!("{plan:?}"),

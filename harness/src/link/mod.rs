@@ -3,27 +3,26 @@
 //! A scenario sees a link and nothing behind it. Each link says what it can observe and inject; what it
 //! cannot makes a scenario that needs it skipped, never wrong.
 
-mod inner;
-mod lateness;
+pub(crate) mod inner;
+pub(crate) mod lateness;
 mod record;
 mod replay;
-mod ring;
-mod stamp;
-mod stream;
-mod tamper;
+pub(crate) mod ring;
+pub(crate) mod stamp;
+pub(crate) mod tamper;
 
 pub use crate::buses::novobus::link::SimulatedLink;
+pub use crate::buses::novobus::stream::{StreamLink, TOLERANCE};
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use inner::{Delay, InnerLink, Ports};
 pub use record::{Event, Look, Recording, Sink};
 pub use replay::Replay;
-pub use stream::{StreamLink, TOLERANCE};
 pub use tamper::{needs_line_errors, only_simulated};
 
 use harness_proto::line::Received;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::error::BusError;
+pub use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::fmt;
@@ -156,7 +155,7 @@ pub struct Lead {
 }
 
 /// A gap on the line that harms nobody: drives that miss their bytes wait for 10 ms at least (ND21 9.9).
-const HARMLESS: Span = Span::from_millis(5);
+pub(crate) const HARMLESS: Span = Span::from_millis(5);
 
 impl Lead {
     /// Each byte is handed over when the line is free for it: time waits for whoever sends.

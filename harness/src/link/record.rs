@@ -7,8 +7,8 @@
 //! not in the record, so that [`Replay`](super::Replay) repeats the conversation exactly, decisions that depend on time included.
 
 use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Shown, Stimulus, Trouble};
+use crate::link::BusError;
 use harness_proto::line::Received;
-use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::collections::VecDeque;

@@ -112,7 +112,7 @@ impl Replay {
             Event::Begin(_) => Some("another conversation".to_owned()),
             Event::Sent(_, at, bytes) => Some(format!("sending {} bytes until {at}", bytes.len())),
             Event::Fault(_, at, ..) => Some(format!("a fault at {at}")),
-            Event::Probe(_, at, count, _) => Some(format!("{count} SYNCO from {at} on")),
+            Event::Probe(_, at, count, _) => Some(format!("{count} sync bytes from {at} on")),
         };
         match &self.trouble {
             Some(_) if !exact => None,
@@ -411,7 +411,7 @@ impl Link for Replay {
                 if let Some(other) = other {
                     self.events.push_front(other);
                 }
-                self.differs("SYNCO that let the ring spell out its address");
+                self.differs("the sync bytes that let the ring repeat its address");
                 Vec::new()
             }
         }

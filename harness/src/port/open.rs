@@ -69,7 +69,9 @@ pub enum OpenError {
     #[error("{0} is a pseudo terminal, which has no parity: say transport = \"pty\"")]
     PseudoTerminal(String),
     /// The port does not take the settings.
-    #[error("{port}: {what} was not taken: a line of a NOVOBUS is 8O1 (ND21 8.3)")]
+    #[error(
+        "{port}: {what} was not taken; the line needs 8 data bits, odd parity and 1 stop bit: use another adapter"
+    )]
     Setting {
         /// The port.
         port: String,

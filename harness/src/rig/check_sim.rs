@@ -4,7 +4,7 @@ use super::check::{Check, FindProfile};
 use super::file::Sim;
 use super::profile::{KnownProfile, Profile};
 use super::schema::Step;
-use super::sim::{lines, settle};
+use crate::rig::sim::{lines, settle};
 use crate::scenario::problem::Problem;
 use crate::scenario::source::Source;
 

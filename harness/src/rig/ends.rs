@@ -1,11 +1,11 @@
 //! The two kinds of ring ends that a rig can have, as one link.
 
+use crate::link::BusError;
 use crate::link::{
     Capability, Lead, Line, Link, Moment, PlacedFault, Shown, SimulatedLink, Stimulus, StreamLink,
     Trouble,
 };
 use harness_proto::line::Received;
-use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 

@@ -15,14 +15,13 @@ pub mod hook;
 pub mod lock;
 mod open;
 mod played;
-mod profile;
+pub(crate) mod profile;
 pub(crate) mod run;
 pub mod scan;
 pub(crate) mod schema;
 pub(crate) mod session;
 mod session_error;
 pub(crate) mod shared;
-pub(crate) mod sim;
 pub mod state;
 pub mod values;
 mod watchdog;
@@ -48,4 +47,4 @@ pub use watchdog::Alarm;
 
 /// How the one bus that is driven today is examined when a bench is opened.
 pub use crate::buses::novobus::rig::figures;
-pub(crate) use crate::buses::novobus::rig::{health, interlock, judge, line_test};
+pub(crate) use crate::buses::novobus::rig::{health, interlock, judge, line_test, sim};

@@ -1,7 +1,7 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
 use super::driven::Driven;
-use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
+use crate::buses::twin::{Comparison, Conversation, Divergence};
 use crate::scenario::run::{Outcome, Skip, Unready, Why};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -219,7 +219,7 @@ impl Again {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::novobus::twin::What;
+    use crate::buses::twin::What;
     use Verdict::{Failed, Flaky, Inconclusive, Marginal, Passed};
     use harness_proto::line::Received;
     use harness_proto::novobus::role::Role;

@@ -6,7 +6,7 @@ use super::driven::Driven;
 use super::played::{Again, Attempt, Played};
 use super::session::Session;
 use super::session_error::SessionError;
-use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin};
+use crate::buses::twin::{Comparison, Conversation, Exactness, Twin};
 use crate::guard::Guarded;
 use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
 use crate::rig::health::{Unhealthy, examine};

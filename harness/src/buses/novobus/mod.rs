@@ -14,5 +14,6 @@ pub mod qualify;
 pub mod report;
 pub mod rig;
 pub mod simulate;
+pub mod stream;
 pub mod top;
 pub mod twin;

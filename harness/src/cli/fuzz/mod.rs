@@ -1,7 +1,5 @@
 //! `drivebench fuzz`: conversations that nobody has written, and what the kept inputs of the fuzz targets reach.
 
-mod coverage;
-mod distil;
 mod replay;
 pub(crate) mod rig;
 mod run;
@@ -21,11 +19,11 @@ pub enum FuzzCommand {
     /// Try the conversations that a run has kept, or those of a corpus, the ones that show most first.
     Replay(replay::ReplayArguments),
     /// Show how many cases it takes to find each planned deviation of a drive.
-    Power(crate::buses::novobus::cli::power::PowerArguments),
+    Power(crate::buses::commands::power::PowerArguments),
     /// Show which protocol transitions the kept inputs reach, and what those of each target reach; exit code 1 where a reachable transition is missing.
-    Coverage(coverage::CoverageArguments),
+    Coverage(crate::buses::commands::coverage::CoverageArguments),
     /// Choose from a grown corpus the few small inputs that reach what the kept ones do not, and put them beside those.
-    Distil(distil::DistilArguments),
+    Distil(crate::buses::commands::distil::DistilArguments),
 }
 
 /// Does it.
@@ -33,10 +31,10 @@ pub(crate) fn fuzz(command: &FuzzCommand, output: &mut Output) -> std::io::Resul
     match command {
         FuzzCommand::Run(arguments) => run::run(arguments, output),
         FuzzCommand::Replay(arguments) => replay::replay(arguments, output),
-        FuzzCommand::Power(arguments) => {
-            crate::buses::novobus::cli::power::power(arguments, output)
+        FuzzCommand::Power(arguments) => crate::buses::commands::power::power(arguments, output),
+        FuzzCommand::Coverage(arguments) => {
+            crate::buses::commands::coverage::coverage(arguments, output)
         }
-        FuzzCommand::Coverage(arguments) => coverage::coverage(arguments, output),
-        FuzzCommand::Distil(arguments) => distil::distil(arguments, output),
+        FuzzCommand::Distil(arguments) => crate::buses::commands::distil::distil(arguments, output),
     }
 }

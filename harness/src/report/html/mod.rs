@@ -15,13 +15,12 @@
 //! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it does for whoever points at a byte |
 
-mod lines;
 mod page;
 mod scenario;
 mod summary;
 mod write;
 
-pub(crate) use lines::Curve;
+pub(crate) use crate::report::lines::Curve;
 pub use page::{MAX_PAGE, Part, Section, page};
 pub use scenario::{Played, section};
 pub(crate) use summary::colour;

@@ -1,10 +1,10 @@
 //! The section of a scenario: what came of it, what was expected beside what was received, and its pictures.
 
-use super::lines::lines;
 use super::page::{Part, Section};
 use super::summary::{Row, Shown, colour};
 use super::write::Html;
 use crate::report::diagram::diagram;
+use crate::report::lines::lines;
 use crate::report::sequence::sequence;
 use crate::scenario::run::{Difference, Finding, Outcome, Shown as Byte, show};
 use crate::scenario::verdict::Verdict;

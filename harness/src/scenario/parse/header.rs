@@ -1,8 +1,8 @@
 //! The header, and the lines one after another.
 
+use super::drive::{self, Line};
 use super::step;
-use crate::buses::novobus::language::parse::drive::{self, Line};
-use crate::buses::novobus::language::parse::words::{master_deviates, named};
+use super::words::{master_deviates, named};
 use crate::link::Capability;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
@@ -271,10 +271,10 @@ impl Reader {
         let needs_steps = setup.is_none();
         let given = setup.filter(|rings| !rings.is_empty());
         let rings = self.rings.take().or(given);
-        let bus = self.bus.unwrap_or(Bus::Novobus);
+        let bus = self.bus.unwrap_or(Bus::DEFAULT);
         let rings = match rings {
             Some(rings) => rings,
-            None if bus == Bus::Novobus && self.problems.is_empty() => {
+            None if bus.is_built() && self.problems.is_empty() => {
                 self.problems.push(
                     Problem::new(
                         Span::default(),
@@ -287,7 +287,7 @@ impl Reader {
             }
             None => Vec::new(),
         };
-        if needs_steps && bus == Bus::Novobus && self.steps.is_empty() && self.problems.is_empty() {
+        if needs_steps && bus.is_built() && self.steps.is_empty() && self.problems.is_empty() {
             let place = Span::default();
             let problem = Problem::new(place, "the scenario has no step", "a step expected");
             let help = "add a line such as `> 80`: the master sends SYNCO";

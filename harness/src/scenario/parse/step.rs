@@ -1,10 +1,10 @@
 //! Steps: a time or none, then `>`, `<`, `!`, `?` or a job.
 
-use crate::buses::novobus::language::parse::check;
-use crate::buses::novobus::language::parse::drive::{self, Line};
-use crate::buses::novobus::language::parse::job;
-use crate::buses::novobus::language::parse::value::place as cell;
-use crate::buses::novobus::language::parse::words::{drives, named, required, ring_prefix};
+use super::check;
+use super::drive::{self, Line};
+use super::job;
+use super::place as cell;
+use super::words::{drives, named, required, ring_prefix};
 use crate::scenario::expression::{self, Counter, Located};
 use crate::scenario::pattern;
 use crate::scenario::problem::{Problem, Span, nearest};

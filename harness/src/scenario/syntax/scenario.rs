@@ -1,5 +1,6 @@
 //! The scenario, its header and its steps.
 
+use crate::buses::Bus;
 use crate::buses::novobus::language::syntax::cell::{Place, Written};
 use crate::buses::novobus::language::syntax::check::{Check, DriveCheck};
 use crate::buses::novobus::language::syntax::job::Job;
@@ -49,26 +50,6 @@ pub struct Citation {
     pub text: String,
     /// Where it stands.
     pub span: Span,
-}
-
-/// The buses of the product.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Bus {
-    /// The ND21's ring.
-    Novobus,
-    /// UNITEK DS/BAMOCAR on CAN; not built yet.
-    Unitek,
-    /// NORDAC vector on PROFIBUS DP; not built yet.
-    Nordac,
-}
-
-impl Bus {
-    /// The names in a scenario.
-    pub const NAMES: [(&'static str, Self); 3] = [
-        ("novobus", Self::Novobus),
-        ("unitek", Self::Unitek),
-        ("nordac", Self::Nordac),
-    ];
 }
 
 /// The sizes of ring that a scenario can be played on.

@@ -16,6 +16,7 @@ mod oracle;
 mod order;
 mod page;
 mod play;
+pub mod promote;
 mod setup;
 pub mod shrink;
 pub mod text;

@@ -101,6 +101,12 @@ impl Meaning {
         }
     }
 
+    /// The document and section of the rule, such as `ND21 9.2`.
+    #[must_use]
+    pub fn citation(&self) -> String {
+        format!("ND21 {}", self.section())
+    }
+
     /// The section of the ND21 manual with the rule.
     #[must_use]
     pub fn section(&self) -> &'static str {

@@ -3,6 +3,7 @@
 pub mod csv;
 pub(crate) mod diagram;
 pub mod json;
+pub(crate) mod lines;
 pub mod meaning;
 pub mod plot;
 pub(crate) mod sequence;

@@ -6,3 +6,4 @@ pub(crate) mod interlock;
 pub(crate) mod judge;
 pub(crate) mod left_open;
 pub(crate) mod line_test;
+pub(crate) mod sim;

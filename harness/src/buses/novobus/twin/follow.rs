@@ -152,11 +152,11 @@ impl Conversation {
 
 /// What a twin received from a ring in a conversation.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Expected {
+pub(crate) struct Expected {
     /// The bytes, and when each came.
-    pub(super) bytes: Vec<(Instant, Received)>,
+    pub(crate) bytes: Vec<(Instant, Received)>,
     /// The place of the first one that a drive sent unasked (ND21 9.9).
-    pub(super) unasked: Option<usize>,
+    pub(crate) unasked: Option<usize>,
 }
 
 impl Expected {

@@ -1,8 +1,8 @@
 //! Simulated rigs: what their drives are before anything is sent.
 
-use super::check::Rig;
-use super::file::{DriveEntry, Hooks, RigFile};
-use super::profile::KnownProfile;
+use crate::rig::check::Rig;
+use crate::rig::file::{DriveEntry, Hooks, RigFile};
+use crate::rig::profile::KnownProfile;
 use crate::scenario::expression::{Expression, Located};
 use crate::scenario::parse::parse_header;
 use crate::scenario::plan::{Plan, plan};

@@ -1,6 +1,6 @@
 //! Recorded cells against time: a curve each, one below the other over the same times.
 
-use super::write::Html;
+use crate::report::html::Html;
 use crate::scenario::quantity::figures;
 use crate::scenario::run::{Record, Sample};
 use harness_proto::nd21::bits;

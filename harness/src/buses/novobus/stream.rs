@@ -4,11 +4,11 @@
 //! read at once each is taken to have come a byte time before the next. What is sent goes to the operating system
 //! a little ahead of the line, so that a busy computer leaves no gaps in a telegram.
 
-use super::inner::InnerLink;
-use super::lateness::Lateness;
-use super::ring::{MOST_RECORDED, Ring};
-use super::tamper::Tamper;
-use super::{
+use crate::link::inner::InnerLink;
+use crate::link::lateness::Lateness;
+use crate::link::ring::{MOST_RECORDED, Ring};
+use crate::link::tamper::Tamper;
+use crate::link::{
     Capability, HARMLESS, Lead, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name,
 };
 use crate::port::{LastWords, Wire, wake_on_time};

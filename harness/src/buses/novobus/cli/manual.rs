@@ -1,9 +1,9 @@
 //! `drivebench manual`: which tables are pinned, the errata ledger, and what the manual leaves open.
 
-use super::args::{ManualArguments, Selection};
-use super::exit::Exit;
-use super::output::Output;
-use super::run::select;
+use crate::cli::args::{ManualArguments, Selection};
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::cli::run::select;
 use crate::library::Entry;
 use crate::manual::{Erratum, ManualTable, NOT_YET, errata, pinned_by, tables};
 use harness_proto::novobus::properties::PROPERTIES;

@@ -1,9 +1,9 @@
 //! A finding that is kept: a scenario, an input of the fuzz targets and the table that it leaves, in a checkout of the repository.
 
-use super::Finding;
-use super::error::ExploreError;
-use super::files::write_whole;
-use super::{Act, Case, Harm, What};
+use crate::explore::ExploreError;
+use crate::explore::Finding;
+use crate::explore::files::write_whole;
+use crate::explore::{Act, Case, Harm, What};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::manual::tables;
