@@ -1,7 +1,7 @@
 //! One fault of a case: where it is and what it does, with the name by which people call it.
 
+use crate::file::values::{Time, Wire};
 use crate::link::{LinkFault, link_name};
-use crate::rig::values::{Time, Wire};
 use harness_proto::time::Span;
 use harness_sim::fault::Flips;
 use std::fmt;

@@ -2,8 +2,8 @@
 
 use super::fault::{Bit, LONGEST, MAX_GAP, wire_index};
 use crate::campaign::class::Class;
-use crate::rig::schema::{Step, compare, place, syntax};
-use crate::rig::values::{Time, Wire};
+use crate::file::schema::{Step, compare, place, syntax};
+use crate::file::values::{Time, Wire};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::Source;
 use schemars::JsonSchema;

@@ -7,7 +7,7 @@ use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shrink::ShrinkArguments;
 use crate::buses::commands::DriveCommand;
-use crate::rig::values::{Time, ValueError};
+use crate::file::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use harness_proto::line::Rate;

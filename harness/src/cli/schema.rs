@@ -3,7 +3,8 @@
 use super::args::SchemaName;
 use super::exit::Exit;
 use super::output::Output;
-use crate::{evidence, rig};
+use crate::evidence;
+use crate::rig;
 
 /// Prints a schema.
 pub(crate) fn schema(name: SchemaName, output: &mut Output) -> std::io::Result<Exit> {

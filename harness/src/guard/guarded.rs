@@ -3,11 +3,11 @@
 use super::Watch;
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::guard::safe_state::telegram;
+use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::link::{
     Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus,
     Trouble,
 };
-use crate::scenario::run::read_byte;
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;

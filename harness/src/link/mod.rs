@@ -13,6 +13,7 @@ pub(crate) mod tamper;
 
 pub use crate::buses::novobus::link::SimulatedLink;
 pub use crate::buses::novobus::stream::{StreamLink, TOLERANCE};
+pub use crate::trouble::Trouble;
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use inner::{Delay, InnerLink, Ports};
@@ -25,7 +26,6 @@ use harness_proto::novobus::command::Command;
 pub use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
-use std::fmt;
 
 /// What a rig can be asked to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -108,41 +108,6 @@ pub enum Moment {
     Byte(u64),
     /// At this time.
     At(Instant),
-}
-
-/// Why a link carries nothing more. It stays so: what is sent from then on is dropped.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Trouble {
-    /// The guard let a byte not pass: what the bench does not allow never reaches a wire. The text says which
-    /// command of which drive, and what would allow it.
-    Denied(String),
-    /// The port is gone, or the other end has closed the connection.
-    Lost(String),
-    /// What came over the port is no stream of this kind: the other end does not mark, or marks were cut.
-    Garbled(String),
-    /// An interlock of the rig's file does not hold.
-    Interlock(String),
-    /// Somebody wants the program to end.
-    Interrupted,
-}
-
-impl Trouble {
-    /// Whether nothing arrives any more. After a denial, and where an interlock does not hold, what was sent before still comes round.
-    #[must_use]
-    pub fn stops_the_line(&self) -> bool {
-        matches!(self, Self::Lost(_) | Self::Garbled(_) | Self::Interrupted)
-    }
-}
-
-impl fmt::Display for Trouble {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Denied(text) | Self::Lost(text) | Self::Garbled(text) | Self::Interlock(text) => {
-                f.write_str(text)
-            }
-            Self::Interrupted => f.write_str("interrupted"),
-        }
-    }
 }
 
 /// How far ahead of the line bytes may be handed over: where time is real, a busy computer would leave gaps between them.

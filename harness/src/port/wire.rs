@@ -3,7 +3,7 @@
 use super::last_words::LastWords;
 use super::rfc2217::Telnet;
 use super::serial::Serial;
-use crate::link::Trouble;
+use crate::trouble::Trouble;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{Unmark, mark};
 use harness_proto::time::Span;

@@ -1,9 +1,10 @@
 //! From the text of a rig file to a [`Rig`]: every mistake is found here, before a port is opened.
 
+use super::file::schema;
 use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
 use super::profile::KnownProfile;
-use super::schema::{Step, compare, place, schema, syntax};
-use super::values::{ValueError, Wire};
+use crate::file::schema::{Step, compare, place, syntax};
+use crate::file::values::{ValueError, Wire};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::quantity::{Dimension, parse as quantity};
 use crate::scenario::source::Source;

@@ -3,7 +3,7 @@
 use super::check::{Check, FindProfile};
 use super::file::Sim;
 use super::profile::{KnownProfile, Profile};
-use super::schema::Step;
+use crate::file::schema::Step;
 use crate::rig::sim::{lines, settle};
 use crate::scenario::problem::Problem;
 use crate::scenario::source::Source;

@@ -1,12 +1,18 @@
 //! What may stand in a rig file. The JSON schema is derived from these types, and every file is checked
 //! against it; what is said of a key here is what `drivebench rig schema` says.
 
-use super::values::{Speed, Time, Wire};
+use crate::file::values::{Speed, Time, Wire};
 use harness_proto::nd21::cells::{Cell, cell};
 use harness_proto::nd21::io::Input;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// The JSON schema of a rig file, draft 2020-12.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(RigFile).to_value()
+}
 
 /// The version of the schema.
 pub const SCHEMA: u32 = 1;

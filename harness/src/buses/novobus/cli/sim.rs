@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::rig;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::rig::values::Wire;
+use crate::file::values::Wire;
 use crate::scenario::argument::duration;
 use crate::serve::{
     ControlPlace, End, Host, Inner, Job, Marks, Pace, Place, Role, ServeError, Server, serve,

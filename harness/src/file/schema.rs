@@ -1,7 +1,5 @@
-//! The JSON schema of a rig file, and the check of a text against a schema: unknown keys, missing keys, wrong types,
-//! numbers out of their range. All mistakes at once, each with its place.
+//! The check of a TOML text against a JSON schema: unknown keys, missing keys, wrong types, numbers out of their range. All mistakes at once, each with its place.
 
-use super::file::RigFile;
 use super::values::check_format;
 use crate::scenario::problem::{Problem, Span};
 use serde_json::Value;
@@ -10,12 +8,6 @@ use toml::de::{DeTable, DeValue};
 
 /// How deep a schema is followed; ours has a quarter of it.
 const MAX_DEPTH: usize = 32;
-
-/// The JSON schema of a rig file, draft 2020-12.
-#[must_use]
-pub fn schema() -> Value {
-    schemars::schema_for!(RigFile).to_value()
-}
 
 /// A place of a TOML value.
 pub(crate) fn span_of<T>(value: &Spanned<T>) -> Span {
