@@ -19,6 +19,10 @@ use std::collections::BTreeMap;
 /// So often the same thing may be flaky before it is no longer looked at.
 const SETTLED: u8 = 3;
 
+/// So often in a row a byte must be late that a drive is late and not the computer: what a busy one delays is at the same byte twice now and
+/// then.
+const TIMES_LATE: u8 = 4;
+
 /// How far a run goes.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
@@ -387,14 +391,18 @@ impl Campaign {
     ) -> Result<(), ExploreError> {
         (finding.seen_again, finding.of) = (0, 0);
         self.moves = false;
+        let (confirm, of) = match finding.difference.time {
+            true => (TIMES_LATE, TIMES_LATE),
+            false => (self.about.confirm, self.about.of),
+        };
         let kind = finding.difference.kind();
-        while finding.of < self.about.of && target.over().is_none() {
+        while finding.of < of && target.over().is_none() {
             target.begin();
             let tried = target.attempt(&finding.case, rehearsal)?;
             self.use_line(tried.took);
             finding.of += 1;
             let Some(other) = tried.difference.filter(|other| other.kind() == kind) else {
-                if self.about.confirm > finding.seen_again + (self.about.of - finding.of) {
+                if confirm > finding.seen_again + (of - finding.of) {
                     return Ok(());
                 }
                 continue;
@@ -409,7 +417,7 @@ impl Campaign {
             } else {
                 other
             };
-            if finding.seen_again >= self.about.confirm {
+            if finding.seen_again >= confirm {
                 finding.confirmed = true;
                 return Ok(());
             }

@@ -15,7 +15,7 @@ use harness::scenario::run::lacks;
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness_proto::time::Span;
-use harness_sim::novobus::deviation::{Deviation, deviations};
+use harness_sim::novobus::deviation::{Deviation, deviations, relatives};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};
 
@@ -263,6 +263,18 @@ fn right_drives_have_no_names() {
         !right.differs && right.named.is_empty() && right.culprit.is_none(),
         "{right:?}"
     );
+}
+
+/// Relatives of the deviations with other numbers, some of them: each is named, or nothing is.
+#[test]
+fn other_numbers() {
+    let mut ends = BTreeMap::new();
+    for (planted, drive) in relatives().step_by(5).zip((0..DRIVES).cycle()) {
+        let (end, _) = end(planted, Some(drive));
+        *ends.entry(end).or_insert(0) += 1;
+    }
+    let count = |end| ends.get(&end).copied().unwrap_or(0);
+    assert!(count(End::Alone) + count(End::AmongOthers) >= 6, "{ends:?}");
 }
 
 /// In every drive: it is named for all of them, or for none.

@@ -1,6 +1,6 @@
 //! What a deviation is, and the ways to inject one.
 
-use super::{behind, cells, channel, errors, recovery, telegram};
+use super::{behind, cells, channel, errors, numbered, recovery, telegram};
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::bus_end::{Deadline, Parameter, Place, Step};
 use harness_proto::novobus::checksum::Checksum;
@@ -46,10 +46,17 @@ pub fn deviations() -> impl Iterator<Item = &'static Deviation> {
     tables.into_iter().flatten()
 }
 
-/// The deviation of this name.
+/// Relatives of these with other numbers. They can be planted and are looked for like all others, and no list shows them.
+pub fn relatives() -> impl Iterator<Item = &'static Deviation> {
+    numbered::numbered_ones()
+}
+
+/// The deviation of this name, the relatives among them.
 #[must_use]
 pub fn deviation(name: &str) -> Option<&'static Deviation> {
-    deviations().find(|deviation| deviation.name == name)
+    deviations()
+        .chain(relatives())
+        .find(|deviation| deviation.name == name)
 }
 
 /// A byte under consideration.

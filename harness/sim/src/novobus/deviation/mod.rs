@@ -14,10 +14,11 @@ mod deviant;
 mod errors;
 mod how;
 mod master;
+mod numbered;
 mod proxy;
 mod recovery;
 mod telegram;
 
 pub use deviant::Deviant;
-pub use how::{Deviation, deviation, deviations};
+pub use how::{Deviation, deviation, deviations, relatives};
 pub use master::{DeviantMaster, MasterDeviation, master_deviation, master_deviations};

@@ -3,7 +3,9 @@
 use super::hypothesis::{Evidence, judge};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::rig::Driven;
-use harness_sim::novobus::deviation::{Deviation, MasterDeviation, deviations, master_deviations};
+use harness_sim::novobus::deviation::{
+    Deviation, MasterDeviation, deviations, master_deviations, relatives,
+};
 use std::collections::BTreeSet;
 use std::fmt;
 
@@ -103,12 +105,23 @@ impl Candidate {
 /// everything. Attempts that the model of the manual explains from its power-up on refute, and prove nothing.
 ///
 /// Simulated drives keep what the scenarios before have left in them, and no twin that starts anew gives every byte then. There, what
-/// explains the most attempts is named.
+/// explains the most attempts is named. Relatives of deviations with other numbers are tried only where no other explains everything.
 pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&[String]) -> Result<Twin, E>) -> Vec<Named> {
+    let named = name_among(seen, candidates(seen, deviations()), twin);
+    match named.is_empty() {
+        true => name_among(seen, candidates(seen, relatives()), twin),
+        false => named,
+    }
+}
+
+fn name_among<E>(
+    seen: &Seen<'_>,
+    mut candidates: Vec<Candidate>,
+    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+) -> Vec<Named> {
     let explains = |lines: &[String], attempt: &[Conversation]| -> Option<Evidence> {
         judge(twin(lines).ok()?, attempt, seen.exactness)
     };
-    let mut candidates = candidates(seen);
     let (simulated, mut differed) = (seen.exactness.knows_cells, 0);
     // The shortest first: it refutes most, and costs least.
     let mut differing: Vec<_> = seen.differing.iter().collect();
@@ -145,7 +158,10 @@ pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&[String]) -> Result<Twin, E>) -> 
     simplest(candidates)
 }
 
-fn candidates(seen: &Seen<'_>) -> Vec<Candidate> {
+fn candidates(
+    seen: &Seen<'_>,
+    deviations: impl Iterator<Item = &'static Deviation>,
+) -> Vec<Candidate> {
     let single: Vec<u8> = match seen.drives <= SMALL {
         true => (0..seen.drives).collect(),
         false => seen.suspects.to_vec(),
@@ -161,7 +177,7 @@ fn candidates(seen: &Seen<'_>) -> Vec<Candidate> {
         };
         whose.iter().map(candidate)
     };
-    deviations().flat_map(of).collect()
+    deviations.flat_map(of).collect()
 }
 
 /// Those that explain the times too if any does, and of these those of single drives if there are some; one entry for each deviation.
