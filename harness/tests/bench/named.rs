@@ -3,6 +3,12 @@
 use crate::program::{Desk, ended, said};
 
 #[test]
+fn a_deviation_of_each_kind_is_named() {
+    named(&["checksum-wrong", "counts-7-zeros"]);
+}
+
+#[test]
+#[ignore = "takes some minutes; .ci/nightly runs it"]
 fn deviations_of_telegrams_are_named() {
     named(&[
         "checksum-wrong",
@@ -16,6 +22,7 @@ fn deviations_of_telegrams_are_named() {
 }
 
 #[test]
+#[ignore = "takes some minutes; .ci/nightly runs it"]
 fn deviations_of_the_error_mode_are_named() {
     named(&[
         "ignores-parity-errors",
@@ -50,14 +57,23 @@ fn named(names: &[&str]) {
     }
 }
 
-/// A wrong master of the bench's own is named, in the evidence too; and the bench is to blame, not a drive. `deviations` has all of them.
 #[test]
+fn a_wrong_master_is_named() {
+    masters(&[("check-byte-off-by-one", "11.6-driver-jobs")]);
+}
+
+#[test]
+#[ignore = "takes some minutes; .ci/nightly runs it"]
 fn wrong_masters_are_named() {
-    for (name, scenario) in [
-        ("check-byte-off-by-one", "11.6-driver-jobs"),
+    masters(&[
         ("names-the-link-behind", "9.7-driver-names-the-link"),
         ("never-gives-up", "11.5-driver-gives-up"),
-    ] {
+    ]);
+}
+
+/// A wrong master of the bench is named, in the evidence too. The bench is to blame, not a drive. `deviations` has all of them.
+fn masters(all: &[(&str, &str)]) {
+    for &(name, scenario) in all {
         let desk = Desk::new(&format!(
             "drives = 3\ntransport = \"sim\"\n[sim]\nsetup = [\"master deviates {name}\"]\n"
         ));

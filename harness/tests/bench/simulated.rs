@@ -22,12 +22,23 @@ fn qualify(folder: &Path, name: &str, text: &str) -> Output {
     command.output().expect("the program")
 }
 
-/// Each number of drives puts a drive's cycles of 432 us (4.1) elsewhere in the conversations.
 #[test]
 fn right_drives_have_no_deviations() {
+    have_none(&[1], &[true]);
+    have_none(&[5], &[false]);
+}
+
+#[test]
+#[ignore = "takes some minutes; .ci/nightly runs it"]
+fn right_drives_of_any_ring_have_no_deviations() {
+    have_none(&[1, 2, 5, 7], &[true, false]);
+}
+
+/// Each number of drives puts a drive's cycles of 432 us (4.1) elsewhere in the conversations.
+fn have_none(sizes: &[u8], resets: &[bool]) {
     let folder = tempfile::tempdir().expect("a folder");
-    for drives in [1, 2, 5, 7] {
-        for reset in [true, false] {
+    for &drives in sizes {
+        for &reset in resets {
             let name = format!("{drives}-{reset}");
             let output = qualify(folder.path(), &name, &rig(drives, reset, "", ""));
             let code = output.status.code();
@@ -101,17 +112,26 @@ fn a_profile_is_loaded_again() {
 /// A scenario that asks for something else than the manual does, with cells that are set back behind it.
 const WRONG: &str = "title wrong\nring 4\ndrive 1 memory FE13 = 88\n> 88 FD C0 13 FE D1\n> 80*6\n< 88 01 C0 13 88 A5\n< 81\n";
 
-/// Whether evidence is kept changes no verdict, no exit code and no word of what is said, and what is kept is judged alike.
 #[test]
 fn evidence_changes_no_verdict() {
+    changes_no_verdict(&[("10", 4)]);
+}
+
+#[test]
+#[ignore = "plays long chapters four times; .ci/nightly runs it"]
+fn evidence_changes_no_verdict_of_long_chapters() {
+    changes_no_verdict(&[("9", 3), ("14", 3)]);
+}
+
+/// Whether evidence is kept changes no verdict, no exit code and no word of what is said, and what is kept is judged alike.
+/// These are the chapters, each with the size of its ring; a scenario that fails is beside them.
+fn changes_no_verdict(chapters: &[(&str, u8)]) {
     let folder = tempfile::tempdir().expect("a folder");
     let wrong = folder.path().join("wrong.scn");
     std::fs::write(&wrong, WRONG).expect("room");
     let wrong = wrong.to_str().expect("a name");
-    for (number, (what, size, code)) in [(wrong, 4, 1), ("9", 3, 0), ("10", 4, 0), ("14", 3, 0)]
-        .into_iter()
-        .enumerate()
-    {
+    let right = chapters.iter().map(|&(chapter, size)| (chapter, size, 0));
+    for (number, (what, size, code)) in [(wrong, 4, 1)].into_iter().chain(right).enumerate() {
         let run = |more: &[&str]| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
             match what == wrong {

@@ -76,8 +76,7 @@ const FAULT: &str =
 const SKIPPED: &str = "title Three\nsource nd21 9.1\nring 3\n> 80\n";
 
 /// A folder of evidence made by `command`.
-pub(crate) fn kept(ring: &str, command: &str, ports: bool) -> Kept {
-    let desk = Desk::new(ring);
+pub(crate) fn kept(desk: Desk, command: &str, ports: bool) -> Kept {
     for (name, text) in [
         ("passes", PASSES),
         ("fails", FAILS),

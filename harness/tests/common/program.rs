@@ -9,13 +9,18 @@ pub(crate) struct Desk {
 }
 
 /// What every limit of a rig's file allows.
-pub(crate) const ALL: &str = "[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n";
+const ALL: &str = "[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n";
 
 impl Desk {
-    /// A rig with one ring, given by the lines of `[ring.1]` and what follows.
+    /// A rig with one ring, given by the lines of `[ring.1]` and what follows. It allows everything.
     pub(crate) fn new(ring: &str) -> Self {
+        Self::limited(ring, ALL)
+    }
+
+    /// The same with these limits.
+    pub(crate) fn limited(ring: &str, limits: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let text = format!("schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\n{ring}{ALL}");
+        let text = format!("schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\n{ring}{limits}");
         std::fs::write(folder.path().join("desk.toml"), text).expect("room");
         Self { folder }
     }

@@ -34,5 +34,5 @@ fn untouched_evidence_of_the_driver_verifies() {
 #[test]
 fn of_a_served_ring() {
     let served = Served::start("nd21", &[2], "tcp", true, &[]);
-    check(&kept(&served.lines(0), "run", true));
+    check(&kept(Desk::new(&served.lines(0)), "run", true));
 }

@@ -205,6 +205,7 @@ fn two_rings_behind_sockets() {
 
 /// Over pseudo-terminals.
 #[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
 fn two_rings_behind_ptys() {
     two_rings("pty");
 }
