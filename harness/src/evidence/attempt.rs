@@ -4,6 +4,7 @@ use super::folder::capture;
 use super::header::Header;
 use super::record::Line;
 use crate::buses::twin::{Conversation, Twin};
+use crate::file::values::Wire;
 use crate::library::Entry;
 use crate::link::{
     Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,
@@ -106,7 +107,8 @@ pub(super) fn again(
         header.drives.clone(),
         header.capabilities.clone(),
     )
-    .reaching(reached(rig, header));
+    .reaching(reached(rig, header))
+    .listening(heard(rig, header));
     let exact = replay.is_exact();
     let mut outcome = match play_one(&mut replay, &plan, way) {
         Ok(outcome) => outcome,
@@ -217,23 +219,33 @@ impl Again {
 
 /// The inner links at which the bench can put faults; those at its own ends need none.
 pub(super) fn reached(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
-    let rings = (0..).zip(&header.drives);
-    let all = rings.flat_map(|(ring, drives)| (0..=usize::from(*drives)).map(move |k| (ring, k)));
-    let interposed = |(ring, link): &(usize, usize)| {
-        rig.file.interposer.iter().any(|own| {
-            let drives = header.drives.get(*ring).copied().unwrap_or(0);
-            let place = own.link.from.map_or(0, |from| drives.saturating_sub(from));
-            usize::from(own.ring) == ring + 1 && usize::from(place) == *link
+    let interposers = rig.file.interposer.iter();
+    links(header, interposers.map(|own| (own.ring, own.link)))
+}
+
+/// The links on which bytes were seen: by ring and place.
+pub(super) fn heard(rig: &Rig, header: &Header) -> Vec<(usize, usize)> {
+    let interposers = rig.file.interposer.iter().map(|own| (own.ring, own.link));
+    let taps = rig.file.tap.iter().map(|own| (own.ring, own.link));
+    links(header, interposers.chain(taps))
+}
+
+/// The master's own links and those between drives that are given by the number of their ring; all links of simulated rings.
+fn links(header: &Header, inner: impl Iterator<Item = (u8, Wire)>) -> Vec<(usize, usize)> {
+    let drives = |ring: usize| header.drives.get(ring).copied().unwrap_or(0);
+    let inner: Vec<_> = inner
+        .map(|(ring, link)| {
+            let ring = usize::from(ring).saturating_sub(1);
+            let place = link
+                .from
+                .map_or(0, |from| drives(ring).saturating_sub(from));
+            (ring, usize::from(place))
         })
-    };
-    let end = |(ring, link): &(usize, usize)| {
-        *link == 0
-            || header
-                .drives
-                .get(*ring)
-                .is_some_and(|last| usize::from(*last) == *link)
-    };
-    all.filter(|place| header.simulated || end(place) || interposed(place))
+        .collect();
+    let all = (0..header.drives.len())
+        .flat_map(|ring| (0..=usize::from(drives(ring))).map(move |place| (ring, place)));
+    let end = |(ring, place): &(usize, usize)| *place == 0 || *place == usize::from(drives(*ring));
+    all.filter(|place| header.simulated || end(place) || inner.contains(place))
         .collect()
 }
 
@@ -395,6 +407,7 @@ impl Ended {
         for event in events.iter().skip(last + 1) {
             let at = match event {
                 Event::Sent(_, at, _) | Event::Received(_, at, _) | Event::Probe(_, at, ..) => *at,
+                Event::Tapped(_, _, at, _) => *at,
                 Event::Fault(_, at, PlacedFault::Link(_, what), _) => {
                     if let LinkFault::Delay(span) | LinkFault::Break(span) = what {
                         ended.held = ended.held + *span;

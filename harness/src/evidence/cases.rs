@@ -217,7 +217,8 @@ impl Opened {
                     header.drives.clone(),
                     header.capabilities.clone(),
                 )
-                .reaching(super::attempt::reached(&self.rig, header));
+                .reaching(super::attempt::reached(&self.rig, header))
+                .listening(super::attempt::heard(&self.rig, header));
                 // What the guard knew of the drives is not in the record.
                 let limited = !header.limits.allow_everything();
                 let words = remarks.first().and_then(|own| own.strip_prefix(DENIED));

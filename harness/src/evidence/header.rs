@@ -166,8 +166,8 @@ fn possible(names: &[String], rig: &Rig) -> (Vec<Capability>, Limits) {
     let mut all = Vec::new();
     for motion in [true, false] {
         let limits = limits(rig, motion);
-        for line_errors in [true, false] {
-            let able = abilities(rig, limits, line_errors);
+        for seen in [(true, true), (false, true), (true, false), (false, false)] {
+            let able = abilities(rig, limits, seen);
             let listed = able.iter().map(|own| own.name());
             if able == named && listed.eq(names.iter().map(String::as_str)) {
                 return (able, limits);
@@ -179,10 +179,13 @@ fn possible(names: &[String], rig: &Rig) -> (Vec<Capability>, Limits) {
 }
 
 /// What a rig can do within these limits, beside what no record shows.
-fn abilities(rig: &Rig, limits: Limits, line_errors: bool) -> Vec<Capability> {
+fn abilities(rig: &Rig, limits: Limits, (line_errors, taps): (bool, bool)) -> Vec<Capability> {
     let file = &rig.file;
+    let has_inner = !file.tap.is_empty() || !file.interposer.is_empty();
     let has = |capability: &Capability| match capability {
-        Capability::Tap | Capability::Power | Capability::Simulator => false,
+        Capability::Power | Capability::Simulator => false,
+        // A record of an earlier version shows no taps.
+        Capability::Tap => taps && !rig.is_simulated() && has_inner,
         Capability::Motion => limits.motion,
         Capability::Eeprom => limits.eeprom,
         // A reset ends block and stop (ND21 11.8).
@@ -201,6 +204,7 @@ fn abilities(rig: &Rig, limits: Limits, line_errors: bool) -> Vec<Capability> {
             Capability::Reset,
             Capability::TwoRings,
             Capability::Interposer,
+            Capability::Tap,
             Capability::LineErrors,
         ],
     };

@@ -183,6 +183,7 @@ impl Order {
             | Event::Received(ring, at, _)
             | Event::Fault(ring, at, ..)
             | Event::Probe(ring, at, ..) => (*ring, *at),
+            Event::Tapped(ring, _, at, _) => (*ring, *at),
             Event::Step(_) | Event::Trouble(_) => return Ok(()),
         };
         let Some(drives) = self.drives.get(ring) else {

@@ -152,6 +152,20 @@ pub enum Line {
         #[schemars(with = "Vec<ByteWritten>")]
         bytes: Vec<(String, Option<String>)>,
     },
+    /// Bytes that arrived at the end of a link between two drives, as a tap there has seen them; those that the record has not shown
+    /// before in this conversation.
+    Tapped {
+        /// Which ring.
+        #[schemars(range(min = 1, max = 2))]
+        ring: usize,
+        /// Which link, counted from the master's outgoing one, which is 0.
+        link: usize,
+        /// When.
+        t: u64,
+        /// What came.
+        #[schemars(with = "Vec<ByteWritten>")]
+        bytes: Vec<(String, Option<String>)>,
+    },
     /// The link carries nothing more.
     Trouble {
         /// `denied`, `lost`, `garbled`, `interlock` or `interrupted`.
@@ -386,6 +400,12 @@ impl Line {
                 .to_owned(),
                 text: trouble.to_string(),
             },
+            Event::Tapped(ring, link, at, bytes) => Self::Tapped {
+                ring: ring + 1,
+                link: *link,
+                t: units(at),
+                bytes: bytes.iter().map(|byte| written(*byte)).collect(),
+            },
             Event::Probe(ring, at, count, bytes) => Self::Probe {
                 ring: ring + 1,
                 t: units(at),
@@ -402,6 +422,7 @@ impl Line {
             Self::Begin { t }
             | Self::Sent { t, .. }
             | Self::Received { t, .. }
+            | Self::Tapped { t, .. }
             | Self::Probe { t, .. } => *t,
             Self::Look { t, pause, .. } => (*t).max(pause.unwrap_or(0)),
             Self::Fault { t, at, what, .. } => (*t).max(at.unwrap_or(0)).max(what.1),
@@ -469,16 +490,19 @@ impl Line {
                 "interrupted" => Trouble::Interrupted,
                 _ => return None,
             }),
+            Self::Tapped {
+                ring,
+                link,
+                t,
+                bytes,
+            } => Event::Tapped(index(ring)?, *link, instant(t), all_received(bytes)?),
             Self::Probe {
                 ring,
                 t,
                 count,
                 bytes,
             } => {
-                let bytes = bytes
-                    .iter()
-                    .map(|(byte, error)| received(byte, error.as_deref()))
-                    .collect::<Option<Vec<_>>>()?;
+                let bytes = all_received(bytes)?;
                 Event::Probe(index(ring)?, instant(t), *count, bytes)
             }
             Self::Run { .. }
@@ -488,6 +512,13 @@ impl Line {
             | Self::End { .. } => return None,
         })
     }
+}
+
+/// Bytes as they are written; `None` where one cannot be.
+fn all_received(bytes: &[(String, Option<String>)]) -> Option<Vec<Received>> {
+    let all = bytes.iter();
+    all.map(|(byte, error)| received(byte, error.as_deref()))
+        .collect()
 }
 
 /// Lines of the evidence of a scenario.

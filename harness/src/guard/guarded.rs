@@ -423,6 +423,14 @@ impl<L: Link> Link for Guarded<L> {
         self.inner.reaches(ring, link)
     }
 
+    fn listens(&self, ring: usize, link: usize) -> bool {
+        self.inner.listens(ring, link)
+    }
+
+    fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
+        self.inner.tapped(ring, link)
+    }
+
     fn time_tolerance(&self) -> Span {
         self.inner.time_tolerance()
     }

@@ -273,6 +273,28 @@ pub trait Link: Line {
         true
     }
 
+    /// Whether the bytes on a link of a ring are seen: 0 is the master's outgoing one.
+    fn listens(&self, ring: usize, link: usize) -> bool {
+        let _any = (ring, link);
+        false
+    }
+
+    /// The bytes that have arrived at the end of a link of a ring since the conversation began; `None` where nothing
+    /// [listens](Self::listens).
+    fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
+        let listens = self.listens(ring, link);
+        let trace = listens.then(|| self.trace(ring))?;
+        let bytes = trace.links.get(link)?.bytes.iter();
+        let arrived = bytes.filter_map(|own| {
+            let byte = own.received?;
+            Some(Received {
+                byte,
+                error: own.error,
+            })
+        });
+        Some(arrived.collect())
+    }
+
     /// How exact its times are: zero where time is virtual.
     fn time_tolerance(&self) -> Span {
         Span::ZERO

@@ -11,7 +11,7 @@ use crate::link::BusError;
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// The most rings of a bench (ND21 8.4).
 const RINGS: usize = 2;
@@ -48,6 +48,8 @@ pub enum Event {
     Look(Look),
     /// So many SYNCO were sent into a ring from this time on to let it spell out its address, and these bytes came.
     Probe(usize, Instant, usize, Vec<Received>),
+    /// What had arrived at the end of a link of a ring by this time, and had not been asked for before in this conversation.
+    Tapped(usize, usize, Instant, Vec<Received>),
 }
 
 /// Takes events as they happen.
@@ -71,6 +73,8 @@ pub struct Recording<'l, L: ?Sized> {
     whole: bool,
     /// Whether a step of a scenario belongs to the present conversation.
     stepped: bool,
+    /// How many bytes of a link are recorded in the present conversation, by ring and link.
+    tapped: BTreeMap<(usize, usize), usize>,
     /// What the links carried in the conversation of the scenario, ring by ring; empty while it lasts.
     scenario: Vec<Trace>,
     /// Trouble that has been recorded.
@@ -104,7 +108,10 @@ impl Known {
 impl<'l, L: Link + ?Sized> Recording<'l, L> {
     /// Records a link from now on.
     pub fn new(link: &'l mut L, sink: &'l mut dyn Sink) -> Self {
-        let seen_beside_the_bus = [Capability::Tap, Capability::Simulator, Capability::Power];
+        let seen_beside_the_bus = match link.capabilities().contains(&Capability::Simulator) {
+            true => &[Capability::Tap, Capability::Simulator, Capability::Power][..],
+            false => &[Capability::Power],
+        };
         let own = link.capabilities().iter().copied();
         let capabilities = own
             .filter(|own| !seen_beside_the_bus.contains(own))
@@ -116,6 +123,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             capabilities,
             whole: false,
             stepped: false,
+            tapped: BTreeMap::new(),
             scenario: Vec::new(),
             trouble: None,
             known: real.then(Known::new),
@@ -282,6 +290,7 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
             self.scenario = rings.map(|ring| self.link.trace(ring)).collect();
         }
         self.link.begin();
+        self.tapped.clear();
         if let Some(known) = &mut self.known {
             known.came = Default::default();
         }
@@ -309,6 +318,19 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
 
     fn reaches(&self, ring: usize, link: usize) -> bool {
         self.link.reaches(ring, link)
+    }
+
+    fn listens(&self, ring: usize, link: usize) -> bool {
+        self.link.listens(ring, link)
+    }
+
+    fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
+        let all = self.link.tapped(ring, link)?;
+        let at = self.now();
+        let known = self.tapped.insert((ring, link), all.len()).unwrap_or(0);
+        let new = all.get(known..).unwrap_or_default().to_vec();
+        self.sink.take(&Event::Tapped(ring, link, at, new));
+        Some(all)
     }
 
     fn time_tolerance(&self) -> Span {

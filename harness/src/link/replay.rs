@@ -10,7 +10,7 @@ use super::{Capability, Event, Lead, Line, Link, LinkFault, Look, Moment, Placed
 use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// A record, played back.
 #[derive(Clone, Debug)]
@@ -22,6 +22,10 @@ pub struct Replay {
     drives: Vec<u8>,
     capabilities: Vec<Capability>,
     reaches: Vec<(usize, usize)>,
+    /// Links on which bytes are seen.
+    listens: Vec<(usize, usize)>,
+    /// What was seen on them in this conversation.
+    tapped: BTreeMap<(usize, usize), Vec<Received>>,
     trouble: Option<Trouble>,
     /// The state as of the last look; `None` where the record has no looks.
     known: Option<Known>,
@@ -67,9 +71,16 @@ impl Replay {
             Event::Fault(ring, _, PlacedFault::Link(link, _), _) => Some((*ring, *link)),
             _ => None,
         });
+        let tapped = events.iter().filter_map(|event| match event {
+            Event::Tapped(ring, link, ..) => Some((*ring, *link)),
+            _ => None,
+        });
+        let listens = tapped.collect();
         let looks = events.iter().any(|event| matches!(event, Event::Look(_)));
         Self {
             reaches: reached.collect(),
+            listens,
+            tapped: BTreeMap::new(),
             // Without looks it is not known which step came when.
             events: events
                 .into_iter()
@@ -89,6 +100,13 @@ impl Replay {
     #[must_use]
     pub fn reaching(mut self, links: impl IntoIterator<Item = (usize, usize)>) -> Self {
         self.reaches.extend(links);
+        self
+    }
+
+    /// Lets bytes be looked at on more links than the record shows.
+    #[must_use]
+    pub fn listening(mut self, links: impl IntoIterator<Item = (usize, usize)>) -> Self {
+        self.listens.extend(links);
         self
     }
 
@@ -112,6 +130,7 @@ impl Replay {
             Event::Begin(_) => Some("another conversation".to_owned()),
             Event::Sent(_, at, bytes) => Some(format!("sending {} bytes until {at}", bytes.len())),
             Event::Fault(_, at, ..) => Some(format!("a fault at {at}")),
+            Event::Tapped(_, link, at, _) => Some(format!("a look at link {link} at {at}")),
             Event::Probe(_, at, count, _) => Some(format!("{count} sync bytes from {at} on")),
         };
         match &self.trouble {
@@ -328,6 +347,7 @@ impl Link for Replay {
         while self.known.is_none() && matches!(self.events.front(), Some(Event::Received(..))) {
             self.events.pop_front();
         }
+        self.tapped.clear();
         match self.events.pop_front() {
             Some(Event::Begin(at)) => {
                 if self.known.is_some() && at < self.now {
@@ -392,6 +412,27 @@ impl Link for Replay {
 
     fn reaches(&self, ring: usize, link: usize) -> bool {
         self.reaches.contains(&(ring, link))
+    }
+
+    fn listens(&self, ring: usize, link: usize) -> bool {
+        self.listens.contains(&(ring, link))
+    }
+
+    fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
+        match self.events.pop_front() {
+            Some(Event::Tapped(own, place, _, bytes)) if (own, place) == (ring, link) => {
+                let all = self.tapped.entry((ring, link)).or_default();
+                all.extend(bytes);
+                Some(all.clone())
+            }
+            other => {
+                if let Some(other) = other {
+                    self.events.push_front(other);
+                }
+                self.differs("a look at an inner link");
+                None
+            }
+        }
     }
 
     fn time_tolerance(&self) -> Span {

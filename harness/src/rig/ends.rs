@@ -101,6 +101,14 @@ impl Link for Ends {
         each!(self, own => own.reaches(ring, link))
     }
 
+    fn listens(&self, ring: usize, link: usize) -> bool {
+        each!(self, own => own.listens(ring, link))
+    }
+
+    fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
+        each!(self, own => own.tapped(ring, link))
+    }
+
     fn time_tolerance(&self) -> Span {
         each!(self, link => link.time_tolerance())
     }

@@ -305,6 +305,15 @@ fn what_the_limits_deny_is_skipped() {
     }
 }
 
+/// A link that a scenario leaves cut is joined behind it, as an interposer joins it: the next scenario finds a ring (ND21 8.5).
+#[test]
+fn a_cut_link_is_joined_behind_its_scenario() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = rig(4, true, "", ", \"drive 0 memory FE13 = 88\"");
+    let output = run(folder.path(), &text, &["8.5-addresses", "9.2-synco"]);
+    ended(&output, 5, "passed 9.2-synco");
+}
+
 /// Where drives are asked about an interlock before each scenario, the ring is brought back first, and the twin follows that.
 #[test]
 fn an_interlock_disturbs_no_verdict() {

@@ -130,9 +130,10 @@ impl Link {
         sent.take().map(UnderWay::unpack)
     }
 
-    /// Forgets what it has carried and the faults whose byte has not come; what is under way counts as the first
-    /// bytes.
+    /// Forgets what it has carried and the faults whose byte has not come, and joins the link if it was cut, as an interposer does; what
+    /// is under way counts as the first bytes.
     pub(crate) fn begin(&mut self) {
+        self.join();
         self.plan = Plan::default();
         self.bytes.forget_arrived();
         self.transmitted = self.bytes.under_way().len() as u64;

@@ -297,6 +297,10 @@ impl Link for SimulatedLink {
         &Self::CAPABILITIES
     }
 
+    fn listens(&self, _: usize, _: usize) -> bool {
+        true
+    }
+
     fn begin(&mut self) {
         self.origin = self.bench.now();
         self.scheduled.clear();

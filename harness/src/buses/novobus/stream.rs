@@ -108,6 +108,9 @@ impl StreamLink {
         if inner.iter().any(InnerLink::passes) {
             capabilities.push(Capability::Interposer);
         }
+        if !inner.is_empty() {
+            capabilities.push(Capability::Tap);
+        }
         let shows = |(wire, _): &(Wire, u8)| wire.abilities().shows_errors;
         if wires.iter().all(shows) && inner.iter().all(InnerLink::shows_errors) {
             capabilities.push(Capability::LineErrors);
@@ -519,6 +522,12 @@ impl Link for StreamLink {
     fn reaches(&self, ring: usize, link: usize) -> bool {
         let drives = self.rings.get(ring).map(|ring| usize::from(ring.drives));
         let inner = |inner: &InnerLink| inner.passes() && (inner.ring, inner.place) == (ring, link);
+        drives.is_some_and(|drives| link == 0 || link == drives) || self.inner.iter().any(inner)
+    }
+
+    fn listens(&self, ring: usize, link: usize) -> bool {
+        let drives = self.rings.get(ring).map(|ring| usize::from(ring.drives));
+        let inner = |inner: &InnerLink| (inner.ring, inner.place) == (ring, link);
         drives.is_some_and(|drives| link == 0 || link == drives) || self.inner.iter().any(inner)
     }
 

@@ -14,6 +14,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::command::Command;
+use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::master::Fault;
 use harness_proto::time::{self, Instant};
 use std::collections::{BTreeMap, BTreeSet};
@@ -98,6 +99,8 @@ pub(crate) struct Runner<'a> {
     pub(crate) seen: BTreeMap<(usize, u8, u16), u8>,
     /// Drives that have just answered a telegram, where the link does not show the error mode.
     pub(crate) answers: BTreeSet<(usize, u8)>,
+    /// Drives whose error mode taps have just shown, with its cause; `None` where they are not in it.
+    pub(crate) tapped: BTreeMap<(usize, u8), Option<BusError>>,
     pub(crate) rings: Vec<RingRecord>,
     /// When the line before was done.
     pub(crate) line_before: Instant,
@@ -141,6 +144,7 @@ impl<'a> Runner<'a> {
             recorder: Recorder::default(),
             seen: BTreeMap::new(),
             answers: BTreeSet::new(),
+            tapped: BTreeMap::new(),
             place: Span::default(),
         }
     }

@@ -23,6 +23,8 @@ pub enum Why {
     Lacks(Vec<Capability>),
     /// A fault is to be put on this link, where the rig has no interposer.
     NoInterposer(String),
+    /// What goes over this link must be seen, where the rig has no tap.
+    NoTap(String),
     /// It is for rings with these numbers of drives, and the rig has those.
     OtherSize(Vec<u8>, Vec<u8>),
     /// The rig's limits deny a byte or a fault of it, in the guard's words.
@@ -40,6 +42,8 @@ pub enum Why {
 pub enum Unlock {
     /// A change of this setting in the rig's `[limits]`.
     Limit(Setting),
+    /// A tap at this link.
+    Tap(String),
     /// An interposer at this link.
     Interposer(String),
     /// Ports that send and show line errors.
@@ -103,6 +107,7 @@ impl Why {
     pub fn group(&self) -> String {
         match self {
             Self::NoInterposer(_) => "the rig has no interposer".to_owned(),
+            Self::NoTap(_) => "the rig has no tap".to_owned(),
             Self::OtherSize(..) => "it is for rings of another size".to_owned(),
             Self::Denied(_) => DENIED.trim_end_matches(": ").to_owned(),
             // Whatever else is missing, a simulated rig has it.
@@ -128,6 +133,7 @@ impl fmt::Display for Why {
                 let names: Vec<_> = missing.iter().map(|own| own.name()).collect();
                 write!(f, "the rig has no {}", names.join(", no "))
             }
+            Self::NoTap(place) => write!(f, "the rig has no tap at {place}"),
             Self::NoInterposer(place) => write!(f, "the rig has no interposer at {place}"),
             Self::OtherSize(own, rig) => write!(
                 f,
@@ -171,6 +177,7 @@ impl fmt::Display for Unlock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Limit(setting) => write!(f, "{setting} in [limits]"),
+            Self::Tap(place) => write!(f, "a tap at {place}"),
             Self::Interposer(place) => write!(f, "an interposer at {place}"),
             Self::LineErrors => f.write_str("ports that show line errors"),
             Self::OtherSize => f.write_str("rings of other sizes"),
@@ -195,38 +202,39 @@ pub fn lacks(plan: &Plan, link: &dyn Link) -> Option<Skip> {
         .copied()
         .filter(|need| !able(need))
         .collect();
-    let unreached: BTreeSet<_> = plan
+    let name = |(ring, place): &(usize, usize)| plan.link_name(*ring, *place);
+    let unreached: Vec<_> = plan
         .fault_links()
         .filter(|(ring, place)| !link.reaches(*ring, *place))
         .collect();
-    let mut unreached = unreached
-        .iter()
-        .map(|(ring, place)| plan.link_name(*ring, *place));
-    let place = plan
-        .fault_links()
-        .find(|(ring, place)| !link.reaches(*ring, *place))
-        .map(|(ring, place)| plan.link_name(ring, place));
-    let why = match (missing.as_slice(), place) {
-        ([], None) => return None,
-        ([], Some(place)) => Why::NoInterposer(place),
-        (missing, _) => Why::Lacks(missing.to_vec()),
+    // An interposer sees what it passes on.
+    let unheard: Vec<_> = plan
+        .heard_links()
+        .filter(|(ring, place)| !link.listens(*ring, *place))
+        .filter(|place| !unreached.contains(place))
+        .collect();
+    let why = match (missing.as_slice(), unreached.first(), unheard.first()) {
+        ([], None, None) => return None,
+        ([], Some(place), _) => Why::NoInterposer(name(place)),
+        ([], None, Some(place)) => Why::NoTap(name(place)),
+        (missing, ..) => Why::Lacks(missing.to_vec()),
     };
     let unlocks = missing.iter().filter_map(|own| unlock(*own));
-    Some(Skip::from(why).and(unlocks.chain(unreached.by_ref().map(Unlock::Interposer))))
+    let interposers = unreached.iter().map(name).map(Unlock::Interposer);
+    let taps = unheard.iter().map(name).map(Unlock::Tap);
+    Some(Skip::from(why).and(unlocks.chain(interposers).chain(taps)))
 }
 
-/// What gives a rig a capability; `None` for interposers, whose places are known.
+/// What gives a rig a capability; `None` for taps and interposers, whose places are known.
 fn unlock(missing: Capability) -> Option<Unlock> {
     Some(match missing {
-        Capability::Interposer => return None,
+        Capability::Interposer | Capability::Tap => return None,
         Capability::Motion => Unlock::Limit(Setting::Motion),
         Capability::Eeprom => Unlock::Limit(Setting::Eeprom),
         Capability::Reset => Unlock::Limit(Setting::Reset),
         Capability::LineErrors => Unlock::LineErrors,
         Capability::TwoRings => Unlock::OtherSize,
-        Capability::Tap | Capability::Memory | Capability::Power | Capability::Simulator => {
-            Unlock::Simulated
-        }
+        Capability::Memory | Capability::Power | Capability::Simulator => Unlock::Simulated,
     })
 }
 

@@ -2,6 +2,7 @@
 //! wrong between them.
 
 mod commands;
+mod taps;
 mod ways_out;
 
 use crate::program::{ended, said, verify};

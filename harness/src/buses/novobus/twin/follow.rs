@@ -81,7 +81,7 @@ impl Conversation {
                     open.received.extend(received);
                 }
                 Event::Look(look) => open.end = open.end.max(look.at),
-                Event::Probe(..) | Event::Trouble(_) => {}
+                Event::Probe(..) | Event::Tapped(..) | Event::Trouble(_) => {}
             }
         }
         all.push(open);

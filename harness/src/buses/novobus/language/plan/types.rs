@@ -402,6 +402,28 @@ impl Plan {
         })
     }
 
+    /// The links in front of and behind the drives whose error mode must be seen, by ring and place; none where no drive must be seen in it,
+    /// as a drive that answers is in none.
+    pub(crate) fn heard_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let wanted = self.needs.contains(&Capability::Tap);
+        let steps = self.steps.iter().filter(move |_| wanted);
+        let drives = steps.filter_map(|step| match &step.action {
+            PlannedAction::Check(PlannedCheck::Error(ring, drive, _)) => {
+                Some((*ring, *drive..=*drive))
+            }
+            PlannedAction::Check(PlannedCheck::Drive(check)) | PlannedAction::Until(check, _) => {
+                let seen = matches!(check.condition, PlannedCondition::InError(_));
+                seen.then(|| (check.ring, check.drives.clone()))
+            }
+            _ => None,
+        });
+        drives.flat_map(|(ring, drives)| {
+            let size = self.rings.get(ring).map_or(0, |ring| ring.drives());
+            let behind = drives.map(move |drive| usize::from(size.saturating_sub(drive)));
+            behind.flat_map(move |place| [(ring, place.saturating_sub(1)), (ring, place)])
+        })
+    }
+
     /// A link as a scenario writes it: `98->97`, `2:0->master`.
     #[must_use]
     pub fn link_name(&self, ring: usize, link: usize) -> String {

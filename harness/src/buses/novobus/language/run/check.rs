@@ -47,7 +47,12 @@ impl Runner<'_> {
                 self.judged(seen, span)
             }
             PlannedCheck::Error(ring, drive, error) => {
-                let seen = match self.link.error_of(*ring, *drive) {
+                if timed {
+                    self.forget_answers();
+                } else {
+                    self.tap(*ring, *drive..=*drive);
+                }
+                let seen = match self.shown_error(*ring, *drive) {
                     Some(Some(found)) if found == *error => Ok(()),
                     Some(Some(found)) => Err(Miss::Otherwise(format!(
                         "drive {drive} has error {found}, expected is {error}"

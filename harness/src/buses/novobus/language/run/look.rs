@@ -73,7 +73,7 @@ impl Runner<'_> {
         let mut unseen = Vec::new();
         for drive in drives {
             let answered = || self.answers.contains(&(ring, drive)).then_some(None);
-            match self.link.error_of(ring, drive).or_else(answered) {
+            match self.shown_error(ring, drive).or_else(answered) {
                 None => unseen.push(drive),
                 Some(error) if error.is_some() != expected => wrong.push(drive),
                 Some(_) => {}

@@ -7,3 +7,4 @@ pub(crate) mod look;
 pub(crate) mod master;
 pub(crate) mod over_bus;
 pub(crate) mod record;
+pub(crate) mod tapped;

@@ -34,7 +34,11 @@ impl Runner<'_> {
             PlannedCondition::InError(false) => nd21::ram::STATUS,
             PlannedCondition::InError(true) | PlannedCondition::Shows(_) => return false,
         };
-        let shown = |drive| self.link.peek(check.ring, drive, address).is_some();
+        let in_error = matches!(check.condition, PlannedCondition::InError(_));
+        let shown = |drive| {
+            self.link.peek(check.ring, drive, address).is_some()
+                || in_error && self.tapped.contains_key(&(check.ring, drive))
+        };
         !check.drives.clone().all(shown)
     }
 
@@ -42,6 +46,7 @@ impl Runner<'_> {
     pub(crate) fn forget_answers(&mut self) {
         self.seen.clear();
         self.answers.clear();
+        self.tapped.clear();
     }
 
     /// How much later an answer over the bus can come than the cell itself: the cell is asked for again and again.
@@ -63,6 +68,9 @@ impl Runner<'_> {
     /// Where the link shows neither cells nor the error mode, asks the drives that a check is about. What does not
     /// answer stays unseen, and nothing is asked in the middle of a telegram or behind an error.
     pub(crate) fn ask_for(&mut self, check: &PlannedDriveCheck) {
+        if matches!(check.condition, PlannedCondition::InError(_)) {
+            self.tap(check.ring, check.drives.clone());
+        }
         let status = nd21::ram::STATUS;
         let (address, size) = match &check.condition {
             PlannedCondition::Memory(address, bytes) => (*address, bytes.len()),
@@ -75,7 +83,9 @@ impl Runner<'_> {
         }
         let ring = check.ring;
         self.settle();
+        let tapped = std::mem::take(&mut self.tapped);
         self.forget_answers();
+        self.tapped = tapped;
         let Ok(size_of_ring) = RingSize::new(u64::from(self.link.drives(ring))) else {
             return;
         };
