@@ -73,11 +73,22 @@ impl Sighting {
             all.filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE));
         let (index, _) = answered.nth(found.byte.checked_sub(1)?)?;
         let (meant, end) = sent.meant(index);
+        let refused = found.received.is_some_and(|(_, came)| came.byte == 0)
+            && found.byte.checked_sub(2).is_some_and(|before| {
+                let came = attempt[place].received.get(before);
+                came.is_some_and(|(_, _, came)| came.byte == 0)
+            });
+        let section = sent.section(index, refused);
+        let count = end.max(index + 1).min(sent.bytes.len());
+        let (sent, count) = match meant {
+            Meant::Own(drive) => sent.shortened(count, drive),
+            _ => (sent, count),
+        };
         Some(Self {
             meant,
-            section: sent.section(index),
+            section,
             about: found.to_string(),
-            count: end.max(index + 1).min(sent.bytes.len()),
+            count,
             sent,
         })
     }
@@ -279,8 +290,9 @@ impl Sent {
         (meant, end)
     }
 
-    /// The section of the rule that a byte obeys: for what a cell holds, that of the command by which it was written.
-    fn section(&self, index: usize) -> &'static str {
+    /// The section of the rule that a byte obeys: for what a cell holds, that of the command by which it was written; for the checking byte of
+    /// an answer that was refused before, that of the command.
+    fn section(&self, index: usize, refused: bool) -> &'static str {
         let role = self.roles[index];
         match role {
             Role::Data {
@@ -288,6 +300,16 @@ impl Sent {
                 address,
             } => self.of_cell(index, drive, address),
             Role::Command { .. } | Role::Check { .. } if self.is_cut(index) => "9.5",
+            Role::Check { drive, length, .. } if refused => {
+                let own =
+                    |role: &&Role| matches!(role, Role::Command { .. }) && role.drive() == drive;
+                let mut command = self.roles[..index]
+                    .iter()
+                    .rev()
+                    .take(length.into())
+                    .filter(own);
+                command.next().map_or("9.6", |role| role.rule().0)
+            }
             _ => role.rule().0,
         }
     }

@@ -6,6 +6,7 @@ use crate::link::{Moment, PlacedFault, link_name};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
+use harness_proto::novobus::sync::{Addressing, SyncByte};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
 use std::fmt::Write as _;
@@ -14,7 +15,10 @@ use std::fmt::Write as _;
 const BYTES_A_LINE: usize = 24;
 
 /// The most bytes of an attempt that is played again.
-const MOST_BYTES: usize = 12_000;
+const MOST_BYTES: usize = 20_000;
+
+/// From so many bytes on only the telegrams of the drive in question are played again.
+const LONG: usize = 8_000;
 
 /// The ports of the EEPROM (ND21 14.10.5): what is written there outlives a reset.
 pub(super) const EEPROM: std::ops::RangeInclusive<u16> = ram::EEPROM_BUFFER..=ram::EEPROM_CONTROL;
@@ -85,6 +89,65 @@ impl Sent {
             Some(Piece::Gap(own)) => *own = *own + gap,
             _ => self.pieces.push(Piece::Gap(gap)),
         }
+    }
+
+    /// The same without the telegrams to other drives, where it is long, and how many of the first `count` bytes are left. What a drive does is
+    /// decided by its own telegrams and by what passes all drives.
+    pub(super) fn shortened(self, count: usize, drive: u8) -> (Self, usize) {
+        let faults = self.pieces.iter().any(|own| matches!(own, Piece::Fault(_)));
+        let kept = match count > LONG && !faults {
+            true => self.kept(drive),
+            false => None,
+        };
+        let Some(kept) = kept else {
+            return (self, count);
+        };
+        let mut own = Self::default();
+        let mut index = 0;
+        for piece in self.pieces {
+            match piece {
+                Piece::Byte => {
+                    if kept[index] {
+                        own.pieces.push(Piece::Byte);
+                        own.bytes.push(self.bytes[index]);
+                        own.roles.push(self.roles[index]);
+                    }
+                    index += 1;
+                }
+                // The gap behind a telegram belongs to it.
+                Piece::Gap(gap) if index == 0 || kept[index - 1] => own.gap(gap),
+                Piece::Gap(_) | Piece::Fault(_) => {}
+            }
+        }
+        let count = kept[..count].iter().filter(|kept| **kept).count();
+        (own, count)
+    }
+
+    /// Which bytes are no part of a telegram to another drive; `None` where a telegram has a short address.
+    fn kept(&self, drive: u8) -> Option<Vec<bool>> {
+        let mut kept = vec![true; self.bytes.len()];
+        for (start, _) in self
+            .roles
+            .iter()
+            .enumerate()
+            .filter(|(_, role)| **role == Role::Sync)
+        {
+            let Ok(SyncByte::Telegram(header)) = SyncByte::decode(self.bytes[start].0) else {
+                continue;
+            };
+            if header.addressing() != Addressing::AddressFollows {
+                return None;
+            }
+            let end = (start + header.telegram_length()).min(self.bytes.len());
+            let others = match self.roles.get(start + 1) {
+                Some(Role::Address { drive: Some(own) }) => *own != drive,
+                _ => false,
+            };
+            if others && !self.roles[start..end].contains(&Role::Foreign) {
+                kept[start..end].fill(false);
+            }
+        }
+        Some(kept)
     }
 
     /// The text of a scenario that sends the first `count` bytes again, each telegram `step` addresses on in a ring of `drives`. `None` where it
