@@ -101,6 +101,7 @@ fn on_simulated(
     let folder = folder.map(|(rig, path)| {
         let about = About {
             sign: arguments.sign.as_deref(),
+            selected: entries.iter().map(|entry| &*entry.source.text).collect(),
             ..About::own_rings(rig)
         };
         Folder::create(path, &about)

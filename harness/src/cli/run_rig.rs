@@ -167,7 +167,7 @@ fn all(
         run.repeat();
     }
     if let Some(path) = &job.evidence {
-        *folder = Some(Folder::create(path, &about(&mut run, job))?);
+        *folder = Some(Folder::create(path, &about(&mut run, job, entries))?);
     }
     let bar = progress_bar(entries.len(), output.progress);
     let mut findings = Findings::new(&mut run);
@@ -284,7 +284,9 @@ pub(crate) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
 }
 
 /// What a record begins with.
-fn about<'r>(run: &'r mut Run<'_>, job: &'r Job) -> About<'r> {
+fn about<'r>(run: &'r mut Run<'_>, job: &'r Job, entries: &'r [Entry]) -> About<'r> {
+    // Those for another bus are never begun.
+    let selected = entries.iter().filter(|entry| entry.plan.is_some());
     let exactness = run.exactness();
     let way = run.way();
     let byte_time = run.session().link().byte_time();
@@ -299,6 +301,7 @@ fn about<'r>(run: &'r mut Run<'_>, job: &'r Job) -> About<'r> {
         anew: way.anew,
         own_rings: false,
         purpose: job.purpose,
+        selected: selected.map(|entry| &*entry.source.text).collect(),
         sign: job.sign.as_deref(),
         rig: run.session().rig(),
     }

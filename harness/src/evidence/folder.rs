@@ -62,6 +62,8 @@ pub struct About<'r> {
     pub own_rings: bool,
     /// The command: `run` or `qualify`.
     pub purpose: &'static str,
+    /// The texts of the scenarios that were selected, in order.
+    pub selected: Vec<&'r str>,
     /// The key to sign the folder with, a file of `ssh-keygen`; `None` for no signature.
     pub sign: Option<&'r Path>,
 }
@@ -83,6 +85,7 @@ impl<'r> About<'r> {
             anew: false,
             own_rings: true,
             purpose: "run",
+            selected: Vec::new(),
             sign: None,
         }
     }
@@ -137,6 +140,7 @@ impl Folder {
         }
         folder.write(VERSIONS, &versions(&started))?;
         let rings: Vec<u8> = about.rig.rings().map(|(_, ring)| ring.drives).collect();
+        let selected = about.selected.iter().map(|text| sum(text.as_bytes()));
         let names = about.capabilities.iter().map(|own| own.name().to_owned());
         folder.writer.line(&Line::Run {
             schema: SCHEMA,
@@ -152,6 +156,7 @@ impl Folder {
             anew: about.anew,
             own_rings: about.own_rings,
             purpose: Some(about.purpose.to_owned()),
+            selected: Some(selected.collect()),
         });
         folder.check()?;
         Ok(folder)

@@ -28,6 +28,8 @@ pub(super) struct Header {
     pub(super) own_rings: bool,
     /// Whether the run was a qualification.
     pub(super) qualified: bool,
+    /// The sums of the texts of the scenarios that were selected, in order, where the record has them.
+    pub(super) selected: Option<Vec<String>>,
     pub(super) limits: Limits,
     pub(super) way: Way,
 }
@@ -51,6 +53,7 @@ pub(super) fn header(lines: &[Line], rig: &Rig, wrong: &mut Vec<String>) -> Resu
         anew,
         own_rings,
         purpose,
+        selected,
     }) = lines.first()
     else {
         return Err("the record of a run expected here".to_owned());
@@ -139,6 +142,7 @@ pub(super) fn header(lines: &[Line], rig: &Rig, wrong: &mut Vec<String>) -> Resu
         simulated: rig.is_simulated(),
         own_rings: *own_rings,
         qualified: purpose.as_deref() == Some("qualify"),
+        selected: selected.clone(),
         limits,
         way: Way {
             rings: rings.clone(),

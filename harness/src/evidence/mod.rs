@@ -27,6 +27,7 @@ mod read;
 mod record;
 mod reports;
 mod rerun;
+mod selection;
 mod signature;
 mod verify;
 

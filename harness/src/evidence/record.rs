@@ -56,6 +56,9 @@ pub enum Line {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("enum" = ["run", "qualify", null]))]
         purpose: Option<String>,
+        /// The sums of the texts of the scenarios that were selected, in order: none of them is left out without a trace.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        selected: Option<Vec<String>>,
     },
     /// An attempt at a scenario begins.
     Scenario {

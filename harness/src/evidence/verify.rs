@@ -12,6 +12,7 @@ use super::read::{RecordError, read};
 use super::record::Line;
 use super::reports;
 use super::rerun::rerun;
+use super::selection;
 use super::signature::{self, Signer};
 use crate::rig::run::{known, twin};
 use crate::rig::{Rig, parse_beside};
@@ -234,7 +235,10 @@ impl Opened {
         verified
             .files
             .extend(cases::differences(self, judged, scenario));
-        verified.complete &= self.header.schema > 1;
+        let selection = selection::compare(self);
+        verified.files.extend(selection.wrong);
+        verified.complete &= self.header.schema > 1 && selection.missing.is_none();
+        verified.unconfirmed.extend(selection.missing);
         verified
     }
 

@@ -46,6 +46,20 @@ fn a_deleted_failure() {
     assert!(kept.refused(&without));
 }
 
+/// A record as of a run without one of the scenarios that were selected, with nothing of it left: the first line knows it.
+#[test]
+fn a_scenario_left_out_with_all_its_files() {
+    let kept = kept(OWN, "run", false);
+    let lines = kept.lines();
+    for place in 0..=4 {
+        let mut more = lines.clone();
+        let selected = more[0]["selected"].as_array_mut().expect("a list");
+        assert_eq!(selected.len(), 4);
+        selected.insert(place, "5".repeat(64).into());
+        assert!(kept.refused(&more), "{place}");
+    }
+}
+
 /// A signature by the standard tool, checked and broken.
 #[test]
 fn signatures() {

@@ -47,6 +47,7 @@ fn a_changed_line_is_none() {
         "unplaced",
         "own_rings",
         "purpose",
+        "selected",
         "opening",
     ];
     for line in kinds.values().chain([&trouble]) {

@@ -1,0 +1,110 @@
+//! Whether a record has each scenario that was selected, and what a qualification plays behind them.
+
+use super::attempt::reached;
+use super::files::sum;
+use super::record::Line;
+use super::verify::Opened;
+use crate::buses::novobus::qualify::{conversations, probes};
+use crate::library::Entry;
+
+/// How the scenarios of a record compare with those that were to be played.
+#[derive(Debug, Default)]
+pub(super) struct Selection {
+    /// What contradicts the first line, in sentences.
+    pub(super) wrong: Vec<String>,
+    /// Why it is not known that all of them were played.
+    pub(super) missing: Option<String>,
+}
+
+/// Compares the lines `case` with the selection in the first line.
+pub(super) fn compare(opened: &Opened) -> Selection {
+    let mut selection = Selection::default();
+    let header = &opened.header;
+    let Some(selected) = &header.selected else {
+        selection.missing =
+            Some("which scenarios were selected: the record's first line does not say".to_owned());
+        return selection;
+    };
+    let cases: Vec<_> = opened.lines.iter().filter_map(case).collect();
+    let pairs = selected.iter().zip(&cases);
+    for (number, (_, (name, _))) in (1..)
+        .zip(pairs)
+        .filter(|(_, (own, (_, case)))| *own != case)
+    {
+        selection.wrong.push(format!(
+            "case {name}: the scenario that was selected as number {number} is another one"
+        ));
+    }
+    if cases.len() < selected.len() {
+        selection.missing = Some(format!(
+            "{} of {} selected scenarios: the record ends before them",
+            selected.len() - cases.len(),
+            selected.len()
+        ));
+        return selection;
+    }
+    let more = &cases[selected.len()..];
+    let qualifying = match header.qualified {
+        true => qualifying(opened),
+        false => Vec::new(),
+    };
+    let known = |sum: &String| qualifying.iter().any(|own| own.sum == *sum);
+    for (name, _) in more.iter().filter(|(_, sum)| !known(sum)) {
+        selection
+            .wrong
+            .push(format!("case {name}: it was not selected"));
+    }
+    let played = |own: &String| more.iter().any(|(_, sum)| sum == own);
+    let left = qualifying
+        .iter()
+        .filter(|own| own.always && !played(&own.sum));
+    let left: Vec<_> = left.collect();
+    if let [first, others @ ..] = &left[..] {
+        let first = &first.name;
+        let more = match others.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        selection.missing = Some(format!(
+            "{first}{more}: a qualification plays them, and the record does not have them"
+        ));
+    }
+    selection
+}
+
+/// The name of a case and the sum of its text.
+fn case(line: &Line) -> Option<(&str, String)> {
+    match line {
+        Line::Case { name, sha256, .. } => Some((name, sha256.clone().unwrap_or_default())),
+        _ => None,
+    }
+}
+
+/// What a qualification plays behind the selected scenarios.
+struct Qualifying {
+    name: String,
+    /// The sum of its text.
+    sum: String,
+    /// A probe may end with its first conversation.
+    always: bool,
+}
+
+fn qualifying(opened: &Opened) -> Vec<Qualifying> {
+    let header = &opened.header;
+    let drives = header.drives.first().copied().unwrap_or(1);
+    let all = reached(&opened.rig, header);
+    let reaches =
+        |place: usize| place == 0 || place < usize::from(drives) && all.contains(&(0, place));
+    let listed = |entry: &Entry, always| Qualifying {
+        name: entry.short_name().to_owned(),
+        sum: sum(entry.source.text.as_bytes()),
+        always,
+    };
+    let own = conversations(drives, &reaches).unwrap_or_default();
+    let mut list: Vec<_> = own.iter().map(|entry| listed(entry, true)).collect();
+    for probe in probes(drives).unwrap_or_default() {
+        let entries = probe.entries.iter().enumerate();
+        list.extend(entries.map(|(place, entry)| listed(entry, place == 0)));
+    }
+    list
+}
