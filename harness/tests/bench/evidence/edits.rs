@@ -49,7 +49,7 @@ fn a_deleted_failure() {
 /// A record as of a run without one of the scenarios that were selected, with nothing of it left: the first line knows it.
 #[test]
 fn a_scenario_left_out_with_all_its_files() {
-    let kept = kept(OWN, "run", false);
+    let kept = kept(Desk::new(OWN), "run", false);
     let lines = kept.lines();
     for place in 0..=4 {
         let mut more = lines.clone();
