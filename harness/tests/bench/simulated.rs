@@ -368,3 +368,14 @@ fn a_failed_scenario_leaves_deviations_unsettled() {
     let text = text.expect("a file");
     assert!(!text.contains("none"), "{text}");
 }
+
+/// Scenarios of the bus set and read cells that a whole drive leaves alone (ND21 14.2), so that it passes them.
+#[test]
+fn a_whole_drive_passes_the_scenarios_of_the_bus() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (drives, name) in [(2, "9.1-seven-forms"), (3, "9.2-address-follows")] {
+        let text = rig(drives, true, "", ", \"drive 0..last model nd21\"");
+        let output = run(folder.path(), &text, &[name]);
+        ended(&output, 0, "1 passed, 0 failed");
+    }
+}
