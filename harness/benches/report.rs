@@ -5,7 +5,7 @@ use harness::library::Entry;
 use harness::link::Link;
 use harness::report::html::{Head, Played, run, section};
 use harness::report::walk::Reader;
-use harness::scenario::run::{AtFinding, Outcome, play};
+use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness_sim::record::Trace;
@@ -32,7 +32,7 @@ fn played() -> Vec<(Entry, Outcome, Vec<Trace>)> {
         let entry = Entry::new(source, None).expect("a scenario");
         let plan = entry.plan.as_ref().expect("novobus");
         let mut link = simulated(plan);
-        let outcome = play(plan, &mut link, AtFinding::Stop);
+        let outcome = play(plan, &mut link, AtMismatch::Stop);
         let traces = vec![link.trace(0)];
         (entry, outcome, traces)
     });

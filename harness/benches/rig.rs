@@ -22,7 +22,7 @@ use harness::link::{Line, Link};
 use harness::port::Endpoint;
 use harness::rig::{Options, Rig, Run, Session, parse};
 use harness::scenario::plan::Plan;
-use harness::scenario::run::{AtFinding, play};
+use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::simulate;
 use harness::scenario::source::Source;
 use harness_proto::time::Span;
@@ -228,7 +228,7 @@ fn main() {
             let entry = Entry::new(source, Some(drives)).expect("a scenario");
             let plan = entry.plan.as_ref().expect("a plan");
             let mut link = simulate::bench(plan);
-            let virtual_time = play(plan, &mut link, AtFinding::Stop);
+            let virtual_time = play(plan, &mut link, AtMismatch::Stop);
             assert!(virtual_time.finding.is_none(), "{:?}", virtual_time.finding);
             let wire = virtual_time.took.as_millis_f64() / 1e3;
             let chunks = chunks(&link.trace(0), link.byte_time());

@@ -11,7 +11,7 @@ use crate::capture::{
 use crate::library::{Entry, sources};
 use crate::link::link_name;
 use crate::regular;
-use crate::scenario::run::AtFinding;
+use crate::scenario::run::AtMismatch;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
@@ -224,7 +224,7 @@ fn side(path: &Path, arguments: &DiffArguments, output: &mut Output) -> Option<C
     let rate = entry.plan.as_ref().map(|plan| plan.rate);
     Some(Capture {
         rate: rate.unwrap_or_default(),
-        traces: play_entry(&entry, AtFinding::GoOn).traces,
+        traces: play_entry(&entry, AtMismatch::GoOn).traces,
     })
 }
 

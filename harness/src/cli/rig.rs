@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output::Output;
 use crate::buses::commands::rig_check::{CheckRigArguments, check};
 use crate::rig::file::Quarantine;
-use crate::rig::find::{self, FindError, Place};
+use crate::rig::find::{self, FindError, RigPlace};
 use crate::rig::lock::{self, LockError, Standing};
 use crate::rig::state::{self, Holder};
 use crate::rig::{Rig, scan, schema};
@@ -224,10 +224,10 @@ fn list(format: ListFormat, folder: &Path) -> String {
 }
 
 /// What is known of a bench: `name`, `state`, `about` in words, and where it has mistakes nothing else.
-fn row(name: &str, place: &Place, folder: &Path) -> Value {
+fn row(name: &str, place: &RigPlace, folder: &Path) -> Value {
     let source = match place {
-        Place::File(path) => path.clone(),
-        Place::BuiltIn(name) => PathBuf::from(format!("built in: {name}")),
+        RigPlace::File(path) => path.clone(),
+        RigPlace::BuiltIn(name) => PathBuf::from(format!("built in: {name}")),
     };
     let rig = place
         .source()

@@ -16,7 +16,7 @@ use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
-use crate::scenario::run::{AtFinding, Finding, Outcome, Skip, play};
+use crate::scenario::run::{AtMismatch, Mismatch, Outcome, Skip, play};
 use crate::scenario::simulate::simulated;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -171,19 +171,19 @@ fn keep(
     let Some(folder) = folder else {
         return Ok(match too_large {
             Some(why) => not_played(why),
-            None => play_entry(entry, AtFinding::Stop),
+            None => play_entry(entry, AtMismatch::Stop),
         });
     };
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
     let played = match (too_large, &entry.plan) {
         (Some(why), _) => not_played(why),
-        (None, None) => play_entry(entry, AtFinding::Stop),
+        (None, None) => play_entry(entry, AtMismatch::Stop),
         (None, Some(plan)) => {
             kept.begins(1);
             let mut link = simulated(plan);
             let played = {
                 let mut recording = Recording::whole(&mut link, &mut kept);
-                play(plan, &mut recording, AtFinding::Stop)
+                play(plan, &mut recording, AtMismatch::Stop)
             };
             let traces = traces(plan, &link);
             let attempt = Attempt::on_own_rings(played, traces);
@@ -217,7 +217,7 @@ pub(crate) struct Played {
 }
 
 /// Plays a scenario on simulated rings.
-pub(crate) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
+pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> Played {
     let Some(plan) = &entry.plan else {
         return Played {
             outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
@@ -225,7 +225,7 @@ pub(crate) fn play_entry(entry: &Entry, at_finding: AtFinding) -> Played {
         };
     };
     let mut link = simulated(plan);
-    let outcome = play(plan, &mut link, at_finding);
+    let outcome = play(plan, &mut link, at_mismatch);
     Played {
         outcome,
         traces: traces(plan, &link),
@@ -269,7 +269,7 @@ pub(crate) fn details(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> Str
 }
 
 /// A finding: the line it is about, and the bytes that differ.
-fn explain(entry: &Entry, finding: &Finding, traces: &[Trace]) -> String {
+fn explain(entry: &Entry, finding: &Mismatch, traces: &[Trace]) -> String {
     let place = place(entry, finding);
     let sources: Vec<_> = entry
         .scenario
@@ -299,7 +299,7 @@ fn explain(entry: &Entry, finding: &Finding, traces: &[Trace]) -> String {
 }
 
 /// `file:line:column` of a finding.
-fn place(entry: &Entry, finding: &Finding) -> String {
+fn place(entry: &Entry, finding: &Mismatch) -> String {
     let before = entry
         .source
         .text

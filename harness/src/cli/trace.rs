@@ -11,7 +11,7 @@ use crate::report::svg::{Options, Scale, svg};
 use crate::report::table::{LEGEND, Part, table, wires};
 use crate::report::vcd::{self, Signals};
 use crate::report::{csv, json, pcapng};
-use crate::scenario::run::{AtFinding, Record};
+use crate::scenario::run::{AtMismatch, Record};
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
 use std::io::{BufWriter, Write};
@@ -45,7 +45,7 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
     if !fits_output(arguments.format, showing, output) {
         return Ok(Exit::Usage);
     }
-    let played = play_entry(&entry, AtFinding::GoOn);
+    let played = play_entry(&entry, AtMismatch::GoOn);
     let shown = Shown {
         title: &entry.scenario.title,
         traces: &played.traces,

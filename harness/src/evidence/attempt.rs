@@ -14,7 +14,7 @@ use crate::rig::judge::{Heard, judge};
 use crate::rig::run::{Way, known, opening, twin};
 use crate::rig::{Driven, Rig, SessionError, play_one};
 use crate::scenario::plan::Plan;
-use crate::scenario::run::{AtFinding, Outcome, play};
+use crate::scenario::run::{AtMismatch, Outcome, play};
 use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -171,7 +171,7 @@ fn simulated_again(recorded: &Recorded, plan: &Plan) -> Again {
     let mut link = simulated(plan);
     let mut events: Vec<Event> = Vec::new();
     let mut recording = Recording::whole(&mut link, &mut events);
-    let outcome = play(plan, &mut recording, AtFinding::Stop);
+    let outcome = play(plan, &mut recording, AtMismatch::Stop);
     let written = |events: &[Event]| -> Vec<Line> { events.iter().filter_map(Line::of).collect() };
     let (theirs, own) = (written(&recorded.events), written(&events));
     let differs = (0..theirs.len().max(own.len())).find(|at| theirs.get(*at) != own.get(*at));

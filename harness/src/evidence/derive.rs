@@ -13,7 +13,7 @@ use crate::capture::read;
 use crate::library::Entry;
 use crate::report::html::{Head, Played, Shown, run, section};
 use crate::scenario::problem;
-use crate::scenario::run::{Finding, Outcome};
+use crate::scenario::run::{Mismatch, Outcome};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
@@ -246,7 +246,7 @@ fn show(
     let found = case.finding.as_ref().map(|message| {
         let same = judged.and_then(|outcome| outcome.finding.clone());
         same.filter(|own| own.message == *message)
-            .unwrap_or_else(|| Finding {
+            .unwrap_or_else(|| Mismatch {
                 span: problem::Span { start: 0, end: 0 },
                 message: message.clone(),
                 difference: None,

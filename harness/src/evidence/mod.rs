@@ -39,4 +39,4 @@ pub use junit::{Case, junit};
 pub use read::{MAX_SIZE, MAX_TIME, RecordError, read};
 pub use record::{Line, Writer, schema};
 pub use signature::Signer;
-pub use verify::{Beside, Finding, Verified, judge_record, verify};
+pub use verify::{Beside, Rejudged, Verified, judge_record, verify};

@@ -23,7 +23,7 @@ use std::path::Path;
 
 /// What was found out about one attempt.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
+pub struct Rejudged {
     /// The scenario, and which attempt.
     pub name: String,
     /// The verdict in the record; `None` where the run did not come to it.
@@ -42,7 +42,7 @@ pub struct Verified {
     /// What is wrong with its files: sums that differ, files that are missing or were added.
     pub files: Vec<String>,
     /// The attempts, in order.
-    pub attempts: Vec<Finding>,
+    pub attempts: Vec<Rejudged>,
     /// Whether the run came to its end, and this program could compare everything that follows from its record.
     pub complete: bool,
     /// What nothing in the folder confirms, in sentences.
@@ -285,11 +285,11 @@ pub(super) fn text_of(
 }
 
 impl Judged {
-    fn finding(&self) -> Finding {
+    fn finding(&self) -> Rejudged {
         let own = self.recorded.verdict.as_ref();
         let unused = own.into_iter().flat_map(Recalled::unused);
         let judged = self.again.as_ref();
-        Finding {
+        Rejudged {
             name: self.recorded.title(),
             recorded: own.map(|own| own.verdict.clone()),
             judged: judged

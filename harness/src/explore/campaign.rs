@@ -7,7 +7,7 @@ use super::dice::Dice;
 use super::drive_name;
 use super::error::ExploreError;
 use super::mutate;
-use super::record::{About, Kept, Line, Progress, Record};
+use super::record::{About, Kept, LogLine, Progress, Record};
 use super::swarm::Swarm;
 use super::target::{Rehearsal, Target};
 use super::tour;
@@ -111,11 +111,11 @@ impl Campaign {
         let mut campaign = Self::new(kept.about.clone(), scope);
         for line in &kept.lines {
             match line {
-                Line::Kept { case, .. } => {
+                LogLine::Kept { case, .. } => {
                     let rehearsal = target.rehearse(case)?;
                     campaign.pool.offer(case, &rehearsal.features);
                 }
-                Line::Finding {
+                LogLine::Finding {
                     signature,
                     confirmed,
                     ..
@@ -212,7 +212,7 @@ impl Campaign {
                     watcher.round(round, &own);
                     if number.is_multiple_of(Swarm::ROUND) {
                         let spices = own.names().into_iter().map(str::to_owned).collect();
-                        write(&mut record, || Line::Swarm { round, spices })?;
+                        write(&mut record, || LogLine::Swarm { round, spices })?;
                     }
                     own
                 }
@@ -226,11 +226,11 @@ impl Campaign {
             self.one(&case, &rehearsal, target, &mut record, watcher)?;
             self.progress.cases += 1;
             if self.progress.cases.is_multiple_of(bounds.every) {
-                write(&mut record, || Line::Progress(self.progress))?;
+                write(&mut record, || LogLine::Progress(self.progress))?;
                 watcher.progress(&self.progress, &self.pool);
             }
         };
-        write(&mut record, || Line::Progress(self.progress))?;
+        write(&mut record, || LogLine::Progress(self.progress))?;
         watcher.progress(&self.progress, &self.pool);
         Ok(end)
     }
@@ -260,7 +260,7 @@ impl Campaign {
             }
             self.one(case, &rehearsal, target, &mut record, watcher)?;
             self.progress.cases += 1;
-            write(&mut record, || Line::Progress(self.progress))?;
+            write(&mut record, || LogLine::Progress(self.progress))?;
         }
         watcher.progress(&self.progress, &self.pool);
         Ok(end)
@@ -307,7 +307,7 @@ impl Campaign {
                 let new = self.pool.offer(case, &rehearsal.features);
                 if new > 0 {
                     let case = case.clone();
-                    write(record, || Line::Kept { number, new, case })?;
+                    write(record, || LogLine::Kept { number, new, case })?;
                 }
             }
             Some(difference) if self.is_settled(&difference) => {
@@ -334,7 +334,7 @@ impl Campaign {
                 let file = format!("finding-{number:06}");
                 if let Some(record) = record {
                     finding.write(record.folder(), &file)?;
-                    record.line(&Line::Finding {
+                    record.line(&LogLine::Finding {
                         number,
                         signature,
                         confirmed: finding.confirmed,
@@ -525,7 +525,7 @@ fn exchanged(case: &Case, step: u8) -> Case {
 
 fn write(
     record: &mut Option<&mut Record>,
-    line: impl FnOnce() -> Line,
+    line: impl FnOnce() -> LogLine,
 ) -> Result<(), ExploreError> {
     match record {
         Some(record) => record.line(&line()),

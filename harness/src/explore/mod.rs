@@ -17,7 +17,7 @@ mod target;
 pub use campaign::{Bounds, Campaign, End, Watcher};
 pub use dice::Dice;
 pub use error::ExploreError;
-pub use record::{About, Kept, Line, Progress, RECORD, Record, read};
+pub use record::{About, Kept, LogLine, Progress, RECORD, Record, read};
 pub use swarm::{Spice, Swarm};
 pub use target::{Rehearsal, Target, Tried};
 

@@ -51,7 +51,7 @@ impl About {
 /// A line of the record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Line {
+pub enum LogLine {
     /// The first line.
     Run(About),
     /// A round begins.
@@ -105,7 +105,7 @@ pub struct Kept {
     /// The first line.
     pub about: About,
     /// The lines behind it, up to the last one of progress.
-    pub lines: Vec<Line>,
+    pub lines: Vec<LogLine>,
     /// The last line of progress.
     pub progress: Progress,
     /// All lines of progress, in order.
@@ -147,8 +147,8 @@ impl Record {
             folder: folder.to_owned(),
             file,
         };
-        record.line(&Line::Run(about.clone()))?;
-        record.line(&Line::Progress(Progress::default()))?;
+        record.line(&LogLine::Run(about.clone()))?;
+        record.line(&LogLine::Progress(Progress::default()))?;
         Ok(record)
     }
 
@@ -184,7 +184,7 @@ impl Record {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn line(&mut self, line: &Line) -> Result<(), ExploreError> {
+    pub fn line(&mut self, line: &LogLine) -> Result<(), ExploreError> {
         let path = self.folder.join(RECORD);
         let failed = |error: std::io::Error| ExploreError::unwritten("write", &path, &error);
         let mut text = serde_json::to_string(line).map_err(|error| failed(error.into()))?;
@@ -238,12 +238,12 @@ pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
             // Its writer was killed.
             break;
         }
-        let line: Line =
+        let line: LogLine =
             serde_json::from_str(line).map_err(|error| damaged(number, &error.to_string()))?;
         match line {
-            Line::Run(own) if number == 0 && own.schema == About::SCHEMA => about = Some(own),
-            Line::Run(_) => return Err(damaged(number, "another kind of record")),
-            Line::Progress(progress) => {
+            LogLine::Run(own) if number == 0 && own.schema == About::SCHEMA => about = Some(own),
+            LogLine::Run(_) => return Err(damaged(number, "another kind of record")),
+            LogLine::Progress(progress) => {
                 history.push(progress);
                 settled = Some((progress, at, lines.len()));
             }

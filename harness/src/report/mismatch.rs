@@ -1,7 +1,7 @@
 //! A finding, shown as the manual's table with the first byte that differs, expected beside received.
 
 use crate::report::table::{LEGEND, Part, table};
-use crate::scenario::run::{Difference, Finding, Shown, show};
+use crate::scenario::run::{Difference, Mismatch, Shown, show};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ const BYTES_AROUND: usize = 8;
 
 /// The bytes of a finding, expected beside received, and the part of the table around them.
 #[must_use]
-pub fn mismatch(finding: &Finding, traces: &[Trace], sources: &[String]) -> String {
+pub fn mismatch(finding: &Mismatch, traces: &[Trace], sources: &[String]) -> String {
     let mut out = String::new();
     let Some(difference) = &finding.difference else {
         return out;

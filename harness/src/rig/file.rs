@@ -139,7 +139,7 @@ pub struct Endpoint {
     pub udev: BTreeMap<String, String>,
     /// Speed and format of the line; default `38400 8O1` (ND21 8.1).
     #[serde(default)]
-    pub line: Line,
+    pub line: LineFormat,
     /// Whether line errors stand in the stream itself (pty and tcp only); default `none`.
     #[serde(default)]
     pub marks: Marks,
@@ -182,7 +182,8 @@ impl Transport {
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema,
 )]
-pub enum Line {
+#[schemars(rename = "Line")]
+pub enum LineFormat {
     /// 38400 baud.
     #[default]
     #[serde(rename = "38400 8O1")]
@@ -195,7 +196,7 @@ pub enum Line {
     Baud9600,
 }
 
-impl Line {
+impl LineFormat {
     /// Bits a second.
     #[must_use]
     pub const fn baud(self) -> u32 {

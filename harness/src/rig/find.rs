@@ -90,14 +90,14 @@ pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
 
 /// Where a rig stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum RigPlace {
     /// In a file.
     File(PathBuf),
     /// In the binary; the name of its file.
     BuiltIn(String),
 }
 
-impl Place {
+impl RigPlace {
     /// The text of the file.
     ///
     /// # Errors
@@ -125,12 +125,12 @@ pub fn read(source: &Source) -> Result<Rig, FindError> {
 
 /// Every rig with its name, in order: those of `folder`, and the built-in ones with other names.
 #[must_use]
-pub fn all(folder: &Path) -> Vec<(String, Place)> {
+pub fn all(folder: &Path) -> Vec<(String, RigPlace)> {
     let mut all = std::collections::BTreeMap::new();
     for file in BUILT_IN.files() {
         if let Some(name) = rig_name(file.path()) {
             let place = file.path().display().to_string();
-            all.insert(name, Place::BuiltIn(place));
+            all.insert(name, RigPlace::BuiltIn(place));
         }
     }
     // A folder that is not there has no rigs.
@@ -141,7 +141,7 @@ pub fn all(folder: &Path) -> Vec<(String, Place)> {
         .map(|entry| entry.path())
     {
         if let Some(name) = rig_name(&path) {
-            all.insert(name, Place::File(path));
+            all.insert(name, RigPlace::File(path));
         }
     }
     all.into_iter().collect()

@@ -14,7 +14,7 @@ use crate::rig::judge::{Heard, by_hand, judge};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{
-    AtFinding, Outcome, Skip, Unlock, Why, come_home, lacks, play_over_bus, start_anew,
+    AtMismatch, Outcome, Skip, Unlock, Why, come_home, lacks, play_over_bus, start_anew,
 };
 use crate::scenario::simulate;
 use harness_proto::novobus::address::RingSize;
@@ -435,7 +435,7 @@ fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
     let outcome = match ready {
         Ok(()) => {
             link.begin();
-            play_over_bus(plan, link, AtFinding::Stop)
+            play_over_bus(plan, link, AtMismatch::Stop)
         }
         Err(not_ready) => not_ready.judged(link),
     };

@@ -3,7 +3,7 @@
 use crate::scenario::source::MAX_LINE;
 
 /// A line without its end, or how many bytes a line has that is too long.
-pub(super) type Line = Result<String, usize>;
+pub(super) type ReadLine = Result<String, usize>;
 
 /// Bytes of which no line has come yet. A line that is too long is not kept.
 #[derive(Debug, Default)]
@@ -14,7 +14,7 @@ pub(super) struct Lines {
 
 impl Lines {
     /// Takes bytes and gives the lines that they end. What is no UTF-8 is replaced, and no line of the language then.
-    pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<Line> {
+    pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<ReadLine> {
         let mut lines = Vec::new();
         for &byte in bytes {
             if byte == b'\n' {
@@ -30,7 +30,7 @@ impl Lines {
     }
 
     /// The stream has ended: what was begun is a line too.
-    pub(super) fn end(&mut self) -> Option<Line> {
+    pub(super) fn end(&mut self) -> Option<ReadLine> {
         let length = std::mem::take(&mut self.length);
         let begun = std::mem::take(&mut self.begun);
         match length {

@@ -14,6 +14,6 @@ mod shell;
 mod tcp;
 
 pub use control::Answer;
-pub use place::{ControlPlace, Inner, Place, Role};
+pub use place::{ControlPlace, Inner, Role, ServedAt};
 pub use server::{Marks, Pace, Server};
 pub use shell::{End, Host, Job, ServeError, serve};

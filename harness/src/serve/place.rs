@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 /// Where a ring is served.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum ServedAt {
     /// On a socket that listens: `127.0.0.1:4000`, or port 0 for a free one.
     Tcp(String),
     /// On a pseudo terminal with a link at this path, which must not be there yet.

@@ -2,8 +2,8 @@
 
 use super::clock::Clock;
 use super::control::Answer;
-use super::lines::{Line, Lines};
-use super::place::{ControlPlace, Place};
+use super::lines::{Lines, ReadLine};
+use super::place::{ControlPlace, ServedAt};
 use super::pty::{Change, Pty};
 use super::server::Server;
 use super::tcp::{Tcp, Visitor};
@@ -29,7 +29,7 @@ const UNREAD: usize = 64 << 10;
 #[derive(Clone, Debug, Default)]
 pub struct Job {
     /// Where each seat of the server is served, in order: its rings, then its inner links.
-    pub places: Vec<Place>,
+    pub places: Vec<ServedAt>,
     /// Where lines of control come from, if from anywhere.
     pub control: Option<ControlPlace>,
     /// Whether sockets may listen at addresses that other machines reach.
@@ -131,8 +131,8 @@ pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, Serv
     let mut ends = Vec::new();
     for place in &job.places {
         ends.push(match place {
-            Place::Tcp(address) => Seat::Tcp(Tcp::listen(address, job.allow_remote)?),
-            Place::Pty(path) => Seat::Pty(Pty::open(path)?),
+            ServedAt::Tcp(address) => Seat::Tcp(Tcp::listen(address, job.allow_remote)?),
+            ServedAt::Pty(path) => Seat::Pty(Pty::open(path)?),
         });
     }
     let control = match &job.control {
@@ -544,7 +544,7 @@ impl Shell<'_> {
         Ok(())
     }
 
-    fn answer(&mut self, line: Line) -> Option<Answer> {
+    fn answer(&mut self, line: ReadLine) -> Option<Answer> {
         match line {
             Ok(line) => self.server.control(&line),
             Err(length) => Some(Answer::Error(format!(

@@ -2,7 +2,7 @@
 
 use harness::library::Entry;
 use harness::link::{Capability, Lead, Line, Link, Moment, PlacedFault, SimulatedLink, Trouble};
-use harness::scenario::run::{AtFinding, play_over_bus};
+use harness::scenario::run::{AtMismatch, play_over_bus};
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
@@ -119,7 +119,7 @@ fn a_gap_of_a_busy_computer_is_no_fault() {
             sends: 0,
             tolerance: Span::from_millis(tolerance),
         };
-        let outcome = play_over_bus(&plan, &mut link, AtFinding::Stop);
+        let outcome = play_over_bus(&plan, &mut link, AtMismatch::Stop);
         assert!(link.sends > 1, "{} pieces", link.sends);
         let finding = outcome.finding.map(|finding| finding.message);
         let gap = |message: String| message.contains("left a gap on the line behind");

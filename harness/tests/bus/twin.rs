@@ -7,7 +7,7 @@ use harness::qualify::{
     Answer, Asked, Hypothesis, Probe, Seen, answer, explaining, hypotheses, name, probes,
 };
 use harness::scenario::plan::Plan;
-use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, start_anew};
+use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, start_anew};
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
@@ -33,7 +33,7 @@ fn conversations(plan: &Plan, link: &mut dyn Link) -> Vec<Conversation> {
     let byte_time = link.byte_time();
     let mut events: Vec<Event> = Vec::new();
     let mut recording = Recording::new(link, &mut events);
-    let _outcome = play_over_bus(plan, &mut recording, AtFinding::GoOn);
+    let _outcome = play_over_bus(plan, &mut recording, AtMismatch::GoOn);
     Conversation::all(&events, byte_time, true)
 }
 
@@ -90,10 +90,10 @@ fn a_record_is_played_again() {
         let mut events: Vec<Event> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut events);
         let capabilities = recording.capabilities().to_vec();
-        let outcome = play_over_bus(&plan, &mut recording, AtFinding::Stop);
+        let outcome = play_over_bus(&plan, &mut recording, AtMismatch::Stop);
         let drives = plan.rings.iter().map(|ring| ring.drives()).collect();
         let mut replay = Replay::new(events, plan.rate, Span::ZERO, drives, capabilities);
-        let again = play_over_bus(&plan, &mut replay, AtFinding::Stop);
+        let again = play_over_bus(&plan, &mut replay, AtMismatch::Stop);
         assert_eq!(
             again.verdict, outcome.verdict,
             "{name}: {:?}",
@@ -281,7 +281,7 @@ fn many_cells_are_set_back() {
     let (_, mut link) = model_of(60, &[]);
     let mut events: Vec<Event> = Vec::new();
     let mut recording = Recording::new(&mut link, &mut events);
-    let outcome = play_over_bus(&plan, &mut recording, AtFinding::Stop);
+    let outcome = play_over_bus(&plan, &mut recording, AtMismatch::Stop);
     assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:?}");
     assert_eq!(outcome.remarks, Vec::<String>::new());
 }

@@ -7,7 +7,7 @@ use harness::link::{
     Trouble,
 };
 use harness::port::{Endpoint, PortSettings, Wire, open};
-use harness::scenario::run::{AtFinding, lacks, play_over_bus, start_anew};
+use harness::scenario::run::{AtMismatch, lacks, play_over_bus, start_anew};
 use harness::scenario::simulate;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
@@ -323,12 +323,12 @@ fn scenarios_at_an_interposer() {
     let plan = located.plan.as_ref().expect("novobus");
     assert_eq!(lacks(plan, &link), None);
     start_anew(&mut link, &plan.rings).expect("it answers");
-    let outcome = play_over_bus(plan, &mut link, AtFinding::Stop);
+    let outcome = play_over_bus(plan, &mut link, AtMismatch::Stop);
     assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:?}");
 
     let elsewhere = entry("! 3->2 byte 1: flip 0\n> 80\n");
     let plan = elsewhere.plan.as_ref().expect("novobus");
-    let outcome = play_over_bus(plan, &mut link, AtFinding::Stop);
+    let outcome = play_over_bus(plan, &mut link, AtMismatch::Stop);
     assert_eq!(outcome.verdict, Verdict::Skipped);
     assert!(outcome.remarks[0].contains("3->2"), "{outcome:?}");
 }

@@ -5,7 +5,7 @@ use crate::ring::Served;
 use harness::library::{Entry, sources};
 use harness::link::{Line, StreamLink};
 use harness::port::{Endpoint, PortSettings, Wire, open};
-use harness::scenario::run::{AtFinding, Outcome, lacks, play_over_bus, run, start_anew};
+use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, run, start_anew};
 use harness::scenario::simulate::simulated;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
@@ -41,7 +41,7 @@ fn play_on(link: &mut StreamLink, entry: &Entry) -> Outcome {
     if lacks(plan, link).is_none() {
         start_anew(link, &plan.rings).unwrap_or_else(|why| panic!("{}: {why}", entry.name));
     }
-    play_over_bus(plan, link, AtFinding::Stop)
+    play_over_bus(plan, link, AtMismatch::Stop)
 }
 
 /// How often a scenario is played whose bytes are right and some late, as a rig plays it.

@@ -28,7 +28,7 @@ pub enum Input {
 }
 
 /// Where a GPIN is shown (ND21 14.7.1).
-struct Place {
+struct InputRow {
     input: Input,
     name: &'static str,
     pin: u8,
@@ -51,17 +51,17 @@ const PORT_7: u16 = 0xFFBE;
 
 /// The table of ND21 14.7.1, in order of [`Input`].
 #[rustfmt::skip]
-const PLACES: [Place; 10] = [
-    Place { input: Input::Gpin1, name: "GPIN1", pin: 21, shown: Some((PORT_2, 4)) },
-    Place { input: Input::Gpin2, name: "GPIN2", pin:  6, shown: Some((PORT_2, 5)) },
-    Place { input: Input::Gpin3, name: "GPIN3", pin: 22, shown: Some((PORT_2, 6)) },
-    Place { input: Input::Gpin4, name: "GPIN4", pin:  7, shown: Some((PORT_2, 7)) },
-    Place { input: Input::Gpin5, name: "GPIN5", pin: 24, shown: Some((PORT_7, 3)) },
-    Place { input: Input::Gpin6, name: "GPIN6", pin:  8, shown: Some((PORT_7, 7)) },
-    Place { input: Input::Gpin7, name: "GPIN7", pin: 10, shown: Some((PORT_6, 0)) },
-    Place { input: Input::Gpin8, name: "GPIN8", pin: 25, shown: Some((PORT_6, 2)) },
-    Place { input: Input::EschP, name: "ESCHP", pin: 34, shown: None },
-    Place { input: Input::EschN, name: "ESCHN", pin:  3, shown: None },
+const PLACES: [InputRow; 10] = [
+    InputRow { input: Input::Gpin1, name: "GPIN1", pin: 21, shown: Some((PORT_2, 4)) },
+    InputRow { input: Input::Gpin2, name: "GPIN2", pin:  6, shown: Some((PORT_2, 5)) },
+    InputRow { input: Input::Gpin3, name: "GPIN3", pin: 22, shown: Some((PORT_2, 6)) },
+    InputRow { input: Input::Gpin4, name: "GPIN4", pin:  7, shown: Some((PORT_2, 7)) },
+    InputRow { input: Input::Gpin5, name: "GPIN5", pin: 24, shown: Some((PORT_7, 3)) },
+    InputRow { input: Input::Gpin6, name: "GPIN6", pin:  8, shown: Some((PORT_7, 7)) },
+    InputRow { input: Input::Gpin7, name: "GPIN7", pin: 10, shown: Some((PORT_6, 0)) },
+    InputRow { input: Input::Gpin8, name: "GPIN8", pin: 25, shown: Some((PORT_6, 2)) },
+    InputRow { input: Input::EschP, name: "ESCHP", pin: 34, shown: None },
+    InputRow { input: Input::EschN, name: "ESCHN", pin:  3, shown: None },
 ];
 
 /// Bits 3 to 0 of [`PORT_2`] for the end switches (N, P): N alone, P alone and both at 5 to 24 V
@@ -83,7 +83,7 @@ impl Input {
         Self::EschN,
     ];
 
-    const fn place(self) -> &'static Place {
+    const fn place(self) -> &'static InputRow {
         &PLACES[self as usize]
     }
 

@@ -7,7 +7,7 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::find_rig;
 use crate::explore::{
-    About, Act, Bounds, Campaign, Case, ExploreError, Line, MOST_BYTES, OnRig, OnSim, Setup,
+    About, Act, Bounds, Campaign, Case, ExploreError, LogLine, MOST_BYTES, OnRig, OnSim, Setup,
     Target, What, by_novelty, read,
 };
 use crate::guard::Limits;
@@ -167,7 +167,7 @@ fn cases(folder: &Path, rig: &Rig) -> Result<Vec<Case>, ExploreError> {
     if folder.join(crate::explore::RECORD).exists() {
         let (kept, _) = read(folder)?;
         let kept = kept.lines.into_iter().filter_map(|line| match line {
-            Line::Kept { case, .. } => Some(case),
+            LogLine::Kept { case, .. } => Some(case),
             _ => None,
         });
         let placed = kept.flat_map(|case| {

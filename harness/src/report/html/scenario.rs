@@ -6,7 +6,7 @@ use super::write::Html;
 use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
-use crate::scenario::run::{Difference, Finding, Outcome, Shown as Byte, show};
+use crate::scenario::run::{Difference, Mismatch, Outcome, Shown as Byte, show};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
@@ -95,7 +95,7 @@ fn facts(html: &mut Html, played: &Played<'_>) {
     });
 }
 
-fn found(html: &mut Html, played: &Played<'_>, finding: &Finding) {
+fn found(html: &mut Html, played: &Played<'_>, finding: &Mismatch) {
     html.line("h3", &[], "What was otherwise");
     html.line("p", &[("class", &"bad")], &finding.message);
     let before = played.text.get(..finding.span.start);

@@ -1,6 +1,6 @@
 //! The header, and the lines one after another.
 
-use super::drive::{self, Line};
+use super::drive::{self, DriveLine};
 use super::step;
 use super::words::{master_deviates, named};
 use crate::link::Capability;
@@ -201,8 +201,10 @@ impl Reader {
         scanner.expect_end()?;
         let span = scanner.since(word.span);
         let what = match line {
-            Line::Setup(what) => what,
-            Line::Influence(influence) if self.steps.is_empty() => SetupKind::Influence(influence),
+            DriveLine::Setup(what) => what,
+            DriveLine::Influence(influence) if self.steps.is_empty() => {
+                SetupKind::Influence(influence)
+            }
             line => {
                 let action = step::drive_action(drives, line, span)?;
                 self.steps.push(Step {

@@ -1,7 +1,7 @@
 //! Steps: a time or none, then `>`, `<`, `!`, `?` or a job.
 
 use super::check;
-use super::drive::{self, Line};
+use super::drive::{self, DriveLine};
 use super::job;
 use super::place as cell;
 use super::words::{drives, named, required, ring_prefix};
@@ -118,11 +118,11 @@ fn begin_loop(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
 }
 
 /// A line that begins with `drive`, as a step.
-pub(crate) fn drive_action(drives: Drives, line: Line, span: Span) -> Result<Action, Problem> {
+pub(crate) fn drive_action(drives: Drives, line: DriveLine, span: Span) -> Result<Action, Problem> {
     match line {
-        Line::Setup(what) => Err(not_a_step(span, &what)),
-        Line::Influence(influence) => Ok(Action::Influence(drives, influence)),
-        Line::Condition(condition) => Ok(Action::Check(Check::Drive(DriveCheck {
+        DriveLine::Setup(what) => Err(not_a_step(span, &what)),
+        DriveLine::Influence(influence) => Ok(Action::Influence(drives, influence)),
+        DriveLine::Condition(condition) => Ok(Action::Check(Check::Drive(DriveCheck {
             drives,
             condition,
             span,

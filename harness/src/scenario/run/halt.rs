@@ -1,6 +1,6 @@
 //! How a conversation ends: at its last step, at a finding, or where it cannot go on.
 
-use super::outcome::{Finding, Stop};
+use super::outcome::{Mismatch, Stop};
 use super::player::{MAX_ROUND, Runner};
 use crate::link::Trouble;
 use crate::scenario::plan::MAX_CARRIED;
@@ -94,7 +94,7 @@ impl Runner<'_> {
     }
 
     /// Adds to a finding what has been received meanwhile.
-    fn complete(&self, finding: &mut Finding) {
+    fn complete(&self, finding: &mut Mismatch) {
         if let Some(difference) = &mut finding.difference {
             let first = difference.byte - 1 - difference.index;
             let wanted = difference.expected.len().max(1);

@@ -14,7 +14,7 @@ pub use crate::buses::novobus::language::run::over_bus::{
 pub(crate) use crate::buses::novobus::language::run::over_bus::{come_home, read_byte};
 pub use crate::buses::novobus::language::run::record::{MAX_SAMPLES, Record, Sample};
 pub use now::{Now, now};
-pub use outcome::{Difference, Finding, Outcome, Unready};
-pub use player::{AtFinding, needs, play, run};
+pub use outcome::{Difference, Mismatch, Outcome, Unready};
+pub use player::{AtMismatch, needs, play, run};
 pub(crate) use skip::DENIED;
 pub use skip::{Skip, Unlock, Why, lacks, together};

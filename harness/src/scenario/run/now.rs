@@ -1,6 +1,6 @@
 //! Steps that are done at once, beside a conversation that somebody else holds.
 
-use super::player::{AtFinding, Runner};
+use super::player::{AtMismatch, Runner};
 use crate::link::Link;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen};
 
@@ -49,7 +49,7 @@ fn look(plan: &Plan, link: &mut dyn Link, check: &PlannedCheck, step: &PlannedSt
             );
         }
     }
-    let mut runner = Runner::new(plan, link, AtFinding::Stop);
+    let mut runner = Runner::new(plan, link, AtMismatch::Stop);
     let result = runner.check(check, false, step.span);
     match (result, runner.unseen.take()) {
         (Ok(()), None) => Now::Done,

@@ -15,7 +15,7 @@ pub struct Outcome {
     /// The verdict.
     pub verdict: Verdict,
     /// The first thing that was otherwise; playing stops there.
-    pub finding: Option<Finding>,
+    pub finding: Option<Mismatch>,
     /// What is worth saying although nothing failed.
     pub remarks: Vec<String>,
     /// How long it took, on the line's clock.
@@ -108,7 +108,7 @@ impl Trouble {
 
 /// Something that was otherwise than a step says.
 #[derive(Clone, Debug)]
-pub struct Finding {
+pub struct Mismatch {
     /// The step.
     pub span: Span,
     /// What is wrong, in a sentence.
@@ -140,14 +140,14 @@ pub struct Difference {
 /// Why playing stops.
 pub(crate) struct Stop {
     pub(crate) verdict: Verdict,
-    pub(crate) finding: Box<Finding>,
+    pub(crate) finding: Box<Mismatch>,
 }
 
 impl Stop {
     pub(crate) fn failed(span: Span, message: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Failed,
-            finding: Box::new(Finding {
+            finding: Box::new(Mismatch {
                 span,
                 message: message.into(),
                 difference: None,

@@ -31,7 +31,7 @@ const UNASKED: usize = 16;
 
 /// What to do at a line that is not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AtFinding {
+pub enum AtMismatch {
     /// Send nothing more.
     Stop,
     /// Go on with the lines behind it: for a trace of the whole conversation.
@@ -40,15 +40,15 @@ pub enum AtFinding {
 
 /// Plays a plan on a link up to its end or to the first line that is not met.
 pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
-    play(plan, link, AtFinding::Stop)
+    play(plan, link, AtMismatch::Stop)
 }
 
 /// Plays a plan on a link. The outcome tells of the first line that was not met.
-pub fn play(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome {
+pub fn play(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
     if let Some(lacks) = lacks(plan, link) {
         return Outcome::skipped(lacks);
     }
-    let mut runner = Runner::new(plan, link, at_finding);
+    let mut runner = Runner::new(plan, link, at_mismatch);
     let result = runner.play();
     let result = runner.wind_up(result);
     let remarks = runner
@@ -88,7 +88,7 @@ pub(crate) struct RingRecord {
 pub(crate) struct Runner<'a> {
     pub(crate) link: &'a mut dyn Link,
     pub(crate) plan: &'a Plan,
-    at_finding: AtFinding,
+    at_mismatch: AtMismatch,
     strict: bool,
     /// Why nothing more can be played: no room for more in what is recorded, or trouble on the link.
     pub(crate) full: Option<Halt>,
@@ -122,7 +122,7 @@ pub(crate) struct Runner<'a> {
 }
 
 impl<'a> Runner<'a> {
-    pub(crate) fn new(plan: &'a Plan, link: &'a mut dyn Link, at_finding: AtFinding) -> Self {
+    pub(crate) fn new(plan: &'a Plan, link: &'a mut dyn Link, at_mismatch: AtMismatch) -> Self {
         Self {
             rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
             line_before: link.now(),
@@ -137,7 +137,7 @@ impl<'a> Runner<'a> {
             sent_to: link.now(),
             link,
             plan,
-            at_finding,
+            at_mismatch,
             strict: plan.strict,
             full: None,
             unseen: None,
@@ -175,7 +175,7 @@ impl Runner<'_> {
             let result = self.step(step);
             self.halted()?;
             first = first.and(result);
-            if first.is_err() && self.at_finding == AtFinding::Stop {
+            if first.is_err() && self.at_mismatch == AtMismatch::Stop {
                 return first;
             }
         }
@@ -189,7 +189,7 @@ impl Runner<'_> {
             return self.receive(step, *ring, expected);
         }
         let in_time = self.pass_until_due(step);
-        if in_time.is_err() && self.at_finding == AtFinding::Stop {
+        if in_time.is_err() && self.at_mismatch == AtMismatch::Stop {
             return in_time;
         }
         in_time.and(self.act(step))
@@ -258,7 +258,7 @@ impl Runner<'_> {
                 self.not_the_driver(*ring);
                 self.settle();
                 let asked = self.nothing_unasked(step.span);
-                if asked.is_err() && self.at_finding == AtFinding::Stop {
+                if asked.is_err() && self.at_mismatch == AtMismatch::Stop {
                     return asked;
                 }
                 self.forget(*ring);

@@ -3,7 +3,7 @@
 mod scenario;
 
 pub use crate::buses::Bus;
-pub use crate::buses::novobus::language::syntax::cell::{CellCheck, Place, Relation, Written};
+pub use crate::buses::novobus::language::syntax::cell::{CellCheck, CellPlace, Relation, Written};
 pub use crate::buses::novobus::language::syntax::check::{
     Check, Condition, DriveCheck, Ending, Showing,
 };

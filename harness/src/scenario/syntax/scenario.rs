@@ -1,7 +1,7 @@
 //! The scenario, its header and its steps.
 
 use crate::buses::Bus;
-use crate::buses::novobus::language::syntax::cell::{Place, Written};
+use crate::buses::novobus::language::syntax::cell::{CellPlace, Written};
 use crate::buses::novobus::language::syntax::check::{Check, DriveCheck};
 use crate::buses::novobus::language::syntax::job::Job;
 use crate::link::{Capability, Stimulus};
@@ -91,9 +91,9 @@ pub struct Setup {
 #[derive(Clone, Debug)]
 pub enum SetupKind {
     /// `memory CELL = VALUE`
-    Memory(Place, Written),
+    Memory(CellPlace, Written),
     /// `eeprom CELL = VALUE`
-    Eeprom(Place, Written),
+    Eeprom(CellPlace, Written),
     /// `model NAME`
     Model(Model),
     /// `type NUMBER`
@@ -123,7 +123,7 @@ pub struct Recording {
     /// Of which drives.
     pub drives: Drives,
     /// Which cell.
-    pub place: Place,
+    pub place: CellPlace,
     /// When it is looked at.
     pub looks: Looks,
 }

@@ -3,7 +3,7 @@
 use super::about;
 use super::findings::empty_checkout;
 use crate::program::{ended, findings, name};
-use harness::explore::{Line, RECORD, Record, Setup};
+use harness::explore::{LogLine, RECORD, Record, Setup};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -23,20 +23,20 @@ pub(crate) fn names(folder: &Path) -> Vec<std::ffi::OsString> {
 }
 
 /// What a record holds but for how often the progress was written.
-pub(crate) fn settled(folder: &Path) -> Vec<Line> {
+pub(crate) fn settled(folder: &Path) -> Vec<LogLine> {
     let text = std::fs::read_to_string(folder.join(RECORD)).expect("a record");
     let lines = text
         .lines()
         .map(|line| serde_json::from_str(line).expect("a line"));
-    let all: Vec<Line> = lines.collect();
+    let all: Vec<LogLine> = lines.collect();
     let last = all
         .iter()
         .rev()
-        .find(|line| matches!(line, Line::Progress(_)));
+        .find(|line| matches!(line, LogLine::Progress(_)));
     let last = last.cloned();
     let mut kept: Vec<_> = all
         .into_iter()
-        .filter(|line| !matches!(line, Line::Progress(_)))
+        .filter(|line| !matches!(line, LogLine::Progress(_)))
         .collect();
     kept.extend(last);
     kept

@@ -6,7 +6,7 @@ use super::{Heard, about, bounds, scope_of};
 use crate::program::{ended, findings, name};
 use harness::buses::novobus::explore::shrink::{Subject, shrink};
 use harness::explore::{
-    About, Beside, Campaign, Case, Finding, Line, OnSim, Planted, Setup, Target, beside,
+    About, Beside, Campaign, Case, Finding, LogLine, OnSim, Planted, Setup, Target, beside,
     by_novelty, play,
 };
 use harness::link::Line as _;
@@ -144,8 +144,8 @@ fn forms_of_cases() {
     assert_eq!((planted.ring, planted.drive), (0, 1));
     let run = "{\"kind\":\"run\",\"schema\":1,\"rig\":\"sim:3\",\"drives\":3,\"ports\":false,\"seed\":1,\"confirm\":2,\"of\":3,\
                \"setup\":{\"header\":[],\"deviates\":[]},\"spices\":[]}";
-    let line: Line = serde_json::from_str(run).expect("a line");
-    assert_eq!(line, Line::Run(about(&Setup::default(), 1)));
+    let line: LogLine = serde_json::from_str(run).expect("a line");
+    assert_eq!(line, LogLine::Run(about(&Setup::default(), 1)));
     assert_eq!(serde_json::to_string(&line).expect("a form"), run);
     for drives in [0, 251] {
         let case = Case {

@@ -10,7 +10,7 @@ use harness::campaign::{Campaign, Case, Class, Finished, Wrong};
 use harness::library::Entry;
 use harness::link::{Line, Link};
 use harness::scenario::problem::Problems;
-use harness::scenario::run::{AtFinding, play};
+use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use std::fmt::Write as _;
@@ -183,7 +183,7 @@ fn a_replay_is_the_case() {
         let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{text}\n{:#?}", p.all()));
         let plan = entry.plan.as_ref().expect("a plan");
         let mut link = simulated(plan);
-        let played = play(plan, &mut link, AtFinding::GoOn);
+        let played = play(plan, &mut link, AtMismatch::GoOn);
         assert!(played.remarks.is_empty(), "{name}: {:?}", played.remarks);
         for wrong in &outcome.evidence.wrong {
             let Wrong::Cell {

@@ -8,7 +8,7 @@ use harness::link::{
     Capability, Event, Line, Link, Moment, PlacedFault, Recording, Replay, Trouble,
 };
 use harness::scenario::plan::Plan;
-use harness::scenario::run::{AtFinding, Outcome, play, play_over_bus};
+use harness::scenario::run::{AtMismatch, Outcome, play, play_over_bus};
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
@@ -39,12 +39,12 @@ fn twice(plan: &Plan, link: &mut dyn Link) -> Outcome {
     let mut recording = Recording::new(link, &mut events);
     let capabilities = recording.capabilities().to_vec();
     recording.begin();
-    let outcome = play_over_bus(plan, &mut recording, AtFinding::Stop);
+    let outcome = play_over_bus(plan, &mut recording, AtMismatch::Stop);
     let drives = plan.rings.iter().map(|ring| ring.drives()).collect();
     let rate = Rate::default();
     let mut replay = Replay::new(events.clone(), rate, Span::ZERO, drives, capabilities);
     replay.begin();
-    let again = play_over_bus(plan, &mut replay, AtFinding::Stop);
+    let again = play_over_bus(plan, &mut replay, AtMismatch::Stop);
     let last = &events[events.len().saturating_sub(6)..];
     assert_eq!(said(&again), said(&outcome), "{last:?}");
     outcome
@@ -293,7 +293,7 @@ fn a_full_record_is_noticed_behind_the_last_step() {
             full: true,
             ..Failing::new(bench(&plan), Trouble::Interrupted, *when)
         };
-        let outcome = play(&plan, &mut link, AtFinding::Stop);
+        let outcome = play(&plan, &mut link, AtMismatch::Stop);
         ends(
             &outcome,
             Verdict::Aborted,

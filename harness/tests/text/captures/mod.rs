@@ -10,7 +10,7 @@ mod tools;
 use harness::capture::Capture;
 use harness::library::Entry;
 use harness::link::Link;
-use harness::scenario::run::{AtFinding, play};
+use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 
@@ -33,7 +33,7 @@ fn run(text: &str) -> Capture {
     let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}\n{text}", p.all()));
     let plan = entry.plan.expect("novobus");
     let mut link = simulated(&plan);
-    play(&plan, &mut link, AtFinding::GoOn);
+    play(&plan, &mut link, AtMismatch::GoOn);
     let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
     let rate = plan.rate;
     Capture { rate, traces }

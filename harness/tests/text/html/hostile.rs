@@ -4,7 +4,7 @@ use super::devtools::Browser;
 use super::parser::{Element, parse, sound};
 use super::{folder, played};
 use harness::report::html::{Head, Played, run, section};
-use harness::scenario::run::AtFinding;
+use harness::scenario::run::AtMismatch;
 use serde_json::json;
 
 /// What would be something else than text in HTML, in an attribute, in a script, in XML, in a comment, or to a reader's eye.
@@ -150,7 +150,7 @@ fn a_hostile_title_of_a_file() {
         };
         let plan = entry.plan.as_ref().expect("novobus");
         let mut link = harness::scenario::simulate::simulated(plan);
-        let outcome = harness::scenario::run::play(plan, &mut link, AtFinding::Stop);
+        let outcome = harness::scenario::run::play(plan, &mut link, AtMismatch::Stop);
         assert_eq!(outcome.verdict.name(), "passed");
         sound(&parse(&super::page(&[("own", scenario)])));
     }

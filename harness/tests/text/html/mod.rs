@@ -10,7 +10,7 @@ mod program;
 use harness::library::Entry;
 use harness::link::Link;
 use harness::report::html::{Head, Played, Shown, run, section};
-use harness::scenario::run::{AtFinding, Outcome, play};
+use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
 use harness_sim::record::Trace;
@@ -39,7 +39,7 @@ fn played(name: &str, text: &str) -> (Entry, Outcome, Vec<Trace>) {
     let entry = Entry::new(source, None).unwrap_or_else(|p| panic!("{:#?}\n{text}", p.all()));
     let plan = entry.plan.clone().expect("novobus");
     let mut link = simulated(&plan);
-    let outcome = play(&plan, &mut link, AtFinding::Stop);
+    let outcome = play(&plan, &mut link, AtMismatch::Stop);
     let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
     (entry, outcome, traces)
 }

@@ -1,6 +1,6 @@
 //! Rig files, locks, quarantine, hooks and the commands for them.
 
-use harness::rig::file::{Condition, Level, Line, Transport};
+use harness::rig::file::{Condition, Level, LineFormat, Transport};
 use harness::rig::hook::{self, HookError};
 use harness::rig::lock::{self, RigLock};
 use harness::rig::{Rig, find, parse, scan, schema};
@@ -92,7 +92,7 @@ fn what_a_file_says_is_what_is_read() {
     );
     assert_eq!(
         (ring.endpoint.line, ring.endpoint.line.baud()),
-        (Line::Baud38400, 38_400)
+        (LineFormat::Baud38400, 38_400)
     );
     assert_eq!(ring.time_tolerance.0, Duration::from_millis(3));
     assert_eq!(ring.endpoint.udev["ID_SERIAL_SHORT"], "EXAMPLE1");

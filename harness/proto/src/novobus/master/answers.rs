@@ -4,7 +4,7 @@ use super::super::sync::SYNCO;
 use super::Master;
 use super::diagnosis::Cause;
 use super::event::Event;
-use super::in_flight::{Composed, Owner, Place, Slot};
+use super::in_flight::{BytePlace, Composed, Owner, Slot};
 use super::job::Outcome;
 use super::recovery::Stumble;
 use crate::line::Received;
@@ -97,13 +97,13 @@ impl Master {
                 self.confirm(&composed);
             }
             match (composed.place, composed.owner) {
-                (Place::Parameter, Owner::Job(slot)) => right = self.take_answer(slot, byte),
-                (Place::ProcessHigh, _) => self.unconfirmed.high = byte,
-                (Place::ProcessLow, Owner::Exchange(drive)) => {
+                (BytePlace::Parameter, Owner::Job(slot)) => right = self.take_answer(slot, byte),
+                (BytePlace::ProcessHigh, _) => self.unconfirmed.high = byte,
+                (BytePlace::ProcessLow, Owner::Exchange(drive)) => {
                     let value = u16::from_be_bytes([self.unconfirmed.high, byte]);
                     self.unconfirmed.exchange = Some((drive, value));
                 }
-                (Place::Last, _) => self.counted(),
+                (BytePlace::Last, _) => self.counted(),
                 _ => {}
             }
         }

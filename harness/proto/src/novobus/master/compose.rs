@@ -5,7 +5,7 @@ use super::super::address::RingSize;
 use super::super::command::Kind;
 use super::super::sync::{Addressing, Header, MAX_NET_LENGTH, SYNCO, SyncByte};
 use super::Master;
-use super::in_flight::{Composed, Owner, Place, Slot};
+use super::in_flight::{BytePlace, Composed, Owner, Slot};
 use crate::time::Instant;
 
 /// Sync byte, address byte and the net bytes.
@@ -51,7 +51,7 @@ impl Outgoing {
         self.next = 0;
     }
 
-    fn push(&mut self, byte: u8, back: Option<u8>, place: Place, owner: Owner) {
+    fn push(&mut self, byte: u8, back: Option<u8>, place: BytePlace, owner: Owner) {
         if let Some(free) = self.bytes.get_mut(usize::from(self.length)) {
             *free = Composed {
                 byte,
@@ -113,9 +113,9 @@ impl Master {
         self.last_addressed = None;
         self.outgoing.clear();
         for (byte, back, place) in [
-            (sync, sync, Place::Sync),
-            (0, drives, Place::Address),
-            (SYNCO, SYNCO, Place::Last),
+            (sync, sync, BytePlace::Sync),
+            (0, drives, BytePlace::Address),
+            (SYNCO, SYNCO, BytePlace::Last),
         ] {
             self.outgoing.push(byte, Some(back), place, Owner::Count);
         }
@@ -127,8 +127,9 @@ impl Master {
         let (length, reset) = self.plan(drive, Order::Drive, ROOM);
         self.begin(drive, true, 2 + length, owner);
         let [high, low] = self.cycle.nominal(drive).to_be_bytes();
-        self.outgoing.push(high, None, Place::ProcessHigh, owner);
-        self.outgoing.push(low, None, Place::ProcessLow, owner);
+        self.outgoing
+            .push(high, None, BytePlace::ProcessHigh, owner);
+        self.outgoing.push(low, None, BytePlace::ProcessLow, owner);
         self.take_commands(drive, Order::Drive, length);
         if reset {
             self.last_addressed = None;
@@ -160,10 +161,11 @@ impl Master {
             return;
         };
         let sync = SyncByte::Telegram(header).encode();
-        self.outgoing.push(sync, Some(sync), Place::Sync, owner);
+        self.outgoing.push(sync, Some(sync), BytePlace::Sync, owner);
         if addressing == Addressing::AddressFollows {
             let byte = address_byte(self.ring, drive);
-            self.outgoing.push(byte, Some(drive), Place::Address, owner);
+            self.outgoing
+                .push(byte, Some(drive), BytePlace::Address, owner);
         }
         self.last_addressed = Some(drive);
     }
@@ -227,7 +229,7 @@ impl Master {
             if let Some((byte, back)) = entry.compose() {
                 let done = entry.left() == 0;
                 self.outgoing
-                    .push(byte, back, Place::Parameter, Owner::Job(slot));
+                    .push(byte, back, BytePlace::Parameter, Owner::Job(slot));
                 if done {
                     self.store.unlink(slot);
                 }

@@ -5,7 +5,7 @@ use super::super::address::RingSize;
 use super::super::check_sequence::{SEQUENCE, ZEROS};
 use super::super::sync::{MAX_NET_LENGTH, SYNCO};
 use super::fault::{Fault, RingLink};
-use super::in_flight::{Place, Sent};
+use super::in_flight::{BytePlace, Sent};
 use crate::line::Received;
 use alloc::vec::Vec;
 
@@ -195,11 +195,11 @@ impl Evidence {
             (Cause::Wrong(sent), Some(received)) if self.fit(1, 1) => {
                 return match (sent.composed.place, sent.composed.back, drive) {
                     // The address byte comes back increased by the number of drives (9.3).
-                    (Place::Address, Some(expected), _) => Fault::WrongRingSize {
+                    (BytePlace::Address, Some(expected), _) => Fault::WrongRingSize {
                         counted: received.wrapping_sub(expected).wrapping_add(ring.drives()),
                         ring,
                     },
-                    (Place::Parameter, expected, Some(drive)) => Fault::Protocol {
+                    (BytePlace::Parameter, expected, Some(drive)) => Fault::Protocol {
                         drive,
                         expected,
                         received,

@@ -23,7 +23,7 @@ pub(super) enum Owner {
 
 /// Which byte it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum BytePlace {
     /// A sync byte.
     Sync,
     /// An address byte.
@@ -45,7 +45,7 @@ pub(super) struct Composed {
     pub(super) byte: u8,
     /// As it must come back; `None` for data, and for a checking byte that depends on data.
     pub(super) back: Option<u8>,
-    pub(super) place: Place,
+    pub(super) place: BytePlace,
     pub(super) owner: Owner,
 }
 
@@ -53,7 +53,7 @@ impl Composed {
     pub(super) const SYNCO: Self = Self {
         byte: SYNCO,
         back: Some(SYNCO),
-        place: Place::Sync,
+        place: BytePlace::Sync,
         owner: Owner::Idle,
     };
 }

@@ -90,7 +90,7 @@ use compose::Outgoing;
 use cycle::Cycle;
 use diagnosis::Cause;
 use event::Events;
-use in_flight::{Composed, InFlight, Place, Sent};
+use in_flight::{BytePlace, Composed, InFlight, Sent};
 use recovery::{Episode, State};
 use store::Store;
 
@@ -327,7 +327,7 @@ impl Master {
         self.counters.sent += 1;
         let idle = composed.byte == SYNCO && composed == Composed::SYNCO;
         self.counters.idle += u64::from(idle);
-        self.counters.telegrams += u64::from(composed.place == Place::Sync && !idle);
+        self.counters.telegrams += u64::from(composed.place == BytePlace::Sync && !idle);
         Some(composed.byte)
     }
 

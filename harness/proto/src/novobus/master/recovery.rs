@@ -5,7 +5,7 @@ use super::super::check_sequence::{Progress, Watch};
 use super::diagnosis::{Cause, Evidence, NO_TELEGRAM, SPELLING, Spelled};
 use super::event::Event;
 use super::fault::{Fault, RingLink, Stop};
-use super::in_flight::{Owner, Place};
+use super::in_flight::{BytePlace, Owner};
 use super::job::{JobId, Outcome};
 use super::store::Entry;
 use super::{Master, Phase};
@@ -164,7 +164,7 @@ impl Master {
                     self.episode.silent = true;
                 }
             }
-            Cause::Wrong(sent) => self.episode.count |= sent.composed.place == Place::Address,
+            Cause::Wrong(sent) => self.episode.count |= sent.composed.place == BytePlace::Address,
             Cause::Unasked => {}
         }
         if matches!(cause, Cause::Wrong(_) | Cause::Unasked) {
@@ -217,7 +217,7 @@ impl Master {
         episode.failures = episode.failures.saturating_add(1);
         episode.attempts = episode.attempts.saturating_add(1);
         let rejected = job.filter(|(sent, job)| {
-            sent.composed.place == Place::Parameter
+            sent.composed.place == BytePlace::Parameter
                 && named(job)
                 && episode.stumble == Stumble::Job(job.id)
         });

@@ -6,7 +6,7 @@ use crate::capture::diff::{Run, Summary, compare};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::scenario::problem::Problems;
-use crate::scenario::run::{AtFinding, play};
+use crate::scenario::run::{AtMismatch, play};
 use crate::scenario::simulate::simulated;
 use crate::scenario::source::{Source, SourceError};
 use crate::scenario::verdict::Verdict;
@@ -120,7 +120,7 @@ fn model(capture: &Capture, options: &Options<'_>) -> Result<(Capture, Vec<Strin
         return Err(JudgeError::Aborted("it is of another bus".to_owned()));
     };
     let mut link = simulated(plan);
-    let outcome = play(plan, &mut link, AtFinding::GoOn);
+    let outcome = play(plan, &mut link, AtMismatch::GoOn);
     if matches!(
         outcome.verdict,
         Verdict::Aborted | Verdict::Skipped | Verdict::RigError

@@ -8,7 +8,7 @@ use crate::cli::output::Output;
 use crate::file::values::Wire;
 use crate::scenario::argument::duration;
 use crate::serve::{
-    ControlPlace, End, Host, Inner, Job, Marks, Pace, Place, Role, ServeError, Server, serve,
+    ControlPlace, End, Host, Inner, Job, Marks, Pace, Role, ServeError, ServedAt, Server, serve,
 };
 use clap::{ArgGroup, Args, ValueEnum};
 use harness_proto::time::Span;
@@ -101,7 +101,7 @@ pub struct InnerPlace {
     text: String,
     ring: usize,
     wire: Wire,
-    places: Vec<Place>,
+    places: Vec<ServedAt>,
 }
 
 impl FromStr for InnerPlace {
@@ -118,8 +118,8 @@ impl FromStr for InnerPlace {
         let wire: Wire = link.parse().map_err(|error| format!("{error}"))?;
         let place = |text: &str| match text {
             "" => Err(expected.to_owned()),
-            path if path.contains('/') => Ok(Place::Pty(path.into())),
-            address => Ok(Place::Tcp(address.to_owned())),
+            path if path.contains('/') => Ok(ServedAt::Pty(path.into())),
+            address => Ok(ServedAt::Tcp(address.to_owned())),
         };
         let places = places.split(',').map(place).collect::<Result<_, _>>()?;
         Ok(Self {
@@ -132,8 +132,8 @@ impl FromStr for InnerPlace {
 }
 
 /// The seats at inner links with their places, in the order of the command line: taps first.
-fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, Place)>, Failure> {
-    let mut all: Vec<(Inner, Place)> = Vec::new();
+fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)>, Failure> {
+    let mut all: Vec<(Inner, ServedAt)> = Vec::new();
     let taps = arguments.tap.iter().map(|place| (place, &[Role::Tap][..]));
     let cuts = arguments.cut.iter().map(|place| match place.places.len() {
         1 => (place, &[Role::Cut][..]),
@@ -186,8 +186,8 @@ pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit,
         MarksForm::None => Marks::None,
         MarksForm::InBand => Marks::InBand,
     };
-    let tcp = arguments.tcp.iter().cloned().map(Place::Tcp);
-    let pty = arguments.pty.iter().cloned().map(Place::Pty);
+    let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
+    let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
     let sizes: Vec<u8> = plan.rings.iter().map(|ring| ring.drives()).collect();
     let inner = inner(arguments, &sizes)?;
     let mut server = Server::new(plan, link, pace, marks);

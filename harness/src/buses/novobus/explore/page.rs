@@ -5,12 +5,12 @@ use crate::explore::Case;
 use crate::explore::ExploreError;
 use crate::explore::Finding;
 use crate::explore::play;
-use crate::explore::{Kept, Line, read};
+use crate::explore::{Kept, LogLine, read};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::report::html::{Played, Shown, section};
 use crate::scenario::problem::Span;
-use crate::scenario::run::{self, AtFinding, Outcome, Skip};
+use crate::scenario::run::{self, AtMismatch, Outcome, Skip};
 use crate::scenario::simulate::simulated;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -34,13 +34,13 @@ pub fn page(folder: &Path) -> Result<String, ExploreError> {
     let mut reached = Reached::default();
     for line in &kept.lines {
         match line {
-            Line::Finding { file, .. } if findings.len() < MOST && is_name(file) => {
+            LogLine::Finding { file, .. } if findings.len() < MOST && is_name(file) => {
                 let path = folder.join(format!("{file}.json"));
                 let (finding, _) = Finding::read(&path)?;
                 let number = findings.len() + 1;
                 findings.push(shown(number, &finding, file, &path)?);
             }
-            Line::Kept { number, new, case } => {
+            LogLine::Kept { number, new, case } => {
                 let before = features.last().map_or(0, |(_, all)| *all);
                 features.push((number + 1, before + *new as u64));
                 reach(&kept, case, &mut reached)?;
@@ -116,7 +116,7 @@ fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Sh
     match &mut outcome.finding {
         Some(found) => found.message = format!("{about}; the scenario says: {}", found.message),
         None => {
-            outcome.finding = Some(run::Finding {
+            outcome.finding = Some(run::Mismatch {
                 span: Span { start: 0, end: 0 },
                 message: about.clone(),
                 difference: None,
@@ -172,7 +172,7 @@ fn played(finding: &Finding, text: &str) -> Result<(String, Outcome, Vec<Trace>)
         ));
     };
     let mut link = simulated(plan);
-    let outcome = run::play(plan, &mut link, AtFinding::GoOn);
+    let outcome = run::play(plan, &mut link, AtMismatch::GoOn);
     let traces = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
     Ok((text, outcome, traces))
 }

@@ -7,7 +7,7 @@ use crate::scenario::parse::{bytes, eeprom_place, equals, place, value};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::quantity::{self, Dimension, Quantity};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Place, Written};
+use crate::scenario::syntax::{CellPlace, Written};
 use crate::scenario::times;
 use harness_proto::nd21::cells::{Access, Cell};
 use harness_proto::nd21::units::{self, Scale};
@@ -34,7 +34,7 @@ pub struct Location {
     pub size: u16,
     /// The scale of the number that these bytes are, if the manual gives one.
     pub scale: Option<Scale>,
-    place: Place,
+    place: CellPlace,
 }
 
 impl Location {
@@ -45,7 +45,7 @@ impl Location {
             memory,
             size: cell.size,
             scale: cell.scale,
-            place: Place {
+            place: CellPlace {
                 name: cell.printed.to_owned(),
                 address: cell.address,
                 offset: None,
@@ -275,7 +275,7 @@ fn location(scanner: &mut Scanner<'_>) -> Result<Location, Problem> {
             (true, None, Some(cell)) => cell.size,
         }
     };
-    let place = Place {
+    let place = CellPlace {
         span: scanner.since(start),
         ..place
     };

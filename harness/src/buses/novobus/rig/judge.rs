@@ -8,7 +8,7 @@ use crate::rig::file::Deviation;
 use crate::rig::run::{Way, known, play_one, twin};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::Plan;
-use crate::scenario::run::{Finding, Outcome};
+use crate::scenario::run::{Mismatch, Outcome};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation;
@@ -213,7 +213,7 @@ fn passes_with_defaults(heard: &Heard<'_>) -> bool {
 }
 
 /// Whether the scenario passes on the model of the manual and fails at the same line on the model with the known deviations.
-fn explained_by_known(finding: &Finding, heard: &Heard<'_>) -> bool {
+fn explained_by_known(finding: &Mismatch, heard: &Heard<'_>) -> bool {
     let deviations = known(heard.rig);
     let fails_alike = |outcome: Outcome| {
         let found = outcome.finding;
@@ -225,7 +225,7 @@ fn explained_by_known(finding: &Finding, heard: &Heard<'_>) -> bool {
 }
 
 /// Whether a finding may be about bytes of the scenario's own conversation, behind the first one of that ring that a drive sent unasked.
-fn in_a_race(finding: &Finding, heard: &Heard<'_>) -> bool {
+fn in_a_race(finding: &Mismatch, heard: &Heard<'_>) -> bool {
     let compared = heard.conversations.iter().zip(heard.comparisons);
     let of_scenario = compared.filter(|(conversation, _)| conversation.has_steps());
     let mut races = of_scenario.flat_map(|(_, comparison)| &comparison.unasked);
@@ -239,7 +239,7 @@ fn in_a_race(finding: &Finding, heard: &Heard<'_>) -> bool {
 
 /// The answer of a drive that a finding is about, if its value depends on the drive's own state: the byte that differs, or else one
 /// that the line of the finding asked for. The cells of the scenario's header are not the drive's own.
-fn of_the_drive<'h>(finding: &Finding, heard: &Heard<'h>) -> Option<&'h Own> {
+fn of_the_drive<'h>(finding: &Mismatch, heard: &Heard<'h>) -> Option<&'h Own> {
     let set = |own: &Own| {
         let mut setups = heard.plan.memory_setups();
         setups.any(|(ring, drives, from, bytes)| {

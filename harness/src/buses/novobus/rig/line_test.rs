@@ -6,7 +6,7 @@ use super::health::Unhealthy;
 use crate::buses::novobus::locate::locate;
 use crate::link;
 use crate::rig::Rig;
-use crate::rig::file::{Endpoint, Hooks, Line, Marks, Transport};
+use crate::rig::file::{Endpoint, Hooks, LineFormat, Marks, Transport};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::novobus::sync::SYNCO;
@@ -105,12 +105,12 @@ pub enum Cause {
     NoCommands,
 }
 
-impl From<Line> for Rate {
-    fn from(line: Line) -> Self {
+impl From<LineFormat> for Rate {
+    fn from(line: LineFormat) -> Self {
         match line {
-            Line::Baud38400 => Self::Baud38400,
-            Line::Baud19200 => Self::Baud19200,
-            Line::Baud9600 => Self::Baud9600,
+            LineFormat::Baud38400 => Self::Baud38400,
+            LineFormat::Baud19200 => Self::Baud19200,
+            LineFormat::Baud9600 => Self::Baud9600,
         }
     }
 }
@@ -285,19 +285,21 @@ pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
             };
             vec![(Cause::Marks { right }, with(&|end| end.marks = right))]
         }
-        Transport::Serial | Transport::Rfc2217 => {
-            [Line::Baud38400, Line::Baud19200, Line::Baud9600]
-                .into_iter()
-                .filter(|line| *line != first.line)
-                .map(|line| {
-                    let cause = Cause::Rate {
-                        found: line.into(),
-                        stated: first.line.into(),
-                    };
-                    (cause, with(&|end| end.line = line))
-                })
-                .collect()
-        }
+        Transport::Serial | Transport::Rfc2217 => [
+            LineFormat::Baud38400,
+            LineFormat::Baud19200,
+            LineFormat::Baud9600,
+        ]
+        .into_iter()
+        .filter(|line| *line != first.line)
+        .map(|line| {
+            let cause = Cause::Rate {
+                found: line.into(),
+                stated: first.line.into(),
+            };
+            (cause, with(&|end| end.line = line))
+        })
+        .collect(),
         Transport::Sim => Vec::new(),
     }
 }
@@ -453,7 +455,7 @@ mod tests {
             .iter()
             .map(|(_, rig)| rig.file.ring.first.endpoint.line)
             .collect();
-        assert_eq!(lines, [Line::Baud38400, Line::Baud9600]);
+        assert_eq!(lines, [LineFormat::Baud38400, LineFormat::Baud9600]);
         let power = "[power.main]\non = [\"true\"]\noff = [\"true\"]\n";
         assert!(neighbours(&rig(serial, power)).is_empty());
     }

@@ -34,7 +34,7 @@ const DEVICES: [(&str, Device); 4] = [
 ];
 
 /// What stands behind the drives.
-pub(crate) enum Line {
+pub(crate) enum DriveLine {
     /// What it holds or is; in the header only.
     Setup(SetupKind),
     /// What happens to it.
@@ -118,7 +118,7 @@ const CONDITIONS: [(&str, Held); 11] = [
 ];
 
 /// Reads what stands behind `drive`.
-pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, Line), Problem> {
+pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, DriveLine), Problem> {
     let drives = drives(scanner)?;
     let before = scanner.clone();
     let word = scanner.word().map_or("", |word| word.value);
@@ -127,7 +127,7 @@ pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, Line), Problem>
         None => {
             *scanner = before;
             let set: Vec<_> = SETTINGS.iter().map(|(name, _)| *name).collect();
-            Line::Condition(condition(scanner, &set)?)
+            DriveLine::Condition(condition(scanner, &set)?)
         }
     };
     Ok((drives, line))
@@ -145,8 +145,8 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<DriveCheck, Problem> {
     })
 }
 
-fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
-    let one = |stimulus| Ok(Line::Influence(Influence::Stimuli(vec![stimulus])));
+fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<DriveLine, Problem> {
+    let one = |stimulus| Ok(DriveLine::Influence(Influence::Stimuli(vec![stimulus])));
     let number = |scanner: &mut Scanner<'_>, dimension, parts, least, most| {
         quantity::quantity(scanner, Some(dimension))?.whole(parts, least, most)
     };
@@ -154,21 +154,21 @@ fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
         Word::Memory => {
             let place = place(scanner)?;
             let value = assigned(scanner, &place)?;
-            Ok(Line::Setup(SetupKind::Memory(place, value)))
+            Ok(DriveLine::Setup(SetupKind::Memory(place, value)))
         }
         Word::Eeprom => {
             let place = eeprom_place(scanner)?;
             let value = assigned(scanner, &place)?;
-            Ok(Line::Setup(SetupKind::Eeprom(place, value)))
+            Ok(DriveLine::Setup(SetupKind::Eeprom(place, value)))
         }
-        Word::Property => Ok(Line::Setup(property(scanner)?)),
-        Word::Deviates => Ok(Line::Setup(SetupKind::Deviates(deviates(scanner)?))),
+        Word::Property => Ok(DriveLine::Setup(property(scanner)?)),
+        Word::Deviates => Ok(DriveLine::Setup(SetupKind::Deviates(deviates(scanner)?))),
         Word::Model => {
             let model = named(scanner, &Model::NAMES, "a drive model")?;
-            Ok(Line::Setup(SetupKind::Model(model)))
+            Ok(DriveLine::Setup(SetupKind::Model(model)))
         }
         Word::Type => device(scanner),
-        Word::Input => Ok(Line::Influence(Influence::Stimuli(inputs(scanner)?))),
+        Word::Input => Ok(DriveLine::Influence(Influence::Stimuli(inputs(scanner)?))),
         Word::Cam => one(cam(scanner)?),
         Word::Analogue => {
             let millivolts = number(scanner, Dimension::Voltage, 1_000, -10, 10)?;
@@ -199,7 +199,7 @@ fn setting(word: Word, scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
         Word::Phases => one(Stimulus::Short(either(scanner, ["sound", "shorted"])?)),
         Word::Power => {
             let on = either(scanner, ["off", "on"])?;
-            Ok(Line::Influence(Influence::Power(on)))
+            Ok(DriveLine::Influence(Influence::Power(on)))
         }
     }
 }
@@ -209,13 +209,13 @@ fn either(scanner: &mut Scanner<'_>, [no, yes]: [&str; 2]) -> Result<bool, Probl
     named(scanner, &[(no, false), (yes, true)], "its state")
 }
 
-fn device(scanner: &mut Scanner<'_>) -> Result<Line, Problem> {
+fn device(scanner: &mut Scanner<'_>) -> Result<DriveLine, Problem> {
     let mut ahead = scanner.clone();
     let digits = ahead.chunk().value;
     match DEVICES.iter().find(|(name, _)| *name == digits) {
         Some((_, device)) => {
             *scanner = ahead;
-            Ok(Line::Setup(SetupKind::Type(*device)))
+            Ok(DriveLine::Setup(SetupKind::Type(*device)))
         }
         None => Err(scanner.unexpected("a type: 5605, 5610, 5615 or 5620 (ND21 4.2.2)")),
     }

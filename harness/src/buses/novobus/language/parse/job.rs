@@ -7,7 +7,7 @@ use crate::scenario::expression;
 use crate::scenario::pattern::{self, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Drives, Job, JobKind, MasterCall, Place, Written};
+use crate::scenario::syntax::{CellPlace, Drives, Job, JobKind, MasterCall, Written};
 
 /// What stands behind a job's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -120,14 +120,14 @@ pub(crate) fn process_data(
 fn operands(
     form: Form,
     scanner: &mut Scanner<'_>,
-) -> Result<(Option<Place>, Option<Written>), Problem> {
+) -> Result<(Option<CellPlace>, Option<Written>), Problem> {
     let place = if form.cell {
         let place = place(scanner)?;
         let offset = match scanner.eat("+") {
             true => Some(Box::new(expression::sum(scanner)?)),
             false => None,
         };
-        Some(Place { offset, ..place })
+        Some(CellPlace { offset, ..place })
     } else {
         None
     };

@@ -5,7 +5,7 @@ use crate::scenario::pattern::{self, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::{self, Dimension, Tolerance};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{CellCheck, Place, Relation, Written};
+use crate::scenario::syntax::{CellCheck, CellPlace, Relation, Written};
 use harness_proto::nd21::cells::{self, Cell};
 use harness_proto::nd21::eeprom;
 use harness_proto::nd21::units::Scale;
@@ -24,7 +24,7 @@ pub(crate) fn cell_names() -> impl Iterator<Item = &'static str> {
 
 /// A RAM cell by its printed name (ND21 14.2.1), which may have blanks and signs in it; `None` where no
 /// name comes next.
-pub(crate) fn cell_by_name(scanner: &mut Scanner<'_>) -> Option<Place> {
+pub(crate) fn cell_by_name(scanner: &mut Scanner<'_>) -> Option<CellPlace> {
     let alias = cells::cell(POSITION.1).map(|cell| (POSITION.0, cell));
     let printed = cells::RAM.iter().map(|cell| (cell.printed, cell));
     named(scanner, printed.chain(alias))
@@ -33,7 +33,7 @@ pub(crate) fn cell_by_name(scanner: &mut Scanner<'_>) -> Option<Place> {
 fn named(
     scanner: &mut Scanner<'_>,
     names: impl Iterator<Item = (&'static str, &'static Cell)>,
-) -> Option<Place> {
+) -> Option<CellPlace> {
     let rest = scanner.rest();
     let comes_next = |name: &str| {
         let behind = rest.strip_prefix(name)?;
@@ -46,7 +46,7 @@ fn named(
         .max_by_key(|(name, _)| name.len())?;
     let here = scanner.here();
     scanner.eat(name);
-    Some(Place {
+    Some(CellPlace {
         name: name.to_owned(),
         address: cell.address,
         offset: None,
@@ -57,7 +57,7 @@ fn named(
 }
 
 /// A cell: four hexadecimal digits, or its printed name.
-pub(crate) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
+pub(crate) fn place(scanner: &mut Scanner<'_>) -> Result<CellPlace, Problem> {
     if let Some(place) = cell_by_name(scanner) {
         return Ok(place);
     }
@@ -66,7 +66,7 @@ pub(crate) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
         return Err(scanner.unexpected("an address of four hexadecimal digits (such as FE13)"));
     };
     match u16::from_str_radix(word.value, 16) {
-        Ok(address) if word.value.len() == 4 => Ok(Place {
+        Ok(address) if word.value.len() == 4 => Ok(CellPlace {
             name: word.value.to_owned(),
             address,
             offset: None,
@@ -87,7 +87,7 @@ pub(crate) fn place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
 
 /// An EEPROM cell: two hexadecimal digits, its printed name, or the name of the RAM cell that is loaded
 /// from it (ND21 14.2.2).
-pub(crate) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> {
+pub(crate) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<CellPlace, Problem> {
     let own = eeprom::EEPROM.iter().map(|cell| (cell.printed, cell));
     if let Some(place) = named(scanner, own) {
         return Ok(place);
@@ -101,7 +101,7 @@ pub(crate) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> 
             )
             .help(format!("`memory {} = ...` sets the RAM", place.name)));
         };
-        return Ok(Place {
+        return Ok(CellPlace {
             address: u16::from(address),
             ..place
         });
@@ -114,7 +114,7 @@ pub(crate) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> 
     {
         Some((2, Ok(address))) => {
             let cell = eeprom::cell_at(address);
-            Ok(Place {
+            Ok(CellPlace {
                 name: format!("{address:02X}"),
                 address: u16::from(address),
                 offset: None,
@@ -143,7 +143,7 @@ pub(crate) fn eeprom_place(scanner: &mut Scanner<'_>) -> Result<Place, Problem> 
 }
 
 /// `= VALUE`
-pub(crate) fn assigned(scanner: &mut Scanner<'_>, place: &Place) -> Result<Written, Problem> {
+pub(crate) fn assigned(scanner: &mut Scanner<'_>, place: &CellPlace) -> Result<Written, Problem> {
     equals(scanner)?;
     value(scanner, place.scale(), place)
 }
@@ -160,7 +160,7 @@ pub(crate) fn bytes(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
 pub(crate) fn value(
     scanner: &mut Scanner<'_>,
     scale: Option<Scale>,
-    place: &Place,
+    place: &CellPlace,
 ) -> Result<Written, Problem> {
     let here = scanner.here();
     if matches!(scale, Some(Scale::Ramp | Scale::SlippingError)) && scanner.eat_word("off") {
@@ -227,7 +227,10 @@ pub(crate) fn tolerance(
 }
 
 /// What stands behind a cell's name in a check: `= 1500rpm +-1%`, `& E0 = 00`, `< 100rpm`.
-pub(crate) fn cell_check(scanner: &mut Scanner<'_>, place: Place) -> Result<CellCheck, Problem> {
+pub(crate) fn cell_check(
+    scanner: &mut Scanner<'_>,
+    place: CellPlace,
+) -> Result<CellCheck, Problem> {
     let mask = if scanner.eat("&") {
         let mut part = scanner.before(&["=", "<", ">"]);
         let mask = pattern::pattern(&mut part)?;

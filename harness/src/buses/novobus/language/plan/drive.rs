@@ -9,7 +9,8 @@ use crate::link::Capability;
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::syntax::{
-    CellCheck, Condition, DriveCheck, Drives, Influence, Looks, Place, Recording, Relation, Written,
+    CellCheck, CellPlace, Condition, DriveCheck, Drives, Influence, Looks, Recording, Relation,
+    Written,
 };
 use harness_proto::time;
 use std::collections::BTreeSet;
@@ -113,7 +114,7 @@ impl Planner {
     fn masked(
         &self,
         drives: &Drives,
-        place: &Place,
+        place: &CellPlace,
         mask: &Pattern,
         value: &Pattern,
     ) -> Result<CellTest, Problem> {
@@ -134,7 +135,12 @@ impl Planner {
     }
 
     /// As many known bytes as the cell has, and no more than a number has.
-    fn raw(&self, drives: &Drives, place: &Place, pattern: &Pattern) -> Result<Vec<u8>, Problem> {
+    fn raw(
+        &self,
+        drives: &Drives,
+        place: &CellPlace,
+        pattern: &Pattern,
+    ) -> Result<Vec<u8>, Problem> {
         let size = place.cell.map_or(1, |cell| usize::from(cell.size));
         if size > NUMBER {
             return Err(Problem::new(
@@ -248,7 +254,7 @@ pub(crate) fn number(bytes: &[u8], signed: bool) -> i64 {
         .fold(start, |n, byte| n << 8 | i64::from(*byte))
 }
 
-fn wrong_length(place: &Place, pattern: &Pattern, found: usize, size: usize) -> Problem {
+fn wrong_length(place: &CellPlace, pattern: &Pattern, found: usize, size: usize) -> Problem {
     let s = |n: usize| if n == 1 { "" } else { "s" };
     Problem::new(
         pattern.span,

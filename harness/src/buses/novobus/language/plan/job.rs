@@ -5,7 +5,7 @@ use super::setup::number_bytes;
 use super::types::{CellTest, PlannedAction, PlannedCell, Reading, setups_of};
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::problem::{Problem, Span};
-use crate::scenario::syntax::{Job, JobKind, Place, Relation, Written};
+use crate::scenario::syntax::{CellPlace, Job, JobKind, Relation, Written};
 use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
 use harness_proto::nd21::units::Scale;
@@ -103,7 +103,7 @@ impl Planner {
         &self,
         kind: JobKind,
         drive: (usize, u8),
-        place: Option<&Place>,
+        place: Option<&CellPlace>,
         data: Option<&Written>,
     ) -> Result<Command, Problem> {
         let address = place.map_or(PAGE, |place| place.address);
@@ -180,7 +180,7 @@ impl Planner {
     }
 
     /// A cell with what is added to its address.
-    pub(crate) fn moved(&self, place: &Place, ring: usize) -> Result<Place, Problem> {
+    pub(crate) fn moved(&self, place: &CellPlace, ring: usize) -> Result<CellPlace, Problem> {
         let Some(offset) = &place.offset else {
             return Ok(place.clone());
         };
@@ -192,7 +192,7 @@ impl Planner {
                 "0000 to FFFF expected here",
             )
         })?;
-        Ok(Place {
+        Ok(CellPlace {
             name: format!("{address:04X}"),
             address,
             cell: cell_at(address).filter(|cell| cell.address == address),
@@ -215,7 +215,7 @@ impl Planner {
     fn written(
         &self,
         data: &Written,
-        place: Option<&Place>,
+        place: Option<&CellPlace>,
         count: usize,
         (ring, drive): (usize, u8),
     ) -> Result<Vec<u8>, Problem> {
@@ -233,7 +233,7 @@ impl Planner {
     pub(crate) fn expected_data(
         &self,
         data: &Written,
-        place: Option<&Place>,
+        place: Option<&CellPlace>,
         count: usize,
         drive: (usize, u8),
     ) -> Result<Vec<Expected>, Problem> {
@@ -371,7 +371,7 @@ fn with_reading(action: PlannedAction, reading: Option<Reading>) -> PlannedActio
 }
 
 /// The scale of the number of `width` bytes that begins at a place.
-fn scale_of(place: &Place, width: usize) -> Result<Scale, Problem> {
+fn scale_of(place: &CellPlace, width: usize) -> Result<Scale, Problem> {
     let own = place.cell.and_then(|cell| cell.scale);
     let scales = [own, place.scale()].into_iter().flatten();
     let mut fitting = scales.filter(|scale| usize::from(scale.size()) == width);
@@ -391,7 +391,7 @@ fn scale_of(place: &Place, width: usize) -> Result<Scale, Problem> {
 }
 
 /// Whether a command reaches a cell.
-pub(crate) fn reaches(command: &Command, place: &Place) -> Result<(), Problem> {
+pub(crate) fn reaches(command: &Command, place: &CellPlace) -> Result<(), Problem> {
     if memory::in_range(command.kind(), place.address) {
         return Ok(());
     }

@@ -5,7 +5,7 @@ use super::types::{PlannedAction, PlannedCall};
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::Quantity;
-use crate::scenario::syntax::{Drives, JobKind, MasterCall, Place, Target, Written};
+use crate::scenario::syntax::{CellPlace, Drives, JobKind, MasterCall, Target, Written};
 use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::units::turns_to_raw;
 
@@ -76,7 +76,7 @@ impl Planner {
         &self,
         drive: (usize, u8),
         kind: JobKind,
-        place: Option<&Place>,
+        place: Option<&CellPlace>,
         data: Option<&Written>,
     ) -> Result<PlannedCall, Problem> {
         let command = self.command(kind, drive, place, data)?;
@@ -101,7 +101,7 @@ impl Planner {
     }
 }
 
-fn low(place: &Place) -> u8 {
+fn low(place: &CellPlace) -> u8 {
     place.address.to_le_bytes()[0]
 }
 

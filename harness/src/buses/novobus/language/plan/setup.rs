@@ -5,7 +5,7 @@ use super::types::{PlannedSetup, PlannedSetupKind, setups_of};
 use crate::scenario::pattern::MAX_CELLS;
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::syntax::{
-    Action, Check, Condition, DriveCheck, Drives, FaultKind, Influence, Place, Scenario, Setup,
+    Action, CellPlace, Check, Condition, DriveCheck, Drives, FaultKind, Influence, Scenario, Setup,
     SetupKind, Written,
 };
 use harness_proto::nd21;
@@ -95,7 +95,7 @@ impl Planner {
         &self,
         ring: usize,
         drives: RangeInclusive<u8>,
-        place: &Place,
+        place: &CellPlace,
         value: &Written,
         setup: impl Fn(Vec<u8>) -> Result<PlannedSetupKind, Problem>,
     ) -> Result<Vec<PlannedSetup>, Problem> {
@@ -288,7 +288,7 @@ pub(crate) fn number_bytes(
     }
 }
 
-pub(crate) fn in_memory(place: &Place, length: usize) -> Result<(), Problem> {
+pub(crate) fn in_memory(place: &CellPlace, length: usize) -> Result<(), Problem> {
     let last = usize::from(place.address) + length.max(1) - 1;
     let inside = |range: &RangeInclusive<u16>| {
         range.contains(&place.address) && last <= usize::from(*range.end())

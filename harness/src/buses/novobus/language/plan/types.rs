@@ -4,7 +4,7 @@ use crate::link::{Capability, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
 use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
-use crate::scenario::syntax::{Ending, Influence, Place, Relation, Showing};
+use crate::scenario::syntax::{CellPlace, Ending, Influence, Relation, Showing};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::Position;
 use harness_proto::nd21::units::{self, Device, Scale};
@@ -229,7 +229,7 @@ pub struct PlannedCell {
 }
 
 impl PlannedCell {
-    pub(crate) fn new(place: &Place, size: usize, test: CellTest) -> Self {
+    pub(crate) fn new(place: &CellPlace, size: usize, test: CellTest) -> Self {
         Self {
             name: place.name.clone(),
             address: place.address,

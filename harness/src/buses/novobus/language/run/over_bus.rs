@@ -9,7 +9,7 @@ use crate::link::{Line, Link, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use crate::scenario::run::outcome::{Outcome, Unready};
-use crate::scenario::run::player::{AtFinding, Runner, play};
+use crate::scenario::run::player::{AtMismatch, Runner, play};
 use crate::scenario::run::skip::lacks;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
@@ -183,7 +183,7 @@ pub(crate) fn read_byte(
 }
 
 /// Plays a plan on drives that only their bus leads to: cells of the header are set before, and set back behind it.
-pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) -> Outcome {
+pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
     if let Some(lacks) = lacks(plan, link) {
         return Outcome::skipped(lacks);
     }
@@ -191,7 +191,7 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_finding: AtFinding) ->
     let outcome = match set_up(plan, link, &mut before) {
         Ok(()) => {
             link.begin();
-            play(plan, link, at_finding)
+            play(plan, link, at_mismatch)
         }
         Err(not_ready) => not_ready.judged(link),
     };

@@ -9,7 +9,7 @@ use harness_proto::nd21::units::Scale;
 
 /// A place in a drive's RAM, its registers or its EEPROM.
 #[derive(Clone, Debug)]
-pub struct Place {
+pub struct CellPlace {
     /// The name or the address as written.
     pub name: String,
     /// The address.
@@ -24,7 +24,7 @@ pub struct Place {
     pub span: Span,
 }
 
-impl Place {
+impl CellPlace {
     /// The scale of the number that begins there.
     #[must_use]
     pub fn scale(&self) -> Option<Scale> {
@@ -97,7 +97,7 @@ impl Relation {
 #[derive(Clone, Debug)]
 pub struct CellCheck {
     /// Which cell.
-    pub place: Place,
+    pub place: CellPlace,
     /// The bits that count; all where `None`.
     pub mask: Option<Pattern>,
     /// How it is compared.

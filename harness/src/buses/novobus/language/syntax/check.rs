@@ -1,6 +1,6 @@
 //! What a scenario can check.
 
-use super::cell::{CellCheck, Place};
+use super::cell::{CellCheck, CellPlace};
 use crate::link::Mode;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
@@ -106,7 +106,7 @@ pub enum Condition {
     /// It is in the error mode, or is not.
     InError(bool),
     /// `memory ADDRESS = BYTES`
-    Memory(Place, Pattern),
+    Memory(CellPlace, Pattern),
     /// A cell compares with a value.
     Cell(CellCheck),
     /// It shows this outside the bus.

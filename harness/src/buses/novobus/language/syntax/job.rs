@@ -1,6 +1,6 @@
 //! The jobs of the master that a scenario can give.
 
-use super::cell::{Place, Written};
+use super::cell::{CellPlace, Written};
 use crate::link::Capability;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
@@ -28,7 +28,7 @@ pub enum Job {
         /// Which drive.
         drive: Drives,
         /// The cell, where the command has one.
-        place: Option<Place>,
+        place: Option<CellPlace>,
         /// The data that are written, or that must be read.
         data: Option<Written>,
         /// How far what is read may be off.
@@ -49,11 +49,11 @@ pub enum Job {
 #[derive(Clone, Debug)]
 pub enum MasterCall {
     /// A command, with what is read or written.
-    Command(JobKind, Option<Place>, Option<Written>),
+    Command(JobKind, Option<CellPlace>, Option<Written>),
     /// `read-eeprom K CELL [= HH]` (12.5)
-    ReadEeprom(Place, Option<Pattern>),
+    ReadEeprom(CellPlace, Option<Pattern>),
     /// `write-eeprom K CELL = HH` (12.5)
-    WriteEeprom(Place, Pattern),
+    WriteEeprom(CellPlace, Pattern),
     /// `ram-to-eeprom K` (12.5)
     RamToEeprom,
     /// `reference K` (13.2.1.1)
