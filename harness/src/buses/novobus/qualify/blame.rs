@@ -73,6 +73,13 @@ impl Sighting {
             all.filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE));
         let (index, _) = answered.nth(found.byte.checked_sub(1)?)?;
         let (meant, end) = sent.meant(index);
+        // Answers of the first drive of the ring pass the second one before all others: a 00 may be that drive's, which takes them for
+        // an error.
+        let refuses = values.is_some_and(|(_, (_, came))| came.byte == 0);
+        let meant = match meant {
+            Meant::Own(drive) if refuses && drives > 1 && drive + 1 == drives => Meant::Nobody,
+            meant => meant,
+        };
         let refused = found.received.is_some_and(|(_, came)| came.byte == 0)
             && found.byte.checked_sub(2).is_some_and(|before| {
                 let came = attempt[place].received.get(before);

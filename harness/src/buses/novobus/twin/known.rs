@@ -3,6 +3,7 @@
 //! A bit that the master has written since the last reset holds what was written, unless the manual lets the drive change it
 //! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
 
+use super::program::Program;
 use harness_proto::nd21::bits::{flags2, ps_status};
 use harness_proto::nd21::own::{self, Worker};
 use harness_proto::nd21::ram;
@@ -104,12 +105,15 @@ pub(crate) struct Knowledge {
     cells: BTreeMap<Place, Known>,
     /// Parts of drives that the master has started: from then on they write their cells until the next reset.
     started: BTreeSet<(usize, u8, Worker)>,
+    /// What the manual decides of the cells of each drive's program.
+    programs: BTreeMap<(usize, u8), Program>,
 }
 
 impl Knowledge {
     /// An attempt begins.
     pub(crate) fn begin(&mut self) {
         self.cells.values_mut().for_each(|own| own.now = 0);
+        self.programs.values_mut().for_each(Program::begin);
     }
 
     /// A drive was reset (ND21 10.5): its cells are loaded from its EEPROM, and how long the drive took to write that is its choice
@@ -118,6 +122,7 @@ impl Knowledge {
         self.cells
             .retain(|cell, _| (cell.0, cell.1) != (ring, drive));
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
+        self.programs.entry((ring, drive)).or_default().begin();
     }
 
     /// The master has written to a byte.
@@ -138,6 +143,11 @@ impl Knowledge {
         let workers = workers.into_iter().filter(|(starts, _)| *starts);
         self.started
             .extend(workers.map(|(_, worker)| (ring, drive, worker)));
+        if ordered {
+            self.programs.remove(&(ring, drive));
+        }
+        let program = self.programs.entry((ring, drive)).or_default();
+        program.write(address, write);
         let own = self.cells.entry(place).or_default();
         own.written |= write.bits();
         own.now |= write.bits();
@@ -166,6 +176,7 @@ impl Knowledge {
     pub(crate) fn may_write(&mut self, place: Place, write: Write) {
         self.write(place, write);
         self.cells.remove(&place);
+        self.programs.remove(&(place.0, place.1));
     }
 
     /// The cell that `DataIn` or `DataOut` of a drive points at (ND21 14.10.3), where that is known.
@@ -193,6 +204,12 @@ impl Knowledge {
 
     /// Judges a byte that was read, where the model holds `wanted`.
     pub(crate) fn read(&mut self, place: Place, wanted: u8, value: u8) -> Reading {
+        let program = self.programs.entry((place.0, place.1)).or_default();
+        match program.read(place.2, wanted, value) {
+            Some(true) => return Reading::Right,
+            Some(false) => return Reading::Wrong,
+            None => {}
+        }
         let kept = self.kept(place, value);
         let own = self.cells.entry(place).or_default();
         let written = own.written & kept;

@@ -9,6 +9,7 @@ mod compare;
 mod comparison;
 mod follow;
 mod known;
+mod program;
 mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};
