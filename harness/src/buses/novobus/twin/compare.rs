@@ -226,10 +226,11 @@ impl Comparer<'_> {
             true => self.is_right(rows, (wanted.byte, found.byte), index),
             false => None,
         };
-        // A command that the model refuses is answered with 00 in the place of data too (ND21 9.7).
+        // A command that the model refuses is answered with 00 in the place of data and of the checking byte too (ND21 9.7), and no checking
+        // byte is 00 (9.6).
         let equal = wanted.byte == found.byte;
-        let same = right.is_some_and(|right| right || equal && !matches!(role, Role::Check { .. }))
-            || right.is_none() && equal;
+        let refused = wanted.byte == 0 || !matches!(role, Role::Check { .. });
+        let same = right.is_some_and(|right| right || equal && refused) || right.is_none() && equal;
         self.note_write(ring, rows, index);
         match (same, wanted_good == found_good) {
             (true, true) => {

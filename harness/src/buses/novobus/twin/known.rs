@@ -213,7 +213,8 @@ impl Knowledge {
         let kept = self.kept(place, value);
         let own = self.cells.entry(place).or_default();
         let written = own.written & kept;
-        let mut differ = (value ^ wanted) & written;
+        // Process data went where the drive's own DataIn says, which the model's may not.
+        let mut differ = (value ^ wanted) & (value ^ own.value) & written;
         if kept != 0xFF || own::is_own(place.2) && !own::is_of_the_scope(place.2) {
             return match (differ, written) {
                 (0, 0xFF) => Reading::Right,
@@ -277,6 +278,8 @@ mod tests {
         assert_eq!(known.read(data_in, 0, 0x74), Reading::Learned);
         known.take_process_data(0, 1, [3, 4]);
         assert_eq!(known.read(CELL, 3, 2), Reading::Wrong);
+        // The model's own DataIn points elsewhere.
+        assert_eq!(known.read(CELL, 0, 3), Reading::Right);
         // Where nothing is known of `DataIn`, any cell of the page may have been written.
         known.reset(0, 1);
         known.write(CELL, Write::Set(9));
