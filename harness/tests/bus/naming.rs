@@ -295,6 +295,20 @@ fn planted_in_every_drive() {
     }
 }
 
+/// What RAM holds before the first write is a drive's choice, DataIn and DataOut (ND21 14.10.3) among it.
+#[test]
+fn right_drives_with_contents_of_their_own_have_no_names() {
+    let lines = [
+        "drive 0..last memory FE10 = A1 B2 C3 D4 E5 F6 17 28",
+        "drive 0..last memory DataIn = 08",
+        "drive 0..last memory DataOut = 0C",
+        "drive 0..last memory FF08 = 12 34",
+        "drive 0..last memory FF7C = 56 78 9A BC",
+    ];
+    let own = verdict(&lines.map(str::to_owned));
+    assert!(!own.differs && own.named.is_empty(), "{own:?}");
+}
+
 /// ND21 9.9: the time-outs of the drives, and their waits, lie 0.3 ms apart at most. No drive is named, and what the probes of these times
 /// settle is the manual's own value.
 #[test]

@@ -231,6 +231,10 @@ impl Knowledge {
         if own.learned || written == 0xFF {
             return Reading::Right;
         }
+        // In the place of data a drive that refuses the rest of the command sends 00 (9.7): nothing is learned from it.
+        if (wanted, value) == (0, 0) {
+            return Reading::Right;
+        }
         own.learned = true;
         own.value = value;
         Reading::Learned
@@ -260,6 +264,7 @@ mod tests {
         assert_eq!(known.read(CELL, 0x12, 0x50), Reading::Wrong);
         assert_eq!(known.read(CELL, 0x12, 0x12), Reading::Right);
         known.reset(0, 1);
+        assert_eq!(known.read(CELL, 0x00, 0x00), Reading::Right);
         assert_eq!(known.read(CELL, 0x00, 0x77), Reading::Learned);
     }
 
