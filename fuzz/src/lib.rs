@@ -6,18 +6,18 @@ use harness_sim::novobus::transitions::Transition;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicU8, AtomicU16};
 
-/// How many counters stand for so many cells: libFuzzer takes them in steps of eight bytes.
+/// Number of counters for `cells` cells: libFuzzer reads them in steps of eight bytes.
 pub const fn counters(cells: usize) -> usize {
     cells.next_multiple_of(8)
 }
 
-/// In how many cases libFuzzer is told of a transition. It keeps an input for what is new; what nearly every case goes through it would read
-/// and compare behind each of them for nothing.
+/// Number of cases in which a transition is reported to libFuzzer. It keeps an input only for a new transition, so reporting
+/// those of nearly every case would only cost time.
 pub const NEWS: u16 = 4_096;
 
-/// Makes `Counters`, which tells libFuzzer of each transition when it happens: one counter for each of the first so many cells of the
-/// matrix of protocol transitions. No more than the target can reach: libFuzzer finds the counters by the name of the section, sets all of
-/// them to 0 before each case, reads all of them behind it and keeps an input that makes one of them rise for the first time.
+/// Defines `Counters`, which reports each transition to libFuzzer when it happens: one counter for each of the first `$cells` cells of the
+/// matrix of protocol transitions. Pass no more cells than the target can reach: libFuzzer finds the counters by the name of the section,
+/// clears all of them before each case, reads all of them after it and keeps an input that raises one of them for the first time.
 #[macro_export]
 macro_rules! counters {
     ($cells:expr) => {
@@ -28,7 +28,7 @@ macro_rules! counters {
         static TRANSITIONS: [std::sync::atomic::AtomicU8; $crate::counters($cells)] =
             [const { std::sync::atomic::AtomicU8::new(0) }; $crate::counters($cells)];
 
-        // In how many more cases each of them is told.
+        // The number of further cases in which each transition is reported.
         static LEFT: [std::sync::atomic::AtomicU16; $crate::counters($cells)] =
             [const { std::sync::atomic::AtomicU16::new($crate::NEWS) }; $crate::counters($cells)];
 
@@ -48,7 +48,7 @@ macro_rules! counters {
     };
 }
 
-/// Raises the counter of a transition, once a case and in so many more cases as are left.
+/// Raises the counter of a transition, once a case, while `left` reports remain for it.
 ///
 /// # Panics
 /// There is no counter for it.

@@ -1,7 +1,7 @@
 //! How long a case of a campaign takes: a ring is copied, disturbed, read, repaired and compared.
 //!
-//! `ring` is the baseline: the same ring is copied and carries the same bytes, and nobody looks. The difference is
-//! what the campaign itself costs.
+//! `ring` is the baseline: the same ring is copied and carries the same bytes, without a check. The difference is
+//! the cost of the campaign itself.
 
 use divan::counter::ItemsCount;
 use harness::campaign::find::find;
@@ -16,7 +16,7 @@ const CAMPAIGNS: [&str; 3] = [
     "9.8-driver-single-bits",
 ];
 
-/// Every so many-th case, so that links and bytes of all kinds are among them.
+/// Step between the cases that are played, so that links and bytes of all kinds are among them.
 const STRIDE: usize = 97;
 
 fn main() {

@@ -9,8 +9,8 @@
 //! the program that never sleeps it is all that the bench does with an answer.
 //!
 //! They take turns, on rings of their own, so that what else the computer does slows down all; each figure is the middle one of
-//! its own kind. Turns in which the host of a virtual machine took its processors away are taken again: who stands still for 10 ms and
-//! more is to send SYNCO further ahead for a while, and that is not what is measured here.
+//! its own kind. A turn is repeated if the host of a virtual machine took its processors away meanwhile: after a stall of 10 ms or
+//! more the bench sends SYNCO further ahead for a while, which is not what is measured here.
 
 #![expect(clippy::print_stdout, reason = "figures are what it is for")]
 
@@ -58,7 +58,7 @@ struct Case {
     text: String,
 }
 
-/// Bytes that go out together, once so many have come back.
+/// Bytes that go out together, once `back` bytes have come back.
 struct Chunk {
     back: usize,
     bytes: Vec<u8>,
@@ -119,7 +119,7 @@ fn processor() -> Duration {
     )
 }
 
-/// What the host has taken of the processors of a virtual machine so far, in seconds (Linux, proc_stat(5)); nothing where nobody says.
+/// The time that the host has stolen from a virtual machine's processors so far, in seconds (Linux, proc_stat(5)); 0 if it is not reported.
 fn taken_away() -> f64 {
     let stat = std::fs::read_to_string("/proc/stat").unwrap_or_default();
     let all = stat.lines().find_map(|line| line.strip_prefix("cpu "));

@@ -85,7 +85,7 @@ impl fmt::Display for LineError {
     }
 }
 
-/// A byte as its receiver reads it: the data bits, and what the line status said of them.
+/// A byte as its receiver reads it: the data bits and the line status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Received {
     /// The eight data bits.

@@ -83,7 +83,7 @@ impl Unmark {
     /// Takes a byte of the stream; `None` in the middle of a mark.
     ///
     /// # Errors
-    /// [`BadMark`]; the byte is dropped, and the next one begins anew.
+    /// [`BadMark`]; the byte is dropped, and the decoder restarts at the next one.
     pub fn push(&mut self, byte: u8) -> Option<Result<Received, BadMark>> {
         let (state, read) = match (self.state, byte) {
             (State::Plain, MARK) => (State::Marked, None),

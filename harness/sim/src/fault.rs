@@ -55,7 +55,7 @@ pub enum LinkFault {
     Drop,
     /// It arrives twice.
     Duplicate,
-    /// A byte that nobody sent arrives before it.
+    /// A byte that was not sent arrives before it.
     Insert(u8),
     /// It arrives later; what follows does not overtake it.
     Delay(Span),

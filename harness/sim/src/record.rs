@@ -10,7 +10,7 @@ use harness_proto::time::Instant;
 pub struct LineByte {
     /// When its stop bit has passed.
     pub at: Instant,
-    /// What the transmitter put on the wire; `None` for a byte that nobody sent.
+    /// What the transmitter put on the wire; `None` for a byte that was not sent.
     pub sent: Option<u8>,
     /// What arrived at the receiver; `None` where nothing did. A drive without power reads nothing, but
     /// the byte arrives.
@@ -22,7 +22,7 @@ pub struct LineByte {
 }
 
 impl LineByte {
-    /// A byte as somebody else has seen it: for traces of rings that are not simulated.
+    /// Creates a byte from an outside observation, for traces of rings that are not simulated.
     #[must_use]
     pub fn seen(
         at: Instant,

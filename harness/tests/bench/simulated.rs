@@ -123,8 +123,8 @@ fn evidence_changes_no_verdict_of_long_chapters() {
     changes_no_verdict(&[("9", 3), ("14", 3)]);
 }
 
-/// Whether evidence is kept changes no verdict, no exit code and no word of what is said, and what is kept is judged alike.
-/// These are the chapters, each with the size of its ring; a scenario that fails is beside them.
+/// Keeping evidence changes no verdict, no exit code and no message, and `verify` gives the same verdicts.
+/// `chapters` are those that are played, each with the size of its ring; one scenario that fails is played as well.
 fn changes_no_verdict(chapters: &[(&str, u8)]) {
     let folder = tempfile::tempdir().expect("a folder");
     let wrong = folder.path().join("wrong.scn");
@@ -345,7 +345,7 @@ fn an_interlock_disturbs_no_verdict() {
     }
 }
 
-/// What is said of deviations says how much was compared, and never "none" beside a scenario that failed.
+/// The report on deviations states how much was compared, and is never "none" if a scenario failed.
 #[test]
 fn a_failed_scenario_leaves_deviations_unsettled() {
     let folder = tempfile::tempdir().expect("a folder");

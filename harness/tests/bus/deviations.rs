@@ -2,7 +2,7 @@
 //!
 //! `corpora/deviations.toml` says which scenario finds which deviation, and by what means: over the `wire`
 //! alone, with `faults` that a bench injects, or only by a `look` into the drive or at its plugs.
-//! `DEVIATIONS=update cargo test --test bus deviations` plays everything with everything and writes the file anew.
+//! `DEVIATIONS=update cargo test --test bus deviations` plays every scenario with every deviation and rewrites the file.
 
 use crate::blind::Blind;
 use harness::library::{Entry, sources};
@@ -56,7 +56,7 @@ struct Candidate {
     two_rings: Option<u8>,
     /// Whether nothing is done to the ring, its drives and their plugs.
     alone: bool,
-    /// Whether it comes to its end for someone who sees only the bytes at the master.
+    /// Whether it can be judged to its end from the bytes at the master alone.
     blind: bool,
     cost: u64,
 }

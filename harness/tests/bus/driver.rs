@@ -324,7 +324,7 @@ fn s_ramp_of_13_5() {
     assert_eq!(end.cast_signed(), -3 * 65_536);
 }
 
-/// ND21 9.3, 14.8: drives are counted without touching them, and say who they are.
+/// ND21 9.3, 14.8: discovery counts the drives without changing them and reads their identity.
 #[test]
 fn discovery() {
     for drives in [1, 3, 40, 250] {
@@ -356,7 +356,7 @@ fn discovery() {
     );
 }
 
-/// ND21 9.7, 9.8: a ring says who saw the fault, and is brought back if it can be.
+/// ND21 9.7, 9.8: recovery names the drive that detected the fault and brings the ring back if possible.
 #[test]
 fn recovery_of_9_8() {
     let mut link = SimulatedLink::new(Bench::one(ring(4, Nd21Properties::default())));

@@ -1,6 +1,6 @@
-//! Which deviation is named, for each that the simulator has, planted in a drive of three and seen as through a port: nothing but the
-//! bytes and times at the master, cells that nobody knows, and faults on the master's own link only. The drives are plain ones, which take
-//! a fraction of the time of whole ND21s: what is behind the bus is left out.
+//! Plants each deviation of the simulator in one drive of three and checks which one is named. The bench sees what it sees through a port:
+//! the bytes and times at the master, cells with unknown contents, and faults on the master's own link only. The drives are plain ones,
+//! which take a fraction of the time of complete ND21s; deviations behind the bus are left out.
 
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};

@@ -1,4 +1,4 @@
-//! The twin: a ring beside its model, and what explains a ring that is otherwise.
+//! The twin: a ring beside its model, and what explains a ring that differs from it.
 
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin, What};
 use harness::library::{Entry, sources};
@@ -64,7 +64,7 @@ fn a_ring_is_its_own_twin() {
     assert!(compared > 5_000, "{compared}");
 }
 
-/// ND21 11.8: drives that leave the ring open while they test themselves are reset and waited for like others.
+/// ND21 11.8: drives that leave the ring open during their self-test can be reset like others.
 #[test]
 fn drives_that_are_silent_in_their_self_test_are_reset() {
     let header = "title t\nring 3\ndrive 0..last model nd21\ndrive 0..last property self-test-bus = silent\n\
@@ -75,7 +75,7 @@ fn drives_that_are_silent_in_their_self_test_are_reset() {
     start_anew(&mut link, &plan.rings).expect("they come back");
 }
 
-/// A record is judged as the run was: the same verdict, the same sentence, and nothing is left over.
+/// A replayed record gives the verdict and the message of the run, and no event is left over.
 #[test]
 fn a_record_is_played_again() {
     let mut played = 0;
@@ -107,7 +107,7 @@ fn a_record_is_played_again() {
     assert!(played >= 30, "{played}");
 }
 
-/// Every word that an open property can have is told from the others by its probe.
+/// The probe of an open property distinguishes each of its values from the others.
 #[test]
 fn probes_tell_properties() {
     for probe in probes(3).expect("no mistakes") {
@@ -125,7 +125,7 @@ fn probes_tell_properties() {
     }
 }
 
-/// ND21 9.9: silence, the wait behind it and what becomes of a byte in it show together, and are told apart.
+/// ND21 9.9: one probe finds the time-out, the wait behind it and the fate of a byte during that wait, and keeps them apart.
 #[test]
 fn a_time_out_is_told_from_the_wait_behind_it() {
     let all = |property: &str, ms: u64| format!("drive 0..last property {property} = {ms}ms");
@@ -175,7 +175,7 @@ fn a_long_ring_is_asked_for_its_time_outs() {
     }
 }
 
-/// What a ring of so many drives with these lines answers to a probe.
+/// The answer to a probe of a ring of `drives` drives with these lines in its header.
 fn answered(drives: u8, probe: &Probe, exactness: Exactness, lines: &[String]) -> Answer {
     let entries = probe.entries.iter();
     let seen = entries.map(|entry| {
@@ -189,7 +189,7 @@ fn answered(drives: u8, probe: &Probe, exactness: Exactness, lines: &[String]) -
     answer(probe, drives, &seen.collect::<Vec<_>>(), exactness, &twin).expect("rings")
 }
 
-/// ND21 11.8, 13.3.2, 14.10.5, 14.11.14: what the manual leaves open of the drive itself is told by its cells, drive by drive.
+/// ND21 11.8, 13.3.2, 14.10.5, 14.11.14: cells of each drive show the open properties of the drive itself.
 #[test]
 fn what_a_drive_leaves_open_is_settled() {
     // What is found is a span of times around the true one, as wide as the questions are apart.
@@ -240,8 +240,8 @@ fn what_a_drive_leaves_open_is_settled() {
     }
 }
 
-/// ND21 14.4.2: a motor without a current says nothing, one with another current than it is given nothing of a time, and one that keeps
-/// its peak current for longer than anybody waits is told from both.
+/// ND21 14.4.2: a motor without current gives no answer, a motor with another current than the set one gives no time, and a motor that
+/// keeps its peak current beyond the longest wait is distinguished from both.
 #[test]
 fn a_motor_that_has_not_its_peak_current_settles_nothing() {
     let answer = asked("i2t-time", "2000ms", "drive 0..last input GPIN3 low");
@@ -264,7 +264,7 @@ fn asked(property: &str, value: &str, lines: &str) -> Answer {
         .find(|probe| matches!(probe.asked, Asked::Drive(1, _)))
         .expect("a probe");
     let so = format!("drive 0..last property {property} = {value}");
-    // As on a rig, where nobody knows what the cells hold that a drive writes itself.
+    // As on a rig, where the cells that a drive writes itself are not known.
     let real = Exactness {
         knows_cells: false,
         ..EXACT
@@ -300,7 +300,7 @@ fn model_of(drives: u8, lines: &[String]) -> (Plan, harness::link::SimulatedLink
     (plan, link)
 }
 
-/// The first byte that is otherwise, with its drive and the rule: ND21 10.1.
+/// A divergence names the first byte that differs, its drive and the rule: ND21 10.1.
 #[test]
 fn a_divergence_says_where() {
     let holds = "drive 1 memory FE12 = 01 02 03 04".to_owned();

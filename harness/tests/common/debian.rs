@@ -3,7 +3,7 @@
 
 use std::io::Write as _;
 
-/// Whether a program can be called; where not, `who` says that it is left out.
+/// Whether a program is on the path; if not, prints that the test `who` is skipped.
 pub(crate) fn has(program: &str, who: &str) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let there = std::env::split_paths(&path).any(|folder| folder.join(program).is_file());

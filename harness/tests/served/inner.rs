@@ -31,7 +31,7 @@ const SYNCOS: [u8; 40] = [0x80; 40];
 /// The link in the middle of a ring of four, 2->1, counted from the master's.
 const MIDDLE: usize = 2;
 
-/// What somebody sees of a byte: what was sent, what arrived, with which error.
+/// An observed byte: what was sent, what arrived, with which error.
 type Seen = (Option<u8>, Option<u8>, Option<LineError>);
 
 /// The process that serves; it ends with this value.
@@ -248,7 +248,7 @@ fn an_interposer_with_two_ports() {
     assert_eq!(column(&link, MIDDLE), column(&model, MIDDLE));
 }
 
-/// The ring of somebody else's conversation is not cut because ours has ended.
+/// The end of our conversation does not cut the ring of another client's conversation.
 #[test]
 fn an_interposer_goes_on_behind_an_interruption() {
     let served = Served::start("tcp", true, &[("--cut", "2->1", 1)]);
@@ -333,7 +333,7 @@ fn scenarios_at_an_interposer() {
     assert!(outcome.remarks[0].contains("3->2"), "{outcome:?}");
 }
 
-/// A cut link is open: with nobody there, nothing comes back.
+/// A cut link without a client is open: no byte comes back.
 #[test]
 fn a_cut_link_with_nobody_there_is_open() {
     let served = Served::start("tcp", true, &[("--cut", "2->1", 1)]);

@@ -169,8 +169,8 @@ fn long_ones_over_a_socket_with_marks_and_a_pty_without() {
     assert!(passed >= 18, "{passed}");
 }
 
-/// Whoever waits for a time and fetches nothing sleeps meanwhile: bytes that lie there wake nobody twice, and are still told of at once
-/// to whoever has fetched the one before.
+/// Edge-triggered: unread bytes do not end a `wait` twice, so a caller that fetches nothing sleeps. After a byte was fetched, `wait` returns
+/// at once if another one is there.
 #[test]
 fn bytes_that_lie_there_are_no_news() {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");

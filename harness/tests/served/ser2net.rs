@@ -48,7 +48,7 @@ fn a_ring_behind_ser2net() {
         assert!(Instant::now() < end, "ser2net does not listen");
         std::thread::sleep(Duration::from_millis(50));
     }
-    // Whoever looked whether it listens has gone, which it must see first.
+    // ser2net must first notice that the probing connection has closed.
     std::thread::sleep(Duration::from_millis(500));
     let rig = folder.path().join("rig.toml");
     let text = format!(

@@ -217,7 +217,7 @@ fn the_next_program_at_a_terminal_reads_nothing_old() {
     assert_eq!(read_byte(&mut terminal(&link)), ANSWER);
 }
 
-/// What somebody else has put at the path meanwhile is not the server's to remove.
+/// The server does not remove a file that another program has put at its path.
 #[test]
 fn a_link_that_somebody_has_replaced_stays() {
     let link = path("replaced");

@@ -207,7 +207,7 @@ fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
         outputs.iter().map(|p| name(p, "snapshots")).collect()
     };
     assert_eq!(inputs, outputs("snapshots/scenarios"));
-    // Only the small campaigns have a snapshot; one more shows what is said of files with mistakes.
+    // Only the small campaigns have a snapshot; one more shows the messages for files with mistakes.
     for output in outputs("snapshots/campaigns")
         .iter()
         .filter(|name| *name != "campaigns/mistakes")

@@ -416,7 +416,7 @@ fn rates_of_a_line() {
     );
 }
 
-/// What is in error is red only where colours are wanted, and bold otherwise.
+/// An error is red if colours are on, and bold if they are off.
 #[test]
 fn errors_are_seen_without_colours_too() {
     for colour in [true, false] {

@@ -17,7 +17,7 @@ cells! {
 ///   [`position::eeprom_address`](super::position::eeprom_address). 12.5 ends the EEPROM at 7F (E44).
 ///
 /// `EE_Seriennummer`, the hours and `EE_InitDatum` "can be read out" (14.8) and are [`Access::Read`];
-/// `EE_ProgDatum` is to be written by whoever changes the EEPROM (14.8.4).
+/// Every program that changes the EEPROM must write `EE_ProgDatum` (14.8.4).
 table EEPROM;
 /// The addresses of the EEPROM cells (ND21 14.2.2).
 addresses ee: u8;

@@ -37,7 +37,7 @@ impl Position {
     /// The greatest number of increments: one less than 16384 turns.
     pub const MAX: i32 = (1 << 30) - 1;
 
-    /// A position of so many increments, 65536 to a turn.
+    /// Creates a position from increments, 65536 to a turn.
     ///
     /// # Errors
     /// Outside [`Self::MIN`] to [`Self::MAX`].
@@ -57,7 +57,7 @@ impl Position {
         })
     }
 
-    /// The position nearest to so many turns, a half increment away from 0.
+    /// Creates the position nearest to `turns`; a half increment is rounded away from 0.
     ///
     /// # Errors
     /// Less than -16384 turns, or nearer to 16384 than to the greatest position.

@@ -230,7 +230,7 @@ struct Flank {
 type Speeds = [u16; POINTS_PER_FLANK + 1];
 
 impl Flank {
-    /// A flank of so many cycles, at least 1.
+    /// A flank of `cycles` cycles, at least 1.
     fn new(cycles: u32) -> Self {
         let mut flank = Self {
             count: 0,
@@ -278,8 +278,8 @@ impl Flank {
             .sum()
     }
 
-    /// The run that covers exactly `path` with a constant phase of so many cycles. With the peak `most` it
-    /// covers that or more.
+    /// The run that covers exactly `path` with a constant phase of `constant` cycles. With the peak `most` it
+    /// covers `path` or more.
     fn run(&self, path: u64, most: u64, constant: u32) -> SRamp {
         let covered = |speeds: &Speeds| {
             2 * self.path(speeds) + u64::from(constant) * u64::from(speeds[self.count])

@@ -76,7 +76,7 @@ enum State {
     Sync,
     /// The address byte of a telegram.
     Address(Header),
-    /// A net byte of a telegram for another drive; so many to come.
+    /// A net byte of a telegram for another drive; `left` bytes are still to come.
     Passing { left: u8 },
     /// A net byte of a telegram for this drive.
     Addressed { left: u8, next: Net },
@@ -106,7 +106,7 @@ enum Net {
     Parameter,
 }
 
-/// What the next byte is to a drive, for those who look at a bus end from outside.
+/// The meaning of the next byte to a drive, for observers of a bus end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A sync byte (ND21 9.2).
@@ -263,7 +263,7 @@ impl BusEnd {
         self.due(|| memory.monitors_time_out())
     }
 
-    /// The same where it is known otherwise whether time-outs are monitored.
+    /// Like [`Self::deadline`], where `monitored` says whether time-outs are monitored.
     #[inline]
     #[must_use]
     pub fn due(&self, monitored: impl FnOnce() -> bool) -> Option<Deadline> {

@@ -29,7 +29,7 @@ pub struct Watch {
 pub enum Progress {
     /// Not part of a sequence.
     None,
-    /// The FF that starts one; it may start anew where another broke off.
+    /// The FF that starts one; it may restart a sequence that broke off.
     Started,
     /// One of the bytes between.
     Continued,

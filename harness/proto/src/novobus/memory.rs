@@ -50,7 +50,7 @@ pub trait Memory {
     /// Writes a byte; where nothing can be written, nothing happens.
     fn write(&mut self, address: u16, data: u8);
 
-    /// Whether a command may touch `address`; otherwise the drive reports error 0506.
+    /// Whether a command may access `address`; if not, the drive reports error 0506.
     fn permits(&self, kind: Kind, address: u16) -> bool {
         in_range(kind, address)
     }

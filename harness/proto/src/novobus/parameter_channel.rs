@@ -28,7 +28,7 @@ struct Partial {
     answer_sum: Checksum,
 }
 
-/// What the next byte of a command begun is, for those who look at a bus end from outside.
+/// The meaning of the next byte of an incomplete command, for observers of a bus end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameter {
     /// The command.

@@ -190,7 +190,7 @@ impl Reader {
 
     fn parameter(&mut self, byte: u8) -> Role {
         let Some(drive) = self.drive else {
-            // Nobody is meant, so nobody reads a command in it.
+            // No drive is addressed, so no drive reads a command in it.
             return Role::Command {
                 drive: None,
                 section: "9.5",

@@ -22,7 +22,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// So many cycles have gone by.
+    /// Advances by this number of cycles.
     #[inline]
     pub(super) fn pass(&mut self, cycles: u64, released: bool, cells: &mut Cells) {
         let [low, high, ..] = cycles.to_le_bytes();

@@ -102,7 +102,7 @@ struct Reach<'a> {
 }
 
 impl CycleControl {
-    /// The function that a PLC has ordered, and what has become of it, for who looks on.
+    /// The function that a PLC has ordered, and its state, for observers.
     pub(super) fn ordered(&self) -> Option<(Function, &'static str)> {
         self.running.map(|(function, course)| match course {
             Course::Working => (function, "working"),

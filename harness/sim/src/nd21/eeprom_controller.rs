@@ -145,7 +145,7 @@ impl EepromController {
                 if address != usize::from(ee::VERSION) {
                     memory.eeprom_mut()[address] = job.data;
                 }
-                // Whoever writes the test byte itself means it.
+                // An explicit write of the test byte is kept.
                 if address != usize::from(ee::PARITY) {
                     set_parity(memory.eeprom_mut());
                 }

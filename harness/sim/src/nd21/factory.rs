@@ -1,4 +1,4 @@
-//! The EEPROM of an ND21 that nobody has set up: one that can be switched on and turned.
+//! The EEPROM of an ND21 that was never configured: the drive can be switched on and its motor turned.
 //!
 //! The manual prints no parameter set. This one is for a 5610 with the motor of [`super::PlantParameters`]: nominal
 //! value from NOVOBUS, position regulator on (`SwVersion` 43), GPO2 shows "in position" (`HwVersion` C4), end

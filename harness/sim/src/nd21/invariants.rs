@@ -1,6 +1,6 @@
-//! What always holds after a cycle, whatever the bus writes and the world does. A drive that breaks one is
-//! in an impossible state: a mistake in this model. Builds with debug assertions check every cycle, and so does whoever
-//! watches.
+//! Invariants that hold after every cycle, for any bus write and any outside input. A drive that breaks one is
+//! in an impossible state: a mistake in this model. Builds with debug assertions check every cycle, and so does a
+//! `Watch` that has begun.
 
 use super::positioning::Positioning;
 use super::world::Mode;
@@ -85,17 +85,17 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Keeps from now on which one is broken first.
+    /// Starts to watch: the first broken invariant is kept from now on.
     pub(crate) fn begin(&mut self) {
         self.watching = true;
     }
 
-    /// The first one that was broken since somebody watches.
+    /// The first invariant that was broken since the watch began.
     pub(crate) fn broken(self) -> Option<&'static str> {
         self.broken
     }
 
-    /// Looks behind a cycle.
+    /// Checks the invariants after a cycle.
     pub(super) fn look(&mut self, state: &State<'_>) {
         if self.watching {
             self.broken = self.broken.or_else(|| broken(state));
@@ -115,7 +115,7 @@ fn broken(state: &State<'_>) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    /// Who watches is told which one was broken first, in every build; nobody panics.
+    /// A watch keeps the first broken invariant in every build and does not panic.
     #[test]
     fn a_broken_invariant_is_kept() {
         let cells = Cells::with_eeprom([0; 256]);

@@ -134,7 +134,7 @@ impl Trapezoid {
 enum Phase {
     #[default]
     Idle,
-    /// The calculation is done after so many cycles.
+    /// The calculation is done after this number of cycles.
     Calculating(u32),
     /// Calculated, for a start at this nominal position.
     Ready(Trapezoid, u32),
@@ -165,7 +165,7 @@ pub(super) struct Situation {
     pub(super) whole_words: bool,
     /// A referencing run drives: it needs no initialisation, it is one.
     pub(super) referencing: bool,
-    /// Increments are so many times raw speed units: 8, or 4 in the range to 12000 rpm.
+    /// Raw speed units per increment: 8, or 4 in the range to 12000 rpm.
     pub(super) per_increment: u8,
 }
 
@@ -305,7 +305,7 @@ impl Positioning {
         let ready = matches!(self.phase, Phase::Ready(..)) && status & ps_status::CALCULATED != 0;
         if status & ps_status::CALCULATE == 0 && (!target || ready) {
             if !ready {
-                // Somebody has taken the result back (13.2.1.3).
+                // The result was withdrawn by a write (13.2.1.3).
                 self.phase = Phase::Idle;
             }
             return Ok(());

@@ -615,7 +615,7 @@ impl Memory for Program {
         self.stir();
     }
 
-    /// The program begins anew, and its cycle with it.
+    /// Restarts the program and its cycle.
     fn reset(&mut self) {
         self.next_cycle = self.now + CYCLE;
         self.due = Instant::START;

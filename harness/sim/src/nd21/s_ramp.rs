@@ -56,10 +56,10 @@ pub enum SRampWire {
     Puffer,
 }
 
-/// Why points from the wire `puffer` are not taken.
+/// Why points from the wire `puffer` are rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BadPoints {
-    /// `scope_puffer` does not hold so many.
+    /// More points than `scope_puffer` holds.
     Count(u16),
     /// A speed is more than H'7FFF (ND21 14.5.3.2).
     Speed(u16),

@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(bench.status(), 0x70);
     }
 
-    /// 14.10.6.4: a recording begins at the trigger, or so many scan periods after it.
+    /// 14.10.6.4: a recording begins at the trigger, or a number of scan periods after it.
     #[test]
     fn positive_delays() {
         for (delay_us, periods) in [(0, 0), (108, 1), (40_000, 370), (65_279 * 108, 65_279)] {

@@ -5,8 +5,8 @@ use crate::novobus::drive::Drive;
 use crate::novobus::ring::Ring;
 use harness_proto::time::Instant;
 
-/// One or two rings. Of drives of any model, and not of any kind of device: so what lets time pass in them is compiled, and optimised, with
-/// this crate and not with whoever uses it.
+/// One or two rings. The drive type is an enum of all models and not a type parameter, so that the code that advances time is compiled
+/// and optimised with this crate and not with its users.
 #[derive(Clone, Debug, Default)]
 pub struct Bench {
     rings: Vec<Ring<Drive>>,

@@ -30,8 +30,8 @@ impl Cells {
         }
     }
 
-    /// Starts with nothing in the registers; ROM and EEPROM stay, which nothing on the bus can change. All where it stands: a memory that is
-    /// made anew and moved is copied.
+    /// Restarts with empty registers; ROM and EEPROM stay, because the bus cannot change them. It works in place, which avoids the copy of
+    /// a newly created memory.
     pub(crate) fn restart(&mut self) {
         self.ram = [0; RAM_AND_REGISTERS];
         self.load();

@@ -93,7 +93,7 @@ pub struct Counted {
     pub memory: CountedCells,
     /// How often the power came back.
     pub starts: u32,
-    /// The protocol transitions that it went through, where somebody watches.
+    /// The protocol transitions that it went through, if they are watched.
     reached: Option<Box<Reached>>,
 }
 
@@ -122,7 +122,7 @@ impl Counted {
         self.reached = Some(Box::default());
     }
 
-    /// Those that it went through; `None` where nobody watches.
+    /// The transitions that it went through; `None` if they are not watched.
     #[must_use]
     pub fn reached(&self) -> Option<&Reached> {
         self.reached.as_deref()

@@ -26,7 +26,7 @@ impl Model {
     /// The names in a scenario.
     pub const NAMES: [(&'static str, Self); 2] = [("plain", Self::Plain), ("nd21", Self::Nd21)];
 
-    /// The EEPROM of a drive that nobody has set up: empty, or as delivered.
+    /// The EEPROM of a drive that was never configured: empty, or as delivered.
     #[must_use]
     pub fn eeprom(self) -> [u8; 256] {
         match self {
@@ -87,7 +87,7 @@ impl Drive {
         }
     }
 
-    /// What its cell seems to hold, to someone who reads it from outside.
+    /// The contents of a cell as an outside reader sees it.
     #[must_use]
     pub fn peek(&self, address: u16) -> u8 {
         match self {
@@ -123,7 +123,7 @@ impl Drive {
         }
     }
 
-    /// Its bus end has taken a byte or a deadline from someone who worked with its [parts](Self::parts).
+    /// Tells the drive that a caller gave its bus end a byte or a deadline through its [parts](Self::parts).
     pub(crate) fn bus_has_worked(&mut self) {
         if let Self::Nd21(drive) = self {
             drive.bus_has_worked();
@@ -178,8 +178,8 @@ impl Drive {
         }
     }
 
-    /// Puts a [witness](Witness) beside a drive to which nobody has spoken, on a line with this time for a byte; false where it is no
-    /// whole ND21 and has none.
+    /// Adds a [witness](Witness) to a drive that has not received a byte yet, on a line with this byte time. Returns false if the drive
+    /// is not a complete ND21 and cannot have one.
     #[must_use]
     pub fn witness(&mut self, byte_time: Span) -> bool {
         let whole = match &*self {

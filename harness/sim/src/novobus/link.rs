@@ -7,7 +7,7 @@ use crate::record::LineByte;
 use harness_proto::line::{LineError, Received};
 use harness_proto::time::{Instant, Span};
 
-/// A link cut open: what the transmitter sends goes to somebody else, and what the receiver hears comes from them.
+/// A link that is cut open: an outside party takes what the transmitter sends and supplies what the receiver hears.
 #[derive(Clone, Debug, Default)]
 struct Opening {
     /// What has been sent and not been fetched.
@@ -75,7 +75,7 @@ impl Link {
         self.bytes.log()
     }
 
-    /// Makes room for so many bytes.
+    /// Reserves room for this number of bytes.
     pub(crate) fn reserve(&mut self, bytes: usize) {
         self.bytes.reserve(bytes);
     }

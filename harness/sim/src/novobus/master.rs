@@ -1,4 +1,4 @@
-//! Which master works at the bench's end of a ring: the right one, or one that deviates on purpose. Whoever works with it does not know.
+//! The master at the bench's end of a ring: the right one, or one that deviates on purpose. Both have the same interface.
 
 use crate::novobus::deviation::{DeviantMaster, MasterDeviation};
 use harness_proto::line::{Rate, Received};
@@ -28,7 +28,7 @@ macro_rules! each {
 }
 
 impl AnyMaster {
-    /// A master for a ring of so many drives on a line of this rate, with a deviation where one is wanted.
+    /// Creates a master for a ring of this size on a line of this rate, with an optional deviation.
     #[must_use]
     pub fn new(
         ring: RingSize,

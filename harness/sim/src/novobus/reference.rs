@@ -417,7 +417,7 @@ impl Drive {
         self.zeros_received = u8::from(good(0)) * self.zeros_received.saturating_add(1);
         self.preceding |= self.zeros_received >= 8;
         if self.preceding {
-            // "@": the check sequence passes; a byte that breaks it off may begin it anew.
+            // "@": the check sequence passes; a byte that breaks it off may restart it.
             if !good(CHECK_SEQUENCE[self.matched]) {
                 self.matched = 0;
             }

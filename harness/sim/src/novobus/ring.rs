@@ -28,7 +28,7 @@ pub struct Ring<D> {
     nodes: Vec<Node<D>>,
     /// What the master still has to send, with the time before which it must not.
     outbox: VecDeque<(Instant, u8)>,
-    /// What the master has received and nobody has fetched.
+    /// Bytes that the master has received and the caller has not fetched.
     inbox: VecDeque<LineByte>,
     now: Instant,
     /// When the master will have sent everything that it has to send.
@@ -65,7 +65,7 @@ impl<D: Device> Ring<D> {
         self.sent_by = Instant::START;
     }
 
-    /// Makes room for so many bytes on every link at once: a short run then does not ask for memory again and again.
+    /// Reserves room for this number of bytes on every link, so that a short run does not reallocate.
     pub fn reserve(&mut self, bytes: usize) {
         self.links.iter_mut().for_each(|link| link.reserve(bytes));
         self.outbox.reserve(bytes);
@@ -138,8 +138,8 @@ impl<D: Device> Ring<D> {
         (next < Instant::NEVER).then_some(next)
     }
 
-    /// Begins another conversation: bytes are counted anew, what was recorded and the faults whose byte has not come
-    /// are forgotten, and so is what was received and not fetched. Time and drives go on.
+    /// Begins another conversation. It resets the byte counts and discards records, faults whose byte has not come,
+    /// and received bytes that were not fetched. Time and drives go on.
     pub fn begin(&mut self) {
         self.links.iter_mut().for_each(Link::begin);
         self.nodes.iter_mut().for_each(Node::begin);

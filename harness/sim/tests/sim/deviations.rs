@@ -29,7 +29,7 @@ enum Piece {
     Sequence,
     /// Anything.
     Bytes(Vec<u8>),
-    /// Nothing, for so many ms.
+    /// Silence for this number of ms.
     Silence(u64),
 }
 

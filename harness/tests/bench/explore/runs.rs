@@ -56,7 +56,7 @@ fn a_run_repeats() {
 struct LateOnce {
     inner: OnSim,
     tried: u32,
-    /// At which attempts something is otherwise.
+    /// The attempts in which the ring deviates.
     wrong: fn(u32) -> bool,
 }
 

@@ -233,7 +233,7 @@ fn check(case: &Case, outcome: &Outcome, verdict: &Verdict) {
             assert_eq!(&found, cells, "{}", place());
         }
         Verdict::Noticed(None) => {
-            // Data that nobody compares may come back otherwise.
+            // Data that are not compared may come back changed.
             let data = outcome.class == Class::SilentCorruption
                 && evidence
                     .wrong

@@ -155,7 +155,7 @@ fn a_motion_of_the_positioning_controller_ends() {
     assert!(word(&line, 0, ram::NIST).abs() <= 20);
 }
 
-/// Half a telegram that nobody denied, on both rings; nothing was synchronised before.
+/// Half a telegram that was not denied, on both rings; nothing was synchronised before.
 #[test]
 fn two_rings() {
     let bench = Bench::two(ring(1), ring(3));

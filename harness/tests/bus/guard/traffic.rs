@@ -300,8 +300,8 @@ fn capabilities_follow_the_limits() {
     assert!(!reset.contains(&Capability::Reset));
 }
 
-/// Scenarios that are denied although they do nothing of what needs leave, and make no fault: each sends on purpose what
-/// nobody can vouch for on a machine.
+/// Scenarios that are denied although they need no permission and inject no fault: each deliberately sends bytes
+/// whose effect on a machine is not known.
 const RUBBISH: &[(&str, &str)] = &[
     (
         "9.2-short-address-first",
@@ -358,7 +358,7 @@ fn corpus(limits: Limits) -> Vec<(String, Option<String>)> {
     found
 }
 
-/// With nothing allowed what is denied needs leave, or is a fault that nobody can judge, or is rubbish on purpose; and it ends.
+/// With nothing allowed, every denied scenario needs a permission, has a fault that cannot be judged, or is in [`RUBBISH`]; and it ends.
 #[test]
 fn the_corpus_with_nothing_allowed() {
     let found = corpus(Limits::default());

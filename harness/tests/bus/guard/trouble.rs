@@ -108,9 +108,9 @@ fn a_denied_probe_is_no_finding() {
 /// When a link gets into trouble.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum When {
-    /// As soon as so many bytes have been sent.
+    /// As soon as this number of bytes has been sent.
     Sent(usize),
-    /// As soon as so many bytes have been received.
+    /// As soon as this number of bytes has been received.
     Received(usize),
     /// With this beginning of a conversation, the first being 1.
     Begin(usize),

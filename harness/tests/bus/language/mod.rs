@@ -533,7 +533,7 @@ fn regressions() {
     );
     // A check takes as long as it lets everything come round.
     passes("title x\nring 100\n> 80*100\n? received 100 bytes\n+1ms > 80\n< 80\n");
-    // A byte outside its window is told from one that never came.
+    // A byte outside its window is distinguished from one that never came.
     fails(
         "title x\nring 10\n> 80\n+1ms..2ms < 80\n",
         "80 came at 3.151 ms, expected at",

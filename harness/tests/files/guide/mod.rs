@@ -187,7 +187,7 @@ thread_local! {
     static EXPECTED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs something that may panic, and prints nothing of that panic: it would hide one that nobody expects.
+/// Runs something that may panic and suppresses the message of that panic, which would hide an unexpected one.
 fn quietly<T>(judge: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

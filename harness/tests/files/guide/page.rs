@@ -37,7 +37,7 @@ pub(super) struct Shown {
 
 /// A step of a page, in order.
 pub(super) enum Step {
-    /// A file that the reader is told to save.
+    /// A file that the page asks the reader to save.
     File {
         /// Its name, relative to the page's folder.
         name: String,

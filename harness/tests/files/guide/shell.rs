@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// A page that hangs is ended; no page is judged by how long it takes.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Does the steps and says what came out otherwise than the page shows.
+/// Runs the steps and returns the differences from the page.
 pub(super) fn differences(steps: &[Step], page: &str) -> String {
     let home = tempfile::tempdir().expect("a folder");
     let (work, out) = (home.path().join("work"), home.path().join("out"));
@@ -98,7 +98,7 @@ fn run(home: &Path) -> bool {
         .expect("a shell");
     let group = Pid::from_child(&child);
     let begun = Instant::now();
-    // The shell is looked at, not waited for: as long as it is not, its number is nobody else's.
+    // NOWAIT leaves the shell a zombie, so that its process id is not reused.
     let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
     let ended = loop {
         if waitid(WaitId::Pid(group), look).is_ok_and(|status| status.is_some()) {

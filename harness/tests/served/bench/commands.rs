@@ -78,7 +78,7 @@ fn quietly_from_command_to_command() {
     shows(&desk, write, "075F (499.88 rpm)");
     std::thread::sleep(std::time::Duration::from_millis(700));
     shows(&desk, "read 0 nist", "499.88 rpm");
-    // Whoever is killed leaves nothing that would be believed.
+    // A killed process leaves no valid mark of a ring at rest, so the next command opens the ring with zeros.
     let mut watch = desk
         .command(&["watch", "0", "nist", "--for", "30s"])
         .spawn()
@@ -101,7 +101,7 @@ fn an_interrupted_command_ends_in_the_safe_state() {
         child
     };
     let child = watch();
-    // Who comes meanwhile is told.
+    // A second process is refused with the holder's name.
     ended(&desk.run(&["read", "0", "nist"]), 75, "held by");
     signal(&child, "-INT");
     ended(&finish(child), 130, SAFE);
@@ -110,7 +110,7 @@ fn an_interrupted_command_ends_in_the_safe_state() {
     ended(&finish(child), 7, "the safe state is NOT confirmed");
 }
 
-/// A rig says of itself what is so, and what its file says otherwise.
+/// `rig check` reports the rig's state and every difference from its file.
 #[test]
 fn a_rig_is_checked() {
     let (_served, desk) = desk(false);
@@ -202,11 +202,11 @@ fn power_and_hooks_stand_around_a_use() {
     };
     shows(&desk, "go 0 --move", SAFE);
     assert_eq!(said(), "before on off after");
-    // What only looks leaves the power on, and nobody switches on what is on.
+    // A command that only reads leaves the power on, and the next one does not switch it on again.
     shows(&desk, "read 0 nist", "0 rpm");
     shows(&desk, "read 0 nist", "0 rpm");
     assert_eq!(said(), "before on after before after");
-    // A switch that does not switch: nobody may rely on it.
+    // A power switch that does not work makes the safe state unconfirmed.
     let stuck = text.replace("rm -f", "true");
     std::fs::write(&path, stuck).expect("room");
     ended(
@@ -289,7 +289,7 @@ fn an_interlock_of_a_simulated_rig_trips() {
     assert_eq!(said(&first), said(&run("075F")));
 }
 
-/// A program that hangs (nobody reads what it says, as when a terminal is held) does not let motors turn on.
+/// The watchdog stops the motors when the program hangs (its output is not read, as when a terminal is held).
 #[test]
 fn a_program_that_hangs_is_watched() {
     let (_served, desk) = desk(true);
@@ -326,7 +326,7 @@ fn a_program_that_hangs_is_watched() {
         "{}",
         said(&output)
     );
-    // A stop takes its time, and who looks on for so long sees it.
+    // A stop takes time; a `watch` of 2 s sees the drive stand.
     shows(
         &desk,
         "watch 0 nist Flags --every 2s --for 2s",
@@ -335,7 +335,7 @@ fn a_program_that_hangs_is_watched() {
     shows(&desk, "read 0 Flags", "stop");
 }
 
-/// Whoever may not open the port is told so. Root may open everything, and becomes somebody else for it.
+/// A user without permission for the port gets an error that says so. Root may open every port, so the test drops root's privileges.
 #[test]
 fn a_port_without_rights() {
     let root = rustix::process::geteuid().is_root();

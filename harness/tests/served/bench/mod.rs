@@ -170,7 +170,7 @@ fn a_wrong_drive_behind_a_socket_is_named() {
 
 #[test]
 fn what_is_no_ring_says_so() {
-    // Nobody listens.
+    // No server listens.
     let desk = Desk::new(2, "tcp", "127.0.0.1:1");
     ended(&desk.run(&["run"]), 3, "failed to connect to 127.0.0.1:1");
     // A port that is no tty, a pty where a serial port should be, nothing at all.

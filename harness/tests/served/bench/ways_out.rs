@@ -227,7 +227,7 @@ fn a_positioning_ends_under_a_maximum_speed() {
     ended(&output, 0, SAFE);
 }
 
-/// What ends a run early is told once, and the rig says whether its drives stand.
+/// The cause of an early end is reported once, and so is whether the drives stand.
 #[test]
 fn a_positioning_that_is_interrupted_ends_in_the_safe_state() {
     let (_served, desk) = desk(true);

@@ -10,7 +10,7 @@ use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// `setsid` of util-linux makes the terminal the program's own, so that nothing goes to the terminal of whoever tests.
+/// `setsid` of util-linux makes the terminal the program's own, so that no output goes to the tester's terminal.
 fn in_session(program: &Path, arguments: &[&str]) -> Command {
     let known = Command::new("setsid")
         .arg("--version")
@@ -149,7 +149,7 @@ fn a_rig_with_a_port_is_only_looked_at() {
         "{}",
         seen.text()
     );
-    // Somebody else is told who has it.
+    // A second process is refused with the holder's name.
     let rig = folder.path().join("desk.toml");
     let other = Command::new(env!("CARGO_BIN_EXE_drivebench"))
         .args(["info", "--rig"])
@@ -165,7 +165,7 @@ fn a_rig_with_a_port_is_only_looked_at() {
     tty.keys("q");
     assert_eq!(tty.ended().code(), Some(0));
     let seen = tty.is_as_before();
-    // Quit as asked, drives stay as they are: nobody speaks of a safe state.
+    // After a normal quit the drives stay as they are, so no safe state is reported.
     assert!(!seen.first.contains("blocked"), "{}", seen.first);
 }
 
@@ -212,7 +212,7 @@ fn a_lost_rig_is_told_on_the_first_screen() {
         let mut tty = top_of(&served, folder.path());
         tty.see("two drives", |seen| shows(seen, 2));
         served.child.kill().expect("a process");
-        // Nobody knows whether its drives stand.
+        // It is not known whether its drives stand.
         assert_eq!(tty.ended().code(), Some(7), "{transport}");
         // The last of its output may still be on its way.
         tty.see("the error", |seen| seen.first.contains("error: "));

@@ -148,7 +148,7 @@ fn a_capture_of_some_links() {
     assert!(error.to_string().contains("no link master->2"), "{error}");
 }
 
-/// Data that change by themselves are told from those that a drive must know.
+/// Data that change by themselves are distinguished from data that a drive must keep.
 #[test]
 fn data_that_change_by_themselves() {
     let read = "> 88 FE C0 13 FE D1\n";

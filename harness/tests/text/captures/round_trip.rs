@@ -136,7 +136,7 @@ fn anything_is_read_back() {
     });
 }
 
-/// A capture by somebody else: the high byte first, microseconds since 1970, unknown blocks and options, several bytes a packet.
+/// A capture of another program: the high byte first, microseconds since 1970, unknown blocks and options, several bytes a packet.
 #[test]
 fn captures_of_others_are_read() {
     let path = root().join("corpora/captures/big-endian.pcapng");

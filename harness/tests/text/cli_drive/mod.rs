@@ -1,4 +1,4 @@
-//! The commands on a bus as somebody at a machine uses them: output, refusals, exit codes.
+//! The commands on a bus as a user at a machine runs them: output, refusals, exit codes.
 
 mod params;
 mod scope;

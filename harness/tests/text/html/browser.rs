@@ -222,7 +222,7 @@ fn the_map_of_a_campaign() {
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
-/// What fuzzing has found: the picture is there, and its fault is told to keys.
+/// The page of a fuzzing finding has the picture, and the arrow keys read out its bytes.
 #[test]
 fn the_page_of_a_finding() {
     let own = folder("finding");

@@ -193,7 +193,7 @@ impl Browser {
 
     /// What the page complained of: exceptions, console, blocked contents.
     pub(crate) fn complaints(&mut self) -> Vec<String> {
-        // All that was told before this answer is there then.
+        // All events sent before this answer have arrived then.
         self.value("0");
         let grave = |event: &&Value| match event["method"].as_str() {
             Some("Runtime.exceptionThrown" | "Runtime.consoleAPICalled") => true,

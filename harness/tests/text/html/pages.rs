@@ -3,7 +3,7 @@
 use super::parser::{outline, parse, sound};
 use super::{FAILS, page, text};
 
-/// The whole outline, for a person who reads it; the pictures are looked at elsewhere.
+/// The whole outline, for a human reader; other tests check the pictures.
 fn snapshot(name: &str, scenarios: &[(&str, String)]) {
     let html = page(scenarios);
     let parsed = parse(&html);

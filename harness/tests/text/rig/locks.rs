@@ -1,4 +1,4 @@
-//! Who holds a rig or a port, and which rigs must not be used.
+//! Locks of rigs and ports, reservations and quarantine.
 
 use super::{good, serial};
 use harness::rig::lock::{self, LockError, PortLock, PortLockError, RigLock, Standing};

@@ -229,7 +229,7 @@ pub fn impulses_from_raw(word: u16) -> Result<Ratio, UnitError> {
     Ok(Ratio::of(0x200_0000, i64::from(word)))
 }
 
-/// The word `VCOlin` x 256 + `VCOlinL` for so many impulses per rotation (ND21 14.7.3).
+/// Returns the word `VCOlin` x 256 + `VCOlinL` for this number of impulses per rotation (ND21 14.7.3).
 ///
 /// # Errors
 /// 512 and less, for which a word is too short, or more than 33554432.

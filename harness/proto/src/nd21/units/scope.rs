@@ -68,7 +68,7 @@ pub struct TriggerDelay {
     pub delay: u8,
 }
 
-/// The cells for a recording that begins so many us after the trigger, or before it if negative (ND21
+/// Returns the cells for a recording that begins `us` microseconds after the trigger, or before it if negative (ND21
 /// 14.10.6.4). The formula of `scope_counter` holds for both signs, as the example there shows (E131).
 ///
 /// # Errors

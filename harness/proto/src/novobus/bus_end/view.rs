@@ -1,4 +1,4 @@
-//! A bus end as those see it who look on from outside and change nothing (ND21 9.1-9.9).
+//! Read-only view of a bus end (ND21 9.1-9.9).
 
 use super::{BusEnd, Net, Silence, State};
 use crate::novobus::error_mode::ErrorMode;

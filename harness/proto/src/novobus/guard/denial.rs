@@ -66,23 +66,23 @@ pub enum Cause {
         act: Act,
         /// `max_speed` in rpm.
         most: u16,
-        /// What would have to be known.
+        /// The facts that are not known.
         missing: Facts,
     },
-    /// It is not known what the drives would make of it.
+    /// The state of the drives is not known well enough to judge the byte.
     InDoubt,
-    /// A short address where nobody knows whom it means (ND21 9.2).
+    /// A short address whose drive is not known (ND21 9.2).
     NoAddress,
-    /// The check sequence, or what becomes one by being counted up, where it is not due (ND21 9.7, 9.8).
+    /// A check sequence, or bytes that become one by being counted up, where none is due (ND21 9.7, 9.8).
     CheckSequence,
     /// More bytes in a second than the rig allows.
     TooMany {
-        /// So many in a second.
+        /// The limit, in bytes per second.
         most: u32,
     },
     /// More bytes in all than the rig allows.
     TooLong {
-        /// So many.
+        /// The limit, in bytes.
         most: u64,
     },
     /// An earlier byte was denied.

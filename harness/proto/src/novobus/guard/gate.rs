@@ -13,7 +13,7 @@ use crate::novobus::sync::{Addressing, Header, PAUSE, SYNCO, SyncByte};
 use crate::time::{Instant, Span};
 use alloc::boxed::Box;
 
-/// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below mean nobody in any ring.
+/// Address bytes from here to FF mean one of 250 drives (ND21 8.4, 9.3); those below address no drive in any ring.
 const FIRST_ADDRESS: u8 = 6;
 /// The longest command without its checking byte (ND21 10.1).
 const LONGEST: usize = 5;
@@ -224,8 +224,8 @@ impl Guard {
         self.doubt();
     }
 
-    /// Judges the next byte. `line_error`: it is to leave with wrong parity or a broken frame; as not every port sends what
-    /// it is told to, it must be allowed as a good byte as well, and brings doubt.
+    /// Judges the next byte. `line_error`: it is sent with wrong parity or a broken frame. Not every port sends the error
+    /// as requested, so the byte must also be allowed as a good byte, and the guard's state becomes doubtful.
     ///
     /// # Errors
     /// [`Denial`]: it must not be sent. Nothing changes but that no byte passes before [`Self::reset_after_denial`].

@@ -29,8 +29,8 @@
 //!
 //! What cannot be promised:
 //!
-//! * A bit error on a wire that nobody sees turns one command into another: the parity bit catches an odd number of wrong bits in a
-//!   byte, the checking byte is a sum of 8 bits, which 1 wrong command in 256 passes. A lost or doubled byte behind the master can leave a drive
+//! * An undetected bit error on a wire can turn one command into another: the parity bit detects an odd number of wrong bits in a
+//!   byte, and the checking byte is a sum of 8 bits, which 1 wrong command in 256 passes. A lost or doubled byte behind the master can leave a drive
 //!   out of step for the rest of a telegram.
 //! * A command that another program has left half-sent may end with a 01 that a drive before it makes of a zero. Process data
 //!   that it has left half-sent end with the next byte, whichever that is (9.4), so with the first zero of the recovery.

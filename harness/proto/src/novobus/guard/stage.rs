@@ -17,7 +17,7 @@ pub enum Stage {
     Sync,
     /// An address byte (9.3).
     Address,
-    /// A net byte for nobody (9.3).
+    /// A net byte of a telegram that addresses no drive (9.3).
     Nobody,
     /// The high byte of process data (9.4).
     ProcessHigh,

@@ -174,7 +174,7 @@ fn where_doubt_begins() {
     assert!(doubt(none, &wrong, false), "a wrong checking byte");
     assert!(doubt(none, &[0x82, 0xFF, 0x00], false), "no command byte");
     assert!(doubt(none, &[0x22], false), "no sync byte");
-    // Address byte 00, which nobody has, and seven zeros to it.
+    // Address byte 00, which no drive has, and seven zeros to it.
     let zeros = [0x8E, 0, 0, 0, 0, 0, 0, 0, 0];
     assert!(!doubt(none, &zeros[..8], false));
     assert!(doubt(none, &zeros, false), "eight zeros (ND21 9.7)");

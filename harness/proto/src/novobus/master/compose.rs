@@ -217,7 +217,7 @@ impl Master {
         (taken, false)
     }
 
-    /// Puts so many bytes of commands into the telegram.
+    /// Puts `length` bytes of commands into the telegram.
     fn take_commands(&mut self, drive: u8, order: Order, length: usize) {
         for _ in 0..length {
             let Some(slot) = self.candidate(drive, order) else {

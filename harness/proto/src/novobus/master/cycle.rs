@@ -137,7 +137,7 @@ impl Cycle {
             .is_multiple_of((self.drives.len() as u64).max(1))
     }
 
-    /// What was sent and not answered is sent again. A round that begins anew has been asked for already.
+    /// Sends unanswered process data again. A restarted round needs no new request.
     pub(super) fn restart(&mut self) {
         let drives = (self.drives.len() as u64).max(1);
         let again = self.composed.div_ceil(drives) - self.answered.div_ceil(drives);

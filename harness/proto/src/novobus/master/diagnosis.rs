@@ -13,13 +13,13 @@ use alloc::vec::Vec;
 const KEPT: usize = 32;
 /// The most bytes that can be found to be lost or too many.
 const MOST_SHIFT: usize = 9;
-/// So many bytes must fit for a shift to be believed.
+/// Number of bytes that must match before a shift is accepted.
 const FITTING: usize = 4;
 
-/// So many zeros in a row are no telegram's: it holds at most seven (ND21 9.7).
+/// Number of zeros in a row that no telegram contains: a telegram holds at most seven (ND21 9.7).
 pub(super) const NO_TELEGRAM: u8 = MAX_NET_LENGTH + 1;
-/// After so many bytes every drive behind the one that detected the error has sent its 17 zeros: they
-/// notice the error after at most 9 bytes, the length of a telegram (ND21 9.7).
+/// Number of bytes after which every drive behind the one that detected the error has sent its 17 zeros: these drives
+/// detect the error after at most 9 bytes, the length of a telegram (ND21 9.7).
 const SETTLED: u32 = ZEROS as u32 + 9;
 /// So often must a byte come then to be what the ring spells out: more than an address and net bytes can
 /// be equal in a row.

@@ -19,7 +19,7 @@ pub enum Event {
         /// How it ended.
         outcome: Outcome,
     },
-    /// All drives of the cyclic exchange have answered. Several rounds that nobody asked for in between
+    /// All drives of the cyclic exchange have answered. If several rounds end before the event is fetched, they
     /// are reported once, with the last number.
     Round {
         /// How many rounds there have been since the master was made.
@@ -64,7 +64,7 @@ pub struct Counters {
     pub disturbed: u64,
     /// Times at which it was put right: the figure of `NB_BusError` (ND21 11.5, 12.1).
     pub corrected: u64,
-    /// Events that nobody fetched in time. Results are never among them.
+    /// Events that were dropped because they were not fetched in time. Results are never dropped.
     pub lost_events: u64,
 }
 

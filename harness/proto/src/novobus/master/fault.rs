@@ -81,12 +81,12 @@ pub enum Fault {
     },
     /// The right bytes came, but too late.
     Late,
-    /// So many bytes did not come back: what came instead was the answer for a later job.
+    /// Bytes did not come back: the answer for a later job came instead.
     Lost {
         /// How many.
         bytes: u8,
     },
-    /// So many bytes came that nobody had asked for: an answer was doubled, or a byte inserted.
+    /// Unexpected bytes came: an answer was doubled, or a byte inserted.
     Extra {
         /// How many.
         bytes: u8,

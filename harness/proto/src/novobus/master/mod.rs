@@ -1,7 +1,7 @@
 //! The master's end of the bus (ND21 8.2, 9, 10, 11): jobs in, telegrams out, results and named faults
 //! back, for one ring.
 //!
-//! It owns no port and no clock. Whoever does calls
+//! It owns no port and no clock (sans-IO). The caller, which owns both, calls
 //!
 //! * [`Master::poll_transmit`] whenever the line is free, and sends the byte that it gives;
 //! * [`Master::handle_byte`] with every byte that has come back;
@@ -9,11 +9,11 @@
 //! * [`Master::poll_event`] after any of these.
 //!
 //! Work is given by [`Master::submit`] (a command for a drive) and [`Master::set_exchange`] (cyclic
-//! process data). The line is kept without a gap (9.1): with nothing to do SYNCO goes out. No answer is
-//! waited for: what is under way is a bounded list of the bytes that must come back, and every one is
-//! compared: sync byte, address, echo, checking byte.
+//! process data). The line has no gap (9.1): an idle master sends SYNCO. Telegrams are pipelined: the master
+//! does not wait for an answer before it sends the next one. It keeps a bounded list of the bytes that must come back
+//! and compares each one: sync byte, address, echo, checking byte.
 //!
-//! # When something comes back wrong
+//! # When a wrong byte comes back
 //!
 //! ```text
 //! Counting -> Running -> Locating -> Resetting -> Verifying -> Running
@@ -22,42 +22,42 @@
 //!                                                           Locating -> Stopped, after too many
 //! ```
 //!
-//! *Locating*: the telegram that has been begun is ended (broken off it would make a sound drive detect
-//! an error of its own, and the ring would spell out that one), then SYNCO goes out until the ring
-//! spells out an address (9.7), or the time is up. *Draining*, from the second recovery on: 8 ms of
-//! silence, in which bytes that are late catch up. *Resetting*: 17 zeros and the check sequence (9.8).
-//! *Verifying*: a drive passes the five bytes on only when they have brought it back; so once all five
-//! have come round, all drives are back. The manual repeats at once; this master waits for that, because
-//! a job that reaches drives half of which are in the error mode would run without an answer. *Counting*:
-//! a telegram for nobody (address byte 00) comes back with the number of drives; so it is at the
-//! beginning, because in a ring of another size than thought every address means another drive, and after
+//! *Locating*: the master completes the current telegram (an incomplete one would make a sound drive detect
+//! an error, and the ring would spell out that drive), then sends SYNCO until the ring
+//! spells out an address (9.7) or a time-out ends the wait. *Draining*, from the second recovery on: 8 ms of
+//! silence, in which late bytes arrive. *Resetting*: 17 zeros and the check sequence (9.8).
+//! *Verifying*: a drive forwards the five bytes only when they have ended its error mode; so once all five
+//! have come round, no drive is in the error mode. The manual repeats at once; this master waits, because
+//! a job that is sent while some drives are in the error mode could run without an answer. *Counting*:
+//! a telegram to address byte 00, which no drive has, comes back with the number of drives. The master counts at the
+//! beginning, because in a ring of another size every address means another drive, and after
 //! an address byte has come back wrong.
 //!
 //! # What is known of a job that was under way
 //!
-//! * It *ran* when every byte up to the drive's own -checksum has come back right: the address says who
-//!   answered, and only a drive whose check of the command was right sends that byte. (For two sums of
-//!   256 both checking bytes are the same; then the address alone says it.)
+//! * It *ran* when every byte up to the drive's own -checksum has come back right: the address names the
+//!   drive that answered, and a drive sends that byte only after its check of the command succeeded. (For two sums of
+//!   256 both checking bytes are the same; then only the address proves it.)
 //! * It *did not run* when its checking byte was never sent: until then a drive changes nothing (9.6).
-//! * In between nobody can say. That the ring names a drive does not prove that the byte had not reached
-//!   those behind it: the named one is the first *in the ring* that is in the error mode, and may have
-//!   come to it later than another one, further down, whose address was overwritten.
+//! * In between it is *unknown*. The spelled-out address does not prove that the byte had not reached
+//!   the drives behind it: the named one is the first *in the ring* that is in the error mode. It may have
+//!   entered the error mode later than a drive further down, whose address was overwritten.
 //!
-//! What did not run is sent again, and so is what may have run, in the order in which it was submitted,
-//! if it [may run twice](Repeat); otherwise it ends as [`Outcome::Unknown`]. A write that may have run
-//! twice says so. Reads that are sent again bring what the cell holds then.
+//! Jobs that did not run are sent again. Jobs that may have run are sent again if they [may run twice](Repeat);
+//! if not, they end as [`Outcome::Unknown`]. The order of submission is kept. The outcome of a write says whether it may have run
+//! twice. A read that is sent again returns the value at that time.
 //!
 //! Data without a check of their own (process data, the four data bytes of `ReadLong`) count only when a
 //! byte other than 00 has come back right behind them: a drive in the error mode answers 00. Where they
 //! end with 80, and only SYNCO follows, a lost byte would look the same; then the drives are counted.
 //!
-//! # What cannot be noticed
+//! # What cannot be detected
 //!
-//! The bus checks a byte by its parity and a command by 8 bits. Whoever loses whole runs of bytes without a
-//! trace (a plug pulled and put back) can fool both: a telegram to the "next" drive then means the one
-//! before, until the next address byte, and process data, which no check guards, are taken for a
-//! neighbour's. Where that matters, [`Packing`] switches the short addresses off: every telegram then
-//! brings back the number of the drive that answered.
+//! The bus checks a byte by its parity and a command by 8 bits. Neither detects every loss of a whole run of bytes
+//! (a plug that is pulled and put back): a telegram to the "next" drive then means the one
+//! before, until the next address byte, and process data, which no check protects, are attributed to a
+//! neighbour. Where that matters, [`Packing`] switches the short addresses off: every telegram then
+//! returns the number of the drive that answered.
 
 mod answers;
 mod compose;
@@ -148,7 +148,7 @@ pub enum Phase {
 }
 
 impl Master {
-    /// A master for a ring of so many drives on a line of this rate.
+    /// Creates a master for a ring of this size on a line of this rate.
     #[must_use]
     pub fn new(ring: RingSize, rate: Rate, options: Options) -> Self {
         let byte_time = rate.byte_time();
@@ -274,8 +274,8 @@ impl Master {
         self.pauses = count;
     }
 
-    /// The next byte to be sent; to be asked for whenever the line is free. `None` when the bus is
-    /// stopped, and while so many bytes are missed that no more may be under way.
+    /// Returns the next byte to send; call it whenever the line is free. `None` when the bus is
+    /// stopped, and while the maximum number of bytes is under way.
     #[inline]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<u8> {
         let watched = match self.state {

@@ -6,7 +6,7 @@ use crate::time::Span;
 /// How a master works. All of it can be left at its default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The most jobs that the master holds: queued, under way, or with a result that nobody has fetched
+    /// Maximum number of jobs that the master holds: queued, under way, or with a result that was not fetched
     /// (ND21 11.6: "to avoid overloading the buffer each result should be called up").
     pub capacity: u16,
     /// Which of the shorter forms of a telegram it may use.

@@ -239,7 +239,7 @@ impl Master {
             self.stop(fault);
         } else {
             self.report(Event::Disturbed { fault, attempt });
-            // Long sent, unless nobody has asked for it.
+            // Sent long ago, unless the caller stopped polling.
             self.outgoing.clear();
             self.state = if attempt == 1 {
                 State::resetting()

@@ -41,7 +41,7 @@ fn ready(drives: u8, packing: Packing) -> Master {
     master
 }
 
-/// What the drives of a ring are told: the parameter bytes of each, and the process data.
+/// What the drives of a ring receive: the parameter bytes of each, and the process data.
 #[derive(Default)]
 struct Told {
     parameters: BTreeMap<u8, Vec<u8>>,
@@ -128,7 +128,7 @@ fn any_packing() -> impl Strategy<Value = Packing> {
 }
 
 proptest! {
-    /// Every drive is told its commands, in the order in which they were submitted, whatever is packed.
+    /// Every drive receives its commands in the order in which they were submitted, with any packing.
     #[test]
     fn every_drive_is_told_its_commands_in_order(
         drives in 1u8..=10,

@@ -63,7 +63,7 @@ impl Deviant {
         &mut self.drive
     }
 
-    /// What a cell seems to hold, to someone who reads it from outside.
+    /// The contents of a cell as an outside reader sees it.
     #[must_use]
     pub fn peek(&self, address: u16) -> u8 {
         let cells = self.drive.cells();
@@ -191,8 +191,8 @@ impl Deviant {
         self.held.pop_front().map(|(_, byte)| byte)
     }
 
-    /// Exchanges what the program finds in its cells, and gives back what is to be restored: the address,
-    /// whether it is a word, what was there and what is there now.
+    /// Replaces values in cells before the program reads them, and returns what must be restored: the address,
+    /// whether it is a word, the old value and the new value.
     fn hold(&mut self) -> Vec<(u16, bool, u16, u16)> {
         let mut kept = Vec::new();
         for deviation in &self.deviations {

@@ -156,7 +156,7 @@ pub(super) struct Write {
     pub(super) address: u16,
     /// What.
     pub(super) data: u8,
-    /// What is there now.
+    /// The present contents.
     pub(super) old: u8,
     /// Whether no byte of the telegram stands behind the one in hand.
     pub(super) last: bool,
@@ -169,13 +169,13 @@ pub(super) struct Write {
 /// Reads a cell as it is.
 pub(super) type Peek<'a> = &'a mut dyn FnMut(u16) -> u8;
 
-/// A cell in which the drive's program finds another value than the one that is there.
+/// A cell in which the drive's program finds another value than the real one.
 pub(super) struct Held {
     /// Its address.
     pub(super) address: u16,
     /// One byte or two.
     pub(super) word: bool,
-    /// What is found for what is there.
+    /// Maps the real value to the value that the program finds.
     pub(super) value: fn(u16) -> u16,
 }
 
@@ -185,23 +185,23 @@ pub(super) enum How {
     Amends(fn(&mut Properties, &mut Rules)),
     /// It hears another byte than the one that arrives.
     Hears(fn(&Moment) -> Received),
-    /// It says another byte, or none.
+    /// It sends another byte, or none.
     Says(fn(&Moment, u8) -> Option<u8>),
-    /// Both: what it hears, what it says.
+    /// Both: it hears another byte and sends another byte.
     Mistakes(fn(&Moment) -> Received, fn(&Moment, u8) -> Option<u8>),
-    /// It says another byte, after a look at its cells.
+    /// It sends another byte, which depends on its cells.
     Tells(fn(&Moment, &mut dyn Memory, u8) -> u8),
     /// It forgets a command that it has received in part.
     Forgets(fn(&Moment) -> bool),
     /// It keeps a command that it had received in part when it went into the error mode.
     Keeps,
-    /// It reads something else for a command: which command that reads it is, the address and what is there.
+    /// A command reads another value. The arguments are the number of the reading command, the address and the real contents.
     Misreads(fn(u64, u16, u8) -> u8),
-    /// It says a byte twice.
+    /// It sends a byte twice.
     Repeats(fn(&Moment) -> bool),
-    /// It says everything so much later.
+    /// It sends every byte later by this time.
     Late(Span),
-    /// It says everything so much earlier.
+    /// It sends every byte earlier by this time.
     Early(Span),
     /// It leaves the error mode after this byte.
     Leaves(fn(&Moment) -> bool),
@@ -211,7 +211,7 @@ pub(super) enum How {
     Waits(fn(Deadline) -> bool),
     /// It reads another cell.
     ReadsFrom(fn(Place, u16) -> u16),
-    /// A cell seems to hold something else, to everyone who reads it from outside.
+    /// A cell shows another value to every outside reader.
     Reads(fn(Peek<'_>, u16) -> u8),
     /// It writes something else, elsewhere or nothing.
     Writes(fn(Write) -> Option<(u16, u8)>),

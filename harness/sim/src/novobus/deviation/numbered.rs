@@ -3,7 +3,7 @@
 
 use super::how::{Deviation, How};
 
-/// A drive that takes so many zeros in a row for the sign that the drive before it is in the error mode.
+/// Drives that take `n` zeros in a row for the sign that the preceding drive is in the error mode.
 macro_rules! counts {
     ($($n:literal)*) => {
         &[$(numbered(
@@ -14,7 +14,7 @@ macro_rules! counts {
     };
 }
 
-/// A drive that begins to increment behind so many zeros.
+/// Drives that begin to increment after `n` zeros.
 macro_rules! sends {
     ($($n:literal)*) => {
         &[$(numbered(

@@ -17,7 +17,7 @@ use harness_proto::time::{Instant, Span};
 /// an overrun, and FF with anything else silence until something is due.
 ///
 /// # Panics
-/// A rule of ND21 9.1 to 9.9 is broken; or the reference model, where no time-out is monitored, answers otherwise.
+/// A rule of ND21 9.1 to 9.9 is broken; or the reference model, where no time-out is monitored, gives another answer.
 pub fn bus_end(data: &[u8]) {
     let _transitions: Reached = bus_end_watched(data);
 }

@@ -12,7 +12,7 @@ use harness_proto::time::Instant;
 /// wire.
 ///
 /// # Panics
-/// The two models answer otherwise, or disagree on the error mode or the memory.
+/// The two models give different answers, or disagree on the error mode or the memory.
 pub fn detector(data: &[u8]) {
     let _transitions: Reached = detector_watched(data);
 }
@@ -46,7 +46,7 @@ impl<N: Notes> Detector<N> {
         theirs.restart_all();
         if let Some((&damaged, wire)) = data.split_first() {
             let wire = &wire[..wire.len().min(LONGEST)];
-            // In front of the damaged byte, that byte, and behind it: so nobody asks of each good byte whether it is one.
+            // Split the input at the damaged byte, so that the loops over good bytes need no test for it.
             let front = usize::from(damaged).checked_sub(1).unwrap_or(wire.len());
             let (front, rest) = wire.split_at(front.min(wire.len()));
             let (bad, behind) = rest.split_at(rest.len().min(1));

@@ -80,12 +80,12 @@ impl fmt::Display for Feature {
     }
 }
 
-/// Where features are noted, if anybody wants them: a body that is only to find mistakes does not even name them.
+/// Receives features if the caller wants them. Without a receiver no feature is built.
 #[derive(Default)]
 pub struct Notebook<'n>(Option<&'n mut dyn FnMut(Feature)>);
 
 impl<'n> Notebook<'n> {
-    /// Nobody notes anything.
+    /// No feature is noted.
     #[must_use]
     pub const fn none() -> Self {
         Self(None)
@@ -96,13 +96,13 @@ impl<'n> Notebook<'n> {
         Self(Some(there))
     }
 
-    /// Whether somebody notes.
+    /// Whether features are noted.
     #[must_use]
     pub const fn wanted(&self) -> bool {
         self.0.is_some()
     }
 
-    /// Notes a feature, which is made for whoever notes only.
+    /// Notes a feature. It is built only if features are noted.
     #[inline]
     pub fn note(&mut self, feature: impl FnOnce() -> Feature) {
         if let Some(there) = &mut self.0 {

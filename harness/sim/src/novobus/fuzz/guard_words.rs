@@ -157,7 +157,7 @@ const fn name(act: &Act) -> &'static str {
     }
 }
 
-/// What leave is missing, one by one; more than each alone is what nobody knows.
+/// The missing permissions, one by one. `EVERYTHING`, for cells of unknown meaning, replaces the others.
 fn needs(missing: Need) -> impl Iterator<Item = &'static str> {
     let names = [
         (Need::EVERYTHING, "needs everything"),

@@ -77,7 +77,7 @@ impl Play {
     /// One byte time.
     fn step(&mut self, byte: u8, notes: &mut Notebook<'_>) {
         let before = self.master.phase();
-        // What somebody asks of the master takes no time on the line.
+        // A request to the master takes no time on the line.
         match byte {
             0xFC => return self.give(notes),
             0xF9 => {

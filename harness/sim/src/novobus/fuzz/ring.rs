@@ -17,7 +17,7 @@ const LONGEST: usize = 256;
 /// to 3) and how (its high half), the second the number of the damaged byte, 0 for none.
 ///
 /// # Panics
-/// A byte on any link is otherwise than in the reference model, or a drive's memory or error mode.
+/// A byte on any link, a drive's memory or its error mode differs from the reference model.
 pub fn ring(data: &[u8]) {
     let _transitions: Reached = ring_watched(data);
 }

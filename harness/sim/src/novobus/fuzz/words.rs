@@ -147,7 +147,7 @@ pub(super) fn told(notes: &mut Notebook<'_>, event: &Event, job: Option<(Kind, P
     }
 }
 
-/// How often: the master tries eight times (ND21 11.5), and more than three tries are told apart from none.
+/// A word for a count: the master tries eight times (ND21 11.5), and the last word covers more than three tries.
 const fn times(count: u8) -> &'static str {
     match count {
         0 | 1 => "once",

@@ -127,7 +127,7 @@ fn between_telegrams(bus_end: &BusEnd, memory: &Cells) -> State {
     }
 }
 
-/// The states with a check sequence half-way: by how the drive is otherwise, then by how many of its bytes have come (ND21 9.8).
+/// The states with an incomplete check sequence: by the drive's other state, then by how many of its bytes have come (ND21 9.8).
 pub(super) const SEQUENCES: [[State; 4]; 4] = [
     [
         State::Sequence1,

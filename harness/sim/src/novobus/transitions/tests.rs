@@ -106,7 +106,7 @@ fn the_numbers_of_the_cells() {
     );
 }
 
-/// A cell that the matrix calls unreachable fails whoever reaches it.
+/// Reaching a cell that the matrix calls unreachable fails the test.
 #[test]
 #[should_panic(expected = "called unreachable")]
 fn a_wrong_matrix_is_noticed() {

@@ -46,7 +46,7 @@ impl<N: Notes> Watched<N> {
         &self.reached
     }
 
-    /// What it has gone through; from now on it notes anew.
+    /// Returns the transitions so far and clears them.
     #[must_use]
     pub fn take_reached(&mut self) -> N {
         std::mem::take(&mut self.reached)

@@ -17,14 +17,14 @@ const FIRST: u16 = 0xFD80;
 /// What a byte may change beside what it means: the bus's own bits (14.4.3).
 const OWN_BITS: u8 = flags2::OK | flags2::TIMEOUT;
 
-/// Which bits of each cell nobody changes but the bus: those that can be written and that the drive does not change by itself.
+/// For each cell, the bits that only the bus changes: they can be written, and the drive does not change them by itself.
 static MASTERS: LazyLock<Image> = LazyLock::new(|| {
     std::array::from_fn(|place| {
         let address = address(place);
         match cell_at(address) {
             // An error is shown by the drive, and the bus keeps the address of each telegram (14.10.1, 9.2).
             _ if [ram::ERRORCODE, ram::ERRORCODE + 1, ram::BUS_ADDR].contains(&address) => 0,
-            // Nobody else switches the monitoring of time-outs on or off (14.10.2).
+            // Only the bus switches the monitoring of time-outs on or off (14.10.2).
             _ if address == ram::FLAGS2 => flags2::MONITORING,
             Some(cell) if cell.access != Access::Read && !changes_by_itself(address) => {
                 !cell.read_only_bits
@@ -111,8 +111,8 @@ fn written(address: u16, before: u8, data: u8) -> u8 {
     }
 }
 
-/// How the cells are otherwise than they must be behind a byte, with the section: what the reference model has executed with it
-/// and holds now, and which code an error of the bus has if the byte led to one.
+/// Compares the cells after a byte with the reference model. Returns the first difference, with its section. The arguments hold
+/// the commands that the model executed with the byte, its cells, and the bus error code if the byte caused an error.
 pub(super) fn executed(
     executed: &[Bytes],
     before: &Image,
@@ -174,7 +174,7 @@ pub(super) fn executed(
     None
 }
 
-/// The first cell that is otherwise, but for those that are `loose` and for the bus's own bits.
+/// The first cell that differs, apart from the `loose` cells and the bus's own bits.
 fn differing(must: &Image, is: &Image, loose: &[u16]) -> Option<usize> {
     if must == is {
         return None;
@@ -209,8 +209,8 @@ fn confirm(must: &mut Image) {
     must[usize::from(ram::STATUS - FIRST)] &= !status::ERROR;
 }
 
-/// What of a drive that has just started is otherwise than its EEPROM says (10.5, 14.2.2): cells with a place there hold what
-/// stands there, others that only the bus changes hold 00.
+/// The first cell of a newly started drive that differs from what its EEPROM requires (10.5, 14.2.2): cells with an EEPROM place
+/// hold its contents, other cells that only the bus changes hold 00.
 pub(super) fn at_start(drive: &Drive) -> Option<String> {
     let is = image(drive);
     let mut must: Image = [0; 0x280];

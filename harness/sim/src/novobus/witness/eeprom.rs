@@ -39,7 +39,7 @@ pub(super) fn order(job: Option<Job>, executed: &[Bytes], before: &Image) -> Opt
                 0x84 => Some(Job::Parameters),
                 _ => None,
             },
-            // What is changed meanwhile nobody can tell from what the controller does.
+            // A cell that is written meanwhile cannot be distinguished from the controller's own change.
             [0x82 | 0x63, .., low, high] => {
                 let cell = u16::from_be_bytes([high, low]);
                 let parameters = cell >= PARAMETERS - 1 && matches!(job, Some(Job::Parameters));
@@ -52,7 +52,7 @@ pub(super) fn order(job: Option<Job>, executed: &[Bytes], before: &Image) -> Opt
     job
 }
 
-/// What of an order is otherwise, once the controller says that it is done; `None` inside while it does not.
+/// Checks the result of an order once the controller reports that it is done; `None` while it is not done.
 pub(super) fn done(job: Job, is: &Image, cells: &Cells) -> Option<Result<(), String>> {
     let control = at(is, ram::EEPROM_CONTROL);
     if control & (READY | READ) == 0 {

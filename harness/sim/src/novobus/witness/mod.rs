@@ -30,7 +30,7 @@ const WAIT: Span = Span::from_millis(10);
 /// The code of a time-out (14.11.14).
 const TIME_OUT_CODE: u16 = 0x0508;
 
-/// What was otherwise than the manual says.
+/// A difference from the manual.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Complaint {
     /// How many bytes the drive had heard.
@@ -59,15 +59,15 @@ pub struct Witness {
     time_out: Option<Instant>,
     /// When it last sent something.
     last_sent: Instant,
-    /// What the EEPROM controller was told to do.
+    /// The order that the EEPROM controller was given.
     job: Option<eeprom::Job>,
     byte_time: Span,
     complaint: Option<Complaint>,
 }
 
 impl Witness {
-    /// A witness beside a drive to which nobody has spoken, on a line with this time for a byte. A plain drive needs none: the
-    /// reference model is one.
+    /// Creates a witness for a drive that has not received a byte yet, on a line with this byte time. A plain drive needs none: the
+    /// reference model replaces it.
     #[must_use]
     pub fn new(mut drive: Drive, byte_time: Span) -> Self {
         drive.watch_invariants();
@@ -98,7 +98,7 @@ impl Witness {
         &mut self.drive
     }
 
-    /// The first thing that was otherwise.
+    /// The first difference.
     #[must_use]
     pub fn complaint(&self) -> Option<&Complaint> {
         self.complaint.as_ref()

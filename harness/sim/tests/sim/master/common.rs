@@ -112,7 +112,7 @@ impl<D: Device> Couple<D> {
         self.master.submit(job).expect("a job that can be done")
     }
 
-    /// Runs until all jobs have ended, for so many byte times at most.
+    /// Runs until all jobs have ended, for at most `most` byte times.
     pub(crate) fn finish(&mut self, most: usize) {
         for _ in 0..most {
             if self.master.jobs() == 0 {

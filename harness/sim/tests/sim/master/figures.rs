@@ -146,8 +146,8 @@ fn a_ring_of_one_needs_no_address_byte() {
     assert!(bytes < u64::from(rounds) * position_bytes(size(1)));
 }
 
-/// With packing switched off every telegram has its address byte and one whole command (for drives that
-/// take short addresses otherwise than the manual leaves open, 9.2).
+/// With packing switched off every telegram has its address byte and one whole command (for drives whose
+/// reading of short addresses is none of those that the manual leaves open, 9.2).
 #[test]
 fn packing_can_be_switched_off() {
     let options = Options {

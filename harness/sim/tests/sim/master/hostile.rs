@@ -143,7 +143,7 @@ fn a_hostile_ring_does_no_harm() {
                 }
                 10 => {
                     if random.below(4) == 0 {
-                        // Nobody has listened for a while.
+                        // The caller was away for a while.
                         now += Span::from_millis(random.below(200));
                     }
                     master.handle_timeout(now);

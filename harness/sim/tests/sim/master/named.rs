@@ -76,7 +76,7 @@ fn a_broken_ring_names_its_place_with_monitoring() {
         couple.steps(3_000);
         let broken = Fault::Broken(link(3, 2));
         assert_eq!(stop(&couple).map(|stop| stop.fault), Some(broken));
-        // All of the command was sent; nobody can say that it did not arrive.
+        // All of the command was sent, so it may have arrived.
         assert_eq!(couple.outcome(id), Some(&Outcome::Unknown(broken)));
         assert_eq!(couple.master.phase(), Phase::Stopped);
         let refused = couple.master.submit(Job::new(1, READ));
@@ -88,7 +88,7 @@ fn a_broken_ring_names_its_place_with_monitoring() {
     }
 }
 
-/// Without monitoring nobody says where.
+/// Without monitoring no drive reports where the ring is broken.
 #[test]
 fn a_broken_ring_is_silent_without_monitoring() {
     let mut couple = counted(5, false);
@@ -298,7 +298,7 @@ fn a_command_that_a_drive_does_not_accept_is_named() {
     assert!(matches!(couple.outcome(others), Some(Outcome::Done { .. })));
 }
 
-/// The damaged last link is heard by the master alone; nobody spells out an address.
+/// Only the master hears the damaged last link; no drive spells out an address.
 #[test]
 fn damage_on_the_last_link_is_named_by_the_master() {
     let mut couple = counted(3, false);
@@ -330,7 +330,7 @@ fn damage_behind_a_pause_is_damage() {
             let damaged = Fault::Damaged(link(drives - 2, drives - 3));
             assert_eq!(faults(&couple), [damaged], "{drives} drives, {pause}");
 
-            // Everything comes home, and then nobody asks the master for bytes.
+            // All bytes come back, and then the master is not polled for a while.
             couple.come_home();
             let rest = couple.ring.now() + couple.ring.byte_time() * pause;
             couple.ring.run_until(rest);
@@ -343,8 +343,8 @@ fn damage_behind_a_pause_is_damage() {
     }
 }
 
-/// A link that damages every so many bytes: the work is done all the same, and the counter of 11.5 says
-/// how good the transmission is.
+/// A link that damages bytes at a fixed interval: the jobs are still done, and the counter of 11.5 counts
+/// the errors.
 #[test]
 fn corrected_errors_are_counted() {
     let mut couple = counted(6, false);

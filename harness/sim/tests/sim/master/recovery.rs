@@ -264,8 +264,8 @@ fn forms_in(mut bytes: &[u8]) -> BTreeSet<(&'static str, bool, bool)> {
     forms
 }
 
-/// A second fault at any byte of the recovery from a first one, on any link: the jobs are done all the
-/// same, what ran once is said to have run once, and the ring is sound (9.8, 11.5).
+/// A second fault at any byte of the recovery from a first one, on any link: the jobs are still
+/// done, a job that ran once is reported as run once, and the ring is sound (9.8, 11.5).
 #[test]
 fn a_second_fault_during_the_recovery_does_no_harm() {
     let write = |k: u8| Command::WriteWord {

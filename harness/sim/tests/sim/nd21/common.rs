@@ -43,7 +43,7 @@ impl Rig {
         self.drive.advance(self.now);
     }
 
-    /// So many cycles of 432 us.
+    /// Runs for `count` cycles of 432 us.
     pub(crate) fn cycles(&mut self, count: u64) {
         self.run(Span::from_micros(432) * count);
     }

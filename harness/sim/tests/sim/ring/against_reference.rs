@@ -67,7 +67,7 @@ fn compare(random: &mut Random, case: u64) -> Option<bool> {
         let link = random.below(u64::from(drives) + 1) as usize;
         let byte = 1 + random.below(stream.len() as u64);
         let (fault, theirs) = fault(random);
-        // What else happens to a byte that is held at 0 is nobody's rule.
+        // No rule says what other faults do to a byte that is held at 0.
         if faults
             .iter()
             .any(|(l, b, _)| (*l, *b as u64) == (link, byte))

@@ -18,7 +18,7 @@ const PARITY: LinkFault = LinkFault::Flip(Flips {
 /// More than any case needs.
 const MANY: usize = 30;
 
-/// How many check sequences a ring needs after faults at these (link, byte) during so many SYNCO.
+/// How many check sequences a ring needs after faults at these (link, byte) during `synco` SYNCOs.
 fn sequences_needed(drives: u8, synco: usize, faults: &[(usize, u64)]) -> usize {
     let mut ring = ring(drives);
     for &(link, byte) in faults {

@@ -106,7 +106,7 @@ fn every_lost_start_bit_is_noticed_and_check_sequences_heal() {
 fn a_healthy_ring_changes_nothing_but_addresses_and_answers() {
     for drives in [1, 2, 7, 100, 250] {
         let mut ring = ring(drives);
-        // Nobody is addressed by k = N: the sum is 0 only behind the last drive.
+        // k = N addresses no drive: the sum is 0 only behind the last drive.
         let stream = [
             &[SYNCO, 0x88, 0x00, 1, 2, 3, 4][..],
             &[0x8F, 0x00, 5, 6, 7, 8, 9, 10, 11],

@@ -12,13 +12,13 @@ use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use std::collections::{BTreeMap, VecDeque};
 
-/// The most bytes that are left out one after another.
+/// Maximum number of bytes left out in a row.
 const MOST_LEFT_OUT: usize = 16;
 
-/// The most bytes under way: more than the master inside lets there be.
+/// Maximum number of bytes under way: more than the inner master allows.
 const MOST_FLOWN: usize = 8_192;
 
-/// The most results of which nobody is told any more.
+/// Maximum number of results whose report is suppressed.
 const MOST_TOLD: usize = 8_192;
 
 /// A master with a deviation around it.
@@ -37,7 +37,7 @@ pub struct DeviantMaster {
 }
 
 impl DeviantMaster {
-    /// A master with this deviation, otherwise as `Master::new` makes it.
+    /// Creates a master with this deviation; the other arguments are those of `Master::new`.
     #[must_use]
     pub fn new(
         ring: RingSize,

@@ -34,7 +34,7 @@ impl PartialEq for MasterDeviation {
 
 impl Eq for MasterDeviation {}
 
-/// All of them: what is wrong with the bytes that go out, with what is made of those that come back, with the work, with what is told.
+/// All deviations of a master: in the bytes sent, in the reading of the bytes that come back, in the work, and in the reports.
 pub fn master_deviations() -> impl Iterator<Item = &'static MasterDeviation> {
     DEVIATIONS.iter()
 }
@@ -84,13 +84,13 @@ pub(super) struct Notes {
     pub(super) ring: RingSize,
     /// Jobs that have not ended.
     pub(super) open: Vec<(JobId, Job)>,
-    /// Jobs of whose end nobody is told any more.
+    /// Jobs whose end is not reported any more.
     pub(super) told: Vec<JobId>,
     /// What the last read brought.
     pub(super) last: Option<Data>,
     /// A result that is held back.
     pub(super) held: Option<(JobId, Data)>,
-    /// What is told next.
+    /// Events to report next.
     pub(super) queue: VecDeque<Event>,
 }
 

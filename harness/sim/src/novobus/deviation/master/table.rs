@@ -443,7 +443,7 @@ fn renamed(event: Event, link: impl Fn(u8) -> RingLink) -> Event {
 }
 
 fn failed_as_read(_: &mut Notes, event: Event) -> Option<Event> {
-    // A write that failed is told as if it had read nothing: an order of either kind has a result then.
+    // A failed write is reported as an empty read, so that a job of either kind has a result.
     let Event::Ended {
         id,
         outcome: Outcome::Failed(_),

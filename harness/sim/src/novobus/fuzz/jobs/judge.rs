@@ -40,7 +40,8 @@ pub(super) const DATA_IN: u16 = 0xFF10;
 /// Where DataOut points to.
 pub(super) const DATA_OUT: u16 = 0xFF18;
 
-/// Byte times within which what came back wrong is told: a way round, slack, an address spelled out, the wait for drives with monitoring.
+/// Byte times within which the master must report a wrong byte: one round trip, slack, a spelled-out address, the wait for drives with
+/// monitoring.
 const PATIENCE: u64 = 450;
 
 /// Everything that is known of a run.
@@ -53,7 +54,7 @@ pub(super) struct Judge<'w> {
     heard_in: Vec<u64>,
     /// How many byte times there have been.
     pub(super) steps: u64,
-    /// How many bytes had been heard when the master first told that something is wrong.
+    /// How many bytes had been heard when the master first reported a disturbance.
     first_told: Option<usize>,
     pub(super) stopped: bool,
     /// When the ring was back for the last time; `None` while something is wrong.
@@ -215,7 +216,7 @@ impl<'w> Judge<'w> {
         self.strays(ring)
     }
 
-    /// What came back wrong is told (11.5).
+    /// The master reports a wrong byte (11.5).
     fn told_in_time(&self, back: &[wire::Back]) -> Result<(), Lie> {
         let compared = self.first_told.unwrap_or(self.heard.len());
         let heard = &self.heard[..compared.min(self.heard.len())];
@@ -234,7 +235,7 @@ impl<'w> Judge<'w> {
         }
     }
 
-    /// No drive was written to where nobody has asked for it.
+    /// No drive was written to without a job that asks for it.
     fn strays(&self, ring: &Ring<Counted>) -> Result<(), Lie> {
         for k in 0..self.work.drives {
             let Some(drive) = ring.drive(k) else { continue };

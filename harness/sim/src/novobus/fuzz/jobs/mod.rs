@@ -35,11 +35,11 @@ pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     }
 }
 
-/// Whether what a master has sent into a ring of so many drives is as the manual says (ND21 9.1-9.8, 10), and each command is one that it was
-/// asked for, where that is known: once, and once more behind each check sequence.
+/// Checks that the bytes that a master sent into a ring of `drives` drives obey the manual (ND21 9.1-9.8, 10). If `asked` is given, each
+/// command must be one of these: once, and once more behind each check sequence.
 ///
 /// # Errors
-/// The first thing that is otherwise.
+/// The first violation.
 pub fn conduct(drives: u8, sent: &[u8], asked: Option<&[(u8, Command)]>) -> Result<(), Lie> {
     let read = wire::read(drives, sent)?;
     asked.map_or(Ok(()), |asked| read.asked_for(asked))

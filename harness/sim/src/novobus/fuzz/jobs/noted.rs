@@ -56,7 +56,7 @@ impl<'a, 'n> Watch<'a, 'n> {
         }
     }
 
-    /// What a single fault is told as.
+    /// How the master reports a single fault.
     fn first(&mut self, told: &'static str) {
         let [fault] = self.work.faults.as_slice() else {
             return;

@@ -17,7 +17,7 @@ use harness_proto::novobus::master::{Pace, Phase};
 /// Byte times after the last order in which every job must have ended: more than 8 recoveries of a ring of six take.
 const BOUND: u64 = 6_000;
 
-/// Byte times behind the last job, in which what came back wrong is told.
+/// Byte times behind the last job, in which the master can still report a wrong byte.
 const AFTERWARDS: u64 = 500;
 
 /// Lets a master do the work, and judges it.
@@ -95,7 +95,7 @@ fn do_all(
     }
 }
 
-/// A drive with what nobody writes, and with places for process data.
+/// A drive with known contents in cells that no job writes, and with places for process data.
 fn drive(work: &Work, k: u8, watched: bool) -> Counted {
     let mut drive = Counted::new(work.monitoring);
     if watched {
@@ -154,7 +154,7 @@ fn step(
     Ok(())
 }
 
-/// What drives gave as process data is told as theirs (9.4).
+/// The master reports the process data of each drive as that drive's (9.4).
 fn actual_values(work: &Work, master: &AnyMaster, judge: &Judge<'_>) -> Result<(), Lie> {
     if work.unchecked() || judge.stopped || work.is_cut() {
         return Ok(());

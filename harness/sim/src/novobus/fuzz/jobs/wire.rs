@@ -55,7 +55,7 @@ impl Read {
     }
 }
 
-/// Reads all bytes that were sent into a ring of so many drives.
+/// Reads all bytes that were sent into a ring of `drives` drives.
 pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
     let mut read = Read::default();
     let mut begun: BTreeMap<u8, Vec<u8>> = BTreeMap::new();
@@ -118,7 +118,7 @@ pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
     Ok(read)
 }
 
-/// The drive that a telegram is for, `Some(None)` for nobody (9.2, 9.3); `None` where the address byte has not been sent.
+/// The drive that a telegram addresses, `Some(None)` if it addresses none (9.2, 9.3); `None` if the address byte has not been sent.
 fn addressed(
     drives: u8,
     addressing: Addressing,
@@ -187,7 +187,7 @@ fn parameter(drive: u8, bytes: &[u8]) -> Result<(Back, Option<Command>), Lie> {
     Ok((back, whole))
 }
 
-/// The first byte that came back otherwise than it must; `None` where there is none. Bytes in and behind a check sequence are left out.
+/// The first wrong byte that came back; `None` if all are right. Bytes in and behind a check sequence are left out.
 pub(super) fn first_wrong(back: &[Back], heard: &[harness_proto::line::Received]) -> Option<usize> {
     let mut answers: BTreeMap<u8, Checksum> = BTreeMap::new();
     for (index, (back, received)) in back.iter().zip(heard).enumerate() {

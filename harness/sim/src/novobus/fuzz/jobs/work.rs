@@ -98,7 +98,7 @@ impl Work {
                 kind => work.fault(kind, place, at, [high, low], last),
             }
         }
-        // Another byte with good parity fools whoever has but 8 bits to check by, together with others.
+        // A replaced byte with good parity can pass the 8-bit check in combination with other faults, so it must be the only fault.
         if let (Some((byte, other)), true) = (replaced, work.faults.is_empty()) {
             work.faults.push(Fault {
                 link: usize::from(work.drives),
@@ -201,8 +201,8 @@ impl Work {
         self.is_cut() || self.faults.iter().filter(late).count() > 1
     }
 
-    /// Whether bytes are lost or come twice. Eight bits of checking miss that once in some ten thousand times, and who looks for long finds
-    /// such a case: what is told of jobs is no measure then.
+    /// Whether bytes are lost or come twice. The 8-bit check misses that about once in ten thousand times, so a long fuzz run finds
+    /// such a case: the reported outcome of jobs cannot be judged then.
     pub(super) fn may_fool(&self) -> bool {
         let fools = |fault: &Fault| matches!(fault.what, LinkFault::Drop | LinkFault::Duplicate);
         self.faults.iter().any(fools)
