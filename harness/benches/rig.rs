@@ -1,4 +1,4 @@
-//! What the bench adds to the time on the wire, and what it costs of a processor, on rings that another process serves at the pace of
+//! The time that the bench adds to the time on the wire, and its processor load, on rings that another process serves at the pace of
 //! the line, 38400 bit/s (ND21 8.1).
 //!
 //! Each conversation is played in four ways: in virtual time, which is the wire's own; by a program that only writes to the socket and

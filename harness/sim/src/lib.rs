@@ -1,10 +1,10 @@
 //! Simulated buses and drives, in virtual time.
 //!
-//! A simulated run is a function of what is sent, of the faults and of the drives' cells: two runs give
-//! the same bytes at the same times. Nothing sleeps and nothing ticks: a run jumps from event to event.
+//! A simulated run is a function of the bytes sent, the faults and the drives' cells: two runs give
+//! the same bytes at the same times. No code sleeps or polls: a run jumps from event to event.
 //!
 //! [`novobus`] is the ring with its drives, [`nd21`] the whole drive on it, [`fault`] the faults of a line, and [`record`]
-//! what a run leaves.
+//! the records of a run.
 #![forbid(unsafe_code)]
 
 pub mod fault;

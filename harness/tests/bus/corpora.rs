@@ -96,7 +96,7 @@ fn script(name: &str, arguments: &[&str]) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// The scripts take the targets from fuzz/Cargo.toml: they are those that are played here.
+/// The scripts take the targets from fuzz/Cargo.toml, which lists the same targets as are played here.
 #[test]
 fn the_scripts_know_every_target() {
     let known: BTreeSet<_> = targets().map(|(name, _)| name.to_owned()).collect();
@@ -110,7 +110,7 @@ fn the_scripts_know_every_target() {
     );
 }
 
-/// What the script makes of the kept inputs for libFuzzer is what is played here.
+/// The script writes for libFuzzer the same inputs that are played here.
 #[test]
 fn the_script_converts_as_the_tests_do() {
     let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fuzz-seeds");
@@ -182,7 +182,7 @@ fn every_target_is_summed_up() {
     }
 }
 
-/// What was distilled stays distilled: without any one of these files something would not be reached.
+/// The corpus stays minimal: each distilled file reaches something that the others do not.
 #[test]
 fn no_distilled_input_is_superfluous() {
     for target in noting() {

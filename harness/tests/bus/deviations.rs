@@ -240,7 +240,7 @@ fn every_wrong_master_is_found() {
     }
 }
 
-/// On a rig the bench is to blame, and the record, played again, tells with which master it was made.
+/// On a rig the bench is blamed for a wrong master, and the replayed record names that master.
 #[test]
 fn every_wrong_master_is_named() {
     let (by, scenarios) = (masters(), scenarios());

@@ -37,7 +37,7 @@ const ELEMENTS: [(&str, &str, &str); 13] = [
     ("system-err", "", ""),
 ];
 
-/// What is wrong with a report; nothing with a right one.
+/// The violations of a report; empty for a right one.
 pub(crate) fn wrong(xml: &str) -> Vec<String> {
     // What is no XML, a character that XML cannot hold among it, is refused here.
     let document = match Document::parse(xml) {

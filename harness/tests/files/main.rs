@@ -1,4 +1,4 @@
-//! One test a file: every scenario leaves its table, and every page of the guide says what is so.
+//! One test for each file: every scenario leaves its table, and every page of the guide is true.
 
 #[path = "../common/debian.rs"]
 mod debian;

@@ -1,4 +1,4 @@
-//! What is left of runs over ports that did not come to their end.
+//! Evidence and reports of runs over ports that ended early.
 
 use crate::junit_rules::wrong;
 use crate::program::{Desk, ended, said, verify};
@@ -26,7 +26,7 @@ fn begun(desk: &Desk, more: &[&str]) -> Child {
     command.spawn().expect("the program")
 }
 
-/// A ring that vanishes: what was under way is the bench's fault.
+/// A ring that vanishes: the scenario under way is a rig error.
 #[test]
 fn a_lost_rig() {
     let mut served = Served::start("nd21", &[2], "tcp", true, &[]);

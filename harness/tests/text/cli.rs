@@ -467,7 +467,7 @@ fn a_closed_pipe_is_no_failure() {
     assert_eq!(child.wait().expect("it ends").code(), Some(1));
 }
 
-/// The whole corpus reaches everything; a part of it does not, and says what is missing.
+/// The whole corpus reaches every transition; with a part of it the command lists the missing ones.
 #[test]
 fn fuzz_coverage() {
     let output = drivebench(&["fuzz", "coverage"]);

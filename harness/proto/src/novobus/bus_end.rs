@@ -1,9 +1,9 @@
 //! A drive's end of the bus (ND21 9.1-9.9): a byte with its line status in, at most one byte out, and
 //! deadlines for the time-out.
 //!
-//! When to call what: [`BusEnd::receive`] with every byte that arrives; after each call ask
-//! [`BusEnd::deadline`], and call [`BusEnd::handle_deadline`] when it has come. What goes out goes out
-//! on a line that carries one byte at a time; keeping the order is the caller's part.
+//! Call [`BusEnd::receive`] with every byte that arrives. After each call ask
+//! [`BusEnd::deadline`], and call [`BusEnd::handle_deadline`] when it has come. The
+//! line carries one byte at a time; the caller keeps the outgoing bytes in order.
 
 mod view;
 
@@ -46,7 +46,7 @@ impl Step {
     }
 }
 
-/// When a bus end wants to be called without a byte.
+/// When a bus end must be called without a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deadline {
     /// At this time. A byte that comes first may move it: ask again after each.
@@ -143,8 +143,8 @@ impl BusEnd {
         }
     }
 
-    /// Whether it will answer everything to come as `other` will, the times of 9.9 left aside: both wait for the same
-    /// byte, with the same command half received.
+    /// Whether it will answer every later byte as `other` will, apart from the times of 9.9: both wait for the same
+    /// byte, with the same incomplete command.
     #[must_use]
     pub fn waits_as(&self, other: &Self) -> bool {
         self.state == other.state
@@ -275,9 +275,9 @@ impl BusEnd {
         }
     }
 
-    /// Does what is due at [`Self::deadline`] (ND21 9.9): first the time-out is detected; then, after
-    /// a further wait, zeros go out, one whenever the line is free. A drive that is in the error mode
-    /// already watches the time as well: a cable that breaks is often heard as a damaged byte first.
+    /// Handles [`Self::deadline`] (ND21 9.9): first the time-out is detected; then, after
+    /// a further wait, zeros go out, one whenever the line is free. A drive that is already in the error mode
+    /// also monitors the time, because a breaking cable often causes a damaged byte first.
     pub fn handle_deadline<M: Memory>(&mut self, now: Instant, memory: &mut M) -> Step {
         let waiting = Silence::Waiting {
             until: now + self.properties.time_out_wait,

@@ -21,8 +21,8 @@ use crate::line::Received;
 /// (ND21 9.7).
 pub const UPSTREAM_ZEROS: u8 = 8;
 
-/// The numbers of the error mode. A drive obeys those of the [manual](Self::MANUAL); others make a wrong
-/// drive, for tests of what must find one.
+/// The numbers of the error mode. A right drive has those of the [manual](Self::MANUAL); other numbers make a wrong
+/// drive, for tests that must find one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rules {
     /// Good zeros in a row that show that the drive before is in the error mode (ND21 9.7); 1 or more.
@@ -119,12 +119,12 @@ pub struct ErrorMode {
     in_sequence: bool,
 }
 
-/// What the error mode makes of a byte.
+/// The reaction of the error mode to a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Response {
-    /// What goes out for it.
+    /// The byte that goes out for it.
     pub byte: u8,
-    /// What it was.
+    /// The event at this byte.
     pub marks: Marks,
 }
 
@@ -229,7 +229,7 @@ impl ErrorMode {
         self.zeros_sent
     }
 
-    /// Whether "*" has been.
+    /// Whether "*" has happened.
     #[must_use]
     #[inline]
     pub const fn upstream(&self) -> bool {

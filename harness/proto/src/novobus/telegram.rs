@@ -2,8 +2,8 @@
 //!
 //! A telegram has an address byte or not, process data or not, and parameter bytes or not; one with an
 //! address byte needs at least one net byte. That makes seven legal forms. [`Telegram`] can hold
-//! nothing else; bytes that break the rules stay what they are, a slice, and [`Telegram::decode`] says
-//! what is wrong with them.
+//! no other form; for bytes that break the rules [`Telegram::decode`] returns the rule that they
+//! break.
 
 use super::decode::Decoded;
 use super::sync::{Addressing, Header, MAX_NET_LENGTH, SyncByte, SyncError};

@@ -1,13 +1,13 @@
 //! The ND21 behind its bus.
 //!
-//! [`Program`] is the drive's program; every 432 us it does one cycle, room by room: `world` and `monitor`
-//! (what comes from outside and what of it is an error), `cycle_control`
-//! (what a PLC orders), `referencing`, `positioning`, `s_ramp`
-//! and `source` (what is demanded), `motion` and `plant` (what becomes of it), `outputs` and `clock` (what is shown
-//! of it); `scope` looks on every 108 us. The rooms
-//! speak through the drive's own cells, as the firmware's parts do, so that a bus master sees every step.
+//! [`Program`] is the drive's program; every 432 us it runs one cycle, module by module: `world` and `monitor`
+//! (inputs and error detection), `cycle_control`
+//! (orders of a PLC), `referencing`, `positioning`, `s_ramp`
+//! and `source` (nominal values), `motion` and `plant` (regulators and motor), `outputs` and `clock` (outputs
+//! and counters); `scope` samples every 108 us. The modules
+//! communicate through the drive's own cells, as the parts of the firmware do, so that a bus master sees every step.
 //!
-//! Not modelled, each because nothing that the manual says of it can be seen on the bus: `HwVersion2` bits 0, 2 and
+//! Not modelled, because the bus shows no effect that the manual describes: `HwVersion2` bits 0, 2 and
 //! 3 (to be 1, 14.3.4) and bit 5 (5 kHz); `SwVersion` bit 2 (frequency converter) and bit 4 (error 701 comes from
 //! a scenario only, 14.3.1); a current limit that falls with the temperature; the analogue input has no
 //! offset, so that its calibration every second leaves `VCOoffset` as it is (14.7.2).

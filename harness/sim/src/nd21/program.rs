@@ -1,7 +1,7 @@
-//! The drive's program: its memory, and what it does with it every 432 us (ND21 4.1, 11.8).
+//! The drive's program: its memory and its cycle of 432 us (ND21 4.1, 11.8).
 //!
-//! A cycle that changes nothing but the clocks will change nothing again until something comes from
-//! outside: then the program is quiet, and cycles are only counted.
+//! If a cycle changes only the clocks, later cycles change only the clocks as well until an input changes. The program is
+//! quiet then, and cycles are only counted.
 
 use super::cycle_control::{CycleControl, Orders};
 use super::eeprom_controller::{EepromController, parity_is_right};
@@ -83,7 +83,7 @@ pub struct Program {
     /// Something has come from outside since the last cycle: what is watched is to be looked at.
     stirred: bool,
     pub(crate) invariants: Watch,
-    /// What the ports of the inputs were last made to show.
+    /// The last values of the input ports.
     shown_inputs: Option<(Inputs, Option<ErrorCode>)>,
 }
 

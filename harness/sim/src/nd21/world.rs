@@ -1,10 +1,10 @@
-//! What happens to a drive from outside the bus, and what it shows there: plugs X1 to X3, the motor, the
+//! Inputs and outputs of a drive outside the bus: plugs X1 to X3, the motor, the
 //! display (ND21 5, 11.8).
 
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::{Input, Inputs};
 
-/// Something that happens to a drive from outside the bus.
+/// A change at a drive from outside the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stimulus {
     /// A digital input is at 5 to 24 V (`true`) or at 0 V (5.3.3, 5.3.4).
@@ -35,7 +35,7 @@ pub enum Stimulus {
     Error(ErrorCode),
 }
 
-/// What a drive shows outside the bus.
+/// The outputs of a drive outside the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shown {
     /// GPO1 is high (5.3.5).

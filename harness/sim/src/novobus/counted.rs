@@ -1,4 +1,4 @@
-//! A plain drive that counts what is written to it: the truth of which jobs ran.
+//! A plain drive that counts the writes to its cells, which shows which jobs really ran.
 
 use crate::novobus::cells::Cells;
 use crate::novobus::device::Device;
@@ -41,7 +41,7 @@ impl CountedCells {
         self.written.keys().copied()
     }
 
-    /// What a cell holds.
+    /// The contents of a cell.
     #[must_use]
     pub fn peek(&self, address: u16) -> u8 {
         self.cells.peek(address)

@@ -1,4 +1,4 @@
-//! What stands in a ring: anything that answers bytes with bytes.
+//! The devices of a ring: anything that answers bytes with bytes.
 
 use harness_proto::line::Received;
 use harness_proto::novobus::bus_end::{Deadline, Step};
@@ -10,13 +10,13 @@ pub trait Device {
     /// A byte has arrived.
     fn receive(&mut self, now: Instant, received: Received) -> Step;
 
-    /// When the device wants to act by itself.
+    /// When the device next acts without a byte.
     fn deadline(&self) -> Option<Deadline>;
 
     /// The deadline has come.
     fn handle_deadline(&mut self, now: Instant) -> Step;
 
-    /// Does all that the device does by itself, without the bus, up to and including `now`.
+    /// Does everything that the device does without the bus, up to and including `now`.
     fn advance(&mut self, now: Instant) {
         let _nothing_of_its_own = now;
     }
@@ -30,7 +30,7 @@ pub trait Device {
     /// Why it last went into the error mode.
     fn cause(&self) -> Option<BusError>;
 
-    /// By how much earlier than a whole byte later its answers go out. A drive stores and forwards, so this
+    /// How much earlier than one byte time its answers go out. A drive stores and forwards, so this
     /// is 0 (ND21 8.2).
     fn head_start(&self) -> Span {
         Span::ZERO

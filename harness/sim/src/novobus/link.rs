@@ -1,4 +1,4 @@
-//! One link of a ring: a wire that carries one byte at a time, and what can go wrong on it.
+//! One link of a ring: a wire that carries one byte at a time, and its faults.
 
 use crate::fault::{Flips, LinkFault, Plan};
 use crate::novobus::uart::{self, Uart};
@@ -10,7 +10,7 @@ use harness_proto::time::{Instant, Span};
 /// A link that is cut open: an outside party takes what the transmitter sends and supplies what the receiver hears.
 #[derive(Clone, Debug, Default)]
 struct Opening {
-    /// What has been sent and not been fetched.
+    /// Bytes that have been sent and not been fetched.
     sent: Bytes,
     /// When the last byte sent arrives there.
     last_arrival: Instant,
@@ -33,7 +33,7 @@ pub struct Link {
     out_of_step: Option<Uart>,
     /// Until when the line is held at 0.
     held_until: Instant,
-    /// Nothing of all that stands between a byte and its receiver.
+    /// No fault stands between a byte and its receiver.
     sound: bool,
     arrived: u64,
 }
@@ -56,7 +56,7 @@ impl Link {
         }
     }
 
-    /// Is as new again, but keeps room and whether it records: a run of many short cases does not ask for memory in each.
+    /// Resets the link for reuse. It keeps its allocations, so that many short cases do not reallocate, and whether it records.
     pub(crate) fn restart(&mut self) {
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.clear();
@@ -89,7 +89,7 @@ impl Link {
         self.bytes.record(true);
     }
 
-    /// What has been recorded since the last call.
+    /// Returns the bytes recorded since the last call.
     pub(crate) fn take_log(&mut self) -> Vec<LineByte> {
         let log = self.bytes.log().collect();
         self.bytes.forget_arrived();
@@ -130,8 +130,8 @@ impl Link {
         sent.take().map(UnderWay::unpack)
     }
 
-    /// Forgets what it has carried and the faults whose byte has not come, and joins the link if it was cut, as an interposer does; what
-    /// is under way counts as the first bytes.
+    /// Discards the bytes carried and the faults whose byte has not come, and joins a link that was cut, as an interposer does. Bytes
+    /// under way count as the first bytes.
     pub(crate) fn begin(&mut self) {
         self.join();
         self.plan = Plan::default();
@@ -204,14 +204,14 @@ impl Link {
         bytes.insert(UnderWay::pack(byte));
     }
 
-    /// The transmitter loses its power: what it has not finished is never sent.
+    /// The transmitter loses its power: bytes that it has not finished are never sent.
     pub(crate) fn silence(&mut self, now: Instant) {
         self.lose_after(now);
         self.line_free = self.line_free.min(now);
     }
 
     fn lose_after(&mut self, now: Instant) {
-        // On an open link what is under way is not the transmitter's.
+        // On an open link the bytes under way are not the transmitter's.
         let own = match &mut self.opening {
             None => &mut self.bytes,
             Some(opening) => &mut opening.sent,
@@ -350,7 +350,7 @@ impl Link {
         self.out_of_step = (!receiver.in_step()).then_some(receiver);
     }
 
-    /// Lets a byte of the transmitter's go its way.
+    /// Sends a byte of the transmitter on its way.
     fn deliver(&mut self, mut byte: UnderWay) {
         match &mut self.opening {
             None => self.line_up(byte),
@@ -362,7 +362,7 @@ impl Link {
         }
     }
 
-    /// Lines a byte up behind those under way.
+    /// Queues a byte behind those under way.
     #[inline]
     fn line_up(&mut self, mut byte: UnderWay) {
         byte.at = byte.at.max(self.last_arrival + self.byte_time);

@@ -55,7 +55,7 @@ impl<D: Device> Node<D> {
         self.recording = false;
     }
 
-    /// Is as new again around a device that is, but keeps whether it records.
+    /// Resets the node around a reset device, but keeps whether it records.
     pub(crate) fn restart(&mut self) {
         self.head_start = self.device.head_start();
         self.powered = true;
@@ -63,7 +63,7 @@ impl<D: Device> Node<D> {
         self.begin();
     }
 
-    /// Forgets its marks, and the faults whose byte has not come.
+    /// Discards its marks and the faults whose byte has not come.
     pub(crate) fn begin(&mut self) {
         self.plan.clear();
         self.marks.clear();

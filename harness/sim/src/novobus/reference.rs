@@ -181,8 +181,8 @@ impl Drive {
         }
     }
 
-    /// Whether time-outs were monitored at any time (bit 2 of `Flags2`, ND21 14.10.2), be they not any more: from there on silence may have
-    /// done what this model does not know (9.9).
+    /// Whether time-outs were monitored at any time (bit 2 of `Flags2`, ND21 14.10.2), even if they no longer are: from then on silence may
+    /// have had effects that this model does not know (9.9).
     #[must_use]
     pub fn has_monitored(&self) -> bool {
         self.monitored
@@ -194,13 +194,13 @@ impl Drive {
         std::mem::take(&mut self.executed)
     }
 
-    /// Forgets a command received in half.
+    /// Discards an incomplete command.
     pub fn forget_half(&mut self) {
         self.command.clear();
         self.answer.clear();
     }
 
-    /// Takes the process data that are under way for received, and executes nothing (ND21 9.4).
+    /// Treats the process data under way as received, and executes nothing (ND21 9.4).
     pub fn forget_process_data(&mut self) {
         if let State::Net(left, process, addressed) = self.state {
             self.state = match left - process {

@@ -27,7 +27,7 @@ fn every_wrong_master_is_found_soon() {
     }
 }
 
-/// What is found is what is wrong.
+/// The finding names the section that the master breaks.
 #[test]
 fn the_section_is_named() {
     for (name, section) in [

@@ -72,7 +72,7 @@ fn about(setup: &Setup, seed: u64) -> About {
     }
 }
 
-/// Keeps what a run tells of.
+/// Keeps the findings of a run.
 #[derive(Default)]
 struct Heard {
     findings: Vec<Finding>,

@@ -1,4 +1,4 @@
-//! The guard: attacks on it, what it does to ordinary traffic, and the safe state.
+//! The guard: attacks on it, its effect on ordinary traffic, and the safe state.
 
 mod attack;
 mod safe_state;

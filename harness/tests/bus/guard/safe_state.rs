@@ -178,7 +178,7 @@ fn two_rings() {
     assert!(drives.iter().all(|drive| drive.axis.ring() == 1));
 }
 
-/// Plain drives have a memory and no motor behind it: what is not read back is not confirmed, and it ends.
+/// Plain drives have a memory and no motor behind it: the safe state is not confirmed without a read-back, and the attempt ends.
 #[test]
 fn plain_drives_are_not_confirmed() {
     let plain = |_| Drive::Plain(PlainDrive::new(Properties::default(), [0; 256]));

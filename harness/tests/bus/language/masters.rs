@@ -1,8 +1,8 @@
-//! The language: wrong masters, and what the driver told and sent.
+//! The language: wrong masters, and checks of the driver's reports and bytes.
 
 use super::{entry, fails, passes, refused};
 
-/// `master deviates`, and what the driver told and sent.
+/// `master deviates`, and checks of the driver's reports and bytes.
 #[test]
 fn masters_deviate() {
     let text = |head: &str, steps: &str| format!("title x\nring 2\n{head}\n{steps}\n");

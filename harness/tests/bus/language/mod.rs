@@ -1,4 +1,4 @@
-//! The scenario language: what is read, what is refused and how, and what each line does.
+//! The scenario language: accepted lines, rejected lines with their messages, and the effect of each line.
 
 use harness::library::Entry;
 use harness::link::Link;

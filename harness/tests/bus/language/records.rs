@@ -1,4 +1,4 @@
-//! What is waited for, what is recorded, and what cannot be seen.
+//! The language: `until`, `record`, and checks of values that a rig cannot show.
 
 use super::drives::{nd21, plain};
 use super::{entry, fails, passes, play, refused};

@@ -299,7 +299,7 @@ fn a_port_that_vanishes_ends_the_run() {
     assert!(lost.iter().any(|words| said.contains(words)), "{said}");
 }
 
-/// What the rig's file does not allow never reaches the ring, and the program says what would allow it.
+/// A command that the rig's file does not permit never reaches the ring, and the message names the missing permission.
 #[test]
 fn nothing_that_is_not_allowed() {
     let served = Served::start("nd21", &[3], "tcp", true, &[]);

@@ -1,4 +1,4 @@
-//! Every way out of a command on a rig: signals, a bench that is still being opened, and what cannot be written.
+//! Every way out of a command on a rig: signals, a bench that is still being opened, and output that cannot be written.
 
 use super::commands::{SAFE, desk, shows};
 use super::{Desk, finish, playing, signal};

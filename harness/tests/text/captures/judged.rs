@@ -172,7 +172,7 @@ fn data_that_change_by_themselves() {
     assert!(text.contains("88 01 C0 13 xx xx"), "{text}");
 }
 
-/// Whole drives need to be told of: the header of a scenario does it.
+/// Complete ND21s must be declared in the header of a scenario.
 #[test]
 fn with_a_setup() {
     let name = "14.3.6-ee-selftest";

@@ -1,4 +1,4 @@
-//! What is written is read back as it was: bytes, times, line status, on every link.
+//! A written capture is read back unchanged: bytes, times, line status, on every link.
 
 use super::{DAMAGED, built_in, json, pcapng, root, run};
 use harness::capture::{Capture, Run, diff, read};

@@ -1,4 +1,4 @@
-//! What a browser makes of pages: pictures, hover, keys, times, colours, print, and no page needs a script.
+//! Pages in a browser: pictures, hover, keys, times, colours, print, and that no page needs a script.
 
 use super::devtools::Browser;
 use super::program::{drivebench, finding, path};

@@ -23,7 +23,7 @@ pub(crate) struct Browser {
     from: Receiver<Value>,
     session: Option<String>,
     next: u64,
-    /// What it told without being asked.
+    /// Events that it sent unasked.
     events: Vec<Value>,
 }
 

@@ -1,4 +1,4 @@
-//! The guard itself: bytes in, leave or denial out.
+//! The guard itself: takes bytes and permits or denies each one.
 
 use super::denial::{Cause, Denial};
 use super::effect::Act;
@@ -18,7 +18,7 @@ const FIRST_ADDRESS: u8 = 6;
 /// The longest command without its checking byte (ND21 10.1).
 const LONGEST: usize = 5;
 
-/// Decides byte by byte what goes onto one ring. See the head of the module.
+/// Decides for each byte whether it may go onto one ring. See the module documentation.
 #[derive(Clone, Debug)]
 pub struct Guard {
     ring: RingSize,
@@ -94,12 +94,12 @@ enum Parameter {
     Half(Half),
     /// A command is complete.
     Complete(Act),
-    /// A drive goes into the error mode over it.
+    /// It puts a drive into the error mode.
     Error,
 }
 
 impl Guard {
-    /// A guard of a ring of which nothing is known.
+    /// Creates a guard for a ring in an unknown state.
     #[must_use]
     pub fn new(ring: RingSize, limits: Limits) -> Self {
         Self {
@@ -117,13 +117,13 @@ impl Guard {
         }
     }
 
-    /// Believes that every drive waits for a sync byte and has heard nothing: true of simulated drives that have just been made, and
-    /// of no machine.
+    /// Assumes that every drive waits for a sync byte and has received nothing. This holds for newly created simulated drives and
+    /// for no physical ring.
     pub fn assume_fresh(&mut self) {
         self.state = State::Sync;
     }
 
-    /// Learns what was read of the drive that this address byte means; what was known of it is forgotten.
+    /// Replaces what is known of the drive with this address byte by values that were read from it.
     pub fn learn(&mut self, address: u8, found: &Found) {
         self.known[usize::from(address)] = Known::of(found, &self.limits);
     }
@@ -133,12 +133,12 @@ impl Guard {
         self.known.fill(Known::default());
     }
 
-    /// Knows of the drives what another guard of the same ring knows.
+    /// Copies what another guard of the same ring knows of the drives.
     pub fn know_as(&mut self, other: &Self) {
         self.known.clone_from(&other.known);
     }
 
-    /// What it allows.
+    /// The limits that it enforces.
     #[must_use]
     pub const fn limits(&self) -> &Limits {
         &self.limits
@@ -150,7 +150,7 @@ impl Guard {
         self.passed
     }
 
-    /// Whether nothing passes but the bytes of the recovery.
+    /// Whether only the bytes of the recovery pass.
     #[must_use]
     pub const fn in_doubt(&self) -> bool {
         matches!(self.state, State::Doubt(_)) && !self.limits.allow_everything()
@@ -201,7 +201,7 @@ impl Guard {
         self.kept
     }
 
-    /// The drives may stand anywhere from now on: something has happened to what was sent, or one was switched on.
+    /// The drives may be in any state from now on: bytes were changed on their way, or a drive was switched on.
     pub fn doubt(&mut self) {
         self.state = State::Doubt(Doubt::default());
         self.kept = None;
@@ -217,8 +217,8 @@ impl Guard {
         &self.known[usize::from(key)]
     }
 
-    /// After a denial: lets the bytes of the recovery pass, and what is allowed behind them. The zeros end what was sent in half, and
-    /// no command is completed by them (ND21 9.5, 9.6).
+    /// After a denial: lets the bytes of the recovery pass, and permitted bytes behind them. The zeros end incomplete telegrams and
+    /// complete no command (ND21 9.5, 9.6).
     pub fn reset_after_denial(&mut self) {
         self.closed = false;
         self.doubt();
@@ -228,7 +228,7 @@ impl Guard {
     /// as requested, so the byte must also be allowed as a good byte, and the guard's state becomes doubtful.
     ///
     /// # Errors
-    /// [`Denial`]: it must not be sent. Nothing changes but that no byte passes before [`Self::reset_after_denial`].
+    /// [`Denial`]: it must not be sent. No byte passes after that until [`Self::reset_after_denial`]; nothing else changes.
     pub fn admit(&mut self, now: Instant, byte: u8, line_error: bool) -> Result<(), Denial> {
         match self.judge(now, byte) {
             Ok(next) => {
@@ -271,7 +271,7 @@ impl Guard {
             return Err(Cause::TooMany { most });
         }
         match self.next(byte) {
-            // Where everything is allowed, what cannot be followed passes all the same.
+            // If everything is allowed, bytes that the guard cannot interpret pass as well.
             Err(_) if self.limits.allow_everything() => Ok(Next::to(in_doubt(byte))),
             next => next,
         }
@@ -329,7 +329,7 @@ impl Guard {
         }
         let certain = !matches!(self.state, State::Doubt(_));
         self.state = match (self.state, next.state) {
-            // Where no drive can be in the middle of a telegram, a bad byte does not bring one there.
+            // If no drive can be in the middle of a telegram, a bad byte does not start one.
             (State::Doubt(doubt), _) if line_error => State::Doubt(Doubt {
                 cleared: doubt.cleared,
                 ..Doubt::default()
@@ -410,7 +410,7 @@ impl Guard {
         let header = match SyncByte::decode(byte) {
             Ok(SyncByte::Synco | SyncByte::Pause) => return Ok(Next::to(State::Sync)),
             Ok(SyncByte::Telegram(header)) => header,
-            // These can be no sync bytes to anybody, and leave no telegram open.
+            // No drive takes these for sync bytes, and they leave no telegram open.
             Err(_) if byte & 0x90 != 0x80 => {
                 let zeros = u8::from(byte == 0);
                 return Ok(Next::to(State::Doubt(Doubt {
@@ -606,7 +606,7 @@ impl Half {
 }
 
 impl Tail {
-    /// By how much the last four bytes and this one must be counted up to be the check sequence.
+    /// The increment that turns the last four bytes and this one into the check sequence.
     fn shift(&self, byte: u8) -> Option<u8> {
         let [a, b, c, d] = self.bytes;
         let shift = SEQUENCE[0].wrapping_sub(a);

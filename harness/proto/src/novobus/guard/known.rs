@@ -1,4 +1,4 @@
-//! What a guard knows of each drive: what was read there, and what it has let through since.
+//! A guard's knowledge of each drive: values that were read, and commands that it has passed since.
 //!
 //! `max_speed` bounds every speed that is written. A drive also turns at speeds that it holds already: `nsoll` when it is released,
 //! `ps_v0` when it positions, `RefV1` and `RefV2` when it searches its reference. Such an order passes when the guard knows the
@@ -15,11 +15,11 @@ use crate::nd21::ram;
 use crate::nd21::units::{Ratio, SpeedRange, speed_from_raw};
 use core::fmt;
 
-/// Facts about a drive, each of which keeps an order to it below `max_speed`.
+/// Facts about a drive. Each one ensures that an order to it keeps `max_speed`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Facts(u16);
 
-/// Each fact: what is not known without it, and what makes it known.
+/// For each fact: what is not known without it, and what makes it known.
 const TEXTS: &[(Facts, &str, &str)] = &[
     (
         Facts::SOURCE,
@@ -232,7 +232,7 @@ impl Known {
         self.buffer
     }
 
-    /// What was read of a drive, of which nothing was known.
+    /// Knowledge from values that were read from a drive; earlier knowledge is dropped.
     pub(super) fn of(found: &Found, limits: &Limits) -> Self {
         let own = found.configuration;
         let range = SpeedRange::from_sw_version2(own.sw_version2);

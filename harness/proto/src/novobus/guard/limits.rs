@@ -1,9 +1,9 @@
-//! What a rig allows, and what an act needs of it.
+//! The permissions of a rig, and the permissions that an act needs.
 
 use super::denial::Cause;
 use core::fmt;
 
-/// What a rig allows. Reading and stopping need no permission.
+/// The permissions of a rig. Reading and stopping need none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Motors may start, change their speed or their place; parameters of the regulators may be written.
@@ -14,20 +14,20 @@ pub struct Limits {
     pub reset: bool,
     /// Digital and analogue outputs may be changed (ND21 10.4, 14.7).
     pub outputs: bool,
-    /// The watch over silences may be switched on (ND21 14.10.2): behind it a pause of 10 ms stops a ring.
+    /// Time-out monitoring may be switched on (ND21 14.10.2): a pause of 10 ms stops the ring after that.
     pub monitoring: bool,
     /// The highest speed of a motor that the bus may cause, in rpm; `None` for any. A raw speed counts in the range of its
     /// drive (ND21 14.3.2, 14.5.3.1), and where that is not known in the one to 12000 rpm, in which a bit is worth most.
     pub max_speed: Option<u16>,
-    /// The most bytes that may begin within a second on the link's clock; `None`: as many as the line carries. Bytes queued
+    /// Maximum number of bytes that may begin within a second on the link's clock; `None`: as many as the line carries. Bytes queued
     /// at one time count at that time.
     pub bytes_per_second: Option<u32>,
-    /// The most bytes that may pass in all.
+    /// Maximum number of bytes that may pass in total.
     pub most_bytes: u64,
 }
 
 impl Default for Limits {
-    /// Nothing but reading and stopping, for about 80 hours at 38400 bit/s.
+    /// Permits only reading and stopping, for about 80 hours at 38400 bit/s.
     fn default() -> Self {
         Self {
             motion: false,
@@ -43,7 +43,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Everything, as on a bench of simulated drives.
+    /// Permits everything, as on a bench of simulated drives.
     #[must_use]
     pub fn unlimited() -> Self {
         Self {
@@ -88,7 +88,7 @@ impl Limits {
         let limits = *self;
         let need = match cause {
             Cause::NotAllowed { missing, .. } => missing,
-            // Where everything is allowed, what cannot be followed passes.
+            // If everything is allowed, bytes that the guard cannot interpret pass.
             Cause::InDoubt | Cause::NoAddress | Cause::CheckSequence => Need::EVERYTHING,
             Cause::TooFast { .. }
             | Cause::HalfSpeed { .. }
@@ -110,7 +110,7 @@ impl Limits {
             })
     }
 
-    /// What of `need` is not allowed.
+    /// The part of `need` that is not permitted.
     #[must_use]
     pub const fn missing(&self, need: Need) -> Need {
         let mut has = 0;
@@ -191,7 +191,7 @@ impl fmt::Display for Setting {
     }
 }
 
-/// What an act needs the rig's permission for.
+/// The permissions of the rig that an act needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Need(u8);
 

@@ -1,6 +1,6 @@
-//! The cells of a drive by what writing there does: one table (ND21 14.2.1).
+//! The cells of a drive, classified by the effect of writing them: one table (ND21 14.2.1).
 //!
-//! The last column is about `max_speed`. A cell stands there as harmless, as a speed, or as a cell through which a motor
+//! The last column is for `max_speed`. It classifies a cell as harmless, as a speed, or as a cell through which a motor
 //! could turn faster than the speeds that the guard bounds, or turn without them. A cell that is not in the table needs everything allowed
 //! and no `max_speed`.
 
@@ -12,7 +12,7 @@ use crate::nd21::{ee, ram};
 /// What a change of a cell does to the speed of a motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pace {
-    /// No motor turns faster by it.
+    /// It makes no motor turn faster.
     Same,
     /// It is a speed: a whole word within `max_speed` passes.
     Speed,

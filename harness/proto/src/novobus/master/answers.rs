@@ -1,4 +1,4 @@
-//! What comes back while all is well: every byte is compared, and data are taken out (ND21 9.3-9.6, 10).
+//! Answers of an undisturbed ring: every byte is compared, and data are extracted (ND21 9.3-9.6, 10).
 
 use super::super::sync::SYNCO;
 use super::Master;
@@ -10,9 +10,9 @@ use super::recovery::Stumble;
 use crate::line::Received;
 use crate::time::Instant;
 
-/// Data that have come back and have no check of their own, or one that may be something else: they count when the byte behind them has come
-/// back right, and says something. 00 does not: a drive in the error mode sends it. A byte that is the same
-/// as the last of the data does not: had one been lost, it would stand in its place.
+/// Data that have come back without an own or an unambiguous check. They count when a significant byte behind them has come
+/// back right. 00 is not significant, because a drive in the error mode sends it. Nor is a byte equal
+/// to the last data byte: if one byte were lost, it would take that one's place.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Unconfirmed {
     high: u8,
@@ -27,7 +27,7 @@ pub(super) struct Unconfirmed {
 enum Doubt {
     #[default]
     None,
-    /// It said nothing, and the next ones may say no more.
+    /// That byte was not significant, and the next ones may not be either.
     Raised,
     /// The telegram that settles it is on its way.
     Asked,

@@ -1,5 +1,5 @@
-//! From the first wrong byte to the name of the fault: what was expected, what came instead, and what
-//! the ring spelled out (ND21 9.7-9.9).
+//! Names a fault from the expected bytes, the bytes that came instead, and the address that the ring
+//! spelled out (ND21 9.7-9.9).
 
 use super::super::address::RingSize;
 use super::super::check_sequence::{SEQUENCE, ZEROS};
@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 
 /// How many bytes after the first wrong one are kept to be compared.
 const KEPT: usize = 32;
-/// The most bytes that can be found to be lost or too many.
+/// Maximum number of lost or extra bytes that can be recognised.
 const MOST_SHIFT: usize = 9;
 /// Number of bytes that must match before a shift is accepted.
 const FITTING: usize = 4;
@@ -21,14 +21,14 @@ pub(super) const NO_TELEGRAM: u8 = MAX_NET_LENGTH + 1;
 /// Number of bytes after which every drive behind the one that detected the error has sent its 17 zeros: these drives
 /// detect the error after at most 9 bytes, the length of a telegram (ND21 9.7).
 const SETTLED: u32 = ZEROS as u32 + 9;
-/// So often must a byte come then to be what the ring spells out: more than an address and net bytes can
-/// be equal in a row.
+/// Number of equal bytes in a row after which they count as the spelled-out address: more than an address byte and net bytes
+/// can be equal in a row.
 const STEADY: u32 = NO_TELEGRAM as u32 + 1;
-/// Byte times, besides those of the way round, within which a ring has spelled out what it has to say: a
-/// telegram is ended first, and drives that send zeros unasked need as many again.
+/// Byte times, in addition to one round trip, within which a ring spells out an address: the current
+/// telegram is completed first, and drives that send zeros unasked need as many again.
 pub(super) const SPELLING: u64 = 2 * (SETTLED + STEADY) as u64;
 
-/// What the ring says once it is steady.
+/// The steady output of the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Spelled {
     /// The address of the drive that detected the error.
@@ -37,18 +37,18 @@ pub(super) enum Spelled {
     Sound,
     /// Nothing comes.
     Nothing,
-    /// Bytes without sense.
+    /// Bytes without a meaning.
     Noise,
 }
 
-/// With what a disturbance began.
+/// The first sign of a disturbance.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Cause {
     /// Another byte came than this one, or it was damaged.
     Wrong(Sent),
     /// This byte did not come.
     Missed(Sent),
-    /// A byte came that nothing had been sent for.
+    /// An unexpected byte came.
     Unasked,
     /// A check sequence did not come back.
     NotBack,
@@ -68,9 +68,9 @@ impl Cause {
 #[derive(Clone, Debug)]
 pub(super) struct Evidence {
     cause: Cause,
-    /// What must have come, from the byte on with which it began.
+    /// The expected bytes, starting at the first wrong one.
     expected: Vec<Option<u8>>,
-    /// What came from there on.
+    /// The bytes that came, starting at the same place.
     received: Vec<Received>,
     seen: u32,
     last: Option<Received>,
@@ -98,7 +98,7 @@ impl Evidence {
         }
     }
 
-    /// With what it began.
+    /// The first sign.
     pub(super) fn cause(&self) -> &Cause {
         &self.cause
     }
@@ -135,7 +135,7 @@ impl Evidence {
             .filter(|spelled| *spelled != Spelled::Noise)
     }
 
-    /// What the ring spells out, when there is no more time.
+    /// What the ring spells out when the time is over.
     pub(super) fn spelled(&self, ring: RingSize) -> Spelled {
         let Some(last) = self.last else {
             return Spelled::Nothing;
@@ -166,7 +166,7 @@ impl Evidence {
         drive: Option<u8>,
     ) -> Fault {
         match spelled {
-            // What only the master heard wrong happened on the last link: no drive passes a damaged byte on.
+            // An error that only the master received happened on the last link: no drive forwards a damaged byte.
             _ if self.received.first().is_some_and(|r| r.error.is_some()) => {
                 Fault::Damaged(RingLink::last())
             }

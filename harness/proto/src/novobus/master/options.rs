@@ -1,9 +1,9 @@
-//! How a master is to work: what it may pack, how long it waits, how often it tries.
+//! Options of a master: packing, time-outs, number of attempts.
 
 use super::super::properties::ReadLongAnswer;
 use crate::time::Span;
 
-/// How a master works. All of it can be left at its default.
+/// Options of a master. Every field has a default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Maximum number of jobs that the master holds: queued, under way, or with a result that was not fetched
@@ -16,15 +16,15 @@ pub struct Options {
     /// How many recoveries in a row may end without the disturbed work done, before the bus is stopped
     /// (ND21 11.5: "after several unsuccessful correction attempts").
     pub attempts: u8,
-    /// How much later than the ring needs by itself a byte may come back: drivers, adapters, a busy host.
+    /// How much later than the ring's own round trip a byte may come back: drivers, adapters, a busy host.
     pub slack: Span,
     /// How long after a silence the ring has time to name the drive that hears nothing: the drives wait
     /// 10 to 20 ms, and then 10 ms more (ND21 9.9).
     pub monitoring: Span,
     /// Whether to begin with the check sequence (ND21 9.8). A master that was stopped, or a program that
-    /// ended, can leave drives with half a command, at which the first whole one is found wrong; but the
+    /// ended, can leave a drive with an incomplete command, and the first command of the next master then fails. But the
     /// zeros of the sequence put every drive into the error mode for a moment, and its cell `errorcode`
-    /// says so.
+    /// shows that.
     pub check_first: bool,
 }
 
@@ -42,8 +42,8 @@ impl Default for Options {
     }
 }
 
-/// Which of the shorter forms of a telegram a master may use (ND21 9.1, 9.2, 9.5). What is switched off
-/// is written out: an address byte in every telegram, one whole command in each.
+/// Which of the shorter forms of a telegram a master may use (ND21 9.1, 9.2, 9.5). Without
+/// a short form the long one is sent: an address byte in every telegram, one whole command in each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packing {
     /// The short address "same drive".

@@ -1,4 +1,4 @@
-//! From the first wrong byte back to work, or to the end (ND21 9.7-9.9, 11.5).
+//! Recovery: from the first wrong byte back to normal operation, or to a stopped bus (ND21 9.7-9.9, 11.5).
 
 use super::super::address::RingSize;
 use super::super::check_sequence::{Progress, Watch};
@@ -12,11 +12,11 @@ use super::{Master, Phase};
 use crate::line::Received;
 use crate::time::{Instant, Span};
 
-/// How long nothing is sent after a recovery that failed: less than the 10 ms after which the drives
-/// with monitoring would report a time-out, each to be spelled out in place of what was wrong (ND21 9.9).
+/// Silence after a failed recovery. It is shorter than the 10 ms after which drives with monitoring report a time-out:
+/// the ring would spell out that time-out in place of the first fault (ND21 9.9).
 const DRAINING: Span = Span::from_millis(8);
 
-/// What a master is doing, with what it needs for that.
+/// The state of a master, with its data.
 #[derive(Clone, Debug)]
 pub(super) enum State {
     Counting {
@@ -37,8 +37,7 @@ pub(super) enum State {
         heard: bool,
         until: Instant,
     },
-    /// Nothing is sent, because what has once come to be late stays late: a line that is never free never
-    /// catches up.
+    /// Nothing is sent, so that late bytes can catch up: on a line without a gap a delay never shrinks.
     Draining {
         until: Instant,
     },
@@ -70,8 +69,8 @@ impl State {
     }
 }
 
-/// The work at which a disturbance began. Recoveries are counted until it is done: a ring that comes back
-/// each time and fails again at the same place is as bad as one that does not come back.
+/// The work at which a disturbance began. Recoveries are counted until it is done, so that a ring that recovers
+/// each time and fails again at the same place is stopped as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Stumble {
     /// None, or none that can be named: done when a round of the ring has come back right.
@@ -81,10 +80,10 @@ pub(super) enum Stumble {
     Exchange(u8),
 }
 
-/// How the recoveries go.
+/// The history of the recoveries.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Episode {
-    /// Recoveries since the stumble was last got over.
+    /// Recoveries since the disturbed work was last done.
     failures: u16,
     /// Recoveries since the ring last ran.
     attempts: u8,
@@ -101,7 +100,7 @@ pub(super) struct Episode {
     count: bool,
     /// The ring has run.
     ran: bool,
-    /// What was found out last.
+    /// The last fault that was found.
     fault: Option<Fault>,
 }
 
@@ -152,7 +151,7 @@ impl Episode {
 }
 
 impl Master {
-    /// The ring is disturbed: work stops, and the ring is given time to spell out where.
+    /// Handles a disturbance: work stops, and the ring gets time to spell out an address.
     pub(super) fn disturb(&mut self, cause: Cause, now: Instant) {
         if self.episode.attempts == 0 {
             self.counters.disturbed += 1;
@@ -198,7 +197,7 @@ impl Master {
         }
     }
 
-    /// The ring has said what it had to say.
+    /// The ring has spelled out an address, or its time is over.
     pub(super) fn located(&mut self, spelled: Spelled, now: Instant) {
         let State::Locating { evidence, .. } = &self.state else {
             return;
@@ -251,7 +250,7 @@ impl Master {
         }
     }
 
-    /// Looks for the check sequence in what comes back.
+    /// Looks for the check sequence in the bytes that come back.
     pub(super) fn verify(&mut self, received: Received) {
         let watch = match &mut self.state {
             State::Resetting { watch, .. } => {
@@ -265,7 +264,7 @@ impl Master {
             _ => return,
         };
         if watch.see(received.byte, received.error.is_none()) == Progress::Complete {
-            // All drives are back, and what was sent behind the sequence comes next.
+            // All drives are back in normal mode; the bytes sent behind the sequence come next.
             if self.episode.count || !self.episode.ran {
                 self.state = State::counting();
             } else {
@@ -274,7 +273,7 @@ impl Master {
         }
     }
 
-    /// The ring is back: what was not done is sent again.
+    /// The ring works again: jobs that were not done are sent again.
     pub(super) fn resume(&mut self) {
         let attempts = core::mem::take(&mut self.episode.attempts);
         self.episode.ran = true;

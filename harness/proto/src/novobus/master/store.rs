@@ -1,5 +1,5 @@
-//! The jobs that a master holds: a fixed number of places, in two orders: all of them as they came, and
-//! those of one drive as they came. Nothing is searched and nothing grows.
+//! The jobs that a master holds: a fixed number of slots in two linked lists, one of all jobs and one for each
+//! drive, both in order of submission. Submitting and sending need no search, and the number of slots is bounded.
 
 use super::super::address::RingSize;
 use super::super::checksum::Checksum;
@@ -157,7 +157,7 @@ struct List {
 /// The jobs.
 #[derive(Clone, Debug)]
 pub(super) struct Store {
-    /// As many as were ever held at once, of `capacity`: most masters hold few.
+    /// Grows up to `capacity` with the number of jobs held at once: most masters hold few.
     entries: Vec<Option<Entry>>,
     capacity: u16,
     /// Which of them are empty.
@@ -256,15 +256,15 @@ impl Store {
         }
     }
 
-    /// Takes a job out for good; it is in no order any more.
+    /// Removes a job that is in neither list any more.
     pub(super) fn remove(&mut self, slot: Slot) -> Option<Entry> {
         let entry = self.entries.get_mut(usize::from(slot))?.take()?;
         self.free.push(slot);
         Some(entry)
     }
 
-    /// Takes out all jobs, oldest first, and leaves those in again, to be sent from the beginning, for
-    /// which `keep` says so. Gives how many of these had been begun.
+    /// Removes all jobs, oldest first, and adds those again, from their beginning, for which `keep` returns
+    /// true. Returns how many of these had been begun.
     pub(super) fn restart(&mut self, mut keep: impl FnMut(&Entry) -> bool) -> u64 {
         let mut slots: Vec<(JobId, Slot)> = (0..)
             .zip(&self.entries)

@@ -13,7 +13,7 @@ use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
 
-/// The most bytes that a drive holds back; those beyond are lost.
+/// Maximum number of bytes that a drive holds back; further bytes are lost.
 const MOST_HELD: usize = 64;
 
 /// A drive with deviations around it.
@@ -79,7 +79,7 @@ impl Deviant {
         }
     }
 
-    /// Lets the bus end work on the memory as the deviations show it.
+    /// Runs the bus end on the memory as the deviations show it.
     fn with<T>(&mut self, place: Place, work: impl FnOnce(&mut BusEnd, &mut Proxy<'_>) -> T) -> T {
         let (bus_end, memory) = self.drive.parts();
         let left = bus_end.remaining().map_or(0, |left| left.net_bytes);

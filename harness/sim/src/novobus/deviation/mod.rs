@@ -1,11 +1,11 @@
-//! Wrong drives: named deviations from the manual, for tests of what must find them.
+//! Wrong drives: named deviations from the manual, for tests that must find them.
 //!
-//! A [`Deviant`] stands around a drive and is the only place where anything is put wrong: it hears what
-//! arrives before the drive's bus end does, says what goes out after it, stands between the bus end and the
-//! memory, and changes what the drive's program finds in its cells. The drive inside knows nothing of it.
-//! [`deviations`] are the table: a name, a sentence, the section that is broken, and the injection.
+//! A [`Deviant`] wraps a right drive and is the only place that injects deviations. It changes incoming bytes before the
+//! drive's bus end receives them, outgoing bytes after it, accesses of the bus end to the
+//! memory, and the values that the drive's program finds in its cells. The inner drive is unchanged.
+//! [`deviations`] is the table: a name, a sentence, the section that is broken, and the injection.
 //!
-//! [`DeviantMaster`] and [`master_deviations`] are the same for the other end of the ring: the bench's own master.
+//! [`DeviantMaster`] and [`master_deviations`] do the same for the bench's own master.
 
 mod behind;
 mod cells;

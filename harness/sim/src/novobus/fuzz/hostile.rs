@@ -1,4 +1,4 @@
-//! The master on a ring that answers as it likes.
+//! The master on a ring that sends arbitrary answers.
 
 use super::LONGEST;
 use super::features::Notebook;
@@ -20,12 +20,12 @@ const SILENCE: usize = 40_000;
 /// second nine must not be repeated.
 ///
 /// # Panics
-/// A job ends twice or not at all, or the master holds more than it may.
+/// A job ends twice or never, or the master holds more jobs than it may.
 pub fn master(data: &[u8]) {
     noted(data, &mut Notebook::none());
 }
 
-/// The same, and what the master does and tells is noted.
+/// The same, and notes the master's phases and events.
 ///
 /// # Panics
 /// As [`master`].
@@ -184,7 +184,7 @@ fn command(number: usize) -> Command {
     }
 }
 
-/// Drives that answer as the manual says, asked for no more than is wanted of them.
+/// Drives that answer as the manual says, computed only on request.
 struct Sound {
     /// In ring order.
     drives: Vec<reference::Drive>,

@@ -1,4 +1,4 @@
-//! In-band marks: what a stream with marks says does not depend on where it is cut.
+//! In-band marks: the meaning of a stream with marks does not depend on where it is split.
 
 use super::LONGEST;
 use super::features::{Feature, Notebook};
@@ -11,8 +11,8 @@ type Read = Vec<Result<Received, BadMark>>;
 /// (PARMRK, termios).
 ///
 /// # Panics
-/// Another cut gives other bytes; a byte is read out of nothing or gets lost; what is read is not read again when it is
-/// written with marks; a good end is called the middle of a mark, or the reverse.
+/// Another split gives other bytes; a byte is invented or lost; bytes that are written again with marks are
+/// read differently; a good end is taken for the middle of a mark, or the reverse.
 pub fn links(data: &[u8]) {
     let Some((&cut, stream)) = data.split_first() else {
         return;
@@ -81,7 +81,7 @@ fn read<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> (Read, bool) {
     (read, unmark.at_boundary())
 }
 
-/// What was read is written with marks and read again.
+/// Writes the bytes that were read with marks, and reads them again.
 fn again(read_first: &Read) {
     let good: Vec<_> = read_first.iter().copied().filter_map(Result::ok).collect();
     let mut stream = Vec::new();

@@ -1,8 +1,8 @@
 //! The bodies of the fuzz targets: each takes any bytes and panics where a rule of the manual is broken.
 //!
-//! Inputs are bytes as they go over the wire, so that a corpus can be read, and played on hardware; what else
-//! a case needs stands in front of them and is described at each target. `corpora/fuzz/<target>/` holds inputs
-//! that are kept; plain `cargo test` plays all of them.
+//! Inputs are bytes as they go over the wire, so that a corpus can be read, and played on hardware. Other data that
+//! a case needs precede them; each target describes its own. `corpora/fuzz/<target>/` holds the kept
+//! inputs; plain `cargo test` plays all of them.
 
 mod bus_end;
 mod codec;
@@ -64,7 +64,7 @@ pub const TARGETS: [Target; 9] = [
     ("guard", guard),
 ];
 
-/// The longest input that is looked at; what lies behind is left out.
+/// Maximum length of an input; further bytes are ignored.
 const LONGEST: usize = 4_096;
 
 /// The codec: every byte string is a value, a beginning or a mistake, and a value is made of the bytes that it
@@ -81,7 +81,7 @@ pub fn codec(data: &[u8]) {
         assert_eq!(again, Some(value), "{used} bytes");
     }
     for length in 0..data.len().min(16) {
-        // What is a value of its beginning stays one, whatever follows.
+        // A value decoded from a beginning of the input stays the same with any bytes behind it.
         if let Decoded::Value { value, used } = Command::decode(&data[..length]) {
             let whole = Command::decode(data);
             assert_eq!(whole, Decoded::Value { value, used });
@@ -93,7 +93,7 @@ pub fn codec(data: &[u8]) {
 fn same_memory(ours: &PlainDrive, theirs: &reference::Drive) {
     let ours = ours.memory().ram_and_registers();
     let theirs = theirs.ram_and_registers();
-    // Not by a comparison of slices: libFuzzer listens in on those, and what two equal memories hold is no hint to it.
+    // Not with a comparison of slices: libFuzzer traces these, and the contents of equal memories are useless to it.
     let differing =
         |from: &[u8], to: &[u8]| from.iter().zip(to).fold(0, |all, (a, b)| all | (a ^ b));
     if differing(&ours[..2], &theirs[..2]) | differing(&ours[4..], &theirs[4..]) == 0 {

@@ -1,4 +1,4 @@
-//! What a master does and tells, and what a line brings, in the words of features.
+//! Names of features for the acts and events of a master and for the bytes of a line.
 
 use super::features::{Feature, Notebook};
 use harness_proto::line::Received;

@@ -1,12 +1,12 @@
 //! The matrix of protocol transitions of a drive's end of the bus: [`State`]s times [`Event`]s (ND21 9.1-9.9).
 //!
-//! A cell is reachable, or unreachable with a reason ([`why_unreachable`]). [`classify`] names the cell that a byte or a
-//! silence is for a bus end; it looks on and changes nothing. [`Watched`] is a drive with that observer around it, and
-//! [`Reached`] the cells of a run. [`tour`] leads to every reachable cell.
+//! A cell is reachable, or unreachable with a reason ([`why_unreachable`]). [`classify`] names the cell of a byte or a
+//! silence at a bus end and changes nothing. [`Watched`] is a drive with that observer around it, and
+//! [`Reached`] holds the cells of a run. [`tour`] leads to every reachable cell.
 //!
-//! The place of a drive in its ring is no dimension of the matrix. A drive hears its inbound link and nothing else, and a
-//! damaged link can bring any byte: what can happen to the first drive can happen to the last. The tests hold that:
-//! each drive of a ring, fed with what its link carried, and nothing of the ring around it, goes through the same cells.
+//! The place of a drive in its ring is no dimension of the matrix. A drive receives only its inbound link, and a
+//! damaged link can carry any byte, so every drive can reach the same cells. The tests check this:
+//! a single drive that receives the bytes of one link of a ring goes through the same cells as the drive in the ring.
 //!
 //! The matrix is that of a drive with default properties.
 
@@ -59,7 +59,7 @@ impl Transition {
         State::ALL.iter().flat_map(row)
     }
 
-    /// Those that can be reached.
+    /// The reachable cells.
     pub fn reachable() -> impl Iterator<Item = Self> {
         Self::all().filter(|cell| why_unreachable(*cell).is_none())
     }
@@ -70,8 +70,8 @@ impl Transition {
         self.state.index() * Event::ALL.len() + self.event.index()
     }
 
-    /// Its number among those that can be reached, from 0 to [`REACHABLE`] less 1; those [`WITHOUT_TIME_OUT`] have
-    /// the first numbers. `None` for one that cannot be.
+    /// Its number among the reachable cells, from 0 to [`REACHABLE`] less 1; those [`WITHOUT_TIME_OUT`] have
+    /// the first numbers. `None` for an unreachable cell.
     #[must_use]
     #[inline]
     pub fn number(self) -> Option<usize> {

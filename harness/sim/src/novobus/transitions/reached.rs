@@ -30,7 +30,7 @@ impl Reached {
         }
     }
 
-    /// Those that are not among those of another.
+    /// The cells that are not in another set.
     #[must_use]
     pub fn beyond(&self, other: &Self) -> Self {
         let mut beyond = self.clone();

@@ -1,5 +1,5 @@
-//! A tour through every reachable cell: for each state the shortest way to it that we know, and for each event what
-//! brings it about there. The inputs of the target `bus_end` in `corpora/fuzz` are this tour, a file a state.
+//! A tour through every reachable cell: for each state the shortest known way to it, and for each event the stimulus that
+//! causes it there. The inputs of the target `bus_end` in `corpora/fuzz` are this tour, one file for each state.
 
 use super::{Event, State, Transition, slug};
 use harness_proto::line::{LineError, Received};
@@ -128,7 +128,7 @@ const fn telegram(state: State) -> Option<&'static [u8]> {
     })
 }
 
-/// What brings the event of a cell about in its state; `None` for a cell that cannot be reached.
+/// The stimulus that causes the event of a cell in its state; `None` for an unreachable cell.
 #[must_use]
 pub fn stimulus(cell: Transition) -> Option<Stimulus> {
     super::why_unreachable(cell).is_none().then(|| {

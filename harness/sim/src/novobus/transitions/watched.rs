@@ -27,7 +27,7 @@ impl<N: Notes> Watched<N> {
         }
     }
 
-    /// Is as new again, with the EEPROM that it has and nothing noted.
+    /// Resets the drive for reuse: it keeps its EEPROM, and the noted transitions are cleared.
     pub fn restart(&mut self) {
         self.drive.restart();
         self.reached = N::default();
@@ -40,7 +40,7 @@ impl<N: Notes> Watched<N> {
         &self.drive
     }
 
-    /// What it has gone through.
+    /// The transitions that it went through.
     #[must_use]
     pub const fn reached(&self) -> &N {
         &self.reached
@@ -58,13 +58,13 @@ impl<N: Notes> Watched<N> {
         self.timed_out
     }
 
-    /// What it has gone through; the drive is done with.
+    /// Returns the transitions that it went through and consumes the drive.
     #[must_use]
     pub fn into_reached(self) -> N {
         self.reached
     }
 
-    /// What a byte would be to it.
+    /// The transition that a byte would be.
     #[must_use]
     pub fn transition(&self, received: Received) -> Transition {
         classify(self.drive.bus_end(), self.drive.memory(), received)

@@ -1,11 +1,11 @@
-//! A witness beside a whole ND21: what of it no other model of the drive is needed to know.
+//! A witness judges a complete ND21 by the rules that need no second model of the drive.
 //!
-//! It hears what the drive hears and says for each byte what must go out for it, by the [reference model](crate::novobus::reference) of the bus
-//! (ND21 9, 10), which shares no code with the drive's own end of the bus. What the drive changes by itself the reference is taught
-//! before each byte, out of the drive's memory; nothing else may change between two bytes, and a byte changes exactly the cells
-//! that it means, as far as the tables let them be written (14.2.1). Silence is watched by the clock of 9.9, the EEPROM
-//! controller by what stands in the EEPROM when it says that it is done, and the invariants of the drive after
-//! every cycle. What a motor does within these it does not judge.
+//! It receives the same bytes as the drive and predicts each answer with the [reference model](crate::novobus::reference) of the bus
+//! (ND21 9, 10), which shares no code with the drive's own end of the bus. Before each byte it copies the cells that the drive changes by
+//! itself from the drive's memory into the reference. No other cell may change between two bytes, and a byte may change only the cells
+//! that it addresses, as far as the tables let them be written (14.2.1). It checks silence against the times of 9.9, the EEPROM
+//! controller against the EEPROM's contents when the controller reports that it is done, and the invariants of the drive after
+//! every cycle. It does not judge how a motor moves within these rules.
 
 mod cells;
 mod eeprom;
@@ -104,7 +104,7 @@ impl Witness {
         self.complaint.as_ref()
     }
 
-    /// Nothing comes any more: what should have happened up to now has.
+    /// The conversation has ended: everything that was due up to now must have happened.
     pub fn end(&mut self, now: Instant) {
         self.before(now);
     }

@@ -110,7 +110,7 @@ fn a_broken_ring_is_silent_without_monitoring() {
     );
 }
 
-/// A ring that is joined again goes on, and what was lost is repeated.
+/// A ring that is joined again goes on, and lost jobs are repeated.
 #[test]
 fn a_ring_that_is_joined_again_goes_on() {
     for monitoring in [false, true] {
@@ -369,7 +369,7 @@ fn corrected_errors_are_counted() {
     }
 }
 
-/// What may run but once is not repeated: "unknown, not repeated". What was not sent whole did not run.
+/// A job that may run only once is not repeated: "unknown, not repeated". A job that was not sent whole did not run.
 #[test]
 fn what_may_run_but_once_is_not_repeated() {
     for repeat in [false, true] {

@@ -1,8 +1,8 @@
-//! Wrong masters: named deviations of a bench's own end of the bus, for tests of what must find them.
+//! Wrong masters: named deviations of a bench's own end of the bus, for tests that must find them.
 //!
-//! A [`DeviantMaster`] stands around a right master and is the only place where anything is put wrong: it changes the jobs that the master
-//! takes, the bytes that it sends and hears, the times for which it waits, and what it tells. The master inside knows nothing of it.
-//! [`master_deviations`] are the table: a name, a sentence, the section that is broken, and the injection.
+//! A [`DeviantMaster`] wraps a right master and is the only place that injects deviations. It changes the jobs that the master
+//! takes, the bytes that it sends and receives, its time-outs, and the events that it reports. The inner master is unchanged.
+//! [`master_deviations`] is the table: a name, a sentence, the section that is broken, and the injection.
 
 mod deviant;
 mod how;

@@ -1,4 +1,4 @@
-//! Whether what a master tells is so.
+//! Judges whether the reports of a master are true.
 
 use super::wire;
 use super::work::{BITS, Order, Work, constant, nominal};
@@ -11,7 +11,7 @@ use harness_proto::novobus::master::{End, Event, Fault, JobId, Outcome, RingLink
 use std::borrow::Cow;
 use std::fmt;
 
-/// Something that a master did or told and that is not as the manual says.
+/// An act or a report of a master that breaks the manual.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lie {
     /// The section of the ND21's manual that is broken.
@@ -91,7 +91,7 @@ impl<'w> Judge<'w> {
         self.jobs.iter().filter(|(.., ended)| !ended).count()
     }
 
-    /// Hears what the master tells.
+    /// Takes an event that the master reports.
     pub(super) fn hear(&mut self, event: &Event, ring: &Ring<Counted>) -> Result<(), Lie> {
         match event {
             Event::Ready | Event::Round { .. } => Ok(()),
@@ -250,8 +250,8 @@ impl<'w> Judge<'w> {
                     || address == ram::BUS_ADDR
                     || self.jobs.iter().any(|(_, order, _)| by_job(order))
             };
-            // A byte too few or too many makes process data of what is none; so does a drive that has missed the check sequence because of
-            // a second fault, and sends received + 1 (9.7): 88 becomes 89.
+            // A missing or extra byte can turn other bytes into process data. So can a drive that missed the check sequence because of
+            // a second fault and sends received + 1 (9.7): 88 becomes 89.
             let stray = drive.memory.all_written().find(|address| !asked(*address));
             if let Some(address) =
                 stray.filter(|_| !self.work.may_fool() && self.work.faults.len() < 2)

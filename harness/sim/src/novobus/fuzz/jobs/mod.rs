@@ -1,7 +1,7 @@
-//! Jobs for a master on a ring with faults, judged by the truth: what the drives hold, which faults there were, and what went over the wire.
+//! Jobs for a master on a ring with faults, judged by the drives' cells, the injected faults and the bytes on the wire.
 //!
-//! The input is a description of the work, so that a fuzzer can write it: see [`Work::read`]. The master is given nothing but its line; the
-//! judge looks into the drives.
+//! The input describes the work in a form that a fuzzer can write: see [`Work::read`]. The master sees only its line; the
+//! judge also looks into the drives.
 
 mod judge;
 mod noted;
@@ -16,15 +16,15 @@ use super::features::Notebook;
 use crate::novobus::deviation::MasterDeviation;
 use harness_proto::novobus::command::Command;
 
-/// A body for fuzz targets: the jobs of the input end with the truth.
+/// A body for fuzz targets: the master must report the true outcome of each job of the input.
 ///
 /// # Panics
-/// The master tells something that is not so, or sends what the manual does not allow.
+/// The master reports something false, or sends bytes that the manual does not allow.
 pub fn jobs(data: &[u8]) {
     noted(data, &mut Notebook::none());
 }
 
-/// The same, and what master and drives go through is noted.
+/// The same, and notes the states of the master and the drives.
 ///
 /// # Panics
 /// As [`jobs`].
@@ -45,7 +45,7 @@ pub fn conduct(drives: u8, sent: &[u8], asked: Option<&[(u8, Command)]>) -> Resu
     asked.map_or(Ok(()), |asked| read.asked_for(asked))
 }
 
-/// The first thing in which a master is wrong; `None` where everything that it did and told is as it must be.
+/// The first mistake of a master; `None` if all its bytes and reports are right.
 #[must_use]
 pub fn judged(work: &Work, deviates: Option<&'static MasterDeviation>) -> Option<Lie> {
     play::play(work, deviates, &mut Notebook::none()).err()

@@ -1,4 +1,4 @@
-//! What the target `jobs` reaches: what meets a master and what it makes of it, and the states of its drives.
+//! The features of the target `jobs`: events at a master, its reactions, and the states of its drives.
 
 use super::super::features::{Feature, Notebook};
 use super::super::words;
@@ -12,7 +12,7 @@ use harness_proto::novobus::command::Kind;
 use harness_proto::novobus::master::{Event, JobId, Phase};
 use std::collections::BTreeMap;
 
-/// An onlooker.
+/// An observer.
 pub(super) struct Watch<'a, 'n> {
     work: &'a Work,
     notes: &'a mut Notebook<'n>,

@@ -1,4 +1,4 @@
-//! A master at its work, in virtual time.
+//! Runs a master in virtual time.
 
 use super::super::features::Notebook;
 use super::judge::{DATA_IN, DATA_OUT, Judge, Lie};
@@ -20,7 +20,7 @@ const BOUND: u64 = 6_000;
 /// Byte times behind the last job, in which the master can still report a wrong byte.
 const AFTERWARDS: u64 = 500;
 
-/// Lets a master do the work, and judges it.
+/// Runs a master on the work, and judges it.
 pub(super) fn play(
     work: &Work,
     deviates: Option<&'static MasterDeviation>,
@@ -40,14 +40,14 @@ pub(super) fn play(
     let mut watch = Watch::new(work, notes);
     let done = do_all(work, &mut master, &mut ring, &mut judge, &mut watch);
     watch.drives(&ring);
-    // What it sent wrongly is why all the rest is wrong.
+    // A wrong byte that it sent explains all later mistakes.
     wire::read(work.drives, &judge.sent)?;
     done?;
     actual_values(work, &master, &judge)?;
     judge.end(&ring)
 }
 
-/// Gives it the orders, until all have ended and what was wrong has been told.
+/// Submits the orders and runs until all have ended and every disturbance has been reported.
 fn do_all(
     work: &Work,
     master: &mut AnyMaster,
