@@ -11,7 +11,7 @@ fn free() -> String {
     listener.local_addr().expect("an address").to_string()
 }
 
-/// The summary names the taps that let more be played and how many scenarios, and with these taps so many more are judged.
+/// The summary names the taps that would let more scenarios be played, and how many; with these taps that many more are judged.
 #[test]
 fn taps_unlock_what_is_said_of_them() {
     let names = [
@@ -65,7 +65,7 @@ fn taps_unlock_what_is_said_of_them() {
         with.status.code() == Some(0)
     });
     assert!(judged, "five runs, and in each something was not seen");
-    // One tap is not enough, and what the other one adds is said.
+    // One tap is not enough, and the summary says what the other one adds.
     let (one, _) = text.rsplit_once("[[tap]]").expect("two taps");
     std::fs::write(&path, one).expect("room");
     let half = desk.run(&arguments);
