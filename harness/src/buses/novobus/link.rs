@@ -73,7 +73,8 @@ impl SimulatedLink {
         }
     }
 
-    /// Puts a [witness](harness_sim::novobus::witness) beside every drive, to whom nobody has spoken; false where one is no whole ND21 and has none.
+    /// Adds a [witness](harness_sim::novobus::witness) to every drive, before anything is sent. Returns false if a drive is not a whole ND21
+    /// and has no witness.
     #[must_use]
     pub fn witness(&mut self) -> bool {
         let byte_time = self.byte_time;

@@ -24,36 +24,35 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time;
 
-/// How far ahead of the line bytes are with the operating system at least, while there are any.
+/// How far ahead of the line queued bytes are handed to the operating system, at least.
 const AT_LEAST_AHEAD: Span = Span::from_millis(50);
 
-/// How far ahead of the line a driver may hand over its bytes at most: more than a busy computer is late, less than a person
-/// notices.
+/// Maximum time ahead of the line at which a driver may hand over its bytes: longer than a busy computer is late, and too short for a
+/// person to notice.
 const LEAD: Span = Span::from_millis(16);
 
-/// How far beyond an answer that somebody waits for at least, on a real line: an adapter takes and gives bytes a millisecond's worth
-/// at a time, and holds them for longer.
+/// Minimum of [`Lead::near`] on a line with an adapter, which transfers bytes in blocks of a millisecond and may hold them for longer.
 const ADAPTER: Span = Span::from_millis(4);
 
-/// How much later than the ring itself needs a byte may come back: adapters, a busy computer.
+/// How much longer than the ring itself needs a byte may take to come back, because of adapters and a busy computer.
 pub(crate) const SLACK: Span = Span::from_millis(30);
 
-/// How exact times are where the rig's file says nothing.
+/// Default time tolerance of a rig.
 pub const TOLERANCE: Span = Span::from_millis(5);
 
-/// The longest sleep, so that a request to end is seen.
+/// The longest sleep: the link checks for a request to end at least this often.
 const NAP: Span = Span::from_millis(50);
 
-/// For how much longer the line must be taken by what has been sent, so that nobody waits for an answer.
+/// The link dozes if the bytes already sent occupy every line for more than this time: no answer is urgent then.
 const CALM: Span = Span::from_millis(4);
 
-/// The sleep then: some bytes.
+/// How long the link dozes: a few byte times.
 const DOZE: Span = Span::from_millis(2);
 
-/// How long before an answer is due whoever waits for it is woken: that takes longer than all that is done about the answer.
+/// How long before an expected answer the link wakes up and polls: waking up takes longer than processing the answer.
 const AWAKE: Span = Span::from_micros(40);
 
-/// For how long he stays awake behind that time; what is later than that finds him asleep.
+/// How long the link keeps polling after an answer was due. It sleeps while it waits for a later answer.
 const STAY: Span = Span::from_micros(150);
 
 /// One or two rings over streams.
@@ -62,23 +61,23 @@ pub struct StreamLink {
     rings: Vec<Ring>,
     inner: Vec<InnerLink>,
     rate: Rate,
-    /// The time that is the conversation's start.
+    /// When the conversation started.
     start: time::Instant,
-    /// The last time that somebody was told: what had not come then has come later, whatever is computed of it.
+    /// The last time that [`Line::now`] returned. A byte that had not arrived by then is stamped later than this.
     told: Cell<Instant>,
-    /// How late it has been woken.
+    /// How late the operating system wakes this thread.
     late: Lateness,
     /// When the ports were last looked at.
     looked: Instant,
-    /// Whoever waits is awake and looks again before this time.
+    /// Set while the caller busy-polls: it is expected to call [`Line::wait`] again before this time.
     awake: Option<Instant>,
-    /// Somebody has been told of bytes that have come, and has fetched none since: only more of them are news.
+    /// Edge-triggered: input already reported and still unread is not reported again.
     lying: bool,
     capabilities: Vec<Capability>,
-    /// Faults that wait for their time, in order of it.
+    /// Faults to inject at a time, in order of time.
     scheduled: VecDeque<(Instant, usize, usize, LinkFault)>,
     interrupt: Arc<AtomicBool>,
-    /// Goes up with every look at the ports.
+    /// Incremented at every poll of the ports.
     beats: Arc<AtomicU64>,
     trouble: Option<Trouble>,
     recording: bool,
@@ -86,8 +85,8 @@ pub struct StreamLink {
 }
 
 impl StreamLink {
-    /// A link over one wire a ring, one ring or two, each with its number of drives. `interrupt` is set by whoever
-    /// wants the program to end.
+    /// Creates a link over one wire per ring, each with its number of drives; there are one or two rings. When `interrupt` is set, the
+    /// link stops sending with [`Trouble::Interrupted`].
     #[must_use]
     pub fn new(
         wires: Vec<(Wire, u8)>,
@@ -138,21 +137,21 @@ impl StreamLink {
         }
     }
 
-    /// Sets how exact times are taken to be.
+    /// Sets the time tolerance.
     pub fn set_time_tolerance(&mut self, tolerance: Span) {
         self.tolerance = tolerance;
     }
 
-    /// A count that goes up while whoever uses this link lives.
+    /// A counter that increases as long as the user of this link keeps calling it; a watchdog reads it.
     #[must_use]
     pub fn beats(&self) -> Arc<AtomicU64> {
         Arc::clone(&self.beats)
     }
 
-    /// Bytes for each ring that somebody else can send when the owner of this link does not move any more.
+    /// Prepares bytes for each ring that a watchdog can send when the owner of this link hangs.
     ///
     /// # Errors
-    /// There is no descriptor left.
+    /// No file descriptor is left.
     pub fn last_words(&self, bytes: impl Fn(usize) -> Vec<u8>) -> std::io::Result<Vec<LastWords>> {
         let rings = self.rings.iter().enumerate();
         rings
@@ -160,12 +159,12 @@ impl StreamLink {
             .collect()
     }
 
-    /// Keeps no record of what the links carry from now on.
+    /// Stops recording what the links carry.
     pub fn stop_recording(&mut self) {
         self.recording = false;
     }
 
-    /// After an interruption: what is needed for a safe state may be sent. Other trouble stays.
+    /// Allows sending again after an interruption, so that a safe state can be reached. Other trouble stays.
     pub fn resume(&mut self) {
         if self.trouble == Some(Trouble::Interrupted) {
             self.trouble = None;
@@ -173,19 +172,19 @@ impl StreamLink {
         }
     }
 
-    /// Line errors that the transport has told of without saying at which byte, since the last call.
+    /// Number of line errors since the last call that the transport reported without their byte.
     pub fn take_unplaced(&mut self) -> u64 {
         let rings = self.rings.iter_mut();
         rings.map(|ring| std::mem::take(&mut ring.unplaced)).sum()
     }
 
-    /// How long sending was held up around bytes with a wrong parity bit, each time.
+    /// How long sending was held up around each byte with a wrong parity bit.
     pub fn take_gaps(&mut self) -> Vec<time::Duration> {
         let rings = self.rings.iter_mut();
         rings.flat_map(|ring| ring.wire.take_gaps()).collect()
     }
 
-    /// The inner links that the bench has a port at.
+    /// The inner links at which the bench has a port.
     #[must_use]
     pub fn inner_links(&self) -> &[InnerLink] {
         &self.inner
@@ -196,22 +195,22 @@ impl StreamLink {
         Instant::START + Span::from_nanos(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
     }
 
-    /// The same the other way.
+    /// Converts a time of the conversation to the computer's clock.
     fn clock(&self, at: Instant) -> time::Instant {
         self.start + time::Duration::from_nanos(at.since_start().as_nanos())
     }
 
-    /// How long a byte may take to come back: whoever was not there at that time looks again.
+    /// How long a byte may take to come back, with the recent lateness of the computer. A byte counts as lost only after one more poll.
     fn round(&self, ring: &Ring) -> Span {
         self.rate.byte_time() * (2 * u64::from(ring.drives) + 4) + SLACK + self.lateness()
     }
 
-    /// How late the computer has been of late.
+    /// The recent lateness of the computer.
     fn lateness(&self) -> Span {
         self.late.at(self.clock(self.told.get()))
     }
 
-    /// Lets due faults happen and gives the operating system what is due.
+    /// Injects due faults and hands due bytes to the operating system.
     fn give(&mut self, now: Instant) {
         self.beats.fetch_add(1, Ordering::Relaxed);
         while let Some(&(at, ring, link, fault)) = self.scheduled.front()
@@ -234,7 +233,7 @@ impl StreamLink {
         }
     }
 
-    /// Takes what has come.
+    /// Reads what has arrived.
     fn take(&mut self, now: Instant) {
         self.looked = now;
         let told = self.told.get();
@@ -245,7 +244,7 @@ impl StreamLink {
                 self.trouble = done.err();
             }
         }
-        // Between two drives bytes are passed on whatever happens to the conversation.
+        // Interposers forward bytes even if the conversation has ended with trouble.
         let most = if self.recording { MOST_RECORDED } else { 0 };
         for inner in &mut self.inner {
             if let Err(trouble) = inner.pump(now, self.rate.byte_time(), most) {
@@ -272,49 +271,50 @@ impl StreamLink {
         }
     }
 
-    /// Whether there is a byte to be fetched from a ring; what is delayed on the last link has not come yet.
+    /// Whether a byte of a ring can be fetched. A byte delayed on the last link has not arrived yet.
     fn has_come(&self, ring: &Ring) -> bool {
         let next = ring.received.front();
         next.is_some_and(|(at, _)| *at <= self.told.get() || *at <= self.now())
     }
 
-    /// The same of all of them.
+    /// Whether a byte of any ring can be fetched.
     fn any_has_come(&self) -> bool {
         self.rings.iter().any(|ring| self.has_come(ring))
     }
 
-    /// When something has to be done although nothing comes.
+    /// The next time at which the link must act even if no byte arrives.
     fn due(&self, now: Instant) -> Option<Instant> {
         let queues = self.rings.iter().filter_map(|ring| {
             let (start, exact, _) = ring.queue.front()?;
-            // All that is due goes out at once, and then nothing for a while.
+            // Due bytes go out together, so that the next call is some time away.
             let lead = if *exact { Span::ZERO } else { AT_LEAST_AHEAD };
             Some(*start - lead)
         });
         let faults = self.scheduled.front().map(|(at, ..)| *at);
-        // What is delayed on the last link.
+        // Bytes delayed on the last link.
         let fronts = self.rings.iter().filter_map(|ring| ring.received.front());
         let queues = queues.chain(fronts.map(|(at, _)| *at).filter(|at| *at > now));
         let relays = self.inner.iter().filter_map(InnerLink::due);
-        // From when on a byte that has not come home counts as lost.
+        // When a byte that has not come back counts as lost.
         let expecting = self.rings.iter().filter(|ring| ring.sent > ring.came);
         let lost = expecting.map(|ring| ring.free + self.round(ring));
         let lost = lost.filter(|at| *at > self.looked);
         queues.chain(faults).chain(relays).chain(lost).min()
     }
 
-    /// Lets time pass until then, or until something has come, and looks.
+    /// Waits until `until` or until a byte arrives, then polls the ports.
     fn pass(&mut self, now: Instant, until: Instant) {
         let calm = now + CALM;
         let awaited = self.awaited(now);
         if self.inner.is_empty() && self.rings.iter().all(|ring| ring.free > calm) {
-            // What comes meanwhile can wait: the line is taken for longer, and to wake up for every byte costs more than all else.
+            // Bytes that arrive meanwhile can wait, because the line is occupied for longer. Waking up for every byte would cost the most
+            // time.
             let until = until.min(now + DOZE);
             std::thread::sleep(time::Duration::from_nanos(until.since(now).as_nanos()));
             self.late.woken(self.clock(until), time::Instant::now());
         } else if let Some(at) = awaited.filter(|at| *at - AWAKE <= now) {
-            // Whoever waits looks at what has come, again and again, and so he has all that he needs at hand when something has.
-            // To give way here is to be out of it for a whole slice of time where others are busy.
+            // The caller polls in a loop, which keeps the code and data for an answer in the caches.
+            // Yielding here would cost a whole time slice on a busy computer.
             self.awake = Some(until.min(at + STAY));
         } else {
             let wake = awaited.map_or(until, |at| until.min(at - AWAKE));
@@ -325,7 +325,7 @@ impl StreamLink {
         self.look();
     }
 
-    /// Gives the operating system what is due and takes what has come.
+    /// Hands due bytes to the operating system and reads what has arrived.
     fn look(&mut self) -> Instant {
         let now = self.at(time::Instant::now());
         self.give(now);
@@ -333,8 +333,8 @@ impl StreamLink {
         now
     }
 
-    /// When something is due for which whoever waits is to be awake: what he has said, and the last byte that was sent. Where an adapter
-    /// brings it, nobody knows when.
+    /// When the next byte is due for which the link must be awake: the answer announced by [`Line::attend`], or the last byte sent. `None`
+    /// for a ring behind an adapter, whose delivery times are unpredictable.
     fn awaited(&self, now: Instant) -> Option<Instant> {
         let out = |ring: &&Ring| ring.sent > ring.came && ring.wire.is_prompt();
         let home = |ring: &Ring| ring.free + self.rate.byte_time() * u64::from(ring.drives);
@@ -343,7 +343,7 @@ impl StreamLink {
         due.filter(|at| now < *at + STAY).min()
     }
 
-    /// Waits for the ports, at most this long.
+    /// Waits for the ports, for at most `span`.
     fn listen(&mut self, span: Span) {
         let timeout = Timespec {
             tv_sec: 0,
@@ -443,8 +443,8 @@ impl Line for StreamLink {
 }
 
 impl StreamLink {
-    /// Whether the port at an inner link still has to show bytes that have come home: its adapter may be slower than
-    /// the master's own.
+    /// Whether the port at an inner link has not yet shown all bytes that are back at the master: its adapter may be slower than the
+    /// master's.
     fn lags(&self, inner: &InnerLink) -> bool {
         let ring = self.rings.get(inner.ring);
         ring.is_some_and(|ring| {
@@ -459,14 +459,14 @@ impl StreamLink {
         if !ring.queue.is_empty() || ring.wire.waiting() > 0 || now < ring.free {
             return true;
         }
-        // More than was sent comes after a time-out, and without an end (ND21 9.9): then only time tells.
-        // What an interposer has dropped does not come home, and what it has put in does.
+        // After a time-out drives send zeros without end (ND21 9.9): then only time decides.
+        // Bytes that an interposer has dropped do not come back; bytes that it has inserted do.
         let inner = self.inner.iter().filter(|inner| inner.ring == index);
         let (taken, given) = inner.fold((0, 0), |(taken, given), inner| {
             (taken + inner.taken, given + inner.given)
         });
         let home = ring.came + taken == ring.sent + given;
-        // Whoever was away at that time has still to look.
+        // A byte counts as lost only after a poll behind its time.
         !home && self.looked < ring.free + self.round(ring)
     }
 }
@@ -497,7 +497,7 @@ impl Link for StreamLink {
     }
 
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
-        // Planning has refused, and the rig's capabilities have excluded, what happens elsewhere.
+        // Planning and the capabilities of the rig exclude faults at other places.
         let PlacedFault::Link(link, fault) = fault else {
             return;
         };

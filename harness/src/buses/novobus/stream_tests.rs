@@ -1,4 +1,4 @@
-//! When who waits for an answer is awake.
+//! Tests when the link is awake for an answer.
 
 use super::*;
 use crate::port::{Endpoint, PortSettings, open};
@@ -28,7 +28,7 @@ fn link() -> (StreamLink, TcpStream) {
     (link, ring)
 }
 
-/// The last byte comes home when it has passed all drives, each of which takes a byte time (ND21 8.2).
+/// The last byte is back when it has passed all drives; each takes a byte time (ND21 8.2).
 #[test]
 fn who_waits_is_awake_for_the_last_byte() {
     let (mut link, _ring) = link();
@@ -44,7 +44,7 @@ fn who_waits_is_awake_for_the_last_byte() {
     );
 }
 
-/// What somebody waits for comes before SYNCO that was sent behind it.
+/// An announced answer is due before SYNCO that was sent behind it.
 #[test]
 fn who_waits_says_for_what() {
     let (mut link, _ring) = link();
@@ -58,7 +58,7 @@ fn who_waits_says_for_what() {
     assert_eq!(link.awaited(Instant::START), None);
 }
 
-/// Nobody stays awake for what has come.
+/// The link does not stay awake for a byte that has arrived.
 #[test]
 fn what_has_come_is_not_waited_for() {
     let (mut link, mut ring) = link();
@@ -70,7 +70,7 @@ fn what_has_come_is_not_waited_for() {
     assert_eq!(link.awaited(Instant::START), None);
 }
 
-/// Whoever was away at the time until which a byte may take looks again: it may lie there, or the ring was away as well.
+/// A byte counts as lost later if the computer was late: the byte may already be in the buffer, or the ring stood still as well.
 #[test]
 fn who_was_away_waits_for_lost_bytes_as_much_longer() {
     let (mut link, _ring) = link();
@@ -82,7 +82,7 @@ fn who_was_away_waits_for_lost_bytes_as_much_longer() {
     assert!(away > calm + SLACK, "{away}, {calm} before");
 }
 
-/// A byte that came while nobody was there to look is not lost, however long that was.
+/// A byte that arrived while the ports were not polled is not lost, however long that was.
 #[test]
 fn who_was_away_looks_before_a_byte_counts_as_lost() {
     let (mut link, mut ring) = link();
@@ -96,7 +96,7 @@ fn who_was_away_looks_before_a_byte_counts_as_lost() {
     assert!(link.wait(link.now() + Span::from_millis(60_000)));
     assert!(!link.busy());
     assert_eq!(link.receive(0).map(|(_, byte)| byte.byte), Some(0x80));
-    // What is lost is lost at the first look behind that time, and nobody sleeps for it.
+    // A missing byte counts as lost at the first poll behind its time, without a sleep.
     let free = link.send(0, &[0x80]);
     let over = free + link.round(&link.rings[0]);
     while link.now() <= over {
@@ -107,13 +107,13 @@ fn who_was_away_looks_before_a_byte_counts_as_lost() {
     assert!(!link.busy(), "it is lost");
 }
 
-/// Whoever stands still while he is awake for an answer is late, as one who is woken late is.
+/// A caller that stands still while it polls for an answer counts as late, as one that is woken late does.
 #[test]
 fn who_stands_still_while_awake_is_late() {
     let (mut link, _ring) = link();
     let long = Span::from_millis(60_000);
     while link.awake.is_none() {
-        // The computer may be late here too: then it is for the next byte.
+        // The computer may be late here too: then try again with the next byte.
         let free = link.send(0, &[0x88]);
         let home = free + link.byte_time() * u64::from(DRIVES);
         while link.awake.is_none() && link.now() < home + STAY {

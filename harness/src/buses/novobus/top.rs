@@ -7,10 +7,10 @@ use harness_proto::nd21::ram;
 use harness_proto::novobus::master::Counters;
 use harness_proto::time::Span;
 
-/// The most disturbances that are told apart; more of other kinds are only counted.
+/// Maximum number of kinds of disturbances listed; further kinds are only counted.
 const MOST_KINDS: usize = 64;
 
-/// What stands above everything and does not change.
+/// The heading of the page, which does not change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Heading {
     /// The bench's name.
@@ -355,7 +355,7 @@ fn row(drive: &DriveReading) -> Row {
     }
 }
 
-/// A number with so many decimals; zero has no sign.
+/// Formats a number with this number of decimals; zero has no sign.
 fn number(value: Option<f64>, decimals: usize) -> String {
     let Some(value) = value else {
         return "-".to_owned();

@@ -168,7 +168,7 @@ impl ByDriver {
 }
 
 impl Evidence {
-    /// A job was not confirmed, and the driver says so.
+    /// Notes a job that the driver reported as not confirmed.
     fn fails(&mut self, error: &Error) {
         self.noticed = true;
         self.confirmed = false;
@@ -192,7 +192,7 @@ impl Evidence {
     }
 }
 
-/// Lets everything come home.
+/// Waits until all bytes are back.
 fn settle(link: &mut SimulatedLink) {
     let end = link.now() + Span::from_millis(3_600_000);
     while link.busy() && link.now() < end && link.wait(end) {}

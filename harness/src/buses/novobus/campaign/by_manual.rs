@@ -184,7 +184,7 @@ impl Play<'_> {
         self.evidence.all_back = all_back(&self.link);
     }
 
-    /// Something is wrong: whom does the master blame?
+    /// Notes the link that the master blames for a wrong byte.
     fn name(&mut self, heard: &[Received], wrong: usize) {
         self.evidence.noticed = true;
         let drives = self.of.answers.shape.drives;
@@ -222,7 +222,7 @@ impl Play<'_> {
         }
     }
 
-    /// Cells that hold what they should not, and data that came otherwise.
+    /// Cells with wrong contents, and data that differed.
     fn wrong_values(&self) -> Vec<Wrong> {
         let mut wrong = self.of.sound.wrong(&self.link, self.evidence.confirmed);
         if !self.evidence.confirmed {

@@ -14,7 +14,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
-    /// Nobody noticed anything, and nothing is different: every drive holds what it should and waits as it should.
+    /// Not noticed and without effect: every drive has the right cells and waits for a sync byte.
     Harmless,
     /// Noticed, the damaged link named, everything back, every cell right.
     Located,
@@ -28,7 +28,7 @@ pub enum Class {
     /// Noticed, but a cell holds what it never should, and nothing that the master saw says which: a wrong
     /// drive or a wrong cell was written before something else was found to be wrong.
     Corrupted,
-    /// Nobody noticed anything, and a cell holds another value than it should, or a job brought a wrong value.
+    /// Not noticed, and a cell holds a wrong value or a job returned one.
     SilentCorruption,
 }
 
@@ -127,7 +127,7 @@ impl Evidence {
     /// The class of a case whose faults were on these links.
     ///
     /// # Errors
-    /// What fits no class, in a sentence: the bench contradicts itself.
+    /// A contradiction in the bench's own evidence, as a sentence: it fits no class.
     pub fn class(&self, links: &[usize]) -> Result<Class, &'static str> {
         let noticed = self.noticed;
         if !noticed && (self.named.is_some() || self.sequences > 0) {

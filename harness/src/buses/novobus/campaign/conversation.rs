@@ -22,8 +22,8 @@ pub enum Talk {
     Calls(Vec<Vec<(u8, PlannedCall)>>),
 }
 
-/// Takes the conversation out of a scenario: its `>` lines and jobs, or its `master` lines. Faults, checks and what is
-/// expected are left out: a campaign brings its own.
+/// Extracts the conversation of a scenario: its `>` lines and jobs, or its `master` lines. Faults, checks and expectations are left
+/// out, because a campaign has its own.
 ///
 /// # Errors
 /// A step that a campaign does not play, or drives whose cells change by themselves.
@@ -126,7 +126,7 @@ struct Half {
 }
 
 impl Answers {
-    /// Takes a conversation apart for a ring of so many drives; `sound` is what comes back without a fault.
+    /// Analyses a conversation for a ring with this number of drives; `sound` is what comes back without a fault.
     #[must_use]
     pub fn new(sent: Vec<u8>, drives: u8, sound: &[Received]) -> Self {
         let telegrams = telegrams(&sent);
@@ -181,8 +181,8 @@ impl Answers {
         answers
     }
 
-    /// Where what comes back without a fault is something else (a telegram for nobody, a command that is refused),
-    /// that is what must come.
+    /// Corrects the expected bytes to those that come back without a fault: these differ for a telegram that addresses no drive, or for a
+    /// refused command.
     fn believe(&mut self, sound: &[Received]) {
         while let Some(place) = self
             .wrong(sound, 0)

@@ -26,8 +26,8 @@ fn cells(link: &SimulatedLink, drive: u8) -> Option<&Cells> {
     Some(link.drive(0, drive)?.cells())
 }
 
-/// The addresses at which two drives differ. What a drive notes of an error of the bus (14.10.1) and for whom it took the
-/// last telegram (9.2) is no damage.
+/// The addresses at which two drives differ. The record of a bus error (14.10.1) and of the addressee of the last telegram (9.2) does
+/// not count as damage.
 fn differences(a: &Cells, b: &Cells) -> Vec<u16> {
     if a == b {
         return Vec::new();

@@ -51,7 +51,7 @@ pub enum JudgeError {
     Aborted(String),
 }
 
-/// What is wrong first; the text is nobody's to look at.
+/// The message of the first problem, without its place: the generated text is not shown to the user.
 fn first(problems: &Problems) -> String {
     let first = problems.all().first();
     first.map_or_else(|| problems.to_string(), |first| first.message.clone())
@@ -66,7 +66,7 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
     let told = unforeseen(capture);
     let model = only_captured(&model, capture);
     let behind = |ring: usize, own: &LinkTrace, index: usize| {
-        // Behind the drive data that nobody foresees are those of the last link at the same place.
+        // Data behind the drive that cannot be predicted stand at the same place on the last link.
         own.from.is_some()
             && told
                 .get(ring)

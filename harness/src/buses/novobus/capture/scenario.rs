@@ -27,10 +27,10 @@ const TITLE: usize = 100;
 pub struct Options<'o> {
     /// What it is called; any text.
     pub title: &'o str,
-    /// A scenario whose header says how the drives are: models, cells, properties. Without one they are plain, and hold what they
-    /// first say of their cells.
+    /// A scenario whose header describes the drives: models, cells, properties. Without one the drives are plain, and their cells hold what
+    /// they first report.
     pub setup: Option<&'o Source>,
-    /// Bytes sent with a smaller gap than this go out without one: real clocks are not exact.
+    /// Smaller gaps between bytes sent are removed, because real clocks are not exact.
     pub tolerance: Span,
 }
 
@@ -144,7 +144,7 @@ fn head(
     let millis = capture.end().since_start().as_nanos() / 1_000_000 + 1_000;
     lines.push(format!("deadline {}ms", millis.min(600_000)));
     match options.setup {
-        // Who says how the drives are knows what their cells hold.
+        // A setup also defines the contents of the cells.
         Some(setup) => lines.extend(setup_lines(setup)?),
         None => lines.extend(cells(rings)),
     }

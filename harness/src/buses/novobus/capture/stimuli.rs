@@ -1,4 +1,4 @@
-//! What a capture tells of the drives: what their cells held before, and which bytes nobody can foretell.
+//! What a capture shows of the drives: the previous contents of their cells, and the bytes that cannot be predicted.
 
 use crate::report::meaning::{self, Observer};
 use harness_proto::line::Received;
@@ -89,9 +89,9 @@ struct Reader {
     told: Told,
     /// The drive that sends on this link, where what was sent is read, and not what arrived.
     own: Option<u8>,
-    /// What a cell holds now: `None` where it was written, and nobody knows how it took that.
+    /// What a cell holds now; `None` if it was written with an unknown result.
     now: BTreeMap<(u8, u16), Option<u8>>,
-    /// Data of the answer that each drive is giving: where they stand, the cell, the value.
+    /// Data of the answer that each drive is giving: place, cell and value.
     open: BTreeMap<u8, Vec<(usize, u16, u8)>>,
 }
 

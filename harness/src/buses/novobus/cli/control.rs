@@ -37,7 +37,7 @@ pub(crate) fn reset(arguments: &MoveArguments, output: &mut Output) -> Result<Ex
             .iter()
             .map(|axis| (axis.ring(), axis.drive()))
             .collect();
-        // Behind a reset nobody knows where drives are: the check sequence (9.8) follows, which is not the master's to send.
+        // After a reset the drives' state is unknown: the check sequence (9.8) follows, which the master does not send by itself.
         reset_drives(session.link(), &drives).map_err(|why| denied(session, why.to_string()))
     };
     let what = leave_to(arguments, "reset");
@@ -110,7 +110,7 @@ fn quietly(
     })
 }
 
-/// Says what can move before it can, and refuses it without a leave.
+/// Warns which motors may turn before the command runs, and refuses it without `--move`.
 fn with_leave(
     arguments: &MoveArguments,
     output: &mut Output,
@@ -126,7 +126,7 @@ fn with_leave(
     })
 }
 
-/// Says what can move, and refuses it without a leave.
+/// Warns which motors may turn, and refuses the command without `--move`.
 fn warn(
     arguments: &MoveArguments,
     drives: &[Axis],

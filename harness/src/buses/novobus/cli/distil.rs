@@ -26,7 +26,7 @@ pub struct DistilArguments {
     pub to: PathBuf,
 }
 
-/// Chooses, makes small, and writes a file an input; what is there stays as it is.
+/// Chooses and shrinks inputs and writes one file per input. Existing files stay unchanged.
 pub(crate) fn distil(arguments: &DistilArguments, output: &mut Output) -> std::io::Result<Exit> {
     match chosen(arguments) {
         Ok(text) => {

@@ -23,12 +23,12 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Something was asked for that cannot be, or that needs a leave that was not given.
+    /// The request is impossible, or it needs a permission that was not given.
     pub(crate) fn refused(message: impl Into<String>) -> Self {
         Self::Said(Exit::Usage, message.into())
     }
 
-    /// A drive is or did otherwise than asked.
+    /// A drive is not in the requested state, or did not do what was requested.
     pub(crate) fn drive(message: impl Into<String>) -> Self {
         Self::Said(Exit::Failed, message.into())
     }
@@ -54,7 +54,7 @@ impl Failure {
     }
 }
 
-/// A drive's fault, the bench's, or that of whoever asked.
+/// The exit code of an error: caused by a drive, by the bench or by the user.
 fn exit(error: &driver::Error) -> Exit {
     match error {
         driver::Error::DriveError { .. }

@@ -33,7 +33,7 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use failure::Failure;
 
-/// Does what a command says; what stands in its way is told.
+/// Runs a command and reports its errors.
 pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
     let end = match command {
         DriveCommand::Read(arguments) => read::read(arguments, output),

@@ -1,5 +1,5 @@
-//! The benches that commands on drives work on: `sim:3`, and `sim:2,3` with two rings, set up anew for every command; or a rig by its
-//! file or name, taken and given back as `run --rig` does.
+//! The benches that commands on drives work on. `sim:3`, or `sim:2,3` with two rings, is created for each command. A rig, given by its
+//! file or name, is taken and given back as by `run --rig`.
 
 use super::args::RigArguments;
 use super::failure::Failure;
@@ -23,19 +23,19 @@ use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// The drives of a simulated bench of which nothing else is said: released and started by their inputs.
+/// Default header of a simulated bench: every drive is released and started by its inputs.
 const RELEASED: &str = "drive 0..last input GPIN3 GPIN5 high\n";
 
-/// How long a simulated bench has been switched on when a command comes to it: the self-tests are over (11.8).
+/// How long a simulated bench has been on when a command starts: the self-tests are over (11.8).
 const WARM: Span = Span::from_millis(200);
 
-/// How long a drive is given to take a confirmation: some of its cycles of 432 us (4.1).
+/// How long a drive may take to process a confirmation: some of its cycles of 432 us (4.1).
 const CYCLES: Span = Span::from_millis(5);
 
 /// The name of a bench.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RigName {
-    /// Simulated rings of so many drives.
+    /// Simulated rings with these numbers of drives.
     Simulated(Vec<u8>),
     /// A file, or a name that `rig list` shows.
     Named(String),
@@ -55,11 +55,11 @@ impl FromStr for RigName {
 /// What a command does with a bench.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Use {
-    /// Its name; others who want the bench are told.
+    /// The command's name, shown to other users who want the bench.
     pub(crate) purpose: &'static str,
-    /// Motors may turn, as far as the command line goes.
+    /// The command line allows motors to turn.
     pub(crate) moves: bool,
-    /// The drives stay as they are behind a good end: nothing was changed, or so it was asked for.
+    /// The drives stay as they are after success: nothing was changed, or the user asked for it.
     pub(crate) holds: bool,
 }
 
@@ -78,7 +78,7 @@ impl Use {
 pub(crate) struct Bench {
     pub(crate) bus: Bus<'static>,
     plan: Plan,
-    /// The rig in use, if it is none that was set up for this command.
+    /// The rig in use; `None` for a simulated bench created for this command.
     rig: Option<Shared>,
 }
 
@@ -92,7 +92,7 @@ impl Bench {
         })
     }
 
-    /// The same without asking the drive: `range` is what it said of its range of speeds.
+    /// The same without asking the drive: `range` is the range of speeds that it reported.
     pub(crate) fn units_with(&self, axis: Axis, range: SpeedRange) -> Drive {
         Drive {
             range,
@@ -100,7 +100,7 @@ impl Bench {
         }
     }
 
-    /// Does something with the rig in use, if it is one; the bus carries nothing meanwhile.
+    /// Runs `act` on the rig in use, if there is one. The bus carries nothing meanwhile.
     pub(crate) fn with_rig<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
         self.rig.as_ref()?.with(act)
     }
@@ -137,8 +137,8 @@ impl Bench {
     }
 }
 
-/// Opens a bench, does something on it, and gives it back: with its drives as they are where `as_what` says so and all went
-/// well, or where nothing was done; in its safe state otherwise.
+/// Opens a bench, runs `act` on it and gives it back. The drives stay as they are if `as_what` says so and `act` succeeds, or if
+/// nothing was done. In all other cases the bench is given back in its safe state.
 pub(crate) fn on(
     arguments: &RigArguments,
     as_what: Use,
@@ -148,7 +148,7 @@ pub(crate) fn on(
     on_after(arguments, as_what, output, |_, _| Ok(()), act)
 }
 
-/// The same, with something done to a rig before its master begins: what leaves no master knowing where the drives are.
+/// The same, but runs `first` on a rig before its master starts: for actions after which a master does not know the drives' state.
 pub(crate) fn on_after(
     arguments: &RigArguments,
     as_what: Use,
@@ -216,7 +216,7 @@ pub(crate) fn named(
     find_rig(name, output).ok_or(Failure::Told(Exit::Usage))
 }
 
-/// Gives a rig back and tells how.
+/// Gives a rig back and reports its state.
 fn give_back(
     rig: &Shared,
     as_what: Use,
@@ -230,7 +230,7 @@ fn give_back(
     let interrupted = trouble == Some(Trouble::Interrupted);
     let (exit, leave) = match result {
         Ok(exit) => (exit, as_what.holds),
-        // What cannot be or has no leave was refused before anything was done.
+        // Impossible requests and missing permissions are refused before anything is done.
         Err(failure @ (Failure::Said(Exit::Usage, _) | Failure::Told(_) | Failure::File(_))) => {
             (failure.tell(output), true)
         }
@@ -245,7 +245,7 @@ fn give_back(
     end.map_or(exit, |end| tell_end(&end, exit, output))
 }
 
-/// The simulated drives of a bench, with nothing sent to them. A rig with ports is stood in for by its simulated likeness.
+/// The simulated drives of a bench, with nothing sent to them. A rig with ports is represented by its simulated model.
 pub(crate) fn link(
     arguments: &RigArguments,
     output: &mut Output,
@@ -290,7 +290,7 @@ fn read(path: &Path) -> Result<Source, Failure> {
     Source::read(path).map_err(|error| Failure::File(error.into()))
 }
 
-/// The header of a bench of which nothing is said.
+/// The default header of a simulated bench.
 fn released(sizes: &[u8]) -> Source {
     let second = RELEASED.replace("0..last", "2:0..last");
     let text = match sizes {

@@ -139,7 +139,7 @@ enum Leave {
     Broken(std::io::Error),
 }
 
-/// The page until its end; the terminal is given back before anything is told.
+/// Shows the page until its end. The terminal is restored before any message is printed.
 fn live(
     reader: &mut Reader<'_>,
     heading: Heading,
@@ -154,7 +154,7 @@ fn live(
     let stopped = Arc::clone(&stop);
     let desk = std::thread::spawn(move || {
         let end = desk(screen, Top::new(heading), &readings, &stopped);
-        // Nobody listens where the bus has ended by itself.
+        // The receiver is gone if the bus has ended by itself.
         let _ended = why.send(end);
     });
     let end = pump(reader, every, &flag, &news, &asked);
@@ -223,7 +223,7 @@ fn desk(
     }
 }
 
-/// Reads drives again and again and lets the bus work, as long as the view is wanted.
+/// Reads the drives repeatedly and runs the bus until the view is closed.
 fn pump(
     reader: &mut Reader<'_>,
     every: Span,
@@ -236,13 +236,13 @@ fn pump(
     let mut next = reader.start;
     loop {
         if reader.bench.bus.now() >= next && reader.read_some()? {
-            // What is slower than the time given is read as often as it can be.
+            // A ring that is slower than the given period is read as often as possible.
             next = (next + every).max(reader.bench.bus.now());
         }
         if let Some(halt) = reader.bench.bus.halted() {
             return Err(halt.into());
         }
-        // Who has not drawn the last page yet gets a later one; who has gone says why by `asked`.
+        // A view that still draws the last page gets a later reading. A view that has closed gives its reason through `asked`.
         let _not_now = news.try_send(reader.reading());
         if interrupted.load(Ordering::Relaxed) {
             return Err(interrupt());
@@ -252,7 +252,7 @@ fn pump(
             Ok(Leave::Interrupt) => return Err(interrupt()),
             Ok(Leave::Broken(error)) => return Err(Failure::Output(error)),
             Err(RecvTimeoutError::Timeout) => {}
-            // A panic, which `wait_for` hands on.
+            // The view panicked; `wait_for` passes the panic on.
             Err(RecvTimeoutError::Disconnected) => return Ok(Exit::RigError),
         }
     }
@@ -342,8 +342,8 @@ impl<'b> Reader<'b> {
         self.reading.clone()
     }
 
-    /// Lets the bus work until the next drives are due, and says how long to wait beside it: where time is virtual it would run
-    /// away from whoever looks.
+    /// Runs the bus until the next drives are due, and returns how long to wait in real time: virtual time must not run ahead of the
+    /// viewer's.
     fn idle(&self, begun: Moment, next: Instant) -> Duration {
         let bus = &self.bench.bus;
         let now = bus.now();

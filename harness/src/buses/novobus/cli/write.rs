@@ -31,7 +31,7 @@ pub(crate) struct Orders {
 }
 
 impl Orders {
-    /// Settles the values of a command line for a drive; what can make its motor turn needs a leave.
+    /// Resolves the values of a command line for a drive. Values that can make its motor turn need a permission.
     pub(crate) fn new(
         bench: &Bench,
         axis: Axis,

@@ -118,7 +118,7 @@ impl Bus<'_> {
                             orders.push_back(order);
                             return Ok(());
                         }
-                        // The master holds no more: the oldest comes home first.
+                        // The master's queue is full: wait for the oldest job first.
                         Err(full @ Error::Refused(Refused::Full { .. })) => {
                             ended.push(self.outcome(orders.pop_front().ok_or(full)?)?);
                         }

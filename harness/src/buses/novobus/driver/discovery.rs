@@ -16,12 +16,11 @@ use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, ZEROS};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 
-/// A telegram whose address nobody has: each of N drives adds 1 to the 00, and no sum is 0 (9.3). The net
-/// byte is passed on by all.
+/// A telegram that addresses no drive: each of N drives adds 1 to the 00, and no sum is 0 (9.3). All drives pass the net byte on.
 const COUNT: [u8; 3] = [0x82, 0x00, SYNCO];
 
-/// Counts the drives of a ring, first as it is and then, if nothing sensible comes back, once more behind
-/// 17 zeros and the check sequence (9.8). Nothing is changed in any drive.
+/// Counts the drives of a ring. If nothing sensible comes back, counts once more after 17 zeros and the check sequence (9.8). Changes
+/// nothing in the drives.
 ///
 /// # Errors
 /// [`Error::TimeOut`] where no ring answers, [`Error::Link`] where the link carries nothing.

@@ -69,7 +69,7 @@ pub enum Error {
         /// How often it was tried.
         attempts: u8,
     },
-    /// It cannot be told whether a step was done once or twice, every time anew.
+    /// Every attempt of a step was disturbed so that it may have run once or twice.
     #[error("{what} was disturbed {attempts} times")]
     Disturbed {
         /// What.

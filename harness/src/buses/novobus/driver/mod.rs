@@ -129,7 +129,7 @@ impl<'l> Bus<'l> {
         self.pump.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Closes the bus: nothing more is sent, and what is under way comes home.
+    /// Closes the bus: sends nothing more and waits until all bytes are back.
     #[doc(alias = "CloseNovobus")]
     #[doc(alias = "NB_CloseBus")]
     pub fn close(self) {
@@ -254,7 +254,7 @@ impl<'l> Bus<'l> {
         pump.has(order.ring, order.id)
     }
 
-    /// Waits for the end of a job and fetches its outcome; a second time there is none (11.6).
+    /// Waits for the end of a job and fetches its result, which can be fetched only once (11.6).
     ///
     /// # Errors
     /// [`Error::TimeOut`], [`Error::Unknown`], [`Error::Stopped`], or [`Error::NoSuchOrder`] for an order whose
@@ -264,7 +264,7 @@ impl<'l> Bus<'l> {
         value_of(self.outcome(order)?)
     }
 
-    /// Waits for the end of a job and fetches how it ended, whatever that is; a second time there is nothing to fetch.
+    /// Waits for the end of a job and fetches its outcome, good or bad, which can be fetched only once.
     ///
     /// # Errors
     /// [`Error::TimeOut`], [`Error::Link`] or [`Error::NoSuchOrder`]: the job has not ended.
@@ -300,7 +300,7 @@ impl<'l> Bus<'l> {
     }
 }
 
-/// What a job read, or why nobody knows whether it ran.
+/// What a job read, or why it is unknown whether it ran.
 fn value_of(outcome: Outcome) -> Result<Option<u32>, Error> {
     match outcome {
         Outcome::Read(data) => Ok(data.value()),

@@ -1,4 +1,4 @@
-//! Masters and their link, coupled: bytes out when the line is free, bytes in as they come.
+//! Couples masters to their link: sends a byte when the line is free for it and passes on the bytes received.
 
 use super::{Error, Options};
 use crate::link::{Lead, Line, Trouble};
@@ -12,22 +12,22 @@ use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::master::AnyMaster;
 use std::collections::BTreeMap;
 
-/// The most events that wait to be fetched.
+/// Maximum number of events kept until they are fetched.
 const MOST_LINES: usize = 256;
 
-/// How much later than the ring needs a byte may come where time is real: a busy computer stands still for longer than a ring does.
+/// How much longer than the ring needs a byte may take in real time: a busy computer can stand still for this long.
 const BUSY_HOST: Span = Span::from_millis(400);
 
-/// How long what is under way may take to come home before a pause.
+/// How long bytes on their way may take to come back before a pause.
 const PAUSE: Span = Span::from_millis(500);
 
 struct Ring {
     master: AnyMaster,
     /// When the line is free for the next byte.
     free: Instant,
-    /// When the last byte that says something comes home.
+    /// When the last byte that is not an idle SYNCO is back at the master.
     home: Instant,
-    /// Behind that byte SYNCO has been sent, and nobody has asked for anything since.
+    /// Only SYNCO has been sent behind that byte, and nothing has been requested since.
     idle: bool,
     results: BTreeMap<JobId, Option<Outcome>>,
     stopped: Option<Stop>,
@@ -37,14 +37,14 @@ struct Ring {
 pub(crate) struct Pump<'l> {
     link: Box<dyn Line + 'l>,
     rings: Vec<Ring>,
-    /// What happened that no job reports, oldest first, with the number of the ring.
+    /// Events that belong to no job, oldest first, with the number of the ring.
     log: Vec<(usize, Event)>,
 }
 
 impl<'l> Pump<'l> {
     pub(crate) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: &Options) -> Self {
         let now = link.now();
-        // A byte that is only late must not count as lost: the recovery stops every drive.
+        // A late byte must not count as lost, because the recovery stops every drive.
         let own = master::Options {
             slack: match link.lead() {
                 Lead::NONE => options.master.slack,
@@ -94,7 +94,7 @@ impl<'l> Pump<'l> {
             .collect()
     }
 
-    /// Why nothing goes on any more, if so: a ring has been stopped, or the link carries nothing.
+    /// Why the bus has halted, if it has: a ring is stopped, or the link carries nothing.
     pub(crate) fn halt(&self) -> Option<Error> {
         let stop = self.rings.iter().find_map(|ring| ring.stopped);
         let trouble = || self.trouble().map(Error::Link);
@@ -122,20 +122,20 @@ impl<'l> Pump<'l> {
         Some(&mut self.rings.get_mut(ring)?.master)
     }
 
-    /// The master of a ring has something to say from now on that is no job.
+    /// Notes that the master of a ring has something to send that is not a job.
     pub(crate) fn speak(&mut self, ring: usize) {
         if let Some(ring) = self.rings.get_mut(ring) {
             ring.idle = false;
         }
     }
 
-    /// The outcome of a job has come.
+    /// Whether the outcome of a job is known.
     pub(crate) fn has(&self, ring: usize, id: JobId) -> bool {
         let result = self.rings.get(ring).and_then(|ring| ring.results.get(&id));
         matches!(result, Some(Some(_)))
     }
 
-    /// The job was started here, and its outcome has not been fetched.
+    /// Whether the job was started here and its outcome has not been fetched.
     pub(crate) fn knows(&self, ring: usize, id: JobId) -> bool {
         self.rings
             .get(ring)
@@ -149,7 +149,7 @@ impl<'l> Pump<'l> {
         self.rings.get_mut(ring)?.results.remove(&id)?
     }
 
-    /// Nobody will ask for this outcome.
+    /// Drops the outcome of a job that will not be fetched.
     pub(crate) fn forget(&mut self, ring: usize, id: JobId) {
         if let Some(ring) = self.rings.get_mut(ring) {
             ring.results.remove(&id);
@@ -160,7 +160,7 @@ impl<'l> Pump<'l> {
         std::mem::take(&mut self.log)
     }
 
-    /// Takes what has come and does what is due, without letting time pass. Says whether a master has reported something.
+    /// Processes received bytes and due time-outs without letting time pass. Returns whether a master has reported something.
     pub(crate) fn poll(&mut self) -> bool {
         let now = self.link.now();
         let mut news = false;
@@ -175,7 +175,7 @@ impl<'l> Pump<'l> {
                 news = true;
                 match &event {
                     Event::Ended { id, outcome } => {
-                        // A result that was given up is dropped.
+                        // The outcome of a forgotten job is dropped.
                         if let Some(result) = ring.results.get_mut(id) {
                             *result = Some(outcome.clone());
                         }
@@ -194,17 +194,17 @@ impl<'l> Pump<'l> {
     }
 
     /// Sends what the lines are free for and lets time pass until the next byte is due or something is reported, at most until `end`.
-    /// Whoever calls waits for a report.
+    /// For callers that wait for a report.
     pub(crate) fn step(&mut self, end: Instant) {
         self.work(end, true);
     }
 
-    /// The same where nobody waits for anything but `end`.
+    /// The same for callers that wait only for `end`.
     pub(crate) fn pass(&mut self, end: Instant) {
         self.work(end, false);
     }
 
-    /// Where time is real, hands over what keeps the line for a while without this program.
+    /// In real time, hands over enough bytes to keep the line busy for a while without this program.
     pub(crate) fn keep(&mut self) {
         if self.link.lead() != Lead::NONE {
             self.work(self.link.now(), false);
@@ -221,10 +221,11 @@ impl<'l> Pump<'l> {
         }
     }
 
-    /// Hands over what may be handed over now, and says when there will be more.
+    /// Hands over the bytes that may be handed over now, and returns when there will be more.
     ///
-    /// Where time is real, somebody waits and there is nothing to say, SYNCO goes no further than the time at which what was said before
-    /// comes home: there may be something to say then, and it leaves behind that SYNCO. When there is not, SYNCO goes on a byte time later.
+    /// In real time, while an answer is `awaited` and the master is idle, SYNCO reaches only to the time at which the answer is due, plus
+    /// [`Lead::near`]: the next job would have to wait behind more SYNCO. If no job has come a byte time after the answer was due, SYNCO
+    /// goes on.
     fn transmit(&mut self, index: usize, awaited: bool) -> Instant {
         let now = self.link.now();
         let byte_time = self.link.byte_time();
@@ -234,7 +235,7 @@ impl<'l> Pump<'l> {
         let far = now + lead.far;
         let mut bytes = Vec::new();
         let next = loop {
-            // Without a lead, or with as much of it as there is, nothing is to be spared.
+            // Without a lead, or with `near` at its maximum, SYNCO is not held back.
             if awaited && ring.idle && lead.near < lead.far {
                 let again = ring.home + byte_time;
                 let enough = match now < again {
@@ -246,10 +247,10 @@ impl<'l> Pump<'l> {
                 }
             }
             if ring.free > far || self.link.trouble().is_some() {
-                // The next go out many at a time.
+                // Refill at half of the lead, so that many bytes go out at a time.
                 break ring.free - Span::from_nanos(lead.far.as_nanos() / 2);
             }
-            // The time at which the byte leaves, not that at which it is handed over.
+            // The time at which the byte leaves, not the time at which it is handed over.
             let start = ring.free.max(now);
             let idle = ring.master.counters().idle;
             let Some(byte) = ring.master.poll_transmit(start) else {
@@ -266,7 +267,7 @@ impl<'l> Pump<'l> {
         if bytes.is_empty() {
             return next;
         }
-        // Where a fault holds the line, all is later than thought; where the link carries nothing, no byte takes any time.
+        // If a fault holds the line, everything is later than computed. If the link carries nothing, bytes take no time.
         let free = self.link.send(index, &bytes);
         let held = free.since(ring.free);
         ring.free = free;
@@ -282,7 +283,7 @@ impl<'l> Pump<'l> {
         self.link.pause_due()
     }
 
-    /// Where the link wants a pause and no job is on its way, lets what is under way come home and gives it one.
+    /// If the link wants a pause and no job is under way, waits until all bytes are back and grants the pause.
     pub(crate) fn pause(&mut self) {
         let now = self.link.now();
         let due = self.link.pause_due().is_some_and(|due| due <= now);
@@ -292,7 +293,7 @@ impl<'l> Pump<'l> {
         }
     }
 
-    /// Sends nothing more and lets what is under way come home, at most until `end`.
+    /// Sends nothing more and waits until all bytes are back, at most until `end`.
     pub(crate) fn drain(&mut self, end: Instant) {
         let under_way = |ring: &Ring| ring.master.under_way() > 0;
         self.poll();

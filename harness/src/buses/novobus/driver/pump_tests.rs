@@ -67,7 +67,7 @@ fn simulated() -> SimulatedLink {
     SimulatedLink::new(Bench::one(ring))
 }
 
-/// What the master sent while a bus did something, with the times at which it had left, and when it was done.
+/// What the master sent while a bus ran `act`, with the time of each byte, and when `act` had ended.
 fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, u8)>, Instant) {
     let mut link = simulated();
     if late > Span::ZERO {
@@ -86,7 +86,7 @@ fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, 
     assert_eq!(bus.corrected_errors(), 0);
     let end = bus.now();
     bus.close();
-    // Behind what comes home SYNCO may still be on its way.
+    // SYNCO behind the last answer may still be on its way.
     link.run_until(link.now() + Span::from_millis(50));
     let sent = link.trace(0).links[0].bytes.clone();
     let sent = sent
@@ -115,7 +115,7 @@ fn ahead(near: Span) -> Lead {
     }
 }
 
-/// Whoever waits for an answer sends the next bytes as soon as without any lead, and the same ones.
+/// A job after an awaited answer sends the same bytes at the same times as without a lead.
 #[test]
 fn a_job_does_not_wait_behind_synco() {
     let (expected, end) = played(Lead::NONE, Span::ZERO, reads);
@@ -139,7 +139,7 @@ fn an_adapter_is_never_without_bytes() {
     );
 }
 
-/// Whoever waits for an answer says when it is due, whatever goes out behind the question.
+/// The pump tells the link when an awaited answer is due, whatever is sent behind the request.
 #[test]
 fn an_answer_is_attended_to_when_it_comes() {
     for near in [Span::ZERO, Span::from_millis(4)] {
@@ -161,7 +161,7 @@ fn an_answer_is_attended_to_when_it_comes() {
     }
 }
 
-/// Where an answer is late, SYNCO goes on a byte time behind the time at which it was to be there.
+/// If an answer is late, SYNCO goes on a byte time after the answer was due.
 #[test]
 fn synco_goes_on_where_an_answer_is_late() {
     let (sent, _) = played(ahead(Span::ZERO), Span::from_millis(3), reads);
@@ -169,7 +169,7 @@ fn synco_goes_on_where_an_answer_is_late() {
     assert!(gap > Span::ZERO && gap <= byte() + byte(), "{gap}");
 }
 
-/// Who passes the time, or keeps the line, may come back late: SYNCO lies ahead, and what he says then leaves behind it.
+/// A caller of `run` or `keep` may come back late: SYNCO is sent ahead, and its next job leaves behind that SYNCO.
 #[test]
 fn the_line_is_kept_while_nobody_waits() {
     let lead = ahead(Span::ZERO);

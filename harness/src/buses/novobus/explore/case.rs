@@ -1,7 +1,7 @@
-//! A case: one conversation as a value, with everything that is to happen on the way.
+//! A case: one conversation as a value, with all faults to inject.
 //!
-//! It is made of acts in the manual's terms, so that what is mutated and made smaller stays a conversation: checking bytes
-//! are worked out when the bytes are made, and a fault belongs to a byte of its act, wherever that stands.
+//! A case consists of acts in the manual's terms, so that it stays a valid conversation when it is mutated or shrunk. Checking bytes
+//! are computed when the bytes are made. A fault belongs to a byte of its act, wherever the act stands.
 
 use super::order::{Command, Order};
 use crate::link::LinkFault;
@@ -30,11 +30,11 @@ pub struct Case {
     /// The other ring of the bench, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beside: Option<Beside>,
-    /// What happens, in order.
+    /// The acts, in order.
     pub acts: Vec<Act>,
 }
 
-/// The ring of a bench that a conversation is not with, and its number of drives (ND21 12.2). No byte goes from one ring to the other.
+/// The other ring of the bench and its number of drives (ND21 12.2). No byte goes from one ring to the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Beside {
@@ -44,7 +44,7 @@ pub enum Beside {
     Second(u8),
 }
 
-/// Something that the master does, with the faults that meet its bytes.
+/// An action of the master, with the faults on its bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Act {
@@ -59,11 +59,11 @@ pub struct Act {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum What {
-    /// So many SYNCO (ND21 9.2).
+    /// This number of SYNCO (ND21 9.2).
     Synco(u8),
-    /// So many PAUSE (9.2).
+    /// This number of PAUSE (9.2).
     Pause(u8),
-    /// So many zeros.
+    /// This number of zeros.
     Zeros(u8),
     /// 17 zeros and the check sequence (9.8).
     Recover,
@@ -73,7 +73,7 @@ pub enum What {
     Bytes(Vec<u8>),
     /// One telegram or several to a drive.
     Talk(Talk),
-    /// Nothing for so many milliseconds.
+    /// Silence of this many milliseconds.
     Wait(u16),
     /// A drive loses its power, or gets it back.
     Power {
@@ -84,12 +84,11 @@ pub enum What {
     },
 }
 
-/// Telegrams to one drive (9.1). Where the commands are longer than the room, they are cut over several: those behind the
-/// first one are for the same drive.
+/// Telegrams to one drive (9.1). If the commands do not fit into one telegram, they are split over several telegrams to the same drive.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Talk {
-    /// To whom.
+    /// The addressee.
     pub to: To,
     /// The process data of the first telegram (9.4).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -100,7 +99,7 @@ pub struct Talk {
     /// The most net bytes of each telegram, 2 to 7.
     #[serde(default = "most_net", skip_serializing_if = "is_most_net")]
     pub room: u8,
-    /// Whole telegrams or idle bytes (9.2) between the telegrams of a command that is cut.
+    /// Whole telegrams or idle bytes (9.2) between the telegrams of a split command.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub between: Vec<u8>,
 }
@@ -117,7 +116,7 @@ const fn is_most_net(room: &u8) -> bool {
     *room == MOST_NET
 }
 
-/// For whom a telegram is (9.2, 9.3).
+/// The addressee of a telegram (9.2, 9.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum To {
@@ -127,7 +126,7 @@ pub enum To {
     Same,
     /// The next drive.
     Next,
-    /// Nobody: this address byte means no drive of the ring.
+    /// No drive: this address byte addresses no drive of the ring.
     Nobody(u8),
 }
 
@@ -164,9 +163,9 @@ pub enum Harm {
     Duplicate,
     /// Another one arrives before it.
     Insert(u8),
-    /// It arrives so many microseconds later.
+    /// It arrives this many microseconds later.
     Delay(u16),
-    /// The line is held at 0 for so many microseconds.
+    /// The line is held at 0 for this many microseconds.
     Break(u16),
     /// The receiver was too slow.
     Overrun,
@@ -408,13 +407,13 @@ impl Harm {
         }
     }
 
-    /// How much there is to it: a single inverted bit is the simplest.
+    /// How complex it is: a single inverted bit is the simplest.
     #[must_use]
     pub const fn weight(self) -> u64 {
         match self {
             Self::Flip { data, parity, stop } => {
                 let bits = data.count_ones() as u64 + parity as u64 + 4 * stop as u64;
-                // A bit further up is as simple, but the lowest one is what a reader expects.
+                // Any single bit is as simple, but a reader expects the lowest one.
                 let place = if data == 0 { 0 } else { data.ilog2() as u64 };
                 16 * bits + place
             }

@@ -287,11 +287,11 @@ impl Model {
             [None, None] => None,
             [Some(one), Some(other)] => {
                 let open = one.byte ^ other.byte;
-                // Bits of a sum over what is open agree by chance; what stands in the error mode is open as a whole, or not.
+                // Bits of a checksum over open data agree by chance. A byte in the error mode is open as a whole or not at all.
                 let data = matches!(role, Role::Data { .. } | Role::ProcessData { .. });
                 let whole = !data || self.any_in_error();
                 Some(match self.sum(role) {
-                    // Which drives have kept the address of which telegram nobody sees behind an error.
+                    // Behind an error the bus does not show which drives have kept the address of which telegram.
                     Some(_) if self.properties.short_address == ShortAddress::KeptSum => {
                         must(one.byte, 0xFF, false)
                     }

@@ -1,4 +1,4 @@
-//! A finding: a case, what was otherwise, and how to see it again. It is kept as JSON, with its scenario beside it.
+//! A finding: a case, the difference, and how to reproduce it. It is stored as JSON next to its scenario.
 
 use crate::buses::novobus::explore::judge::Judge;
 use crate::buses::novobus::explore::text::{Expected, Page, text};
@@ -13,33 +13,33 @@ use harness_proto::novobus::address::RingSize;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The version of the form.
+/// The version of the format.
 const SCHEMA: u32 = 1;
 
-/// Something that was found.
+/// A finding.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
-    /// The version of the form: 1.
+    /// The version of the format: 1.
     pub schema: u32,
-    /// The rig as it was named.
+    /// The rig's name, as it was given.
     pub rig: String,
-    /// Whether that rig has ports: its drives are nobody's to plant something in.
+    /// Whether that rig has ports: deviations cannot be planted in its drives.
     pub ports: bool,
     /// The seed of the run.
     pub seed: u64,
     /// Which case of the run it was, counted from 0.
     pub number: u64,
-    /// How often it was seen again.
+    /// How many attempts reproduced it.
     pub seen_again: u8,
-    /// Of so many attempts.
+    /// The number of attempts to reproduce it.
     pub of: u8,
-    /// Whether it was seen again often enough.
+    /// Whether enough attempts reproduced it.
     pub confirmed: bool,
-    /// How many runs made it smaller; none where nobody tried.
+    /// The number of runs used to shrink it; `None` if shrinking was not tried.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shrunk_in: Option<u32>,
-    /// What was otherwise.
+    /// How the ring differs from the expected behaviour.
     pub difference: Difference,
     /// What its rings are made of.
     pub setup: Setup,
@@ -48,13 +48,13 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// The version of the form.
+    /// The version of the format.
     pub const SCHEMA: u32 = SCHEMA;
 
     /// The finding of a file: its JSON, or the scenario beside it.
     ///
     /// # Errors
-    /// There is none, or it is damaged.
+    /// There is no finding, or it is damaged.
     pub fn read(path: &Path) -> Result<(Self, PathBuf), ExploreError> {
         let file = match path.extension() {
             Some(ending) if ending == "scn" => path.with_extension("json"),
@@ -80,7 +80,7 @@ impl Finding {
         Ok((finding, file))
     }
 
-    /// Writes the finding and its scenario into a folder; gives the two files.
+    /// Writes the finding and its scenario into a folder; returns the paths of the two files.
     ///
     /// # Errors
     /// They cannot be written, or the model cannot be made.

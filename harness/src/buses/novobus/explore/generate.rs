@@ -21,7 +21,7 @@ pub struct Scope {
     pub spices: Vec<Spice>,
     /// What may be sent.
     pub limits: Limits,
-    /// Whether the EEPROM is spared, whatever may be sent: what is written there stays (ND21 14.10.5).
+    /// Whether no case writes to the EEPROM, even if writes are permitted: such writes are permanent (ND21 14.10.5).
     pub spare_eeprom: bool,
 }
 
@@ -265,7 +265,7 @@ impl<'s> Generator<'s> {
         }
     }
 
-    /// Whom a telegram is for.
+    /// Chooses the addressee of a telegram.
     pub fn to(&self, dice: &mut Dice) -> To {
         let drive = dice.below(usize::from(self.ring.drives)) as u8;
         match dice.below(100) {
@@ -383,7 +383,7 @@ impl<'s> Generator<'s> {
                     at: dice.below(length) as u16,
                     ..damage
                 };
-                // What else happens to a byte that meets two faults is nobody's rule.
+                // No rule says what two faults do to the same byte.
                 let free = |other: &Damage| (other.link, other.at) != (damage.link, damage.at);
                 if length > 0 && act.damages.iter().all(free) {
                     act.damages.push(damage);
@@ -438,8 +438,8 @@ impl<'s> Generator<'s> {
         }
     }
 
-    /// On a rig that does not allow everything only the recovery passes behind what leaves drives in doubt (ND21 9.8): it is
-    /// put there, and what nobody could judge is left out.
+    /// Adds a recovery after each act that leaves the drives' state in doubt (ND21 9.8). On a rig that does not allow everything, the guard
+    /// permits nothing else there.
     pub fn keep_in_step(&self, case: &mut Case) {
         if self.scope.limits.allow_everything() {
             return;
@@ -457,7 +457,7 @@ impl<'s> Generator<'s> {
     }
 }
 
-/// Whether it is not known behind it where in a telegram the drives are.
+/// Whether the drives' position within a telegram is unknown after this act.
 fn leaves_doubt(act: &Act) -> bool {
     let spoiled = |talk: &Talk| {
         talk.orders

@@ -13,7 +13,8 @@ use harness_proto::novobus::properties::{
 use harness_proto::novobus::role::{Role, roles_with};
 use std::collections::BTreeMap;
 
-/// The first conversation with drives that were made ready: a telegram to nobody, behind which every drive knows its address (ND21 9.3).
+/// The first conversation with drives that were made ready: a telegram that addresses no drive, after which every drive knows its
+/// address (ND21 9.3).
 pub(crate) fn prologue(drives: u8, beside: Option<Beside>) -> Case {
     let read = Command::ReadByte { cell: 0xFE13 };
     Case {
@@ -265,21 +266,21 @@ impl Judge {
             }
             seen.is_harmful |= model.writes_what_drives_use();
         }
-        // What a fault makes of a byte that is the drive's choice may be a sync byte or none.
+        // A fault may or may not turn a byte that is the drive's choice into a sync byte.
         seen.is_harmful |= !case.harms.is_empty() && !seen.open.is_empty();
         seen
     }
 }
 
-/// What a case will do.
+/// The predicted effects of a case.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Foreseen {
     /// How many bytes come back.
     pub(crate) count: usize,
-    /// Those of them that drives may answer in more than one way, by their index.
+    /// Indexes of those that drives may answer in more than one way.
     pub(crate) open: Vec<usize>,
-    /// Whether cells are written with which a drive's program works, or nobody knows which, or a fault meets what is the drive's choice: what
-    /// comes of that no model says.
+    /// Whether the case writes unknown cells or cells that a drive's program uses, or a fault hits a byte that is the drive's choice. No
+    /// model predicts the result.
     pub(crate) is_harmful: bool,
 }
 

@@ -1,5 +1,5 @@
-//! Cases on a rig with ports, one behind the other: what the guard would deny is not sent, and a [`Judge`] sees every byte. The drives are
-//! made ready anew where nobody knows their state any more.
+//! Runs cases on a rig with ports, one after another. Bytes that the guard would deny are not sent, and a [`Judge`] sees every byte. The
+//! drives are made ready again when their state is unknown.
 
 use super::case::{Act, Beside, Case, Harm, What};
 use super::judge::{Exchange, Judge, prologue};
@@ -27,10 +27,10 @@ use harness_proto::time::{Instant, Span};
 /// How long the drives of the model have been switched on: their self-tests are over (ND21 11.8).
 const WARM: Span = Span::from_millis(200);
 
-/// How many bytes are sent until the drives are made ready anew: what was sent since then is known, and can be sent again.
+/// Maximum number of bytes sent before the drives are made ready again. The bytes sent since then are kept, so they can be replayed.
 const LONGEST_HISTORY: usize = 40_000;
 
-/// How long a byte may be missing before it counts as lost, beside the tolerance of the rig.
+/// How long a byte may be missing before it counts as lost, in addition to the tolerance of the rig.
 const PATIENCE: Span = Span::from_millis(60);
 
 /// A rig in use.
@@ -39,11 +39,11 @@ pub struct OnRig<'r, 's> {
     /// The model that cases are rehearsed on.
     model: SimulatedLink,
     limits: Limits,
-    /// What each ring was seen to do since its drives were made ready.
+    /// What each ring has done since its drives were made ready.
     judges: Vec<Judge>,
     /// The acts of these cases, ring by ring.
     history: Vec<Vec<Act>>,
-    /// Whether the drives are in a state that nobody knows.
+    /// Whether the state of the drives is unknown.
     stale: bool,
 }
 
@@ -55,7 +55,7 @@ impl<'r, 's> OnRig<'r, 's> {
     pub fn new(run: &'r mut Run<'s>, limits: Limits) -> Result<Self, ExploreError> {
         let session = run.session();
         let mut rig = session.rig().clone();
-        // What is said of simulated drives is what they are, and not what the manual says.
+        // The setup describes the simulated drives themselves; the model must follow the manual.
         if let Some(sim) = &mut rig.file.sim {
             sim.setup.clear();
         }
@@ -79,13 +79,13 @@ impl<'r, 's> OnRig<'r, 's> {
         })
     }
 
-    /// Makes the drives ready: nothing of what was sent before matters from now on.
+    /// Makes the drives ready, so that earlier bytes have no effect any more.
     fn begin_anew(&mut self) -> Result<Span, ExploreError> {
         let anew = self.run.way().anew;
         let session = self.run.session();
         session.health()?;
         let rings = session.rings().to_vec();
-        // A drive that does not answer `ResetH8` as it should is tried as it is.
+        // A drive that does not answer `ResetH8` correctly is tested without a reset.
         if anew && start_anew(session.link(), &rings).is_err() {
             self.run.leave_as_they_are();
         }
@@ -97,7 +97,7 @@ impl<'r, 's> OnRig<'r, 's> {
             let link = self.run.session().link();
             let (received, ..) = converse(link, &case, case.bytes().len());
             let received = received.into_iter().map(|(_, byte)| byte).collect();
-            // What is wrong there is wrong in the first case too.
+            // A difference here shows again in the first case.
             let _again = judge
                 .see(Exchange::of(&case, received))
                 .map(|_| judge.begin());
@@ -295,7 +295,7 @@ fn converse(
     (received, due, link.now().since_start())
 }
 
-/// Takes what comes in until so many bytes have come, or until `end`.
+/// Receives bytes until there are `count` of them, or until `end`.
 fn await_bytes(
     link: &mut dyn Link,
     ring: usize,
@@ -314,7 +314,7 @@ fn await_bytes(
 
 /// Why a case cannot be tried on a ring behind a port.
 fn beyond(case: &Case, link: &dyn Link, received: usize) -> Option<&'static str> {
-    // A ring that nobody speaks to falls silent too.
+    // A ring to which nothing is sent times out as well.
     let monitors = |(ring, drive): (usize, u8)| {
         link.peek(ring, drive, ram::FLAGS2).unwrap_or(0) & flags2::MONITORING != 0
     };
@@ -324,7 +324,7 @@ fn beyond(case: &Case, link: &dyn Link, received: usize) -> Option<&'static str>
         matches!(harm, Harm::Delay(_) | Harm::Break(_) | Harm::Overrun)
     };
     if received > case.bytes().len() && case.faults().is_empty() || drives.any(monitors) {
-        // In real time it is a race how a ring comes out of that.
+        // In real time the outcome is a race of clocks.
         Some("drives would miss bytes and send unasked (ND21 9.9)")
     } else if case.faults().iter().any(unjudged) {
         Some("what drives take a broken byte for is their choice")
@@ -333,7 +333,7 @@ fn beyond(case: &Case, link: &dyn Link, received: usize) -> Option<&'static str>
     }
 }
 
-/// The other ring of a bench, as a case with this one names it.
+/// The other ring of the bench, as a case with this ring names it.
 fn beside_of(rings: &[RingSize], ring: usize) -> Option<Beside> {
     match (rings, ring) {
         ([_, second], 0) => Some(Beside::Second(second.drives())),

@@ -32,7 +32,7 @@ impl OnSim {
         Self { setup, fresh: None }
     }
 
-    /// How the model itself is otherwise than it must be.
+    /// How the model itself differs from the expected behaviour.
     fn judge(&self, case: &Case, link: &mut SimulatedLink, trace: &Trace) -> Option<Difference> {
         let own = match self.setup.is_plain() {
             true => against_reference(case, link, trace),
@@ -41,10 +41,10 @@ impl OnSim {
         own.or_else(|| beside(case, link))
     }
 
-    /// The same, with rings of these sizes made at once: what cannot be is said before a run begins.
+    /// The same, but creates rings of these sizes at once, so that errors are reported before a run begins.
     ///
     /// # Errors
-    /// The lines of the setup have mistakes, or nobody can judge what they make.
+    /// The lines of the setup have mistakes, or there is no reference for the drives that they describe.
     pub fn ready(setup: Setup, sizes: &[u8]) -> Result<Self, ExploreError> {
         let mut new = Self::new(setup);
         new.fresh_of(sizes.to_vec())?;

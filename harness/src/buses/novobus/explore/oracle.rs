@@ -1,5 +1,5 @@
-//! What a ring must answer: the model of the manual, byte for byte and to the nanosecond, and the reference model, on every link and
-//! in every cell.
+//! Compares a ring with what it must answer: with the model of the manual, byte for byte and to the nanosecond, and with the reference
+//! model, on every link and in every cell.
 
 use super::case::{Beside, Case, Harm, What};
 use super::order::Order;
@@ -24,7 +24,7 @@ use std::ops::RangeInclusive;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Difference {
-    /// What is otherwise, in a few words.
+    /// What differs, in a few words.
     pub what: String,
     /// The section of the ND21 manual with the rule, such as `9.6`.
     pub section: String,
@@ -33,30 +33,30 @@ pub struct Difference {
     /// In which ring, counted from 0.
     #[serde(default, skip_serializing_if = "is_first")]
     pub ring: usize,
-    /// The drive that is to blame, where the bytes or an experiment show which.
+    /// The drive to blame, if the bytes or an experiment show which.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<u8>,
-    /// The drive to which the telegram went; another one may have made its bytes what they are.
+    /// The drive addressed by the telegram; another one may have changed its bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub meant: Option<u8>,
-    /// Which byte received it is, counted from 1; none where it is no byte at the master.
+    /// The number of the received byte, counted from 1; `None` if the difference is not in a byte at the master.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub byte: Option<usize>,
-    /// Whether only the time of that byte is otherwise.
+    /// Whether only the time of that byte differs.
     #[serde(default)]
     pub time: bool,
-    /// All of it, in a sentence.
+    /// The whole difference, as a sentence.
     pub about: String,
 }
 
 impl Difference {
-    /// What makes two findings one: the same thing is otherwise by the same rule.
+    /// Identifies a kind of finding: findings are equal if the same thing differs from the same rule.
     #[must_use]
     pub fn kind(&self) -> String {
         format!("{} (ND21 {}, {})", self.what, self.section, self.rule)
     }
 
-    /// What makes two findings of a run one: the same kind in telegrams to the same drive.
+    /// Identifies a finding within a run: the same kind, in telegrams to the same drive.
     #[must_use]
     pub fn key(&self) -> String {
         match self.meant {
@@ -102,7 +102,7 @@ impl From<&twin::Divergence> for Difference {
     }
 }
 
-/// The first byte that the master received otherwise than the model says: by value, line status and number, or else by time.
+/// The first received byte that differs from the model: in value, line status or number, or else in time.
 #[must_use]
 pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Difference> {
     if model.received == seen.received {
@@ -159,8 +159,8 @@ pub(crate) fn answered<'a>(
         .map(|(role, _)| *role)
 }
 
-/// The first place where a simulated ring of plain drives is otherwise than the reference model; `None` also where the case is
-/// beyond that model: it knows no time and no power.
+/// The first place where a simulated ring of plain drives differs from the reference model. `None` also if the model does not cover
+/// the case: it has no time and no power.
 #[must_use]
 pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Option<Difference> {
     let beyond = |act: &super::case::Act| matches!(act.what, What::Wait(_) | What::Power { .. });
@@ -272,7 +272,7 @@ fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
     })
 }
 
-/// A byte on the ring that a case is not with: nobody has spoken to its drives (ND21 12.2).
+/// The first byte on the other ring of the bench, to whose drives nothing was sent (ND21 12.2).
 #[must_use]
 pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
     let other = match case.beside? {

@@ -17,7 +17,7 @@ pub struct Seen {
     pub took: Span,
 }
 
-/// Plays a case on a ring that nobody has spoken to, in the steps in which a scenario is played.
+/// Plays a case on a ring to which nothing has been sent, in the steps of a scenario.
 pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
     let ring = case.ring();
     for (place, byte, harm) in case.faults() {

@@ -27,9 +27,9 @@ const MOST_INPUT: usize = 256;
 pub struct Naming {
     /// The name of its files.
     pub name: String,
-    /// Its title; that of the finding where nothing is said.
+    /// Its title; by default that of the finding.
     pub title: Option<String>,
-    /// The table of the manual that it pins; that of the finding where nothing is said.
+    /// The table of the manual that it covers; by default that of the finding.
     pub source: Option<String>,
 }
 

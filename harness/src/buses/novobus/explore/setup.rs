@@ -86,14 +86,14 @@ impl Setup {
         Self { header, deviates }
     }
 
-    /// The same with a drive that deviates where nobody knows of it: in the model too.
+    /// Adds a hidden deviation: the model has it as well.
     #[must_use]
     pub fn hides(mut self, planted: &Planted) -> Self {
         self.header.push(planted.line());
         self
     }
 
-    /// The model of a rig with ports, with so many rings.
+    /// The model of a rig with ports and this number of rings.
     #[must_use]
     pub fn of_ports(rings: usize) -> Self {
         Self {
@@ -102,7 +102,7 @@ impl Setup {
         }
     }
 
-    /// What is said of the drives of one ring, as of a bench that has no other; the ring is counted from 0.
+    /// The setup of one ring, as for a bench without another; the ring is counted from 0.
     #[must_use]
     pub fn of_ring(&self, ring: usize) -> Self {
         let own = |line: &String| match (line.strip_prefix("drive 2:"), ring) {
@@ -122,7 +122,7 @@ impl Setup {
         }
     }
 
-    /// Whether nothing is said of the drives: the reference model is one of them.
+    /// Whether the drives have no setup: these are what the reference model describes.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.header.is_empty()

@@ -1,8 +1,8 @@
-//! Makes a finding small: what is not needed for it is left out, what is needed is made simple.
+//! Shrinks a finding: removes what is not needed to reproduce it and simplifies the rest.
 //!
-//! Every step removes or lowers something: [`Case::measure`] falls strictly with each one that holds, so it ends. The order of
-//! steps is fixed, so it is the same each time. On hardware a run is what it costs, so the steps that take most away come first:
-//! behind the byte that is otherwise nothing is needed, then acts, parts of acts, faults, drives, silence and values.
+//! Every accepted step removes or lowers something, so [`Case::measure`] falls strictly and shrinking ends. The order of the steps is
+//! fixed, so the result is reproducible. On hardware the runs dominate the cost, so the steps that remove most come first: everything
+//! behind the differing byte, then acts, parts of acts, faults, drives, silence and values.
 
 use super::case::{Act, Beside, Case, Harm, MOST_NET, Talk, To, What};
 use super::oracle::Difference;
@@ -12,7 +12,7 @@ use crate::explore::ExploreError;
 use harness_proto::novobus::memory::RAM;
 use std::collections::BTreeSet;
 
-/// What is made small: a conversation with a ring.
+/// What is shrunk: a conversation with a ring.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Subject {
     /// The conversation.
@@ -21,26 +21,26 @@ pub struct Subject {
     pub setup: Setup,
 }
 
-/// What came of it.
+/// The result of shrinking.
 #[derive(Clone, Debug)]
 pub struct Shrunk {
-    /// The smallest one that was found.
+    /// The smallest subject found.
     pub subject: Subject,
-    /// How its ring is otherwise.
+    /// How its ring differs from the expected behaviour.
     pub difference: Difference,
-    /// How often a ring was asked.
+    /// Number of runs.
     pub runs: u32,
-    /// Whether nothing more could be taken away; otherwise the runs were used up.
+    /// Whether nothing more could be removed; false if the limit of runs was reached first.
     pub complete: bool,
 }
 
-/// Asks a ring how it is otherwise; `None` where it is not.
+/// Runs a subject on a ring and returns how the ring differs from the expected behaviour, or `None` if it does not.
 pub type Asking<'a> = dyn FnMut(&Subject) -> Result<Option<Difference>, ExploreError> + 'a;
 
-/// Makes a subject small within so many runs. It stays a finding of the same kind as `difference`.
+/// Shrinks a subject in at most `most_runs` runs. The result is a finding of the same kind as `difference`.
 ///
 /// # Errors
-/// The ring cannot be asked.
+/// A run is not possible.
 pub fn shrink(
     subject: Subject,
     difference: Difference,
@@ -80,7 +80,7 @@ struct Shrinker<'a, 'b> {
     best: Subject,
     kind: String,
     difference: Difference,
-    /// What was asked already.
+    /// Subjects already run.
     tried: BTreeSet<String>,
     runs: u32,
     most_runs: u32,
@@ -92,7 +92,7 @@ impl Shrinker<'_, '_> {
         self.runs >= self.most_runs
     }
 
-    /// Asks about a candidate that is smaller, and takes it where it is a finding of the same kind.
+    /// Runs a smaller candidate and accepts it if it is a finding of the same kind.
     fn offer(&mut self, candidate: Subject) -> Result<bool, ExploreError> {
         let smaller = candidate.case.measure() < self.best.case.measure();
         if !smaller || candidate.case.acts.is_empty() || self.is_spent() {
@@ -161,7 +161,7 @@ impl Shrinker<'_, '_> {
         Ok(())
     }
 
-    /// Behind the byte that is otherwise nothing is needed to see it; in doubt, up to the end of its act.
+    /// Cuts the case behind the differing byte, or, if the finding is lost by that, behind the act of this byte.
     fn cut_behind(&mut self) -> Result<(), ExploreError> {
         let Some(byte) = self.difference.byte else {
             return Ok(());
@@ -180,7 +180,7 @@ impl Shrinker<'_, '_> {
         let Some((at, inside)) = found else {
             return Ok(());
         };
-        // The command that is answered need not be the last one of its act.
+        // The act may have more commands behind the one that is answered.
         let shortened = self.change(|case| {
             case.acts.truncate(at + 1);
             if let Some(act) = case.acts.last_mut() {
@@ -229,7 +229,7 @@ impl Shrinker<'_, '_> {
         Ok(())
     }
 
-    /// The smallest ring that shows it.
+    /// Tries smaller rings, the smallest first.
     fn smaller_ring(&mut self) -> Result<(), ExploreError> {
         for drives in 1..self.best.case.drives {
             if self.offer(on_ring(&self.best, drives))? {
@@ -328,10 +328,10 @@ impl Shrinker<'_, '_> {
         }
     }
 
-    /// The lowest number of like bytes that shows it.
+    /// Lowers a number of equal bytes.
     fn lowest(&mut self, at: usize, count: usize) -> Result<(), ExploreError> {
         let (mut too_few, mut enough) = (0, count);
-        // One less first: behind a cut that is most often the end of it.
+        // One less first: after a cut, usually no more than that can be removed.
         let mut next = count.saturating_sub(1);
         while enough - too_few > 1 {
             if self.change_act(at, |act| shorten(&mut act.what, next))? {
@@ -440,7 +440,7 @@ impl Shrinker<'_, '_> {
     }
 }
 
-/// Leaves so many bytes of an act, where it can be cut at any byte.
+/// Shortens an act to `length` bytes if it can be cut at any byte.
 fn shorten(what: &mut What, length: usize) {
     let count = u8::try_from(length).unwrap_or(u8::MAX);
     match what {
@@ -485,7 +485,7 @@ fn lower(command: Command) -> Vec<Command> {
     }
 }
 
-/// The same conversation on a smaller ring: the drives that it has not are its highest one.
+/// The same conversation on a smaller ring: commands to removed drives go to the last drive.
 fn on_ring(subject: &Subject, drives: u8) -> Subject {
     let old = subject.case.drives;
     let ring = subject.case.ring();

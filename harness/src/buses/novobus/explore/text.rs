@@ -41,7 +41,7 @@ pub struct Page<'a> {
 pub struct Expected<'a> {
     /// The bytes.
     pub seen: &'a Seen,
-    /// Those that any ring may answer otherwise, by their index: data that a drive measures, and their checking bytes.
+    /// Indexes of bytes that may have any value: data that a drive measures, and their checking bytes.
     pub any: &'a [usize],
     /// The byte that must come at its time, by its index.
     pub timed: Option<usize>,
@@ -111,13 +111,13 @@ fn wrapped(remark: &str) -> Vec<String> {
     lines
 }
 
-/// Whether every byte that the ring gives back is asked for. Zeros that drives send unasked (9.9) come as long as somebody
-/// listens.
+/// Whether the scenario expects every byte that the ring returns. This is not possible with unasked zeros (9.9), which drives send
+/// without end.
 fn is_strict(case: &Case, expected: Expected<'_>) -> bool {
     expected.seen.received.len() <= case.bytes().len()
 }
 
-/// What stands in front of `>` and `<`: a case with ring 2 says so.
+/// The prefix of `>` and `<` lines, which names ring 2 for a case with that ring.
 fn side(case: &Case) -> &'static str {
     ["", "2"][case.ring()]
 }

@@ -28,7 +28,7 @@ const MOST_TRIES: usize = 20_000;
 /// Of what the inputs of a target are made: pieces that can be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pieces {
-    /// Bytes behind a head, in records of so many.
+    /// Bytes behind a head, in records of a fixed length.
     Bytes {
         /// How many bytes stand in front of the records.
         head: usize,
@@ -74,7 +74,7 @@ impl Distilled {
         self.new.first().map(Feature::file_name).unwrap_or_default()
     }
 
-    /// The ending of its file: that of a text where it is one, `hex` otherwise.
+    /// The extension of its file: that of a text if the input is one, else `hex`.
     #[must_use]
     pub fn ending(&self, pieces: Pieces) -> &'static str {
         match pieces {
@@ -83,7 +83,7 @@ impl Distilled {
         }
     }
 
-    /// What its file holds: a text as it is; otherwise what is new as comments, then the bytes, a record a line.
+    /// The content of its file: a text unchanged; for bytes, the new features as comments, then the bytes, one record per line.
     #[must_use]
     pub fn content(&self, pieces: Pieces) -> Vec<u8> {
         if self.ending(pieces) != "hex" {
@@ -123,9 +123,9 @@ fn is_text(bytes: &[u8]) -> bool {
     !bytes.is_empty() && std::str::from_utf8(bytes).is_ok_and(shown)
 }
 
-/// Chooses from `inputs`, beside those that reach `kept` already: again and again the one with the most new features for its size,
-/// made as small and as plain as it can be without losing one of them. Those that can be are put one behind the other; those whose features
-/// the others reach too are left out. The same inputs in another order give the same.
+/// Chooses inputs that reach features not in `kept`. Repeatedly takes the input with the most new features for its size and shrinks it
+/// without losing one of these features. Joins inputs where possible and drops those whose features the others reach too. The order of
+/// `inputs` does not change the result.
 ///
 /// # Panics
 /// An input, or a part of one, breaks a rule of the target.
@@ -149,7 +149,7 @@ pub fn distil(
     let mut chosen = Vec::new();
     loop {
         left.retain(|(_, new)| !new.is_empty());
-        // The first of equal ones is the shortest.
+        // Of equal ones, the first is the shortest.
         let worth = |(input, new): &(&Vec<u8>, BTreeSet<Feature>)| {
             new.len() * 10_000 / (input.len() + file)
         };
@@ -165,10 +165,10 @@ pub fn distil(
     }
 }
 
-/// An input, and all that it reaches.
+/// An input and all features that it reaches.
 type Chosen = (Vec<u8>, BTreeSet<Feature>);
 
-/// Two inputs, one behind the other: the head of the first is that of both; a line that the first text has stands there once.
+/// Joins two inputs. The head of the first one serves both; a line that the first text already has is not repeated.
 fn together(pieces: Pieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>> {
     let (rest, most) = match pieces {
         Pieces::Bytes { head, .. } => (second.get(head..)?.to_vec(), MOST_JOINED),
@@ -183,7 +183,7 @@ fn together(pieces: Pieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>> {
     (!rest.is_empty() && both.len() <= most).then_some(both)
 }
 
-/// Puts inputs one behind the other where nothing gets lost by it: one conversation is better than ten.
+/// Joins inputs if no feature is lost: one conversation is better than ten.
 fn joined(
     body: Body,
     pieces: Pieces,

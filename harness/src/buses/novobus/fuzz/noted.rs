@@ -135,12 +135,12 @@ pub(crate) fn record(data: &[u8], notes: &mut Notebook<'_>) {
     });
 }
 
-/// The mistakes by what they say.
+/// Notes mistakes by their messages.
 fn problems(notes: &mut Notebook<'_>, place: &'static str, found: &Problems) {
     for problem in found.all() {
         notes.note(|| {
             let (what, expected) = (shape(&problem.message), shape(&problem.expected));
-            // What is said twice is told once.
+            // Leave out an expectation that repeats the message.
             let is_new = !what.contains(expected.trim_end_matches(" expected here"));
             let more = if is_new {
                 format!("; {expected}")

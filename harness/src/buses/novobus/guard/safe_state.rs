@@ -17,23 +17,23 @@ use std::fmt;
 /// How often a ring is brought back before it counts as lost (ND21 9.8; three are the most that were ever needed).
 const ATTEMPTS: u8 = 3;
 
-/// What a drive is told on its way to the safe state.
+/// A step on the way to the safe state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SafeStep {
-    /// To stop on its ramp, and to stand.
+    /// Stop on the ramp and stand.
     Stop,
-    /// To give no torque, with a nominal speed of 0.
+    /// Block: no torque, with a nominal speed of 0.
     Block,
 }
 
 /// How drives are taken to their safe state, and when they count as standing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
-    /// What they are told, in this order.
+    /// The steps, in this order.
     pub order: Vec<SafeStep>,
     /// The speed below which a motor counts as standing, in rpm.
     pub rpm: f64,
-    /// How long it may take to stand.
+    /// How long a drive may take to stand.
     pub within: Span,
 }
 
@@ -51,9 +51,9 @@ impl Default for Standing {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum SafeState {
-    /// Every drive answered that it is stopped, blocked and standing: so many drives a ring.
+    /// Every drive reported that it is stopped, blocked and standing. Holds the size of each ring.
     Confirmed(Vec<RingSize>),
-    /// Of these drives nobody knows; the others are.
+    /// These drives are not confirmed; all others are.
     NotConfirmed(Vec<NotSafe>),
 }
 
@@ -87,16 +87,15 @@ impl fmt::Display for SafeState {
     }
 }
 
-/// Brings every drive of the rings to its safe state and reads it back; a guarded line lets all of it pass, behind a
-/// denial after [`Guarded::reset_after_denial`](crate::guard::Guarded::reset_after_denial).
+/// Brings every drive of the rings to its safe state and reads it back. A guarded line lets all of these bytes pass; after a denial,
+/// [`Guarded::reset_after_denial`](crate::guard::Guarded::reset_after_denial) must be called first.
 ///
-/// A ring is brought back first (9.8), whatever was half-sent. Then all drives get the first of the steps, each is seen to do it, and
-/// the next follows, on a drive that does not stand as well. The software stop ends every motion on its ramp (11.8); with the
-/// software block goes the nominal speed 0. Confirmed is a drive whose `Flags` show what it was told (14.4.2) and
-/// that stands. A ring that does not answer is given the stops all the same, as drives in front of a break hear
-/// them.
+/// A ring is recovered first (9.8), even from a half-sent telegram. Then all drives get the first step and are polled until they have
+/// done it or their time is over; the next step goes to all drives, also to those that do not stand. The software stop ends every
+/// motion on its ramp (11.8). The software block comes with a nominal speed of 0. A drive is confirmed if its `Flags` show all steps
+/// (14.4.2) and it stands. A ring that does not answer gets the stops anyway, because drives in front of a break still receive them.
 ///
-/// It ends within about 15 seconds a ring, and the time to stand a step for a drive that does not stop.
+/// It takes up to about 15 seconds per ring, plus the time to stand per step if a drive does not stop.
 pub fn safe_state(line: &mut dyn Line, rings: &[RingSize], standing: &Standing) -> SafeState {
     let mut not_safe = Vec::new();
     for (ring, &size) in rings.iter().enumerate() {
@@ -136,7 +135,7 @@ fn ring_to_safe_state(
         Ok(bus) => bus,
         Err(error) => return all(error.to_string()),
     };
-    // The bus has one ring, whichever it is of the bench.
+    // The bus has one ring, which is ring 0 there.
     let axes = (0..size.drives()).filter_map(|drive| Axis::new(0, drive));
     let mut drives: Vec<_> = axes.map(Told::new).collect();
     let mut told = 0;
@@ -163,9 +162,9 @@ fn ring_to_safe_state(
 /// A drive on its way to the safe state.
 struct Told {
     axis: Axis,
-    /// Why it is not there.
+    /// Why it is not in its safe state.
     why: Option<String>,
-    /// Since when it has been standing.
+    /// When it came to stand.
     stood: Option<Instant>,
     seen: bool,
 }
@@ -185,8 +184,8 @@ impl Told {
     }
 }
 
-/// One command for every drive, all on their way at once: the last drive of a long ring must not wait for the answers of the
-/// others. Where one answer does not come, nobody waits for those behind it.
+/// Sends one command to every drive without waiting for each answer, so that the last drive of a long ring gets it without delay.
+/// After the first missing answer, the answers behind it are not waited for.
 fn together(bus: &Bus<'_>, drives: &[Told], command: Command) -> Vec<Result<Option<u32>, String>> {
     let start = |drive: &Told| bus.start(drive.axis, |k| Job::new(k, command));
     let orders: Vec<_> = drives.iter().map(start).collect();
@@ -202,7 +201,7 @@ fn together(bus: &Bus<'_>, drives: &[Told], command: Command) -> Vec<Result<Opti
     orders.into_iter().map(result).collect()
 }
 
-/// Waits until every drive shows what it was told, and stands. One that did not stop before is not waited for again.
+/// Waits until every drive stands and its `Flags` show the bits in `told`. A drive that failed before gets only [`FLAGS`] of time.
 fn wait_until_seen(bus: &Bus<'_>, drives: &mut [Told], told: u8, standing: &Standing) {
     let read = |drives: &[Told], address, whole| {
         let command = match whole {
@@ -270,7 +269,7 @@ fn wait_until_seen(bus: &Bus<'_>, drives: &mut [Told], told: u8, standing: &Stan
     }
 }
 
-/// Ends what was half-sent and brings the ring back (ND21 9.8).
+/// Ends a half-sent telegram and recovers the ring (ND21 9.8).
 fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), String> {
     let mut why = String::new();
     for _ in 0..ATTEMPTS {
@@ -297,7 +296,7 @@ fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), St
     Err(why)
 }
 
-/// The check sequence (9.8) and the software stop for every drive of a ring (14.10): for whoever can wait for no answer.
+/// The check sequence (9.8) and the software stop for every drive of a ring (14.10), for senders that cannot wait for an answer.
 #[must_use]
 pub fn blind_stop(size: RingSize) -> Vec<u8> {
     let mut bytes = CHECK_SEQUENCE.to_vec();
@@ -333,11 +332,11 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
     while line.now() < sent && line.wait(sent) {}
 }
 
-/// How long `Flags` may take to follow: they do in the drive's next cycle.
+/// How long `Flags` may take to follow a command; a drive updates them in its next cycle.
 const FLAGS: Span = Span::from_millis(500);
 
 impl SafeStep {
-    /// What a drive is told (11.8, 14.10).
+    /// The commands of this step (11.8, 14.10).
     fn commands(self) -> Vec<Command> {
         let status = |data| Command::Or {
             address_low: ram::STATUS.to_be_bytes()[1],

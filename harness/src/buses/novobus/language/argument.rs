@@ -25,7 +25,7 @@ pub enum Memory {
     Eeprom,
 }
 
-/// A cell, or so many bytes from an address on.
+/// A cell, or a number of bytes from an address on.
 #[derive(Clone, Debug)]
 pub struct Location {
     /// Where.

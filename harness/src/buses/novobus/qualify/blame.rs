@@ -1,8 +1,8 @@
 //! Which drive differs from the manual where no known deviation explains what it does.
 //!
-//! Between the sync byte of a telegram and its end only the addressed drive changes a byte (ND21 9.3). A byte that is otherwise there is that
-//! drive's, unless another one damages what it passes on: then it is otherwise in telegrams to any drive. So the attempt is played again
-//! with the drives' roles exchanged.
+//! Between the sync byte of a telegram and its end only the addressed drive changes a byte (ND21 9.3). A byte that differs there is that
+//! drive's, unless another drive damages the bytes that it passes on: then bytes differ in telegrams to any drive. To tell these cases
+//! apart, the attempt is played again with the drives' roles exchanged.
 
 use super::diagnose::{Named, Whose};
 use super::exchange::{EEPROM, Sent, begin};
@@ -32,14 +32,14 @@ pub enum Meant {
 /// An attempt that differed from the model.
 #[derive(Clone, Debug)]
 pub struct Sighting {
-    /// To whom the byte belongs.
+    /// The drive that the byte belongs to.
     pub meant: Meant,
-    /// The section of the rule that is broken there.
+    /// The section of the broken rule.
     pub section: &'static str,
-    /// What was seen, in a sentence.
+    /// What was seen, as a sentence.
     pub about: String,
     sent: Sent,
-    /// How many bytes are sent until it is seen, and the telegram is whole.
+    /// How many bytes are sent until the difference is seen and the telegram is complete.
     count: usize,
 }
 
@@ -54,7 +54,7 @@ impl Sighting {
         drives: u8,
         byte_time: Span,
     ) -> Option<Self> {
-        // A byte that is missing or late may be the computer's fault; another value is none.
+        // The computer may cause a missing or late byte, but not another value.
         let values = found.expected.zip(found.received);
         if found.ring != 0 || values.is_none_or(|((_, due), (_, came))| due.byte == came.byte) {
             return None;
@@ -101,26 +101,26 @@ impl Sighting {
     }
 }
 
-/// A sighting that was sent again with the roles exchanged, step by step, and to whom the byte belonged at which that differed, if it did.
+/// A sighting that was played again with exchanged roles, step by step, and the owner of the differing byte in each step, if one differed.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// To whom it belonged in the attempt.
+    /// The drive that the byte belonged to in the attempt.
     pub meant: Meant,
-    /// How many addresses on, and what came of it; one for each other drive.
+    /// The offset of the addresses and the result, one for each other drive.
     pub steps: Vec<(u8, Option<Meant>)>,
 }
 
-/// How many attempts that differed are played again with the drives' roles exchanged.
+/// Maximum number of differing attempts that are played again with exchanged roles.
 const MOST_TRIED: usize = 3;
 
-/// With how many drives at most the roles are exchanged.
+/// Maximum number of drives whose roles are exchanged.
 const MOST_EXCHANGED: u8 = 8;
 
-/// Plays a scenario, and gives to whom the byte belonged at which it differed from the model, if it did; `None` where it says nothing.
+/// Plays a scenario and returns the owner of the byte that differed from the model, if one did; `None` if the run shows nothing.
 type Ask<'a, E> = &'a mut dyn FnMut(&Entry) -> Result<Option<Option<Meant>>, E>;
 
-/// Plays again what differed, with the drives' roles exchanged, the clearest and shortest first; each sighting has the name of its scenario.
-/// `ask` plays them.
+/// Plays differing attempts again with exchanged roles, the clearest and shortest first. Each sighting has the name of its scenario. `ask`
+/// plays a scenario.
 ///
 /// # Errors
 /// Those of `ask`.
@@ -268,7 +268,7 @@ fn may_be(drives: u8, drive: u8, wrong: &BTreeSet<u8>) -> bool {
 }
 
 impl Sent {
-    /// To whom a byte belongs, and where the telegram ends that it stands in.
+    /// The drive that a byte belongs to, and where its telegram ends.
     fn meant(&self, index: usize) -> (Meant, usize) {
         let is_sync = |at: &usize| self.roles[*at] == Role::Sync;
         let Some(start) = (0..=index).rev().find(is_sync) else {
@@ -280,7 +280,7 @@ impl Sent {
         let end = start + header.telegram_length();
         let drive = match (header.addressing(), self.roles.get(start + 1)) {
             (Addressing::AddressFollows, Some(Role::Address { drive: Some(drive) })) => *drive,
-            // Which drive a short address means, the drives before have decided.
+            // The telegrams before decide which drive a short address means.
             _ => return (Meant::Nobody, end),
         };
         let whole = self.bytes[..=index]
@@ -354,7 +354,7 @@ impl Sent {
                     let right = self.is_right(at, drive, length);
                     match (section, right) {
                         ("10.5", true) => return "10.5",
-                        // What was right a moment ago, and was not written since.
+                        // The cell was read correctly before and has not been written since.
                         (_, true) if writes && was_right => return "14.2.1",
                         (_, true) if writes => return section,
                         (_, false) if writes => return "9.6",

@@ -9,13 +9,13 @@ use harness_sim::novobus::deviation::{
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// Largest ring whose drives are all tried one by one; in larger ones only those that telegrams named are.
+/// Largest ring in which every drive is tried. In larger rings only drives addressed by telegrams are tried.
 const SMALL: u8 = 16;
 
-/// The most attempts on simulated drives that are to be explained.
+/// Maximum number of attempts on simulated drives to explain.
 const MOST_SIMULATED: usize = 12;
 
-/// The number of attempts for which every candidate is tried on simulated drives, even where it has explained none.
+/// Number of attempts for which every candidate is tried on simulated drives, even if it has explained none.
 const ASKED_OF_ALL: usize = 3;
 
 /// A deviation that explains every byte.
@@ -23,9 +23,9 @@ const ASKED_OF_ALL: usize = 3;
 pub struct Named {
     /// Which.
     pub deviation: &'static Deviation,
-    /// Whose it is.
+    /// Which drives have it.
     pub whose: Whose,
-    /// Whether every byte is the same if all drives have it: it is that drive's, and perhaps others'.
+    /// Whether every byte would be the same if all drives had it: then that drive has it, and perhaps others.
     pub perhaps_of_all: bool,
 }
 
@@ -100,12 +100,13 @@ impl Candidate {
     }
 }
 
-/// The deviations that explain every byte of every attempt, those in which nothing differed too; `twin` gives a ring with more lines in
-/// its header. A deviation of one drive is simpler than one of all drives, which is given only where no single drive explains
-/// everything. Attempts that the model of the manual explains from its power-up on refute, and prove nothing.
+/// The deviations that explain every byte of every attempt, including attempts in which nothing differed. `twin` returns a ring with
+/// additional header lines. A deviation of one drive is simpler than one of all drives, which is returned only if no single drive
+/// explains everything. An attempt that the model of the manual explains from its power-up on can refute a deviation, but not prove it.
 ///
-/// Simulated drives keep what the scenarios before have left in them, and no twin that starts anew gives every byte then. There, what
-/// explains the most attempts is named. Relatives of deviations with other numbers are tried only where no other explains everything.
+/// Simulated drives keep their state from earlier scenarios, which a fresh twin does not have, so no twin may give every byte. For them
+/// the deviation that explains the most attempts is named. Relatives of deviations with other numbers are tried only if no other
+/// deviation explains everything.
 pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&[String]) -> Result<Twin, E>) -> Vec<Named> {
     let named = name_among(seen, candidates(seen, deviations()), twin);
     match named.is_empty() {

@@ -1,5 +1,5 @@
-//! An attempt again with the drives' roles exchanged: every telegram goes so many addresses on. A drive that is wrong is wrong at other
-//! bytes then; what lies on the way of all telegrams, or in every drive, is wrong at the same byte again.
+//! Repeats an attempt with the drives' roles exchanged: the address of every telegram is shifted. A single wrong drive is then wrong at
+//! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::link::{Moment, PlacedFault, link_name};

@@ -21,16 +21,16 @@ static OF_DRIVES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/nd2
 
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/novobus");
 
-/// What stands for a drive's number in a conversation that is played for several: the first ones, the middle one and the
-/// last one.
+/// Placeholder for a drive's number in a conversation that is played for several drives: the first ones, the middle one and the last
+/// one.
 const EACH: &str = "{drive}";
 
-/// What stands for a silence, and what is put there: halves, since computers are not on time.
+/// Placeholder for a silence, and its values: halves, because computers are not on time.
 const GAP: &str = "{gap}";
 const GAPS: [&str; 3] = ["12.5ms", "15.5ms", "18.5ms"];
 
-/// What stands for telegrams that switch the monitoring of time-outs on or off in every drive (14.10.2), one behind the other: while the
-/// last drives are told, the first ones miss their bytes already where there is a gap (9.9).
+/// Placeholders for telegrams that switch the monitoring of time-outs on or off in every drive (14.10.2), one after another. A gap between
+/// them would be a time-out for the first drives before the last ones are switched (9.9).
 const MONITORING: [(&str, u8); 2] = [
     ("{monitoring on}", flags2::MONITORING),
     ("{monitoring off}", 0),
@@ -39,7 +39,7 @@ const MONITORING: [(&str, u8); 2] = [
 /// Times that a time-out may have, in milliseconds (ND21 9.9: 10 to 20).
 const TIME_OUTS: std::ops::RangeInclusive<u64> = 10..=20;
 
-/// Times that a drive may wait behind it, in milliseconds, the manual's first (9.9).
+/// Times that a drive may wait after its time-out, in milliseconds, the manual's first (9.9).
 const WAITS: [u64; 11] = [10, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15];
 
 /// A probe for a ring of a given size.
@@ -51,15 +51,15 @@ pub struct Probe {
     pub section: &'static str,
     /// What the property decides.
     pub about: &'static str,
-    /// Who is asked.
+    /// What the probe asks.
     pub asked: Asked,
-    /// What is taken for granted: the header lines of the scenario language that make it so.
+    /// The assumptions, as header lines of the scenario language.
     pub assumed: Vec<String>,
     /// The conversations.
     pub entries: Vec<Entry>,
 }
 
-/// Who is asked by a probe.
+/// What a probe asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
     /// The whole ring: every drive answers with its end of the bus.
@@ -87,7 +87,7 @@ const LOOKS: &[(&str, &[Look])] = &[
         ],
     ),
     ("s-ramp-wire", &[look(ram::PS_STATUS, 0xFF)]),
-    // 4096 turns are to be told from 28,672 of them, some more or less.
+    // 4096 turns must be distinguished from 28,672, with some tolerance.
     ("ps-position", &[look(ram::PS_UMDREHUNG, 0x60)]),
     (
         "bus-errors",
@@ -103,7 +103,7 @@ const fn look(address: u16, mask: u8) -> Look {
     Look { address, mask }
 }
 
-/// The drives of a ring that are asked one by one: the first ones, the middle one and the last one.
+/// The drives of a ring that are asked individually: the first ones, the middle one and the last one.
 fn some_drives(drives: u8) -> BTreeSet<u8> {
     let some = [0, 1, drives / 2, drives.saturating_sub(1)];
     some.into_iter().filter(|drive| *drive < drives).collect()
@@ -192,7 +192,7 @@ fn telegrams(drives: u8, address: u16, data: u8) -> String {
 /// The longest silence before a drive sends zeros that the manual allows, in milliseconds: 20 and 10 (9.9).
 const LONGEST_SILENCE: u64 = 30;
 
-/// What stands for a link in a conversation that is played for every link that faults can be put on, and for the drive behind it.
+/// Placeholders for a link, and for the drive behind it, in a conversation that is played for every link that can carry faults.
 const LINK: &str = "{link}";
 const RECEIVER: &str = "{receiver}";
 
@@ -247,7 +247,7 @@ pub fn conversations(
     Ok(entries)
 }
 
-/// What a property of the bus may be: every drive alike, and then one drive otherwise than the others.
+/// The possible values of a property of the bus: first all drives alike, then one drive different from the others.
 #[must_use]
 pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
     let known = PROPERTIES.iter().find(|known| known.name == property);
@@ -264,7 +264,7 @@ pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
             (0..drives).map(move |drive| (value.clone(), other.clone(), drive))
         })
     });
-    // More than this tells nothing that a person would read.
+    // More hypotheses would not help a reader.
     let times = values.len() > 2;
     let differing = differing.take(if drives > 1 && !times { 1_000 } else { 0 });
     hypotheses.extend(differing.map(|(value, other, drive)| Hypothesis {
@@ -284,11 +284,11 @@ fn alike(property: &str, value: &str) -> Hypothesis {
     }
 }
 
-/// When drives may miss their bytes: with the manual's wait behind it and an answer, then with what else the two other
-/// properties of a time-out may be, since all three show together.
+/// Hypotheses for the time-out: first with the manual's wait and answer, then combined with the other values of these two properties,
+/// because all three show together.
 fn time_outs() -> Vec<Hypothesis> {
     let mut hypotheses = Vec::new();
-    // The first is what a drive does where nothing is said.
+    // The first is the default of a drive.
     let waits = std::iter::once(None).chain(WAITS.into_iter().skip(1).map(Some));
     for wait in waits {
         for silent in [false, true] {

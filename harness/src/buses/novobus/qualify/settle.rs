@@ -150,8 +150,8 @@ fn explaining_all<E>(
     Ok(found)
 }
 
-/// The hypothesis whose times fit best. Where the manual's own value, which stands in front, fits as well but for a sixth and `lateness`,
-/// it is that: in real time the bench sees bytes a little late.
+/// The hypothesis whose times fit best. The first one, which has the manual's value, is preferred if it fits equally well within a sixth
+/// and `lateness`, because in real time the bench sees bytes a little late.
 fn best(found: &[(Hypothesis, Evidence)], lateness: Span) -> Option<&Hypothesis> {
     let (first, evidence) = found.first()?;
     let (best, better) = found.iter().min_by_key(|(_, evidence)| evidence.apart)?;
@@ -174,14 +174,14 @@ fn written(tenths: u64) -> String {
     }
 }
 
-/// How a model explains what came.
+/// How well a model explains the bytes received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Explained {
     /// All of it.
     Whole,
-    /// Where the cell was read in which the drive says whether it is done, the model has these bits of it and the drive others.
+    /// The bits in the cell by which the drive reports that it is done differ; these are the model's.
     Cell(u8),
-    /// Not, in something that the question is not about.
+    /// It does not explain a byte that the question is not about.
     Not,
 }
 
@@ -205,7 +205,7 @@ fn explained(mut twin: Twin, conversations: &[Conversation], exactness: Exactnes
     })
 }
 
-/// The times that explain what came, in tenths of a millisecond.
+/// The times that explain the bytes received, in tenths of a millisecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Bracket {
     /// From the first to the last of these.
@@ -214,14 +214,14 @@ enum Bracket {
     Nothing,
 }
 
-/// Which times up to `longest` explain everything, where a drive is asked again and again whether it is done. Where the model
-/// says what it says with the longest time, its time is too long, and otherwise too short.
+/// Finds the times up to `longest` that explain everything, if a drive is polled until it is done. If the model answers as with the
+/// longest time, its time is too long, else too short.
 fn bracket<E>(longest: u64, explained: &dyn Fn(u64) -> Result<Explained, E>) -> Result<Bracket, E> {
     let not_yet = explained(longest)?;
     if not_yet == Explained::Whole && explained(0)? == Explained::Whole {
         return Ok(Bracket::Anything);
     }
-    // The shortest that is not too short.
+    // The shortest time that is not too short.
     let (mut low, mut high) = (0, longest);
     while low < high {
         let middle = low.midpoint(high);

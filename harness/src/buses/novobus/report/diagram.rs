@@ -1,8 +1,8 @@
 //! The space-time diagram of a ring: drives across, bytes down, a colour for what each sender was doing (ND21 9.7, 9.8).
 //!
-//! The picture stands without scripts, aligned by index as the manual's tables are. Beside it stands what every byte means, as data;
-//! the script shows it to whoever points at a byte or walks through the bytes by keys, and lays the bytes out at their
-//! times. Equal neighbours are one rectangle, and all rectangles of a colour one path.
+//! The picture works without scripts and is aligned by index, as the manual's tables are. The page also holds the meaning of every byte
+//! as data. The script shows the meaning of a byte under the pointer or selected by keys, and can place the bytes at their times. Equal
+//! neighbours are one rectangle, and all rectangles of a colour are one path.
 
 use crate::report::html::Html;
 use crate::report::pcapng::name;
@@ -32,7 +32,7 @@ const FAULTS: usize = 12;
 /// How far a byte may be from where the byte before it puts it, in thirds of a nanosecond: what times in nanoseconds lose.
 const EXACT: u64 = 6;
 
-/// What the script is told. Lists are flat: a line of numbers is short and read at once.
+/// The data for the script. Lists are flat, because a line of numbers is short and fast to read.
 #[derive(Serialize)]
 struct Data {
     left: usize,

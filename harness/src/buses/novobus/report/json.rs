@@ -9,13 +9,13 @@
 //! | `from`, `to` | the ends of a link: `"master"` or a drive's number |
 //! | `bytes` | what the link carried, in order |
 //! | `t_ns` | when the byte's stop bit had passed, in nanoseconds since the start, cut off below |
-//! | `sent` | what the transmitter put on the wire; `null` for a byte that nobody sent |
+//! | `sent` | what the transmitter put on the wire; `null` for a byte that no transmitter sent |
 //! | `received` | what the receiver read after any fault; `null` where nothing arrived |
 //! | `error` | `null`, `"parity"`, `"framing"`, `"break"`, `"overrun"` or `"dropped"` |
 //! | `marks` | what the drives remarked, in order of time |
 //! | `byte` | at which byte of the drive's inbound link, counted from 1 (at a time-out, the last before it) |
 //! | `kind` | `detected` (!), `upstream` (*), `seventeenth` (#), `sequence` (@) or `recovered` |
-//! | `cause` | for `detected`: `parity`, `framing`, `overrun`, `sync`, `command`, `parameter`, `checksum` or `time-out`; otherwise `null` |
+//! | `cause` | for `detected`: `parity`, `framing`, `overrun`, `sync`, `command`, `parameter`, `checksum` or `time-out`; else `null` |
 //! | `records` | the cells that the scenario recorded, in order of their beginnings; left out where there are none |
 //! | `cell`, `unit` | the cell as the scenario names it, and the unit of its values (empty for bytes without a scale) |
 //! | `every_ns` | how often it was noted; `null` where its changes were |

@@ -1,8 +1,8 @@
 //! What the bytes on one link of a ring are, as the receiver of that link reads them (ND21 9.1 to 9.8, 10).
 //!
-//! An [`Observer`] knows nothing but the bytes of its own link, as somebody with a tap does. Where it stands in the
-//! ring is told by the drives at the ends of the link: each drive adds 1 to an address byte (9.3), so behind
-//! drive K the byte is `drive - K`; and behind the drive that is meant a command has become its answer (9.5).
+//! An [`Observer`] sees only the bytes of its own link, as a tap does. Its place in the ring follows from the drives at the ends of the
+//! link: each drive adds 1 to an address byte (9.3), so behind drive K the byte is `drive - K`. Behind the addressed drive, a command has
+//! become its answer (9.5).
 
 use harness_proto::line::LineError;
 use harness_proto::novobus::check_sequence::{Progress, Watch};
@@ -34,7 +34,7 @@ pub enum Role {
     Data,
     /// A checking byte (9.6).
     Check,
-    /// A net byte of which nobody can tell more: no address was seen, or no command begins so.
+    /// A net byte without a known meaning: no address was seen, or no command starts with this byte.
     Net,
     /// A zero of the error mode (9.7).
     ErrorZero,

@@ -23,25 +23,25 @@ const LIFELINES: usize = 10;
 const FAULTS: usize = 12;
 /// Drives that detected something shown one by one at most: behind the first one every drive does.
 const DETECTED: usize = 4;
-/// Bytes of an event that are written at most.
+/// Maximum number of bytes written for an event.
 const BYTES: usize = 16;
 
-/// What the master sends to bring a ring back (9.8).
+/// The label of what the master sends to recover a ring (9.8).
 const CHECK: &str = "check sequence";
 
-/// Said of an answer whose checking byte is wrong (9.6).
+/// Suffix of an answer whose checking byte is wrong (9.6).
 const MISFIT: &str = " (checking byte does not fit)";
 
 const COLUMN: usize = 110;
 const ROW: usize = 26;
 const TOP: usize = 30;
 
-/// One of those that speak.
+/// A sender or receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Who {
     Master,
     Drive(u8),
-    /// All drives, or nobody knows which.
+    /// All drives, or an unknown one.
     Ring,
 }
 
@@ -359,7 +359,7 @@ fn hex(event: &Event) -> String {
     text
 }
 
-/// Who has a line: the master, the drives in the order of the ring, and what stands for all others.
+/// The participants with a lifeline: the master, the drives in the order of the ring, and one that stands for all others.
 fn lifelines(drawn: &[Event]) -> Vec<Who> {
     let mut who: Vec<Who> = drawn
         .iter()

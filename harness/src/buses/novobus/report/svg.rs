@@ -1,9 +1,9 @@
 //! A trace as a space-time diagram: the drives across, time down, a colour for what each was doing (SVG 1.1).
 //!
-//! A column is a link, headed by its sender, as in the manual's tables (ND21 9.7, 9.8). By [`Scale::Index`] row n is the n-th byte
-//! of each link; by [`Scale::Time`] a byte stands where its time is, so that it is seen to go round. Whoever points at a
-//! byte reads what it is, by which rule and section. Equal bytes side by side are one rectangle. No scripts; colours
-//! follow the reader's light or dark scheme; a long run is cut, and the picture says so.
+//! A column is a link, headed by its sender, as in the manual's tables (ND21 9.7, 9.8). With [`Scale::Index`] row n is the n-th byte of
+//! each link. With [`Scale::Time`] a byte is placed at its time, which shows how it goes round. A tooltip gives the meaning of a byte, its
+//! rule and section. Equal neighbouring bytes are one rectangle. There are no scripts; colours follow the reader's light or dark scheme. A
+//! long run is cut, and the picture says so.
 
 pub(crate) mod cells;
 
@@ -384,7 +384,7 @@ fn legend(out: &mut String, y: f64) {
     );
 }
 
-/// What the picture shows, for those who do not see it.
+/// The description of the picture for screen readers.
 fn description(traces: &[Trace], drawn: &[Diagram], options: &Options<'_>) -> String {
     let mut text =
         String::from("Space-time diagram: the links of the ring across, headed by their senders; ");

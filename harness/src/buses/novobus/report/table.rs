@@ -43,7 +43,7 @@ pub struct Part {
     pub columns_at_most: Option<usize>,
 }
 
-/// Rows shown of a table where nobody says how many.
+/// Default number of rows shown of a table.
 const ROWS: usize = 20_000;
 
 /// A trace as a table.

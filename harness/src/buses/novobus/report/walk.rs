@@ -32,9 +32,9 @@ pub(crate) fn in_time(links: &[LinkTrace]) -> impl Iterator<Item = (usize, usize
 pub enum State {
     /// It passed on SYNCO or PAUSE.
     Idle,
-    /// It passed on a telegram for somebody else.
+    /// It passed on a telegram for another drive.
     Forwarding,
-    /// It is the drive that is meant, and answered.
+    /// It is the addressed drive, and answered.
     Addressed,
     /// It sent a zero of the error mode (ND21 9.7).
     Zero,
@@ -78,7 +78,7 @@ impl State {
 pub struct Seen<'t> {
     /// What it is to its receiver.
     pub meaning: Meaning,
-    /// What it was to its sender: the same where nobody knows better.
+    /// The meaning of the byte to its sender; the same as for the receiver if nothing more is known.
     pub sent: Meaning,
     /// What its sender was doing.
     pub state: State,

@@ -1,4 +1,4 @@
-//! What a rig shows of itself: who its drives are, how long a byte takes round its rings, and what went wrong meanwhile.
+//! The properties of a rig: the identities of its drives, how long a byte takes round its rings, and what went wrong meanwhile.
 
 use super::line_test;
 use crate::buses::novobus::driver::{self, Axis, Bus, Identity, State};
@@ -54,11 +54,11 @@ pub struct DriveFigures {
     pub identity: Identity,
     /// Its mode and error.
     pub state: State,
-    /// What the rig's file says otherwise, in a sentence.
+    /// How this contradicts the rig's file, as a sentence.
     pub contradiction: Option<String>,
 }
 
-/// What a rig shows.
+/// The properties of a rig.
 #[derive(Clone, Debug)]
 pub struct Figures {
     /// Its rings, in order.

@@ -58,7 +58,7 @@ impl Interlocks {
         (!all.is_empty()).then_some(Self { all })
     }
 
-    /// Looks at every interlock. Nobody has just been looked at, and drives must answer.
+    /// Checks every interlock, whether it is due or not. Every drive must answer.
     ///
     /// # Errors
     /// The first that does not hold, or whose drive does not answer, in a sentence.

@@ -187,7 +187,7 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
     }
 }
 
-/// What comes of the scenario on a rig's model, whose drives have just been switched on, with these known deviations.
+/// The outcome of the scenario on a rig's model with drives that have just been switched on and have these known deviations.
 fn switched_on(rig: &Rig, lines: &[String], heard: &Heard<'_>) -> Option<Outcome> {
     let mut link = twin(rig, lines).ok()?.into_link();
     let mut forgotten: Vec<Event> = Vec::new();

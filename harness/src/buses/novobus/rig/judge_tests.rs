@@ -19,7 +19,7 @@ fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
     judged_with(ring, rig, scenario, &|_| {})
 }
 
-/// The same where the comparisons with the twin are changed before.
+/// The same, but `change` edits the comparisons with the twin first.
 fn judged_with(
     ring: &str,
     rig: &str,
@@ -166,7 +166,7 @@ fn a_known_deviation_excuses_nothing_else() {
     check(wrong, &known("odd-sums", 2, "9.6"), reads, Failed);
 }
 
-/// ND21 9.9: how many zeros come unasked, and whose zero is the first, is a race of the drives' clocks.
+/// ND21 9.9: the number of unasked zeros, and which drive sends the first one, is a race of the drives' clocks.
 #[test]
 fn a_race_of_clocks_accuses_no_drive() {
     let silent = "drive 0..last memory Flags2 = 04\n> 80*3\n< 80*3\nwait 80ms\n";

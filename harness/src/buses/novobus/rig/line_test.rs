@@ -167,8 +167,8 @@ pub(crate) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
         if sync.is(WITH_FF[0]) && address.error.is_none() && damaged.byte == 0 && damaged.error.is_some())
 }
 
-/// The rate of a ring whose bytes come back slower than they were sent; `None` where they do not. A computer that stood still
-/// does not look like a slow ring: the fastest of three passes counts.
+/// The rate of a ring whose bytes come back slower than they were sent; `None` if they do not. The fastest of three passes counts, so
+/// that a computer that stood still does not look like a slow ring.
 pub(crate) fn slower(line: &mut dyn link::Line, ring: usize, stated: Rate) -> Option<Rate> {
     (0..RATE_PASSES)
         .map(|_| slower_in(&pass(line, ring), stated))

@@ -46,7 +46,7 @@ impl Rows<'_> {
         sync_before(1) == own && sync_before(2) != own
     }
 
-    /// The command whose checking byte the master sent at a place, if it is a right one.
+    /// The command whose checking byte the master sent at `index`, if that byte is right.
     fn command(&self, index: usize, drive: u8, length: u8) -> Option<Command> {
         let before = answer_of(self.roles.get(..index)?, drive, length);
         let mut bytes: Vec<u8> = before.map(|(place, _)| self.sent[place]).collect();
@@ -181,8 +181,8 @@ impl Comparer<'_> {
         }
     }
 
-    /// The drive whose answers are all that differs from the `first` byte on that does, in a ring that gives a byte for a byte. A drive that
-    /// damages what it forwards leaves the answer's checking byte as it was: of a single byte nothing is known.
+    /// The drive whose answers contain every differing byte from `first` on, in a ring that returns one byte for each byte sent. A single
+    /// differing byte proves nothing, because a drive that damages forwarded bytes does not correct the checking byte of the answer.
     fn culprit(&mut self, rows: &Rows<'_>, first: usize) -> Option<u8> {
         let answering = |index: usize| match rows.role(index) {
             Role::Data { drive, .. } | Role::Check { drive, .. } | Role::ProcessData { drive } => {
@@ -201,7 +201,7 @@ impl Comparer<'_> {
         (!differing.is_empty() && differing.iter().all(own)).then_some(drive)
     }
 
-    /// What is otherwise at one place, apart from the time.
+    /// What differs at one place, apart from the time.
     fn row(
         &mut self,
         rows: &Rows<'_>,
@@ -316,7 +316,7 @@ impl Comparer<'_> {
         own::is_of_the_scope(address) && self.recording.contains(&(ring, drive))
     }
 
-    /// Notes a byte whose value the drive decides.
+    /// Notes a byte whose value is the drive's choice.
     fn note_own(&mut self, rows: &Rows<'_>, index: usize, place: Option<usize>) {
         let Some((place, (at, _))) = place.zip(rows.received.get(index)) else {
             return;
@@ -549,7 +549,7 @@ mod tests {
     use crate::scenario::simulate::bench;
     use crate::scenario::source::Source;
 
-    /// ND21 14.2.1: what a drive changes by itself, while it stands and while it turns, is compared with nobody's.
+    /// ND21 14.2.1: cells that a drive changes by itself, standing or turning, are not compared.
     #[test]
     fn what_changes_by_itself_is_not_compared() {
         let text = "title x\nring 1\ndrive 0 model nd21\ndrive 0 input GPIN3 GPIN5 high\nwrite-word 0 nsoll = 0400\n";

@@ -1,24 +1,24 @@
-//! What a comparison with a twin is asked for, and what comes of it.
+//! The options and the result of a comparison with a twin.
 
 use harness_proto::line::Received;
 use harness_proto::novobus::role::Role;
 use harness_proto::time::{Instant, Span};
 use std::fmt;
 
-/// How exactly is compared.
+/// How exact a comparison is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exactness {
-    /// How far times may be apart.
+    /// Maximum difference of times.
     pub tolerance: Span,
     /// Whether the link shows line errors at their bytes.
     pub line_errors: bool,
-    /// Whether the twin knows what every cell holds: a rig whose drives are simulated too.
+    /// Whether the twin knows the content of every cell: true for a rig whose drives are simulated too.
     pub knows_cells: bool,
     /// Cells of a drive that are compared although it writes them itself.
     pub looks: Option<(u8, &'static [Look])>,
 }
 
-/// Bits of a cell that a question is about.
+/// Bits of a cell that decide a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Look {
     /// The address of the byte.
@@ -43,7 +43,7 @@ pub enum What {
 }
 
 impl What {
-    /// It in a few words.
+    /// A short description.
     #[must_use]
     pub const fn words(&self) -> &'static str {
         match self {
@@ -56,7 +56,7 @@ impl What {
     }
 }
 
-/// The first byte that is otherwise than the model says.
+/// The first byte that differs from the model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Divergence {
     /// In which ring, counted from 0.
@@ -65,20 +65,20 @@ pub struct Divergence {
     pub byte: usize,
     /// How it differs.
     pub what: What,
-    /// What the model says, and when.
+    /// The byte that the model expects, and its time.
     pub expected: Option<(Instant, Received)>,
-    /// What came, and when.
+    /// The byte received, and its time.
     pub received: Option<(Instant, Received)>,
     /// What the byte is for.
     pub role: Role,
-    /// The step of the scenario that was under way when the byte went out, as a place in its text.
+    /// The step of the scenario that was running when the byte was sent, as a place in its text.
     pub step: Option<usize>,
-    /// The drive whose answers are all that differs in the conversation; none where the bytes do not say which drive is wrong.
+    /// The drive whose answers are the only differing bytes of the conversation; `None` if the bytes do not show which drive is wrong.
     pub drive: Option<u8>,
 }
 
 impl Divergence {
-    /// Whether another conversation differed at the same place, in the same way, and as late or as early but for a tolerance.
+    /// Whether another conversation differed at the same place and in the same way, and equally late or early within the tolerance.
     #[must_use]
     pub fn is_like(&self, other: &Self, tolerance: Span) -> bool {
         let place = |own: &Self| (own.ring, own.role, own.step, own.drive);
@@ -88,7 +88,7 @@ impl Divergence {
             && apart <= u128::from(tolerance.as_nanos())
     }
 
-    /// By how many nanoseconds the byte came too late; less than nothing where it was early.
+    /// How late the byte was, in nanoseconds; negative if it was early.
     fn late_by(&self) -> i128 {
         let at = |byte: &Option<(Instant, Received)>| {
             byte.map(|(at, _)| i128::from(at.since_start().as_nanos()))
@@ -125,7 +125,7 @@ impl fmt::Display for Divergence {
     }
 }
 
-/// A cell of which the model did not know what it holds.
+/// A cell whose content the model did not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Adopted {
     /// In which ring, counted from 0.
@@ -138,8 +138,8 @@ pub struct Adopted {
     pub value: u8,
 }
 
-/// A byte received of which the drive decides bits: a cell that it writes itself or that was not written since the attempt began, or the
-/// checking byte behind one.
+/// A received byte with bits that are the drive's choice: of a cell that it writes itself, of a cell that was not written since the
+/// attempt began, or the checking byte of such data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Own {
     /// In which ring, counted from 0.
@@ -150,9 +150,9 @@ pub struct Own {
     pub place: usize,
     /// The drive.
     pub drive: u8,
-    /// The cell, also of a checking byte behind it; none for process data of a cell that is not known.
+    /// The cell of the data or of its checking byte; `None` for process data of an unknown cell.
     pub address: Option<u16>,
-    /// The bits that the drive does not decide: the master has written them.
+    /// The bits that are not the drive's choice, because the master has written them.
     pub known: u8,
     /// The byte.
     pub value: u8,
@@ -167,25 +167,25 @@ pub struct Unasked {
     pub at: Instant,
 }
 
-/// What came of a comparison.
+/// The result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Comparison {
     /// How many bytes were compared.
     pub compared: u64,
-    /// How many were data that the drive measures itself, and were not.
+    /// How many were not compared, because the drive measures their data itself.
     pub measured: u64,
-    /// What was taken over.
+    /// The contents of cells that the model took over.
     pub adopted: Vec<Adopted>,
-    /// The bytes whose values the drives decide, in order; none where the twin knows what every cell holds.
+    /// The bytes whose values are the drives' choice, in order; empty if the twin knows the content of every cell.
     pub own: Vec<Own>,
-    /// The first byte that is otherwise, apart from its time.
+    /// The first byte that differs in more than its time.
     pub divergence: Option<Divergence>,
-    /// In real time, the first byte of each ring that a drive sent unasked. The bytes behind it are a race of clocks: of them only what
-    /// holds for every order is compared.
+    /// In real time, the first byte of each ring that a drive sent unasked. The bytes behind it are a race of clocks: only properties that
+    /// hold for every order are compared.
     pub unasked: Vec<Unasked>,
     /// Whether a ring was left out: an earlier conversation ended in such a race.
     pub left_out: bool,
-    /// The first byte at another time.
+    /// The first byte that differs only in its time.
     pub untimely: Option<Divergence>,
     /// All differences of times together.
     pub apart: Span,

@@ -1,4 +1,4 @@
-//! The twin itself, and what it is given.
+//! The twin and its input.
 
 use super::compare::Comparer;
 use super::comparison::{Comparison, Exactness};
@@ -12,8 +12,8 @@ use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
-/// How much longer than its conversation a twin in real time listens: a real clock is late now and then, and what a ring
-/// has sent may have come a moment sooner than its twin's.
+/// How much longer than its conversation a twin in real time listens. Real clocks are late at times, and bytes of the ring may arrive a
+/// moment before those of its twin.
 const SLACK: Span = Span::from_millis(1);
 
 /// What the bench did to a ring.
@@ -23,7 +23,7 @@ pub enum Done {
     Sent(Instant, u8),
     /// It came to the step at this place of the scenario's text.
     Step(usize),
-    /// It let a fault happen, at this time or at the moment given.
+    /// It injected a fault, at this time or at the given moment.
     Fault(Instant, PlacedFault, Moment),
 }
 
@@ -122,7 +122,7 @@ impl Conversation {
         starts.collect()
     }
 
-    /// The step that was under way when the `index`-th byte was sent into a ring, counted from 0.
+    /// The step that was running when the `index`-th byte, counted from 0, was sent into a ring.
     pub(crate) fn step_at(&self, ring: usize, index: usize) -> Option<usize> {
         let mut step = None;
         let mut sent = 0;
@@ -160,7 +160,7 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    /// Takes what has come from a ring of the link.
+    /// Reads the bytes received from a ring of the link.
     fn fetch(&mut self, link: &mut SimulatedLink, ring: usize) {
         while let Some((at, byte, asked)) = link.receive_with_cause(ring) {
             if !asked {
@@ -171,7 +171,7 @@ impl Expected {
     }
 }
 
-/// A simulated ring that is given what a real one is given.
+/// A simulated ring that gets the same bytes as a real one.
 #[derive(Clone, Debug)]
 pub struct Twin {
     link: SimulatedLink,
@@ -190,13 +190,13 @@ impl Twin {
         }
     }
 
-    /// The simulated ring of a twin that nobody has spoken to.
+    /// The simulated ring of a twin to which nothing has been sent.
     #[must_use]
     pub fn into_link(self) -> SimulatedLink {
         self.link
     }
 
-    /// Lives through a conversation, and says how what was received compares with what it received itself.
+    /// Plays a conversation and compares the bytes received with those of the twin.
     pub fn follow(&mut self, conversation: &Conversation, exactness: Exactness) -> Comparison {
         self.follow_rings(conversation, exactness, &BTreeSet::new())
     }
@@ -254,9 +254,9 @@ impl Twin {
         drives.filter(holds).collect()
     }
 
-    /// Lives through conversations one after another. In real time no model knows how a ring comes out of a conversation in which drives
-    /// sent unasked (9.9): it is a race of their bytes with the master's. The ring is not compared any more behind that conversation, and
-    /// the second value says that another twin is needed.
+    /// Plays conversations one after another. In real time no model knows the state of a ring after drives have sent unasked bytes (9.9),
+    /// because these race with the master's bytes. The ring is not compared any more after that conversation, and the second value says that
+    /// another twin is needed.
     pub fn follow_all(
         &mut self,
         conversations: &[Conversation],
@@ -277,7 +277,7 @@ impl Twin {
         (comparisons, diverged || !left_out.is_empty())
     }
 
-    /// The same up to the first conversation in which a byte is otherwise.
+    /// The same up to the first conversation in which a byte differs.
     pub fn follow_while_alike(
         &mut self,
         conversations: &[Conversation],
@@ -295,7 +295,7 @@ impl Twin {
         comparisons
     }
 
-    /// Lives through a conversation, and `slack` longer, and gives what it received, ring by ring.
+    /// Plays a conversation and `slack` more, and returns what the twin received, ring by ring.
     fn answer(&mut self, conversation: &Conversation, slack: Span) -> Vec<Expected> {
         self.link.begin();
         let byte_time = self.link.byte_time();

@@ -1,7 +1,7 @@
 //! Bytes that drives send unasked in real time (ND21 9.9).
 //!
-//! How many zeros come before another byte, and whose zero comes first, depends on the clocks of the drives. No model knows that. From the
-//! first byte that was sent unasked to the next byte of the master's, only what holds for every order is asked for.
+//! The number of zeros before another byte, and which drive sends the first zero, depend on the clocks of the drives, which no model
+//! knows. From the first unasked byte to the next byte of the master, only properties that hold for every order are checked.
 
 use super::comparison::What;
 use super::follow::Expected;

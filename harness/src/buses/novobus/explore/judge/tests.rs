@@ -35,7 +35,7 @@ enum Wrong {
     OneValue,
 }
 
-/// A memory whose contents, and whose own cells at every moment, are chance.
+/// A memory with random contents, in which the drive's own cells change randomly at any time.
 struct Any {
     cells: Vec<u8>,
     dice: Dice,
@@ -217,7 +217,7 @@ impl Watcher for Heard {
     fn progress(&mut self, _: &Progress, _: &Pool) {}
 }
 
-/// What a run of so many cases finds, and how many of them could not be sent.
+/// Runs `cases` cases and returns the findings and how many cases could not be sent.
 fn run(mut ring: AnyRing, seed: u64, cases: u64, without: &[Spice]) -> (Vec<Finding>, u64) {
     let (first, second) = RingScope::both(3, None, |_, _| true);
     let not_on_ports = [Spice::Power, Spice::Silence, Spice::Late, Spice::Eeprom];

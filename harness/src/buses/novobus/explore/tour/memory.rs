@@ -8,8 +8,8 @@ use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::command::Kind;
 use harness_proto::novobus::memory::{ROM_BYTES, ROM_WORDS, in_range};
 
-/// All spare RAM with values of its own, upwards and downwards, by bytes and by words, each cell read before it is written again: a bit that
-/// is stuck, cells that are one, writes that are lost (ND21 10.1, 10.2).
+/// Marches through all spare RAM with a different value for each cell, upwards and downwards, by bytes and by words, and reads each cell
+/// before it is written again. Finds stuck bits, aliased cells and lost writes (ND21 10.1, 10.2).
 pub(crate) fn march(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>> {
     let words: Vec<u16> = own::SPARE.step_by(2).collect();
     let content: Vec<u16> = words.iter().map(|_| dice.word()).collect();

@@ -23,13 +23,13 @@ use harness_sim::fault::LinkFault;
 use harness_sim::novobus::drive::Model;
 use std::ops::RangeInclusive;
 
-/// The most bytes that a run may leave on all links together: its record is held in memory.
+/// Maximum number of bytes that a run may carry on all links together: its record is kept in memory.
 pub(crate) const MAX_CARRIED: u64 = 20_000_000;
 
 /// The longest delay or break.
 const MAX_FAULT: time::Span = time::Span::from_millis(10_000);
 
-/// How long a line without a time waits where the scenario does not say.
+/// Default wait of a line without a time.
 const DEADLINE: time::Span = time::Span::from_millis(1000);
 
 /// Settles a scenario, for a first ring of `size` drives where that is given.
@@ -119,7 +119,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         needs.push(Capability::TwoRings);
     }
     needs.extend(planner.setups.iter().filter_map(|setup| setup.what.needs()));
-    // What a wrong master does to a machine nobody knows.
+    // The effect of a wrong master on a machine is unknown.
     needs.extend(scenario.master.as_ref().map(|_| Capability::Simulator));
     needs.sort();
     needs.dedup();

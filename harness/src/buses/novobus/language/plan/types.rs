@@ -168,9 +168,9 @@ pub enum PlannedAction {
     Recover(usize),
     /// The driver does this of these drives; whether its commands must not run twice, and may end in any way.
     Master(usize, Vec<(u8, PlannedCall)>, bool),
-    /// The driver counts so many drives.
+    /// The driver counts this number of drives.
     Count(usize, u8),
-    /// Time passes until a check holds, at most so long.
+    /// Time passes until a check holds, at most this long.
     Until(PlannedDriveCheck, time::Span),
     /// Time passes.
     Wait(time::Span),
@@ -323,15 +323,15 @@ pub enum PlannedLooks {
 /// A check, settled.
 #[derive(Clone, Debug)]
 pub enum PlannedCheck {
-    /// The ring spells out this drive, after at most so many zeros.
+    /// The ring spells out this drive, after at most this number of zeros.
     Located(usize, u8, Option<u64>),
-    /// It does so after at most so many zeros.
+    /// It does so after at most this number of zeros.
     Within(u64),
     /// Something holds of drives.
     Drive(PlannedDriveCheck),
     /// A drive's error mode has this cause.
     Error(usize, u8, BusError),
-    /// So many check sequences came back whole.
+    /// This number of check sequences came back whole.
     Corrected(u64),
     /// The driver has named this link of this ring, as broken or as damaged.
     Named(usize, usize, bool),
@@ -339,9 +339,9 @@ pub enum PlannedCheck {
     Ended(Ending),
     /// What the driver has sent into this ring is as the manual says.
     RulesKept(usize),
-    /// So many bytes were sent since the last check, in this time (and its tolerance).
+    /// This number of bytes was sent since the last check, in this time (and its tolerance).
     Sent(u64, Option<(time::Span, time::Span)>),
-    /// So many bytes were received since the start.
+    /// This number of bytes was received since the start.
     Received(u64),
 }
 

@@ -56,7 +56,7 @@ impl Runner<'_> {
                 Err(Miss::Otherwise(_)) => {
                     self.recorder.count_look();
                     self.pass_until(end.min(now + LOOK));
-                    // Why there is no room is said by whoever plays the step.
+                    // The caller that plays the step reports why there is no room.
                     if self.full.is_some() {
                         return Ok(());
                     }

@@ -29,7 +29,7 @@ impl Runner<'_> {
         self.look_at_drives(check, check.drives.clone())
     }
 
-    /// The same, up to the first drive of which it does not hold: for whoever looks often.
+    /// The same, but stops at the first drive for which it does not hold: for frequent checks.
     pub(crate) fn glance(&self, check: &PlannedDriveCheck) -> Result<(), Miss> {
         let mut drives = check.drives.clone();
         drives.try_for_each(|drive| self.look_at_drives(check, drive..=drive))
@@ -161,7 +161,7 @@ fn list(ring: usize, drives: &[u8]) -> String {
     format!("drive{s} {}", names.join(", "))
 }
 
-/// Whether the bytes of a cell are what they must be; otherwise what they are, in a sentence.
+/// Checks the bytes of a cell; the error is a sentence that says what they are instead.
 pub(crate) fn judge(cell: &PlannedCell, found: &[u8], units: units::Drive) -> Result<(), String> {
     let name = &cell.name;
     match &cell.test {

@@ -240,8 +240,8 @@ impl NotReady {
         }
     }
 
-    /// What a scenario comes to whose drives were not made ready. A drive must answer, and hold what was written to it; the manual
-    /// leaves open only what a cell holds that the drive writes by itself.
+    /// The outcome of a scenario whose drives could not be made ready. A drive must answer and hold what was written to it. The manual
+    /// leaves open only the contents of cells that the drive writes by itself.
     pub fn judged(self, link: &dyn Link) -> Outcome {
         if let Some(trouble) = link.trouble() {
             return Outcome::trouble(trouble);
@@ -360,7 +360,7 @@ fn passes_synco(link: &mut dyn Link, ring: usize) -> bool {
     false
 }
 
-/// A check sequence stands behind each telegram: whoever was in the middle of something hears the next one whole (9.8).
+/// A check sequence follows each telegram, so that a drive in the middle of a telegram receives the next one whole (9.8).
 fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
     let ring = cells.first()?.ring;
     let drives = link.drives(ring);
@@ -461,13 +461,13 @@ fn set_up(plan: &Plan, link: &mut dyn Link, before: &mut Vec<Before>) -> Result<
     Ok(())
 }
 
-/// Sets cells to what they held before, the last one first, and reads them back.
+/// Restores the previous contents of cells, the last one first, and reads them back.
 ///
-/// The check sequence (9.8) and all telegrams go out without a gap: a scenario may have left the ring in the error mode,
-/// or with drives that miss their bytes after 10 ms (9.9) until one of these cells says otherwise.
+/// The check sequence (9.8) and all telegrams go out without a gap. A scenario may have left the ring in the error mode, or with drives
+/// that monitor time-outs of 10 ms (9.9) until one of these cells is restored.
 ///
 /// # Errors
-/// The first cell that does not hold it, in a sentence.
+/// The first cell that does not hold its previous contents, as a sentence.
 fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), NotReady> {
     for ring in 0..2 {
         let mut bytes = CHECK_SEQUENCE.to_vec();

@@ -155,7 +155,7 @@ impl Runner<'_> {
         self.note();
     }
 
-    /// Notes what the cells hold whose time has come.
+    /// Samples the cells that are due.
     pub(crate) fn note(&mut self) {
         let now = self.link.now();
         if self.recorder.next() > now {
@@ -172,7 +172,7 @@ impl Runner<'_> {
             let found = self.bytes(record.ring, record.drive, record.address, record.size);
             let next = at + step;
             self.recorder.running[place].1 = if next > now { next } else { now + step };
-            // What the link does not show leaves no sample.
+            // A cell that the link does not show gets no sample.
             let Some(found) = found else { continue };
             let sample = Sample::new(now, &found);
             let record = &mut self.recorder.records[index];

@@ -13,14 +13,14 @@ use harness_proto::novobus::error::BusError;
 /// What must hold at a point of a scenario.
 #[derive(Clone, Debug)]
 pub enum Check {
-    /// The ring spells out that this drive saw the fault (ND21 9.7), after at most so many zeros.
+    /// The ring spells out the drive that saw the fault (ND21 9.7), after a limited number of zeros.
     Located {
         /// Which drive.
         drive: Drives,
         /// The most zeros; any number where `None`.
         within: Option<Located>,
     },
-    /// It does so after at most so many zeros (ND21 9.7: 25).
+    /// It does so after at most this number of zeros (ND21 9.7: 25).
     Within(Located),
     /// Something holds of drives.
     Drive(DriveCheck),
@@ -31,15 +31,15 @@ pub enum Check {
         /// Which drive.
         drive: Drives,
     },
-    /// So many check sequences came back whole.
+    /// This number of check sequences came back whole.
     Corrected(Located),
-    /// The driver has named this link as the first thing that was wrong in its last job.
+    /// The driver named this link as the first fault of its last job.
     Named {
         /// Which ring, counted from 0.
         ring: usize,
-        /// Whether it is broken; damaged otherwise.
+        /// Whether it is broken; false if it is damaged.
         broken: bool,
-        /// Where the link stands.
+        /// The place of the link in the text.
         link: Located,
         /// Its ends.
         ends: LinkEnds,
@@ -48,14 +48,14 @@ pub enum Check {
     Ended(Ending),
     /// What the driver has sent into this ring is as the manual says.
     RulesKept(usize),
-    /// So many bytes were sent since the last check, and took this long.
+    /// This number of bytes was sent since the last check, in this time.
     Sent {
         /// How many.
         bytes: Located,
         /// How long, to the last digit written.
         time: Option<Duration>,
     },
-    /// So many bytes were received since the start.
+    /// This number of bytes was received since the start.
     Received(Located),
 }
 
@@ -66,7 +66,7 @@ pub enum Ending {
     Done,
     /// It may have run twice.
     Twice,
-    /// Nobody knows whether it has run.
+    /// It is not known whether the job has run.
     Unknown,
     /// It has not run, and the bus is stopped.
     Failed,
