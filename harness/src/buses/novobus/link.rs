@@ -134,7 +134,7 @@ impl SimulatedLink {
         }
     }
 
-    /// Cuts a link open: what the drive in front sends is to be fetched, and the one behind hears what is fed.
+    /// Cuts a link open: bytes of the drive in front must be fetched, and the drive behind receives the bytes that are fed.
     pub fn open(&mut self, ring: usize, link: usize) {
         if let Some(ring) = self.bench.ring_mut(ring) {
             ring.open_link(link);
@@ -154,7 +154,7 @@ impl SimulatedLink {
         heard
     }
 
-    /// Feeds the drive behind an open link a byte; says when the line will have carried it.
+    /// Feeds a byte to the drive behind an open link and returns when the line will have carried it.
     pub fn feed(&mut self, ring: usize, link: usize, byte: Received) -> Instant {
         let now = self.bench.now();
         let ring = self.bench.ring_mut(ring);

@@ -8,7 +8,7 @@ use harness_proto::novobus::sync::SYNCO;
 const ZEROS: usize = 7;
 /// How often an address must repeat before it counts: it comes "for ever".
 const REPEATS: usize = 4;
-/// The most zeros in front of an address (ND21 9.7).
+/// Maximum number of zeros in front of an address (ND21 9.7).
 pub const MAX_ZEROS: usize = 25;
 
 /// A drive that the ring spells out.

@@ -1,8 +1,8 @@
 //! A link over streams of bytes: real rings, or simulated ones in another process.
 //!
-//! Time is the computer's monotonic clock. A byte received is stamped with the time at which it was read; of several
-//! read at once each is taken to have come a byte time before the next. What is sent goes to the operating system
-//! a little ahead of the line, so that a busy computer leaves no gaps in a telegram.
+//! Time is the computer's monotonic clock. A received byte is stamped with the time at which it was read. If several bytes are read at
+//! once, each is assumed to have arrived a byte time before the next. Bytes to send are handed to the operating system a little ahead of
+//! the line, so that a busy computer leaves no gaps in a telegram.
 
 use crate::link::inner::InnerLink;
 use crate::link::lateness::Lateness;
@@ -466,7 +466,7 @@ impl StreamLink {
             (taken + inner.taken, given + inner.given)
         });
         let home = ring.came + taken == ring.sent + given;
-        // A byte counts as lost only after a poll behind its time.
+        // A byte counts as lost only after a poll later than its time.
         !home && self.looked < ring.free + self.round(ring)
     }
 }

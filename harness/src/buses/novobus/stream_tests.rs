@@ -107,7 +107,7 @@ fn who_was_away_looks_before_a_byte_counts_as_lost() {
     assert!(!link.busy(), "it is lost");
 }
 
-/// A caller that stands still while it polls for an answer counts as late, as one that is woken late does.
+/// A caller that stalls while it polls for an answer counts as late, like one that is woken late.
 #[test]
 fn who_stands_still_while_awake_is_late() {
     let (mut link, _ring) = link();

@@ -1,4 +1,4 @@
-//! What is known of a bench, and what the user wants to see of it.
+//! The known state of a bench, and the user's view of it.
 
 use crate::buses::novobus::driver::{Axis, State};
 use harness_proto::nd21::bits::set_in;
@@ -49,7 +49,7 @@ pub struct RingReading {
     pub share: u64,
 }
 
-/// Something that went wrong on a ring, told by its master.
+/// A disturbance of a ring, reported by its master.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Disturbance {
     /// The ring, counted from 0.
@@ -75,7 +75,7 @@ pub struct Reading {
     pub disturbances: Vec<Disturbance>,
     /// Disturbances of kinds for which there was no more room.
     pub others: u64,
-    /// Line errors that the transport told of without their bytes.
+    /// Line errors that the transport reported without their bytes.
     pub unplaced: u64,
 }
 
@@ -198,7 +198,7 @@ pub struct Row {
 pub struct Top {
     pub(crate) heading: Heading,
     pub(crate) reading: Reading,
-    /// What is read while the page stands still.
+    /// The reading shown while the page is paused.
     paused: Option<Reading>,
     /// Disturbances up to this time are not shown.
     forgotten: Option<Span>,
@@ -213,7 +213,7 @@ pub struct Top {
 }
 
 impl Top {
-    /// A view of a bench of which nothing has been read.
+    /// A view of a bench before the first reading.
     #[must_use]
     pub fn new(heading: Heading) -> Self {
         Self {
@@ -231,7 +231,7 @@ impl Top {
         self.keep_in_sight();
     }
 
-    /// Whether the page stands still.
+    /// Whether the page is paused.
     #[must_use]
     pub const fn is_paused(&self) -> bool {
         self.paused.is_some()

@@ -1,6 +1,6 @@
-//! A conversation in bytes, read and repaired by the manual alone (ND21 9.7, 9.8): the master compares what comes back
-//! with what must, goes on with SYNCO, reads the number of the drive that the ring spells out, sends the check sequence
-//! and repeats the telegrams that were not completed.
+//! A conversation in bytes, read and repaired by the manual alone (ND21 9.7, 9.8). The master compares the bytes that come back with the
+//! expected ones, continues with SYNCO, reads the number of the drive that the ring spells out, sends the check sequence and repeats the
+//! incomplete telegrams.
 
 use super::class::{Evidence, Wrong};
 use super::conversation::Answers;

@@ -5,7 +5,7 @@ use harness_proto::novobus::master::{End, Fault};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What came of a case, in order of gravity. Every case is exactly one of these.
+/// The result of a case, in order of severity. Every case is exactly one of these.
 ///
 /// *Noticed* means that the master saw something that was not the conversation without a fault: a byte, a line
 /// error, a byte too many, a byte that did not come. *Named* is the link that it then blamed: by the number that the ring
@@ -22,11 +22,11 @@ pub enum Class {
     Recovered,
     /// Noticed and a sound link named; everything back, every cell right.
     Mislocated,
-    /// Noticed, and not everything is back: a drive stays in the error mode, or a job is not confirmed. The master says so,
-    /// and no cell holds what it never should.
+    /// Noticed, and not everything is back: a drive stays in the error mode, or a job is not confirmed. The master reports this, and no cell
+    /// holds a value that it never has without the fault.
     NotRecovered,
-    /// Noticed, but a cell holds what it never should, and nothing that the master saw says which: a wrong
-    /// drive or a wrong cell was written before something else was found to be wrong.
+    /// Noticed, but a cell holds a value that it never has without the fault, and the master cannot know which cell: a wrong drive or a wrong
+    /// cell was written before another fault was noticed.
     Corrupted,
     /// Not noticed, and a cell holds a wrong value or a job returned one.
     SilentCorruption,
@@ -119,7 +119,7 @@ pub struct Evidence {
     pub confirmed: bool,
     /// Whether no drive is in the error mode.
     pub all_back: bool,
-    /// What is wrong in the end, in order.
+    /// What is wrong at the end, in order.
     pub wrong: Vec<Wrong>,
 }
 

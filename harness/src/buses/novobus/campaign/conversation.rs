@@ -1,4 +1,4 @@
-//! What the master says in a campaign, taken from a scenario, and what must come back of it (ND21 9.1-9.6).
+//! What the master sends in a campaign, taken from a scenario, and what must come back (ND21 9.1-9.6).
 
 use crate::campaign::plan::Shape;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedCall, PlannedWhen};
@@ -10,10 +10,10 @@ use harness_proto::novobus::sync::{Addressing, SyncByte};
 use harness_sim::novobus::drive::Model;
 use std::collections::BTreeMap;
 
-/// The most bytes, or calls, of a conversation: it is played again for every case.
+/// Maximum number of bytes, or calls, of a conversation: it is played again for every case.
 const MAX_LENGTH: usize = 4096;
 
-/// What the master says.
+/// What the master sends.
 #[derive(Clone, Debug)]
 pub enum Talk {
     /// These bytes, without a gap; a master by the manual alone reads what comes back (9.7, 9.8).
@@ -85,7 +85,7 @@ pub fn talk(plan: &Plan) -> Result<Talk, Problem> {
 enum Back {
     /// This byte.
     Exact(u8),
-    /// Any byte: it is what this drive was asked for.
+    /// Any byte: data requested from this drive.
     Data(u8),
     /// The negated sum of what came back at these places (9.6).
     Check(Vec<usize>),
@@ -196,8 +196,9 @@ impl Answers {
         }
     }
 
-    /// The place of the first byte that cannot be right, of what came back for the bytes from `from` on, and for SYNCO
-    /// behind them; `None` where a master finds nothing wrong. What did not come is wrong too.
+    /// The place of the first wrong byte among those that came back for the bytes from `from` on and for SYNCO behind them; `None` if a
+    /// master
+    /// finds nothing wrong. A missing byte is wrong too.
     #[must_use]
     pub fn wrong(&self, heard: &[Received], from: usize) -> Option<usize> {
         for (index, byte) in heard.iter().enumerate() {

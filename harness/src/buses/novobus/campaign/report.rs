@@ -1,4 +1,4 @@
-//! What came of a campaign, for people and for tools.
+//! The results of a campaign, for people and for tools.
 
 use super::class::{Class, Evidence, Wrong};
 use crate::campaign::run::{Finished, Outcome};

@@ -1,4 +1,4 @@
-//! The cells of a ring, beside those of the ring without a fault.
+//! Compares the cells of a ring with those of the same ring without a fault.
 
 use super::class::Wrong;
 use crate::link::{Link, SimulatedLink};
@@ -40,7 +40,7 @@ fn differences(a: &Cells, b: &Cells) -> Vec<u16> {
 }
 
 impl Sound {
-    /// Begins with a ring as it is before anything is sent.
+    /// Starts with a ring before anything is sent.
     #[must_use]
     pub fn new(start: SimulatedLink) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! A capture beside the model: what was done to the ring is done to a simulated one, and what both answer is compared.
+//! Compares a capture with the model: a simulated ring gets the same input as the real one, and the answers are compared.
 
 use super::scenario::{Options, SketchError, scenario, unforeseen};
 use crate::capture::Capture;
@@ -15,7 +15,7 @@ use harness_proto::time::Span;
 use harness_sim::record::LineByte;
 use harness_sim::record::LinkTrace;
 
-/// What came of a judgement.
+/// The result of a judgement.
 #[derive(Clone, Debug)]
 pub struct Judged {
     /// Passed where the last link of every ring carried what the model says; inconclusive where no last link was captured.
@@ -24,13 +24,13 @@ pub struct Judged {
     pub master: Summary,
     /// Every link that was captured: where the rings differ first.
     pub links: Summary,
-    /// How many cells hold what their first answers say: the model cannot know it.
+    /// How many cells took their contents from their first answers, because the model cannot know them.
     pub adopted: usize,
     /// How many bytes are data that changed by themselves, and were not compared.
     pub unforeseen: usize,
     /// The drive that the captured ring spells out at its end (ND21 9.7), with its ring.
     pub located: Option<(usize, u8)>,
-    /// What is worth saying.
+    /// Remarks for the user.
     pub remarks: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! A capture as a scenario: what the master sent at its times, what was damaged on the way, what came back.
+//! Converts a capture to a scenario: the bytes sent with their times, the faults on the way, and the bytes that came back.
 
 use super::stimuli::{Told, told};
 use crate::capture::Capture;
@@ -15,9 +15,9 @@ use std::fmt::Write as _;
 
 /// Bytes on a line of a scenario, where it is not a long one.
 const A_LINE: usize = 16;
-/// The most lines that a scenario has (see its language), but for some of the header.
+/// Maximum number of lines of a scenario (see its language), except for some of the header.
 const LINES: usize = 19_000;
-/// The most bytes on a line: 10,000 characters.
+/// Maximum number of bytes on a line: 10,000 characters.
 const MOST_A_LINE: usize = 3_000;
 /// The longest title.
 const TITLE: usize = 100;
@@ -188,7 +188,7 @@ fn title(text: &str) -> String {
     }
 }
 
-/// The lines of a header that say how drives are.
+/// The lines of a header that describe the drives.
 fn setup_lines(setup: &Source) -> Result<Vec<String>, SketchError> {
     let scenario = parse(setup).map_err(Box::new)?;
     let steps = scenario.steps.first().map(|step| step.span.start);

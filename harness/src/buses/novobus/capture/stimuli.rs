@@ -9,7 +9,7 @@ use harness_proto::novobus::sync::PAUSE;
 use harness_sim::record::{LinkTrace, Trace};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a ring's first and last link tell.
+/// What the first and the last link of a ring show.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Told {
     /// What cells held before: drive and address.

@@ -107,7 +107,7 @@ impl Found<'_> {
         }
     }
 
-    /// The unit, empty where there is none.
+    /// The unit; empty if there is none.
     pub(crate) fn unit(&self) -> &'static str {
         self.location.scale.map_or("", |scale| scale.unit())
     }

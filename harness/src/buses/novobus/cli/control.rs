@@ -149,8 +149,8 @@ fn warn(
     Ok(())
 }
 
-/// Orders it of every drive first, and then says how each is. One that does not answer does not keep the
-/// others from being stopped.
+/// Sends the command to every drive first, and then reports the state of each. A drive that does not answer does not prevent the others
+/// from being stopped.
 fn each(
     bench: &Bench,
     drives: &[Axis],

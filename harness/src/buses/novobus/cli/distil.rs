@@ -99,7 +99,7 @@ fn inputs(folder: &Path) -> Result<Vec<Vec<u8>>, CoverageError> {
     Ok(inputs)
 }
 
-/// Writes a file under another name first: it is there whole or not at all.
+/// Writes a file atomically, under another name first.
 fn write(path: &Path, content: &[u8]) -> Result<(), CoverageError> {
     regular::write_text(path, content).map_err(|error| CoverageError::Unwritable {
         name: path.display().to_string(),

@@ -12,9 +12,9 @@ use crate::scenario::problem::Problems;
 pub(crate) enum Failure {
     /// Standard output cannot be written to.
     Output(std::io::Error),
-    /// What is wrong, in a sentence, with the exit code for it.
+    /// An error message with its exit code.
     Said(Exit, String),
-    /// What is wrong has been told.
+    /// The error has been reported already; this is its exit code.
     Told(Exit),
     /// There is no file, or it has mistakes.
     File(LibraryError),
@@ -33,7 +33,7 @@ impl Failure {
         Self::Said(Exit::Failed, message.into())
     }
 
-    /// Says what is wrong and gives the exit code for it.
+    /// Reports the error and returns its exit code.
     pub(crate) fn tell(&self, output: &mut Output) -> Exit {
         match self {
             Self::Output(error) => output.unwritable(error),

@@ -15,10 +15,10 @@ use crate::scenario::quantity::shown;
 use harness_proto::nd21::units::{Date, Scale, Value};
 use serde_json::json;
 
-/// Cells that say how a drive is.
+/// Cells that show the state of a drive.
 const CELLS: [&str; 4] = ["nist", "position", "TempKK", "TempMot"];
 
-/// Drives that are asked for their EEPROM at a time.
+/// Number of drives whose EEPROM is read at a time.
 const SIDE_BY_SIDE: usize = 25;
 
 struct Drive<'a> {
@@ -41,7 +41,7 @@ pub(crate) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exi
 fn show(arguments: &InfoArguments, bench: &Bench, output: &mut Output) -> Result<Exit, Failure> {
     let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let locations = cells(&CELLS.map(str::to_owned))?;
-    // A long ring answers slowly, and people want to see that something happens.
+    // A long ring answers slowly, so show progress.
     let bar = progress_bar(axes.len(), output.progress);
     let mut drives = Vec::new();
     for some in axes.chunks(SIDE_BY_SIDE) {

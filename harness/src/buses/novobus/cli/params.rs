@@ -16,7 +16,7 @@ use harness_proto::nd21::eeprom::eeprom_of;
 use harness_proto::nd21::units::{Date, Drive};
 use harness_proto::nd21::{PARAMETERS, ee};
 
-/// Does what one of the commands says.
+/// Runs one of the commands.
 pub(crate) fn params(command: &ParamsCommand, output: &mut Output) -> Result<Exit, Failure> {
     match command {
         ParamsCommand::Save(arguments) => {
@@ -64,7 +64,7 @@ fn save(arguments: &ParamsArguments, bench: &Bench, output: &mut Output) -> Resu
     Ok(Exit::Passed)
 }
 
-/// A drive and a file beside each other.
+/// A drive and the file that it is compared with.
 struct Comparison<'b> {
     bench: &'b Bench,
     axis: Axis,
@@ -289,7 +289,7 @@ fn home(entry: &Entry) -> Option<Location> {
     Some(entry.location.moved(Memory::Eeprom, address.into()))
 }
 
-/// The day (UTC); `None` where the clock stands outside of what the drive can hold.
+/// The day (UTC); `None` if the clock is outside the range of the drive's date.
 fn today() -> Option<Date> {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     let mut days = since.ok()?.as_secs() / 86_400;

@@ -131,7 +131,7 @@ fn units(written: &[(Location, Written, Span)], drive: Drive) -> Drive {
     }
 }
 
-/// What the file says, as far as it can be read.
+/// The values of the file, as far as they can be read.
 fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(Location, Written, Span)> {
     let (document, errors) = DeTable::parse_recoverable(&source.text);
     for error in errors {

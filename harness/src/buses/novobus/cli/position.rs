@@ -75,8 +75,8 @@ fn turn(
     let end = run.play(bench, &bar, before);
     bar.finish_and_clear();
     if let Err(failure) = end {
-        // The motor must not go on turning. Where this stop fails too, the rig is given back in its safe state, which says whether the
-        // drives stand.
+        // The motor must not go on turning. If this stop fails too, the rig is given back in its safe state, which reports whether the drives
+        // stand.
         if bench.bus.stop(axis).is_ok() {
             output.say(&format!("drive {axis} was stopped (software stop)\n"));
         }

@@ -10,7 +10,7 @@ use crate::cli::output::Output;
 use crate::link::Line;
 use serde_json::json;
 
-/// Brings every ring of a bench back.
+/// Recovers every ring of a bench.
 pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Result<Exit, Failure> {
     let Some(RigName::Named(name)) = &arguments.rig.rig else {
         let (plan, mut link) = rig::link(&arguments.rig, output)?;

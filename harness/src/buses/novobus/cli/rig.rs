@@ -83,8 +83,8 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// What the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds,
-    /// which the drive is asked for (14.3.2).
+    /// The values that the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds, which is read from
+    /// the drive (14.3.2).
     pub(crate) fn units(&self, axis: Axis) -> Result<Drive, Failure> {
         Ok(Drive {
             range: self.bus.speed_range(axis)?,

@@ -31,7 +31,7 @@ use std::time::{Duration, Instant as Moment};
 const SIDE_BY_SIDE: usize = 8;
 /// Rates are those of so much time.
 const WINDOW: Span = Span::from_millis(2_000);
-/// The most marks within it.
+/// Maximum number of marks within it.
 const MARKS: usize = 256;
 /// The longest step of the bus at a time, and how long a key may wait.
 const STEP: Span = Span::from_millis(50);
@@ -83,7 +83,7 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
     })
 }
 
-/// What stands above everything.
+/// The heading of the page.
 fn heading(name: &str, bench: &Bench) -> Heading {
     let mut sizes = Vec::new();
     for axis in bench.bus.axes() {
@@ -185,7 +185,7 @@ fn ended(thread: &JoinHandle<()>) -> bool {
     thread.is_finished()
 }
 
-/// Draws what comes and takes keys, until its end.
+/// Draws readings and handles keys until the view is closed.
 fn desk(
     mut screen: Screen,
     mut top: Top,
@@ -283,7 +283,7 @@ impl<'b> Reader<'b> {
         }
     }
 
-    /// Reads some drives, and says whether they were the last.
+    /// Reads some drives and returns whether they were the last ones.
     fn read_some(&mut self) -> Result<bool, Failure> {
         let some: Vec<Axis> = self
             .axes

@@ -12,7 +12,7 @@ use crate::scenario::argument::{Location, cells};
 use harness_proto::nd21::units::Drive;
 use harness_proto::time::Span;
 
-/// The most lines of one command.
+/// Maximum number of lines of one command.
 const MOST: u64 = 1_000_000;
 
 /// Shows values, a line each time.
@@ -62,7 +62,7 @@ fn show(
         }
         next += arguments.every;
         let now = bench.bus.now();
-        // What is slower than the time given is looked at as often as it can be.
+        // If reading takes longer than the given period, it is repeated as often as possible.
         next = next.max(now);
         if next > end {
             break;

@@ -31,7 +31,7 @@ pub fn count_drives(link: &mut dyn Line, ring: usize) -> Result<RingSize, Error>
         .ok_or_else(|| link.trouble().cloned().map_or_else(no_answer, Error::Link))
 }
 
-/// What brings a ring back that can be brought back: 17 zeros and the check sequence (9.8).
+/// The bytes that recover a ring: 17 zeros and the check sequence (9.8).
 fn repair() -> Vec<u8> {
     let mut bytes = vec![0; usize::from(ZEROS)];
     bytes.extend(CHECK_SEQUENCE);
@@ -89,7 +89,7 @@ fn listen<T>(
     None
 }
 
-/// What a ring said when it was brought back (9.7, 9.8).
+/// What a ring reported during its recovery (9.7, 9.8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recovery {
     /// The drive that spelled out its address before: the fault was in front of it.
@@ -124,7 +124,7 @@ fn reported(link: &mut dyn Line, ring: usize) -> Option<u8> {
     locate(&heard, u8::try_from(MAX_DRIVES).unwrap_or(u8::MAX)).map(|location| location.drive)
 }
 
-/// What a drive says of itself (14.3.5, 14.8).
+/// The identity that a drive reports (14.3.5, 14.8).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// The serial number; `None` where the EEPROM holds none.

@@ -77,7 +77,7 @@ pub enum Error {
         /// How often it was tried.
         attempts: u8,
     },
-    /// The manual does not say how it is done.
+    /// The manual does not describe this operation.
     #[error("{0}")]
     Open(&'static str),
     /// A value that cannot be.

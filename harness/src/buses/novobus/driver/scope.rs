@@ -28,7 +28,7 @@ pub struct Scope {
     pub signals: [u8; 2],
     /// `scope_timer0` (14.10.6.2).
     pub timer0: u8,
-    /// What is waited for; `None` records at once (14.10.6.7).
+    /// The trigger condition; `None` records at once (14.10.6.7).
     pub trigger: Option<Trigger>,
 }
 

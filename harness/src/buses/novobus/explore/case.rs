@@ -12,13 +12,13 @@ use harness_proto::time::Span;
 use harness_sim::fault::Flips;
 use serde::{Deserialize, Serialize};
 
-/// The most acts of a case.
+/// Maximum number of acts of a case.
 pub const MOST_ACTS: usize = 48;
 
-/// The most bytes that a case sends.
+/// Maximum number of bytes that a case sends.
 pub const MOST_BYTES: usize = 400;
 
-/// The most net bytes of a telegram (ND21 9.2).
+/// Maximum number of net bytes of a telegram (ND21 9.2).
 pub const MOST_NET: u8 = 7;
 
 /// A conversation with a ring of a given size.
@@ -96,7 +96,7 @@ pub struct Talk {
     /// The commands (9.5).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub orders: Vec<Order>,
-    /// The most net bytes of each telegram, 2 to 7.
+    /// Maximum number of net bytes of each telegram, 2 to 7.
     #[serde(default = "most_net", skip_serializing_if = "is_most_net")]
     pub room: u8,
     /// Whole telegrams or idle bytes (9.2) between the telegrams of a split command.
@@ -462,7 +462,7 @@ mod tests {
         assert_eq!(talk.telegrams(3), expected);
     }
 
-    /// A fault keeps to the byte of its act, whatever stands in front.
+    /// A fault stays at the byte of its act, whatever precedes the act.
     #[test]
     fn a_fault_moves_with_its_act() {
         let damage = Damage {
