@@ -248,11 +248,11 @@ fn all_planted_in_turn() {
     planted_in_turn(1, 30, 12);
 }
 
-/// With every change each deviation of so many is planted, in the nightly run each one.
+/// An ordinary run plants every `SOME`-th deviation, the nightly run plants all of them.
 const SOME: usize = 4;
 
-/// Each in a drive of its own, in turn. No other drive is blamed, and where only that drive's own answers differ, it is: as it would be for
-/// a deviation that has no name. So many must be named, and so many drives blamed.
+/// Plants every `step`-th deviation, each in the next drive in turn. No other drive may be blamed. The planted drive is blamed where only
+/// its own answers differ, as for a deviation without a name. At least `named` deviations must be named, and `culprits` drives blamed.
 fn planted_in_turn(step: usize, named: usize, culprits: usize) {
     let (mut ends, mut blamed) = (BTreeMap::new(), 0);
     let of_the_bus = deviations().filter(|own| !own.behind_the_bus);
