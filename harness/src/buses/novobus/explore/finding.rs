@@ -97,7 +97,7 @@ impl Finding {
         Ok([json, scenario])
     }
 
-    /// The scenario: it passes where every byte is as the model says, and fails where it is not.
+    /// The scenario, which passes if every byte is as the model predicts, and fails if one is not.
     ///
     /// # Errors
     /// The model cannot be made.

@@ -1,4 +1,4 @@
-//! New cases from numbers: telegrams mostly as they should be, now and then not, and a look at what came of them.
+//! Generates cases from random numbers: telegrams that are mostly correct and sometimes not, and reads of their effects.
 
 use super::case::{Act, Beside, Case, Damage, Harm, MOST_NET, Talk, To, What};
 use super::idiom::Idiom;
@@ -76,7 +76,7 @@ impl RingScope {
     }
 }
 
-/// The most acts that a new case has in front of its end.
+/// Maximum number of acts of a new case in front of its end.
 const NEW_ACTS: usize = 6;
 
 /// Cells that the bus itself works with, and some that are nothing but memory: (14.2.1).
@@ -110,7 +110,7 @@ pub struct Generator<'s> {
     scope: &'s Scope,
     ring: &'s RingScope,
     swarm: &'s Swarm,
-    /// The cells of this case: what is written is read again.
+    /// The cells of this case: written cells are read again.
     cells: Vec<u16>,
 }
 

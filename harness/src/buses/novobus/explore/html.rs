@@ -15,7 +15,7 @@ const ROWS: usize = 40;
 pub(crate) struct Explored<'e> {
     /// What the run is.
     pub about: &'e About,
-    /// How far it had come, again and again; the last one is where it stands.
+    /// The progress of the run over time; the last entry is the current state.
     pub history: &'e [Progress],
     /// After how many cases how many features had been seen.
     pub features: &'e [(u64, u64)],
@@ -23,7 +23,7 @@ pub(crate) struct Explored<'e> {
     pub reached: &'e Reached,
     /// What was found, each with its picture.
     pub findings: Vec<Shown>,
-    /// The command that goes on with it.
+    /// The command that continues the run.
     pub again: &'e str,
 }
 

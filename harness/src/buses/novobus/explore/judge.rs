@@ -24,7 +24,7 @@ pub(crate) fn prologue(drives: u8, beside: Option<Beside>) -> Case {
     }
 }
 
-/// What the master sent, what met it on links, and what came back.
+/// The bytes that the master sent, the faults on links, and the bytes that came back.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Exchange {
     /// Bytes, and whether each went round whole.
@@ -60,7 +60,7 @@ struct Mismatch {
     section: &'static str,
 }
 
-/// What a ring was seen to do since its drives were made ready.
+/// What a ring has done since its drives were made ready.
 #[derive(Clone, Debug)]
 pub(crate) struct Judge {
     ring: usize,
@@ -76,7 +76,7 @@ pub(crate) struct Judge {
 }
 
 impl Judge {
-    /// A ring, counted from 0, of which nothing is known but its size.
+    /// Starts with a ring, counted from 0, of which only the size is known.
     pub(crate) fn new(ring: usize, size: RingSize, line_errors: bool) -> Self {
         let possible = all_properties();
         Self {
@@ -90,7 +90,7 @@ impl Judge {
         }
     }
 
-    /// Its drives were made ready: what their cells hold is not known any more. Their kind stays known.
+    /// Notes that the drives were made ready: the contents of their cells are unknown again. Their kind stays known.
     pub(crate) fn begin(&mut self) {
         self.log.clear();
         self.sent.clear();
@@ -109,7 +109,7 @@ impl Judge {
                     self.log.push(exchange);
                     return None;
                 }
-                // The model that explains most says best what is wrong.
+                // The model that explains most bytes gives the best description of the fault.
                 Err(found) if best.as_ref().is_none_or(|best| found.index > best.index) => {
                     best = Some(found);
                 }
@@ -244,7 +244,7 @@ impl Judge {
         }
     }
 
-    /// What a case will do to the drives, as far as the model knows.
+    /// Predicts the effects of a case on the drives, as far as the model knows.
     pub(crate) fn foresee(&self, case: &Case) -> Foreseen {
         let mut model = self.model.clone();
         let mut seen = Foreseen::default();

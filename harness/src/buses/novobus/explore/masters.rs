@@ -1,13 +1,13 @@
 //! Cases for the bench's own master: jobs on a ring with faults, judged by the truth (`harness_sim::novobus::fuzz::jobs`).
 //!
-//! The judge knows which faults there were and looks into the drives, so that no second master is needed to say what the first one should
-//! have told. Cases are made from a seed and none depends on another.
+//! The judge knows the injected faults and reads the drives directly, so that no second master is needed as a reference. Cases are made
+//! from a seed and are independent of each other.
 
 use crate::explore::Dice;
 use harness_sim::novobus::deviation::MasterDeviation;
 use harness_sim::novobus::fuzz::jobs::{Lie, Work, judged};
 
-/// The most jobs and faults of a case.
+/// Maximum number of jobs and faults of a case.
 const MOST_RECORDS: usize = 24;
 
 /// Kinds of records (see [`Work::read`]): jobs, faults at a byte, a cut, another byte on the last link.

@@ -1,7 +1,7 @@
-//! What a case has shown that none before it had: it is kept, and others are made of it.
+//! Keeps cases that show new features, so that other cases can be made from them.
 //!
-//! A feature is what a drive's end of the bus did, with what stood on the line then: which byte of which kind of telegram came behind
-//! which other, how the ring answered it, what the drives marked there (ND21 9.7) and for what reason.
+//! A feature is an action of a drive's bus end and the state of the line at that time: which byte of which kind of telegram followed which
+//! other byte, how the ring answered it, what the drives marked there (ND21 9.7) and for what reason.
 
 use crate::explore::Case;
 use crate::explore::Dice;
@@ -11,7 +11,7 @@ use harness_proto::novobus::role::{Role, roles};
 use harness_sim::record::Trace;
 use std::collections::BTreeSet;
 
-/// The most cases that are kept.
+/// Maximum number of cases kept.
 pub const MOST_KEPT: usize = 2_000;
 
 /// The features of a run of the model.
@@ -53,7 +53,7 @@ pub fn features(case: &Case, seen: &Seen, trace: &Trace) -> BTreeSet<u32> {
     found.insert(hash(&[4, surplus.min(3) as u32]));
     match case.ring() {
         0 => found,
-        // What one ring has shown says nothing of the other one.
+        // Features of one ring are independent of those of the other ring.
         ring => found
             .into_iter()
             .map(|own| hash(&[own, ring as u32]))
@@ -115,7 +115,7 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// Keeps a case that shows something new; how much of it is new, 0 where it is not kept.
+    /// Keeps a case that shows new features. Returns the number of new features, 0 if the case is not kept.
     pub fn offer(&mut self, case: &Case, features: &BTreeSet<u32>) -> usize {
         let new = features.difference(&self.shown).count();
         if new == 0 || self.cases.len() >= MOST_KEPT {

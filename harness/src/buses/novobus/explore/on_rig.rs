@@ -107,7 +107,7 @@ impl<'r, 's> OnRig<'r, 's> {
         Ok(took)
     }
 
-    /// The first byte of a whole conversation that came at another time than the line gives it (ND21 8.2): every drive takes a byte time.
+    /// The first byte of a complete conversation that came at a wrong time (ND21 8.2): every drive takes a byte time.
     fn untimely(
         &mut self,
         case: &Case,
@@ -261,8 +261,7 @@ impl Target for OnRig<'_, '_> {
     }
 }
 
-/// Sends a case, and gives what came back, when each byte sent was on the line, and how long the line was
-/// used; `count` bytes are awaited.
+/// Sends a case and waits for `count` bytes. Returns the bytes received, the time of each byte sent, and how long the line was used.
 fn converse(
     link: &mut dyn Link,
     case: &Case,

@@ -10,7 +10,7 @@ use crate::explore::{Rehearsal, Target, Tried};
 use crate::link::{Link, SimulatedLink};
 use harness_sim::record::Trace;
 
-/// A simulated ring beside its model, and beside the reference model where its drives are plain and sound.
+/// Compares a simulated ring with its model, and with the reference model if its drives are plain and sound.
 #[derive(Debug)]
 pub struct OnSim {
     setup: Setup,
@@ -51,7 +51,7 @@ impl OnSim {
         Ok(new)
     }
 
-    /// The model: where nothing is planted it is under test itself, beside the reference model or with witnesses.
+    /// The model. If no deviation is planted, the model itself is under test, against the reference model or witnesses.
     fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, ExploreError> {
         let mut model = self.setup.model(sizes)?;
         if !self.setup.deviates.is_empty() || self.setup.is_plain() {

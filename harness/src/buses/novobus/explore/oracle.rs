@@ -175,7 +175,7 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
     }
     let mut drives: Vec<_> = (0..case.drives).map(|_| reference::Drive::new()).collect();
     let links = reference::run(&mut drives, &case.bytes(), &faults);
-    // A reset may have switched the monitoring off again behind a time-out.
+    // A reset may have switched the monitoring off again after a time-out.
     if drives.iter().any(reference::Drive::has_monitored) {
         return None;
     }
@@ -213,7 +213,7 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
     })
 }
 
-/// What the witnesses of whole ND21s have seen of a case, or an answer that did not go out a byte time behind what came.
+/// What the witnesses of whole ND21s complain of, or an answer that did not go out a byte time after the byte received.
 #[must_use]
 pub fn against_witnesses(
     case: &Case,
@@ -242,7 +242,7 @@ pub fn against_witnesses(
     })
 }
 
-/// A byte that did not go out as the one that it answers was in (ND21 8.2). Behind faults and silence others may stand in its way.
+/// A byte that did not go out when the byte that it answers had arrived (ND21 8.2). After faults and silence other bytes may delay it.
 fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
     let waits = |act: &super::case::Act| matches!(act.what, What::Wait(_));
     if !case.faults().is_empty() || case.acts.iter().any(waits) {
@@ -250,7 +250,7 @@ fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
     }
     trace.links.windows(2).find_map(|pair| {
         let mut heard = pair[0].bytes.iter().map(|byte| byte.at + byte_time);
-        // What is not answered is passed over: PAUSE, and all that a drive without power hears.
+        // Bytes without an answer are skipped: PAUSE, and everything that a drive without power receives.
         let early = |at: Instant| !heard.any(|due| due == at);
         let place = pair[1].bytes.iter().map(|byte| byte.at).position(early)?;
         let drive = pair[1].from?;
@@ -299,7 +299,7 @@ pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
     })
 }
 
-/// Whether a case asks a drive which error of the line it was: the reference model knows one code for every bad byte.
+/// Whether a case reads the kind of a line error from a drive: the reference model has one code for every bad byte.
 fn asks_for_code(case: &Case) -> bool {
     // A long read begins up to three cells in front of it.
     const CODE: RangeInclusive<u16> = ram::ERRORCODE - 3..=ram::ERRORCODE + 1;

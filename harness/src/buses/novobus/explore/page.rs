@@ -97,7 +97,7 @@ fn heard(link: &LinkTrace) -> Reached {
     drive.reached().clone()
 }
 
-/// A finding as a section: the ring under test, or its model where the ring is behind ports.
+/// A finding as a section: shows the ring under test, or its model if the ring is behind ports.
 fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Shown, ExploreError> {
     let sources = finding.sources();
     let text = finding.scenario(&finding.difference.kind(), &sources)?;

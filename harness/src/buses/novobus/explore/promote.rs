@@ -19,7 +19,7 @@ const SCENARIOS: &str = "corpora/scenarios/novobus";
 const INPUTS: &str = "corpora/fuzz/ring";
 const SNAPSHOTS: &str = "snapshots/scenarios/novobus";
 
-/// The most bytes of an input of the fuzz target `ring`.
+/// Maximum number of bytes of an input of the fuzz target `ring`.
 const MOST_INPUT: usize = 256;
 
 /// What a promoted finding is called.
@@ -44,10 +44,10 @@ pub struct Promoted {
     pub fails_on_deviating: Option<bool>,
 }
 
-/// The top of the checkout in which `from` stands.
+/// The top folder of the checkout that contains `from`.
 ///
 /// # Errors
-/// It stands in none.
+/// It is not in a checkout.
 pub fn checkout(from: &Path) -> Result<PathBuf, ExploreError> {
     let is_top = |folder: &&Path| {
         let has = |inner: &str| folder.join(inner).is_dir();

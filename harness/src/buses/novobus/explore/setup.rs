@@ -128,8 +128,8 @@ impl Setup {
         self.header.is_empty()
     }
 
-    /// The first line that sets what the manual leaves open of the bus: the reference model, which judges where nothing is planted, knows
-    /// the defaults only.
+    /// The first line that sets a bus property that the manual leaves open. The reference model, which judges if no deviation is planted,
+    /// knows only the defaults.
     #[must_use]
     pub fn sets_property(&self) -> Option<&str> {
         let sets = |line: &&String| {
@@ -151,7 +151,7 @@ impl Setup {
     /// The model: rings of these sizes without deviations.
     ///
     /// # Errors
-    /// The lines have mistakes, or speak of drives that these rings have not.
+    /// The lines have mistakes, or name drives that these rings do not have.
     pub fn model(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
         rings(sizes, &self.header)
     }

@@ -407,7 +407,7 @@ impl Shrinker<'_, '_> {
         }
     }
 
-    /// Brings values toward zero.
+    /// Lowers values toward zero.
     fn values(&mut self, at: usize) -> Result<(), ExploreError> {
         let Some(What::Talk(talk)) = self.best.case.acts.get(at).map(|act| act.what.clone()) else {
             return Ok(());

@@ -22,7 +22,7 @@ const HARDWARE: &str = include_str!("../../../../../corpora/fuzz/hardware.toml")
 /// The largest input file that is read, in bytes.
 const MAX_SIZE: u64 = 1 << 20;
 
-/// The most files that are taken from a folder.
+/// Maximum number of files read from a folder.
 const MAX_FILES: usize = 100_000;
 
 /// Why there is no coverage.
@@ -35,7 +35,7 @@ pub enum CoverageError {
     Unreadable {
         /// Which.
         name: String,
-        /// What the system said.
+        /// The system's error.
         error: std::io::Error,
     },
     /// A file cannot be written.
@@ -43,7 +43,7 @@ pub enum CoverageError {
     Unwritable {
         /// Which.
         name: String,
-        /// What the system said.
+        /// The system's error.
         error: std::io::Error,
     },
     /// A file that no input can be, or more files than are taken.

@@ -10,19 +10,19 @@ const BYTES_A_LINE: usize = 16;
 /// How many features a file names; what it reaches is no secret, but a list of a hundred is not read.
 const NAMED: usize = 8;
 
-/// What a file costs beside its bytes, in bytes: a few inputs that each reach much are better than many that reach one thing each.
+/// The cost of a file in addition to its bytes, in bytes: a few inputs with many features are better than many inputs with one feature.
 const FILE: usize = 64;
 
-/// The same for texts, which can less often be put one behind the other.
+/// The same for texts, which can less often be joined.
 const TEXT_FILE: usize = 4_096;
 
-/// The most bytes of an input that is put together of several.
+/// Maximum number of bytes of a joined input.
 const MOST_JOINED: usize = 256;
 
 /// The same of a text.
 const MOST_JOINED_TEXT: usize = 1_500;
 
-/// The most tries at making one input smaller.
+/// Maximum number of attempts to shrink one input.
 const MOST_TRIES: usize = 20_000;
 
 /// Of what the inputs of a target are made: pieces that can be left out.
@@ -239,7 +239,7 @@ fn needed(mut chosen: Vec<Chosen>, kept: &BTreeSet<Feature>) -> Vec<Chosen> {
     chosen
 }
 
-/// Each with what is new in it.
+/// Each input with its new features.
 fn named(chosen: Vec<Chosen>, kept: &BTreeSet<Feature>) -> Vec<Distilled> {
     let mut before = kept.clone();
     let new = |(input, reached): Chosen| {
@@ -269,7 +269,7 @@ pub fn superfluous(body: Body, inputs: &[(String, Vec<u8>)]) -> Vec<String> {
     idle.map(|((name, _), _)| name.clone()).collect()
 }
 
-/// Makes an input smaller without losing what is wanted of it.
+/// Shrinks an input without losing the wanted features.
 struct Shrinking<'w> {
     body: Body,
     wanted: &'w BTreeSet<Feature>,
@@ -384,7 +384,7 @@ mod tests {
         let inputs = inputs();
         let distilled = distil(detector(), BYTES, &inputs, &none);
         let chosen: Vec<_> = distilled.iter().map(|one| one.input.clone()).collect();
-        // One behind the other they reach even more; without any one of them something is lost.
+        // Joined, they reach even more; without any one of them a feature is lost.
         assert!(reach(&chosen).is_superset(&reach(&inputs)));
         assert!(chosen.len() < inputs.len(), "{chosen:02X?}");
         for place in 0..chosen.len() {

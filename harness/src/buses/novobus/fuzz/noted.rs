@@ -17,7 +17,7 @@ use harness_sim::record::LineByte;
 /// The sizes of ring for which a scenario is settled: its own, the smallest and the largest (ND21 8.4).
 const SIZES: [Option<u8>; 3] = [None, Some(1), Some(250)];
 
-/// How many words of a line say which statement it is.
+/// How many words of a line identify its statement.
 const STATEMENT: usize = 3;
 
 /// A text as a scenario: the statements of one that is taken, or the mistakes.

@@ -10,7 +10,7 @@ use harness_proto::time::Span;
 /// How long a drive may take to answer.
 const PATIENCE: Span = Span::from_millis(2_000);
 
-/// The cells that say at which speed a drive would turn.
+/// The cells that determine the speed at which a drive would turn.
 const CELLS: [(u16, Width); 9] = [
     (ram::HW_VERSION, Width::Word),
     (ram::SW_VERSION, Width::Word),

@@ -14,7 +14,7 @@ use harness_proto::novobus::sync::{Addressing, Header, SyncByte};
 use harness_proto::time::{Instant, Span};
 use std::fmt;
 
-/// How often a ring is brought back before it counts as lost (ND21 9.8; three are the most that were ever needed).
+/// Number of recovery attempts before a ring counts as lost (ND21 9.8; no ring has needed more than three).
 const ATTEMPTS: u8 = 3;
 
 /// A step on the way to the safe state.

@@ -13,7 +13,7 @@ use harness_proto::nd21::cells::{Access, Cell};
 use harness_proto::nd21::units::{self, Scale};
 use harness_proto::time;
 
-/// The most bytes that are read from an address on.
+/// Maximum number of bytes read from an address on.
 const MAX_LENGTH: i64 = 256;
 
 /// Which of a drive's memories.
@@ -56,7 +56,7 @@ impl Location {
         }
     }
 
-    /// The same bytes in another place.
+    /// The same number of bytes at another place.
     #[must_use]
     pub fn moved(&self, memory: Memory, address: u16) -> Self {
         let mut moved = self.clone();

@@ -11,10 +11,10 @@ use crate::explore::Dice;
 use crate::explore::Spice;
 use harness_proto::nd21::{own, ram};
 
-/// The most bytes of a case of the tour.
+/// Maximum number of bytes of a case of the tour.
 const MOST: usize = 300;
 
-/// The most drives of a ring that it goes to: the first ones, the last ones and some between.
+/// Maximum number of drives of a ring that it visits: the first ones, the last ones and some between.
 const MOST_DRIVES: usize = 8;
 
 /// Parameters in the page that the bit commands and process data reach (ND21 10.3, 14.10.3): the drive only reads them.

@@ -11,7 +11,7 @@ use crate::scenario::syntax::{Check, Drives, Ending};
 use crate::scenario::times;
 use harness_proto::novobus::error::BusError;
 
-/// Reads what stands behind `?`.
+/// Reads the text after `?`.
 pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
     #[derive(Clone, Copy)]
     enum Word {

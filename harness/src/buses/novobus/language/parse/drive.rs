@@ -23,7 +23,7 @@ pub(crate) const WORDS: [&str; 2] = ["drive", "drives"];
 /// Positions have 31 bits (ND21 13.1.9).
 const MAX_TURNS: i32 = 16_384;
 
-/// The most ohms: more is an open circuit.
+/// Maximum resistance in ohms: more is an open circuit.
 const MAX_OHM: i32 = 10_000_000;
 
 const DEVICES: [(&str, Device); 4] = [
@@ -117,7 +117,7 @@ const CONDITIONS: [(&str, Held); 11] = [
     ("mode", Held::Mode),
 ];
 
-/// Reads what stands behind `drive`.
+/// Reads the text after `drive`.
 pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, DriveLine), Problem> {
     let drives = drives(scanner)?;
     let before = scanner.clone();
@@ -133,7 +133,7 @@ pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, DriveLine), Pro
     Ok((drives, line))
 }
 
-/// Reads what stands behind `? drive` and `until drive`.
+/// Reads the text after `? drive` and `until drive`.
 pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<DriveCheck, Problem> {
     let here = scanner.here();
     let drives = drives(scanner)?;

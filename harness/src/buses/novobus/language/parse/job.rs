@@ -57,7 +57,7 @@ pub(crate) fn names() -> Vec<&'static str> {
     names
 }
 
-/// Reads what stands behind the job's name; `None` where there is no such job.
+/// Reads the text after a job's name; `None` if there is no such job.
 pub(crate) fn job(name: &str, scanner: &mut Scanner<'_>) -> Option<Result<Job, Problem>> {
     match name {
         "recover" => Some(recover(scanner)),

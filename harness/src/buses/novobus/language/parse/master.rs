@@ -25,7 +25,7 @@ const CALLS: [&str; 11] = [
     "exchange",
 ];
 
-/// The most jobs in one line.
+/// Maximum number of jobs in one line.
 const MOST_CALLS: usize = 64;
 
 /// Reads what stands behind `master`: one call, or several behind semicolons that go out together.

@@ -15,7 +15,7 @@ use crate::scenario::syntax::{
 use harness_proto::time;
 use std::collections::BTreeSet;
 
-/// The most records of a scenario, each of one cell of one drive.
+/// Maximum number of records of a scenario, each of one cell of one drive.
 const MAX_RECORDS: usize = 1_000;
 
 /// The longest cell that is a number.

@@ -181,7 +181,7 @@ impl Planner {
         units
     }
 
-    /// What only the nd21 model has would do nothing in a drive of another model.
+    /// The error of a setting that only the nd21 model has, for a drive with another model: it would have no effect.
     fn idle(&self, setup: &Setup) -> Option<Problem> {
         let (what, span) = match &setup.what {
             SetupKind::Time(name, _) | SetupKind::Word(name, _)
@@ -198,7 +198,7 @@ impl Planner {
         self.only_nd21(&setup.drives, &what, span).err()
     }
 
-    /// Refuses what only the nd21 model has for a drive of another.
+    /// Refuses settings that only the nd21 model has, for a drive with another model.
     pub(crate) fn only_nd21(&self, drives: &Drives, what: &str, span: Span) -> Result<(), Problem> {
         let model = |drive: &u8| {
             let of_ring = self.models.get(drives.ring);
@@ -216,8 +216,7 @@ impl Planner {
     }
 }
 
-/// Which model stands where the header says nothing: `nd21` where no line names a model and one needs what
-/// only it has.
+/// The default model: `nd21` if no line names a model and a line needs a feature that only this model has.
 pub(crate) fn model_unless_said(scenario: &Scenario) -> Model {
     let said = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
     if scenario.setups.iter().any(said) {
@@ -245,13 +244,13 @@ pub(crate) fn model_unless_said(scenario: &Scenario) -> Model {
     }
 }
 
-/// The most settings that the header may come to: of drives with different scales each has its own.
+/// Maximum number of settings of the header: drives with different scales have separate ones.
 const MAX_SETUPS: usize = 100_000;
 
 /// What a plain drive has not got.
 pub(crate) const OUTSIDE: &str = "plugs, motor and display";
 
-/// A drive of which the header says nothing (LANGUAGE.md, "Types and ranges").
+/// The units of a drive without settings in the header (LANGUAGE.md, "Types and ranges").
 const DEFAULT_UNITS: units::Drive = units::Drive {
     device: Device::Nd5610,
     range: SpeedRange::To8000,

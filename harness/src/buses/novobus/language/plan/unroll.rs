@@ -4,7 +4,7 @@ use crate::scenario::expression::{Counter, Scope};
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::syntax::{Action, Step};
 
-/// The most steps that a scenario may come to, the turns of its loops included.
+/// Maximum number of steps of a scenario, including the repetitions of its loops.
 const MAX_STEPS: usize = 200_000;
 
 /// A loop under way.

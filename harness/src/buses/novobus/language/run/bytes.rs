@@ -1,4 +1,4 @@
-//! Bytes as expected beside bytes as received.
+//! Compares expected bytes with received ones.
 
 use crate::scenario::pattern::Expected;
 use harness_proto::line::Received;

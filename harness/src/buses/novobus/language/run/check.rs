@@ -147,7 +147,7 @@ impl Runner<'_> {
         }
     }
 
-    /// The address that the ring spells out, letting it go on where it has not come to it yet.
+    /// The address that the ring spells out. Lets the ring continue if it has not spelled it out yet.
     fn locate(&mut self, ring: usize) -> Option<Location> {
         let size = self.link.drives(ring);
         let record = &self.rings[ring];

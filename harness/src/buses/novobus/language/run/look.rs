@@ -1,4 +1,4 @@
-//! What can be seen of drives, beside what must hold.
+//! Compares the visible state of drives with what must hold.
 
 use crate::buses::novobus::language::run::bytes::{Shown as Byte, matches};
 use crate::link::{Mode, Shown};
@@ -17,9 +17,9 @@ const ROUNDING: f64 = 1e-12;
 
 /// Why a check does not hold.
 pub(crate) enum Miss {
-    /// Something else was found, in a sentence.
+    /// Something else was found, as a sentence.
     Otherwise(String),
-    /// It cannot be seen on this link, in a sentence.
+    /// It cannot be seen on this link, as a sentence.
     Unseen(String),
 }
 
@@ -48,7 +48,7 @@ impl Runner<'_> {
         for drive in drives {
             match self.look_at(check, drive) {
                 Ok(()) => {}
-                // What is seen to be wrong weighs more than what cannot be seen.
+                // A visible fault takes precedence over a cell that cannot be seen.
                 Err(Miss::Otherwise(message)) if first.is_none() => first = Some(message),
                 Err(Miss::Otherwise(_)) => others += 1,
                 Err(unseen) if first.is_none() => return Err(unseen),

@@ -1,7 +1,6 @@
-//! Cells of drives that stand behind nothing but their bus: read and set by telegrams.
+//! Reads and sets cells of drives that are accessible only over their bus, by telegrams.
 //!
-//! What is read to answer a check stands beside the conversation: its bytes are not counted, and no line asks for
-//! them.
+//! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::twin::unknowable;
@@ -22,7 +21,7 @@ use harness_proto::novobus::role::at_rest;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 
-/// How long an answer may take, beside what the ring itself needs.
+/// How long an answer may take, in addition to the time that the ring itself needs.
 const PATIENCE: Span = Span::from_millis(1_000);
 
 impl Runner<'_> {
