@@ -2,8 +2,10 @@
 
 use super::args::VerifyArguments;
 use super::exit::Exit;
+use super::fuzz;
 use super::output::Output;
 use crate::evidence::{Signer, verify as judge_again};
+use crate::explore::read as read_run;
 
 /// Judges a folder again.
 pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -12,6 +14,9 @@ pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::i
         .as_deref()
         .zip(arguments.identity.as_deref());
     let signer = signer.map(|(allowed, identity)| Signer { allowed, identity });
+    if let Ok((kept, _)) = read_run(&arguments.folder) {
+        return fuzz::verify(&arguments.folder, &kept, signer, output);
+    }
     let verified = match judge_again(&arguments.folder, signer) {
         Ok(verified) => verified,
         Err(error) => {

@@ -3,6 +3,7 @@
 mod replay;
 pub(crate) mod rig;
 mod run;
+mod verify;
 mod watch;
 
 use super::exit::Exit;
@@ -10,6 +11,7 @@ use super::output::Output;
 use clap::Subcommand;
 
 pub(crate) use rig::{Use, on_ports, scope, sizes, tell};
+pub(crate) use verify::verify;
 
 /// The commands of `fuzz`.
 #[derive(Debug, Subcommand)]

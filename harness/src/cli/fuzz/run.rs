@@ -7,6 +7,7 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::page::{writable, write};
 use crate::cli::rig_failure::find_rig;
+use crate::evidence::{can_sign, seal};
 use crate::explore::{
     About, Bounds, Campaign, ExploreError, Kept, OnRig, OnSim, Planted, Record, Scope, Setup,
     Target, page, read,
@@ -67,6 +68,9 @@ pub struct FuzzRunArguments {
     /// Write the report as one page of HTML into this file, which is there whole or not at all.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Sign the folder of the run with this key of `ssh-keygen`; `verify --allowed-signers` checks the signature.
+    #[arg(long, value_name = "KEY")]
+    pub sign: Option<PathBuf>,
     /// Let motors turn, where the rig's file allows it too.
     #[arg(long)]
     pub allow_motion: bool,
@@ -246,6 +250,10 @@ fn explore(
     bounds: &Bounds,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
+    if let Some(Err(error)) = arguments.sign.as_deref().map(can_sign) {
+        output.complain(&error.to_string());
+        return Ok(Exit::of_evidence(&error));
+    }
     let begun = match &arguments.resume {
         Some(folder) => resume(folder, &about, &scope, target),
         None => {
@@ -288,6 +296,10 @@ fn explore(
     }
     output.result(&summary(&campaign, &end))?;
     output.say(&format!("the run is in {}\n", folder.display()));
+    if let Some(Err(error)) = arguments.sign.as_deref().map(|key| seal(&folder, key)) {
+        output.complain(&error.to_string());
+        return Ok(Exit::of_evidence(&error));
+    }
     if let Some(path) = &arguments.html {
         match page(&folder) {
             Ok(text) if write(path, &text, output) => {}

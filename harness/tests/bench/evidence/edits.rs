@@ -115,3 +115,49 @@ fn signatures() {
     fs::remove_file(desk.path("kept/SHA256SUMS.sig")).expect("a file");
     ended(&signed("bench@lab"), 1, "SHA256SUMS.sig: it is missing");
 }
+
+/// The folder of a fuzz run is signed; its findings are played again, and a changed one is refused.
+#[test]
+fn a_fuzz_run_is_verified() {
+    if !crate::debian::has("ssh-keygen", "signatures") {
+        return;
+    }
+    let desk = Desk::new(OWN);
+    let made = Command::new("ssh-keygen")
+        .args(["-q", "-t", "ed25519", "-N", "", "-f", "key"])
+        .current_dir(desk.path(""))
+        .output()
+        .expect("ssh-keygen");
+    assert!(made.status.success());
+    let public = fs::read_to_string(desk.path("key.pub")).expect("a key");
+    fs::write(desk.path("signers"), format!("bench@lab {public}")).expect("room");
+    let fixed = [
+        "fuzz",
+        "run",
+        "--rig",
+        "sim:2",
+        "--findings",
+        "1",
+        "--deviates",
+    ];
+    let run =
+        |more: &[&str]| desk.run(&[&fixed[..], &["1=writes-ignored", "--out"], more].concat());
+    ended(&run(&["bare"]), 1, "1 found");
+    ended(&desk.run(&["verify", "bare"]), 5, "the folder has no sums");
+    ended(&run(&["kept", "--sign", "key"]), 1, "1 found");
+    let by = ["--allowed-signers", "signers", "--identity", "bench@lab"];
+    let signed = || desk.run(&[&["verify", "kept"], &by[..]].concat());
+    ended(&signed(), 0, "signed by    bench@lab");
+    ended(&signed(), 0, "1 findings played again, 0 things wrong");
+    let files = fs::read_dir(desk.path("kept")).expect("a folder");
+    let mut files = files.map(|file| file.expect("a file").path());
+    let finding = files
+        .find(|file| file.extension().is_some_and(|own| own == "json"))
+        .expect("a finding");
+    let text = fs::read_to_string(&finding).expect("a file");
+    fs::write(&finding, text.replace("writes-ignored", "and-is-or")).expect("room");
+    ended(&desk.run(&["verify", "kept"]), 1, "was changed");
+    fit(&desk.path("kept"));
+    ended(&desk.run(&["verify", "kept"]), 1, "differs      case");
+    ended(&signed(), 1, "SHA256SUMS.sig is no signature of bench@lab");
+}
