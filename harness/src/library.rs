@@ -35,7 +35,7 @@ pub enum LibraryError {
     Folder {
         /// The folder.
         folder: String,
-        /// What the system said.
+        /// The operating system's error.
         error: std::io::Error,
     },
     /// A folder holds more than we take.

@@ -5,21 +5,21 @@ use std::fmt;
 /// Why a link carries nothing more. It stays so: what is sent from then on is dropped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// The guard let a byte not pass: what the bench does not allow never reaches a wire. The text says which
-    /// command of which drive, and what would allow it.
+    /// The guard has denied a byte: what the bench does not allow never reaches a wire. The text names the command, the drive,
+    /// and what would allow it.
     Denied(String),
     /// The port is gone, or the other end has closed the connection.
     Lost(String),
-    /// What came over the port is no stream of this kind: the other end does not mark, or marks were cut.
+    /// The port's input is not a marked stream: the other end does not mark its bytes, or marks were cut.
     Garbled(String),
     /// An interlock of the rig's file does not hold.
     Interlock(String),
-    /// Somebody wants the program to end.
+    /// The program has been interrupted.
     Interrupted,
 }
 
 impl Trouble {
-    /// Whether nothing arrives any more. After a denial, and where an interlock does not hold, what was sent before still comes round.
+    /// Whether nothing arrives any more. After a denial or a failed interlock, what was sent before still comes round.
     #[must_use]
     pub fn stops_the_line(&self) -> bool {
         matches!(self, Self::Lost(_) | Self::Garbled(_) | Self::Interrupted)

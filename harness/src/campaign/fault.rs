@@ -44,9 +44,9 @@ pub enum What {
     Duplicate,
     /// The receiver was too slow for it.
     Overrun,
-    /// A byte that nobody sent arrives before it.
+    /// A byte that was not sent arrives before it.
     Insert(u8),
-    /// This and the following bytes do not arrive, so many together.
+    /// This and the following bytes do not arrive; the number counts all of them.
     Gap(u16),
     /// It arrives later.
     Delay(Time),

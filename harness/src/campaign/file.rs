@@ -374,10 +374,10 @@ impl Read<'_> {
         found
     }
 
-    /// What does not fit a ring of so many drives and a conversation of so many bytes.
+    /// Checks that the campaign fits a ring of `drives` drives and a conversation of `length` bytes.
     ///
     /// # Errors
-    /// The first such thing.
+    /// The first key that does not fit.
     pub fn fits(&self, drives: u8, length: u64) -> Result<(), Problem> {
         for (index, wire) in self.file.links.iter().flatten().enumerate() {
             if wire_index(drives, *wire).is_none() {

@@ -7,13 +7,13 @@ use crate::report::html::Html;
 use crate::report::html::{Part, Section, page};
 use std::collections::BTreeMap;
 
-/// Cells of a map at most: of a larger one several bytes stand in one row.
+/// Maximum number of cells of a map; a larger map shows several bytes in one row.
 const CELLS: usize = 12_000;
 
-/// Rows of the table by link at most: the rings of the manual have no more links.
+/// Maximum number of rows of the table by link: the manual's largest ring has 251 links.
 const LINKS: usize = 251;
 
-/// A class's letter: whoever sees no colours reads these.
+/// A class's letter, for readers who see no colours.
 const fn letter(class: Class) -> char {
     match class {
         Class::Harmless => '.',
@@ -171,7 +171,7 @@ fn classes(html: &mut Html, finished: &Finished) {
     }
 }
 
-/// A map: the gravest class in each cell, as a table that colours only repeat.
+/// A map: a table with the most serious class in each cell. Colours only repeat the letters.
 fn map(
     html: &mut Html,
     caption: &str,

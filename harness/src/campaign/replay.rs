@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 /// Bytes in a line.
 const BYTES: usize = 24;
 
-/// The scenario that replays a case: the header of the campaign's scenario, the faults, and what the master said in this case,
-/// byte by byte; or, where the driver plays, its calls.
+/// The scenario that replays a case: the header of the campaign's scenario, the faults, and the bytes that the master sent in
+/// this case; or, if the driver plays, its calls.
 ///
 /// # Errors
 /// The case fits no class.

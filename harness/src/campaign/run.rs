@@ -37,7 +37,7 @@ pub struct Campaign {
     played: Played,
 }
 
-/// Who plays.
+/// What plays the campaign's conversation.
 #[derive(Debug)]
 enum Played {
     ByManual(Box<ByManual>),
@@ -230,8 +230,8 @@ impl Campaign {
         Ok((outcome, said))
     }
 
-    /// Plays every case, on so many threads; `progress` is told how many more are done. The outcome does not depend on
-    /// the number of threads.
+    /// Plays every case on `threads` threads; `progress` is called with the number of cases done since its last call. The outcome
+    /// does not depend on the number of threads.
     ///
     /// # Errors
     /// The first case, in the order of the plan, that fits no class.
@@ -283,7 +283,7 @@ impl Campaign {
     }
 }
 
-/// A figure that a file pins and that came out otherwise.
+/// A pinned figure that was not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Differs {
     /// Of which class; `None` for all cases together.
@@ -308,7 +308,7 @@ impl Finished {
         self.outcomes.iter().filter(of_class).count() as u64
     }
 
-    /// The pinned figures that came out otherwise, in order of gravity.
+    /// The pinned figures that were not met: the number of cases first, then the classes in order of gravity.
     #[must_use]
     pub fn differs(&self) -> Vec<Differs> {
         let all = Class::ALL.map(|class| (Some(class), self.expect.of(class), self.count(class)));

@@ -22,7 +22,7 @@ pub struct Run<'r> {
     pub capture: &'r Capture,
 }
 
-/// What is otherwise on one link.
+/// The first difference on one link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// The link, as in a scenario.
@@ -37,7 +37,7 @@ pub struct Difference {
     pub words: [String; 2],
     /// Only their times are apart.
     pub only_time: bool,
-    /// What stands around it: its number, and the byte of either side.
+    /// The bytes around it: the number of each, and the byte of either side.
     pub around: Vec<(usize, Option<LineByte>, Option<LineByte>)>,
 }
 

@@ -10,8 +10,8 @@ use harness_sim::record::LinkTrace;
 /// A run of lost bytes longer than this is a cut cable.
 const CUT: usize = 8;
 
-/// The faults of a link, a line each. What a cable did cannot always be told from its bytes: a break is taken to
-/// last as long as bytes were lost behind it, many lost bytes are a cut. A delay is not seen.
+/// The faults of a link, a line each. Bytes do not always show what a cable did: a break is assumed to last as long as bytes were
+/// lost behind it, and many lost bytes are taken for a cut. A delay is not seen.
 pub(crate) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
     let name = name(ring, link);
     let bytes = &link.bytes;
@@ -70,7 +70,7 @@ pub(crate) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
     lines
 }
 
-/// Whether a byte that nobody sent is the one before it once more.
+/// Whether a byte that was not sent repeats the byte before it.
 fn doubled(before: Option<&LineByte>, byte: &LineByte, rate: Rate) -> bool {
     before.is_some_and(|before| {
         before.received == byte.received

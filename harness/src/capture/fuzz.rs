@@ -30,7 +30,7 @@ pub fn import(data: &[u8]) {
     let put = pcapng::write(&capture.traces, capture.rate, &mut written);
     assert!(put.is_ok(), "a Vec takes everything");
     match read(&written, Some(capture.rate)) {
-        // Times are told from those since 1970 by their size.
+        // Small times are relative to the start; large ones are times since 1970.
         Ok(again) if capture.end().since_start() < Span::from_millis(86_400_000) => {
             let (left, right) = (
                 Run {

@@ -1,12 +1,12 @@
-//! Captures: what the links of a ring carried, read from a file, whoever wrote it.
+//! Captures: what the links of a ring carried, read from a file of any program.
 //!
 //! [`read`] takes pcapng of link type 250 and the JSON of `drivebench trace`. A capture can be shown in every form that a run can,
 //! compared with another ([`diff`]), turned into a scenario ([`scenario`]), and so be judged against the model
 //! ([`judge`]): what the master sent and what was damaged on the way is done to a simulated ring, and what came back is
 //! compared.
 //!
-//! Every file gives a capture or says at which place it is none; what a capture takes of memory is bounded by the size
-//! of its file, and that by [`MAX_FILE`].
+//! Every file gives a capture or an error that names the place. The memory of a capture is bounded by the size of its file, and
+//! that by [`MAX_FILE`].
 
 pub(crate) mod diff;
 pub(crate) mod faults;

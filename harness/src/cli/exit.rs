@@ -5,16 +5,16 @@ use crate::regular::is_wrong_path;
 use crate::scenario::verdict::Verdict;
 use std::process::ExitCode;
 
-/// What the program says when it ends.
+/// The program's exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Exit {
     /// Everything passed.
     Passed = 0,
-    /// A drive behaved otherwise than the scenario or the command says, or differs from a file; a campaign has another figure
-    /// than it pins.
+    /// A drive did not behave as the scenario or the command says, or differs from a file; or a campaign's pinned figure was not
+    /// met.
     Failed = 1,
-    /// Wrong usage, a file with mistakes, or a motion or a change without the leave for it.
+    /// Wrong usage, a file with mistakes, or something that needs `--move` or `--yes`.
     Usage = 2,
     /// The bench itself failed.
     RigError = 3,
@@ -26,7 +26,7 @@ pub enum Exit {
     Interlock = 6,
     /// The safe state could not be confirmed.
     NotSafe = 7,
-    /// Somebody else holds the bench.
+    /// Another process or user holds the bench.
     Busy = 75,
     /// Interrupted (Ctrl-C, SIGTERM, SIGHUP, SIGQUIT); the safe state was reached.
     Interrupted = 130,

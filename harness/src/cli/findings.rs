@@ -9,13 +9,13 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
 
-/// The most deviations that are told.
+/// The most deviations that are listed.
 const MOST_TOLD: usize = 8;
 
 /// The most scenarios and probes listed that were not compared, or not equal.
 const MOST_LISTED: usize = 12;
 
-/// The most sections that are told of a drive whose deviation has no name.
+/// The most sections that are listed for a drive whose deviation has no name.
 const MOST_SECTIONS: usize = 3;
 
 /// What was played, and what of it differed from the model.
@@ -291,7 +291,7 @@ impl Findings {
         text
     }
 
-    /// What is said where no known deviation explains every byte.
+    /// The report if no known deviation explains every byte.
     fn unnamed(&self, culprit: Option<Culprit>) -> String {
         let Some(culprit) = culprit else {
             return "deviations: the drives differ from the model, and no single known deviation explains every byte; not known which drive\n".to_owned();

@@ -45,7 +45,7 @@ impl Cases {
         });
     }
 
-    /// Writes the file, whole or not at all; where that fails it is told, and the exit code is that of a bench that failed.
+    /// Writes the file atomically. A failure is reported and gives the exit code of a bench that failed.
     pub(crate) fn write(&self, exit: Exit, output: &mut Output) -> Exit {
         let Some(path) = &self.file else {
             return exit;

@@ -56,13 +56,13 @@ impl Output {
         self.say(&format!("{label}: {text}\n"));
     }
 
-    /// Says that standard output or a file cannot be written to, and gives the exit code for it.
+    /// Reports that standard output or a file cannot be written to, and returns the exit code for it.
     pub(crate) fn unwritable(&mut self, error: &std::io::Error) -> Exit {
         self.complain(&format!("failed to write: {error}"));
         Exit::RigError
     }
 
-    /// Writes to standard error; where that is closed, nobody wants to read it.
+    /// Writes to standard error; a failure is ignored, because a closed standard error means that no one reads it.
     pub(crate) fn say(&mut self, text: &str) {
         let _unwritable = std::io::stderr().lock().write_all(text.as_bytes());
     }

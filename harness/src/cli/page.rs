@@ -15,8 +15,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    /// A page for a file, where one is wanted; false where it could not be written anyway, which has been said then: a run may take
-    /// hours.
+    /// Starts a page if a file is named. A file that cannot be written is refused and reported now, because a run may take hours.
     pub(crate) fn new(path: Option<&Path>, output: &mut Output) -> Result<Option<Self>, Refused> {
         let Some(path) = path else { return Ok(None) };
         writable(path, output)?;
@@ -61,17 +60,17 @@ impl Page {
         self.shown.push(section(self.shown.len() + 1, &played));
     }
 
-    /// Writes it; false where that failed, which has been said then.
+    /// Writes it. Returns false after reporting a failure.
     pub(crate) fn write(self, head: &Head<'_>, output: &mut Output) -> bool {
         let text = run(head, self.shown);
         write(&self.path, &text, output)
     }
 }
 
-/// A file that cannot be written, which has been said.
+/// A file cannot be written, which has been reported.
 pub(crate) struct Refused;
 
-/// Looks whether a file could be written.
+/// Checks that a file could be written.
 pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
@@ -88,7 +87,7 @@ pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> 
     Err(Refused)
 }
 
-/// Writes a page, whole or not at all; false where that failed, which has been said then.
+/// Writes a page atomically. Returns false after reporting a failure.
 pub(crate) fn write(path: &Path, text: &str, output: &mut Output) -> bool {
     match regular::write_text(path, text) {
         Ok(()) => {

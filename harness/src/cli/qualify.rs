@@ -21,16 +21,16 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::SystemTime;
 
-/// The most deviations of the master that are told.
+/// The most deviations of the master that are listed.
 const MOST_TOLD: usize = 8;
 
 /// The file of a folder of evidence that says what was compared and which deviations explain it.
 pub(crate) const DEVIATIONS: &str = "deviations.txt";
 
-/// What is said where a run ended early.
+/// The message if a run ended early.
 pub(crate) const ENDED: &str = "the run ended before everything was played";
 
-/// How often a probe is played until a value explains it: a busy computer is late now and then.
+/// How often a probe is played until a value explains it: a busy computer is late sometimes.
 const PROBED: usize = 3;
 
 /// Qualifies a rig.
@@ -68,7 +68,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
     work(&rig, &entries, &job, page, output)
 }
 
-/// Plays what is judged by the model alone, settles what the manual leaves open, and names what drives do otherwise.
+/// Plays what is judged by the model alone, settles what the manual leaves open, and names the deviations of drives.
 pub(crate) fn settle(
     run: &mut Run<'_>,
     findings: &mut Findings,
@@ -132,7 +132,7 @@ pub(crate) fn settle(
     Ok(exit)
 }
 
-/// What the bench's own master does otherwise, if it does.
+/// Names the deviation of the bench's own master, if it is wrong.
 fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<String> {
     if !findings.master_is_wrong {
         return Ok(String::new());

@@ -1,4 +1,4 @@
-//! `drivebench rig`: benches, their files and who holds them.
+//! `drivebench rig`: benches, their files and their locks.
 
 use super::exit::Exit;
 use super::output::Output;

@@ -1,4 +1,4 @@
-//! What a rig in use says when it cannot be used, and how it ended.
+//! Messages and exit codes for a rig that cannot be used, and for how its use ended.
 
 use super::exit::Exit;
 use super::output::Output;
@@ -11,7 +11,7 @@ use crate::top::screen;
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-/// The rig of this name; what is wrong with it is told.
+/// Finds the rig of this name; reports what is wrong with it.
 pub(crate) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
     match find(name, &folder()) {
         Ok(rig) => Some(rig),
@@ -26,7 +26,7 @@ pub(crate) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
     }
 }
 
-/// What a program does that hangs: it says so, and ends with the exit code for drives that nobody knows to stand.
+/// The alarm of a program that hangs: it prints why and exits with the code for an unconfirmed safe state.
 pub(crate) fn alarm() -> Alarm {
     Alarm::new(|why| {
         let why = format!("error: {why}\n");

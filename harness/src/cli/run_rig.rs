@@ -114,8 +114,7 @@ pub(crate) fn work(
     })
 }
 
-/// Ends the folder and writes the page; false where that failed, which has been said then. The page of a run with a folder is
-/// the folder's.
+/// Ends the folder and writes the page. Returns false after reporting a failure. A run with a folder writes the folder's page.
 pub(crate) fn reports(
     rig: &Rig,
     folder: Option<Folder>,

@@ -15,10 +15,10 @@ use harness_sim::novobus::deviation::deviations;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// How often a simulated ring is asked at most where nothing is said.
+/// The default limit of tries on a simulated ring.
 const RUNS: u32 = 300;
 
-/// How often a rig is asked at most where nothing is said.
+/// The default limit of tries on a rig with ports.
 const RUNS_ON_RIG: u32 = 40;
 
 /// For `shrink`.

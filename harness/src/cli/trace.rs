@@ -82,7 +82,7 @@ pub(crate) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut O
     true
 }
 
-/// Shows a run; false where the file could not be written, which has been said then.
+/// Shows a run. Returns false after reporting that the file could not be written.
 pub(crate) fn show(
     shown: &Shown<'_>,
     format: TraceFormat,

@@ -374,8 +374,8 @@ impl Recalled {
 }
 
 impl Header {
-    /// What an attempt can have taken. What was sent comes round behind its end, and where nobody fetches it the record does not
-    /// say when; where time is real, a wait ends a little later than it was to.
+    /// The shortest and the longest time that an attempt can have taken. Bytes sent last come round after its end, and if they
+    /// are not fetched the record does not say when. In real time a wait also ends a little late.
     fn could_take(&self, took: Span, ended: &Ended) -> (Span, Span) {
         let real = match self.exactness.tolerance {
             Span::ZERO => Span::ZERO,

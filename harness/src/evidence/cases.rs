@@ -91,7 +91,7 @@ impl Settling<'_> {
         for own in attempts {
             must("name", name, &own.recorded.name);
         }
-        // What is wrong with an attempt has been told.
+        // What is wrong with an attempt has been reported.
         if attempts.iter().any(|own| own.differs.is_some()) {
             return;
         }
@@ -180,7 +180,7 @@ fn settled(attempts: &[Judged]) -> Vec<Attempt> {
         let stated = own.recorded.verdict.as_ref()?;
         Some(Outcome {
             remarks: stated.remarks.clone(),
-            // On a simulated rig the time of what nobody fetched is not in the record; playing it again tells.
+            // On a simulated rig the record lacks the time of bytes that were not fetched; playing it again shows it.
             took: stated.took,
             ..again.outcome.clone()
         })

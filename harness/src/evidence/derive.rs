@@ -1,8 +1,7 @@
-//! The reports of a folder, made again from its record, its captures and nothing else.
+//! Makes the reports of a folder again, from nothing but its record and its captures.
 //!
-//! A run makes them in the same way when it ends, so that whoever makes them again gets the same bytes. What was expected is not in a
-//! record: as `verify` does, each attempt is played again from what was received, and where that says the same as the record
-//! the bytes that differ are shown.
+//! A run makes them in the same way when it ends, so making them again gives the same bytes. A record does not have the expected bytes: as
+//! in `verify`, each attempt is played again from what was received. If the result agrees with the record, the bytes that differ are shown.
 
 use super::files::{self, CAPTURES, SCENARIOS};
 use super::folder::EvidenceError;

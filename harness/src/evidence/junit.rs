@@ -1,7 +1,7 @@
 //! Verdicts for continuous integration: JUnit's XML as Jenkins and GitLab read it.
 //!
-//! A flaky scenario passed, and what came of the attempts before is a `flakyFailure`. What a scenario left is named in its output, as
-//! `[[ATTACHMENT|path]]`.
+//! A flaky scenario counts as passed and has a `flakyFailure` for its failed attempts. Files that a scenario left are named in
+//! its output, as `[[ATTACHMENT|path]]`.
 
 use crate::scenario::verdict::Verdict;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestRerun, TestSuite};
@@ -15,7 +15,7 @@ pub struct Case {
     pub name: String,
     /// What came of it.
     pub verdict: Verdict,
-    /// What was otherwise, for people.
+    /// What differed, as a text for people.
     pub message: String,
     /// How long it took on the line.
     pub took: Duration,
@@ -62,7 +62,7 @@ fn without_skipped(mut xml: String) -> String {
     xml
 }
 
-/// A name that no case has had yet: GitLab drops what has the same name.
+/// A name that no case has had yet: GitLab drops cases with the same name.
 fn unique(name: &str, names: &mut BTreeSet<String>) -> String {
     let own = named(name, "scenario");
     let later = (2..).map(|number: usize| format!("{own}_{number}"));
@@ -110,7 +110,7 @@ fn output(case: &Case) -> String {
         .collect::<String>()
 }
 
-/// A name, or another one where nothing is left of it.
+/// The printable part of a name, or `otherwise` if nothing of it is printable.
 fn named(name: &str, otherwise: &str) -> String {
     match printable(name) {
         empty if empty.trim().is_empty() => otherwise.to_owned(),

@@ -65,7 +65,7 @@ pub fn read(bytes: &[u8]) -> Result<(Vec<Line>, bool), RecordError> {
     Ok((lines, bytes.ends_with(b"\n")))
 }
 
-/// A line, or where in it (counted from 1) it is none, and why.
+/// Parses a line. The error has the column, counted from 1, and the reason.
 fn parse(bytes: &[u8]) -> Result<Line, (usize, String)> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let at = error.valid_up_to();
@@ -74,7 +74,7 @@ fn parse(bytes: &[u8]) -> Result<Line, (usize, String)> {
     })?;
     serde_json::from_str::<Line>(text.trim_end_matches('\n')).map_err(|error| {
         let message = error.to_string();
-        // The place is told apart.
+        // The place is reported separately.
         let message = message.split(" at line ").next().unwrap_or_default();
         (error.column(), message.to_owned())
     })

@@ -548,7 +548,7 @@ impl Line {
         }
     }
 
-    /// What came of a scenario with this title on rings of so many drives.
+    /// The line for a scenario with this title on rings of these sizes.
     pub(super) fn of_case(
         name: &str,
         (title, drives): (&str, &str),

@@ -32,7 +32,8 @@ pub struct Rejudged {
     pub judged: String,
     /// What differs, if anything does.
     pub differs: Option<String>,
-    /// Faults that were asked for and never happened, as the run told of them: a link's own bytes show them, not the master's.
+    /// Faults that were requested and never happened, as the run reported them: the bytes of the fault's own link show this, the
+    /// master's bytes do not.
     pub unused: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! A run: case after case, what is new is kept, what is otherwise is confirmed and written down.
+//! A run tries case after case, keeps those that show something new, and confirms and records every difference from the model.
 
 use super::Difference;
 use super::Finding;
@@ -16,11 +16,10 @@ use super::{Generator, Scope};
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 
-/// So often the same thing may be flaky before it is no longer looked at.
+/// After how many flaky sightings a difference is no longer looked at.
 const SETTLED: u8 = 3;
 
-/// So often in a row a byte must be late that a drive is late and not the computer: what a busy one delays is at the same byte twice now and
-/// then.
+/// How many times in a row a byte must be late before the drive is blamed. A busy computer sometimes delays the same byte twice.
 const TIMES_LATE: u8 = 4;
 
 /// How far a run goes.
@@ -28,9 +27,9 @@ const TIMES_LATE: u8 = 4;
 pub struct Bounds {
     /// The number of cases.
     pub cases: u64,
-    /// How long the line is used at most.
+    /// The longest time that the line is used.
     pub wire: Option<Span>,
-    /// It ends with so many findings.
+    /// The run ends after this many findings.
     pub findings: usize,
     /// After how many cases the progress is written.
     pub every: u64,
@@ -45,7 +44,7 @@ pub enum End {
     Wire,
     /// Enough was found.
     Findings,
-    /// The rig, or somebody, wants it to end.
+    /// The rig or the user has ended it, for this reason.
     Over(String),
 }
 
@@ -54,10 +53,10 @@ pub trait Watcher {
     /// A round begins, with what its cases may have.
     fn round(&mut self, round: u64, swarm: &Swarm);
 
-    /// Something was found; the name of its files stands behind it.
+    /// Something was found; `file` is the name of its files.
     fn found(&mut self, finding: &Finding, file: &str);
 
-    /// So far.
+    /// The state so far.
     fn progress(&mut self, progress: &Progress, pool: &Pool);
 }
 
@@ -68,7 +67,7 @@ pub struct Campaign {
     scope: Scope,
     pool: Pool,
     progress: Progress,
-    /// What was found, and how often in vain: what counts is settled.
+    /// How often each difference was flaky, by its key; `SETTLED` for a confirmed one.
     known: BTreeMap<String, u8>,
     /// On a rig with ports, what every ring is asked before anything is left to chance.
     tour: Vec<Case>,
@@ -235,7 +234,7 @@ impl Campaign {
         Ok(end)
     }
 
-    /// Tries these cases in order, within the wire's time: what is otherwise is confirmed and written down as in a run.
+    /// Tries these cases in order, within the wire's time. Differences are confirmed and recorded as in a run.
     ///
     /// # Errors
     /// The rig or the record fails.
@@ -347,8 +346,8 @@ impl Campaign {
         Ok(())
     }
 
-    /// Tries a case again with drives made ready for it, then with more and more of what was sent before it. A difference that was seen in
-    /// other cases is seen again too: no wire and no computer makes the same of two.
+    /// Tries a case again with drives made ready for it, then with more and more of what was sent before it. A difference that several
+    /// cases have shown counts as confirmed too: a disturbed line or a busy computer does not repeat itself in different cases.
     fn confirm(
         &mut self,
         finding: &mut Finding,
@@ -382,7 +381,7 @@ impl Campaign {
         Ok(())
     }
 
-    /// Tries a case until it was otherwise in the same way often enough or cannot be any more.
+    /// Repeats a case until it has shown the same kind of difference often enough, or no longer can.
     fn again(
         &mut self,
         finding: &mut Finding,
@@ -407,7 +406,7 @@ impl Campaign {
                 }
                 continue;
             };
-            // A computer that is late is so at another byte the next time, and a drive that counts is wrong there.
+            // A late computer delays another byte the next time; a drive that counts is wrong at another byte too.
             let moved = other.byte != finding.difference.byte;
             self.moves |= finding.of > 1 && moved;
             let late = finding.difference.time && moved;
@@ -425,8 +424,8 @@ impl Campaign {
         Ok(())
     }
 
-    /// Finds out which drive is to blame, where it is that of the telegram: the same conversation with the drives' roles exchanged
-    /// differs at the same byte where it is another one, on whose way the byte is.
+    /// Checks whether the drive that the telegram addresses is to blame. If another drive on the byte's way is to blame, the same
+    /// conversation with the drives' roles exchanged differs at that byte too.
     fn blame(
         &mut self,
         finding: &mut Finding,
@@ -458,7 +457,7 @@ impl Campaign {
                 return Ok(());
             }
         }
-        // A drive that is wrong now and then may have been right by chance.
+        // A drive that is wrong only sometimes may have been right by chance.
         let rehearsal = target.rehearse(&finding.case)?;
         target.begin();
         let tried = target.attempt(&finding.case, &rehearsal)?;
@@ -476,7 +475,7 @@ impl Campaign {
     }
 }
 
-/// The cases of several tours in turns.
+/// Interleaves the cases of several tours.
 fn in_turns(tours: Vec<Vec<Case>>) -> Vec<Case> {
     let longest = tours.iter().map(Vec::len).max().unwrap_or(0);
     let at = |index: usize| {
@@ -487,13 +486,13 @@ fn in_turns(tours: Vec<Vec<Case>>) -> Vec<Case> {
     (0..longest).flat_map(at).collect()
 }
 
-/// How many bytes are sent again before a case that shows nothing alone.
+/// How many earlier bytes are sent again before a case that shows nothing by itself.
 const PREFIXES: [usize; 3] = [0, 2_000, 8_000];
 
-/// With how many drives at most the roles are exchanged.
+/// The maximum number of drives to exchange roles with.
 const MOST_EXCHANGED: u8 = 8;
 
-/// The last acts that fit into so many bytes.
+/// The last acts that fit into `most` bytes.
 fn last_acts(acts: &[Act], drives: u8, most: usize) -> &[Act] {
     let mut left = most;
     let mut from = acts.len();
@@ -507,7 +506,7 @@ fn last_acts(acts: &[Act], drives: u8, most: usize) -> &[Act] {
     &acts[from..]
 }
 
-/// The same conversation with each telegram to another drive, so many addresses on.
+/// The same conversation with each telegram addressed to the drive `step` addresses further on.
 fn exchanged(case: &Case, step: u8) -> Case {
     let mut new = case.clone();
     for act in &mut new.acts {

@@ -11,7 +11,8 @@ impl Dice {
         Self(fastrand::Rng::with_seed(seed))
     }
 
-    /// Those of the `n`-th part of a run: each case has its own, so that no case depends on how many numbers another took.
+    /// The numbers of the `n`-th part of a run: each case has its own, so that no case depends on how many numbers another one
+    /// took.
     #[must_use]
     pub fn of_part(seed: u64, n: u64) -> Self {
         let mut z = seed.wrapping_add(n.wrapping_mul(0x9E37_79B9_7F4A_7C15));
@@ -35,12 +36,12 @@ impl Dice {
         self.0.u16(..)
     }
 
-    /// True so many times of a hundred.
+    /// True with a probability of `times` percent.
     pub fn percent(&mut self, times: usize) -> bool {
         self.below(100) < times
     }
 
-    /// One of these; `None` of none.
+    /// One of these; `None` if there are none.
     pub fn pick<'a, T>(&mut self, of: &'a [T]) -> Option<&'a T> {
         of.get(self.below(of.len()))
     }

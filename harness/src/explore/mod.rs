@@ -1,10 +1,10 @@
-//! Exploring: conversations that nobody has written, tried on a ring beside its model.
+//! Exploring: generated conversations, tried on a ring beside its model.
 //!
-//! A [`Case`] is a conversation as a value. [`Generator`] and [`mutate`] make them from a seed, within a [`Swarm`]'s subset of
-//! what a conversation can have; a [`Target`] tries them: [`OnSim`] on simulated rings, [`OnRig`] on a rig with ports behind
-//! its guard. What shows something new stays in a [`Pool`], what is otherwise than the model is a [`Finding`], and every
-//! finding is a scenario ([`text`](mod@text)). A [`Campaign`] does all of it, a [`Record`] keeps it as it happens, [`shrink`](mod@shrink) makes
-//! findings small and [`promote`](mod@promote) keeps them.
+//! A [`Case`] is a conversation as a value. [`Generator`] and [`mutate`] make them from a seed, within a [`Swarm`]'s subset of what a
+//! conversation can have; a [`Target`] tries them: [`OnSim`] on simulated rings, [`OnRig`] on a rig with ports behind its guard. A [`Pool`]
+//! keeps the cases that show something new, a difference from the model is a [`Finding`], and every finding is a scenario
+//! ([`text`](mod@text)). A [`Campaign`] does all of it and a [`Record`] writes it down as it happens. [`shrink`](mod@shrink) reduces
+//! findings and [`promote`](mod@promote) makes them regression tests.
 
 mod campaign;
 mod dice;

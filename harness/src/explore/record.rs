@@ -33,9 +33,9 @@ pub struct About {
     pub ports: bool,
     /// The seed.
     pub seed: u64,
-    /// A finding counts when it is seen again so often ...
+    /// A finding is confirmed when it is seen again this often ...
     pub confirm: u8,
-    /// ... of so many attempts.
+    /// ... in this many attempts.
     pub of: u8,
     /// What the rings are made of.
     pub setup: Setup,

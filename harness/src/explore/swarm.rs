@@ -32,7 +32,7 @@ pub enum Spice {
     Same,
     /// The next drive (9.2).
     Next,
-    /// Addresses that nobody has (9.3).
+    /// Addresses of no drive (9.3).
     Nobody,
     /// SYNCO and PAUSE between telegrams (9.2).
     Idle,

@@ -18,7 +18,7 @@ pub struct Rehearsal {
     pub features: BTreeSet<u32>,
     /// Why it is not tried: the rig does not allow it, or cannot do it.
     pub denied: Option<String>,
-    /// How the model is otherwise than the reference model.
+    /// How the model differs from the reference model.
     pub of_model: Option<Difference>,
 }
 
@@ -27,9 +27,9 @@ pub struct Rehearsal {
 pub struct Tried {
     /// How long the line was used for it.
     pub took: Span,
-    /// How the ring was otherwise than it must be.
+    /// Mismatch with the expected behaviour.
     pub difference: Option<Difference>,
-    /// What was sent to the ring before the case, since its drives were made ready, where the difference may come from that.
+    /// What was sent to the ring between making its drives ready and the case, if the difference may come from that.
     pub before: Option<Vec<Act>>,
     /// Why it was not played after all.
     pub not_played: Option<String>,
@@ -37,7 +37,7 @@ pub struct Tried {
 
 /// A ring that cases are tried on, beside its model.
 pub trait Target {
-    /// Lets the model live through a case.
+    /// Plays a case on the model.
     ///
     /// # Errors
     /// The model cannot be made.
@@ -49,10 +49,10 @@ pub trait Target {
     /// The rig cannot go on.
     fn attempt(&mut self, case: &Case, rehearsal: &Rehearsal) -> Result<Tried, ExploreError>;
 
-    /// Lets the next attempt begin with drives that were made ready for it.
+    /// Has the drives made ready before the next attempt.
     fn begin(&mut self) {}
 
-    /// Whether no other case can be tried: somebody wants the program to end, or the rig's file allows no longer run.
+    /// Why no further case can be tried, if so: the program has been interrupted, or the rig's file allows no longer run.
     fn over(&mut self) -> Option<String> {
         None
     }

@@ -36,7 +36,7 @@ fn wrong(message: impl Into<String>, expected: impl Into<String>) -> ValueError 
 pub struct Time(pub Duration);
 
 impl Time {
-    /// So many seconds.
+    /// A time of `seconds`.
     #[must_use]
     pub const fn seconds(seconds: u64) -> Self {
         Self(Duration::from_secs(seconds))
@@ -128,8 +128,8 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Whether a ring of so many drives has this wire: bytes go from the master to the drive with the highest
-    /// address and down to drive 0 (ND21 8.1).
+    /// Whether a ring of `drives` drives has this wire: bytes go from the master to the drive with the highest address and down
+    /// to drive 0 (ND21 8.1).
     #[must_use]
     pub fn is_in(self, drives: u8) -> bool {
         match (self.from, self.to) {

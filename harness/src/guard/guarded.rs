@@ -61,7 +61,7 @@ enum Verdict {
     Damages { byte: u64, data: u8 },
     /// Drives may be out of step behind it.
     Doubt,
-    /// Nobody can judge what drives make of it.
+    /// It cannot be judged what drives make of it.
     Open,
 }
 
@@ -155,13 +155,13 @@ impl<L: Line> Guarded<L> {
         &self.inner
     }
 
-    /// The link behind the guard, for what sends nothing. Bytes sent past the guard are nobody's to judge.
+    /// The link behind the guard, for callers that send nothing. Bytes sent past the guard are not checked.
     pub(crate) fn inner_mut(&mut self) -> &mut L {
         &mut self.inner
     }
 
-    /// Lets somebody look at drives from now on, in every [pause](Line::pause). What was seen to be wrong before is forgotten: on the way
-    /// to the safe state nobody looks, and nothing may stop it.
+    /// Sets the watch that looks at drives in every [pause](Line::pause). Trouble from an interlock is cleared: on the way to the safe
+    /// state there is no watch, and nothing may stop it.
     pub fn set_watch(&mut self, watch: Option<Box<dyn Watch>>) {
         self.watch = watch;
         if matches!(self.trouble, Some(Trouble::Interlock(_))) {

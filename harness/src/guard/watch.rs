@@ -1,4 +1,4 @@
-//! What is asked of drives beside everybody's conversation.
+//! Queries to drives in the pauses of a conversation.
 
 use crate::link::Line;
 use harness_proto::time::Instant;
@@ -9,9 +9,9 @@ pub trait Watch: Send + fmt::Debug {
     /// When it wants to look next, on a clock that is never set back; `None` for never.
     fn due(&self) -> Option<Instant>;
 
-    /// Looks. It sends whole telegrams only, and leaves with their answers taken.
+    /// Looks at the drives. It sends whole telegrams only, and returns when it has received their answers.
     ///
     /// # Errors
-    /// What must not go on, in a sentence.
+    /// Why the conversation must not go on, in a sentence.
     fn look(&mut self, now: Instant, line: &mut dyn Line) -> Result<(), String>;
 }

@@ -1,12 +1,12 @@
-//! By how much the computer has been late of late.
+//! An estimate of how late the computer wakes up.
 
 use harness_proto::time::Span;
 use std::time::{Duration, Instant};
 
-/// The time in which what was seen counts half as much: who was late once is not late for long, and SYNCO sent ahead delays each job.
+/// Half-life of the estimate. One late wake-up must not count for long, because the SYNCO sent ahead for it delay each job.
 const HALF: Duration = Duration::from_millis(500);
 
-/// The worst that has been seen, forgotten little by little.
+/// The worst lateness seen; it is halved every `HALF`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lateness {
     worst: Span,
@@ -22,7 +22,7 @@ impl Lateness {
         }
     }
 
-    /// Somebody who wanted to be woken at `due` is awake `now`.
+    /// Records a wake-up that was due at `due` and happened at `now`.
     pub(crate) fn woken(&mut self, due: Instant, now: Instant) {
         let late = now.saturating_duration_since(due).as_nanos();
         let late = Span::from_nanos(u64::try_from(late).unwrap_or(u64::MAX));
@@ -34,7 +34,7 @@ impl Lateness {
         }
     }
 
-    /// By how much whoever wants to be woken may be late now.
+    /// How late a wake-up may be now.
     pub(crate) fn at(&self, now: Instant) -> Span {
         let halves = now.saturating_duration_since(self.seen).as_millis() / HALF.as_millis();
         let left = self.worst.as_nanos() >> halves.min(63);

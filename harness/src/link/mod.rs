@@ -110,26 +110,26 @@ pub enum Moment {
     At(Instant),
 }
 
-/// How far ahead of the line bytes may be handed over: where time is real, a busy computer would leave gaps between them.
+/// How far ahead of the line bytes may be queued. In real time a busy computer that queues none leaves gaps between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lead {
-    /// While nobody waits for an answer.
+    /// While no answer is awaited.
     pub far: Span,
-    /// Beyond the time at which an answer comes home that somebody waits for: what he sends next leaves behind these bytes.
+    /// Past the time at which an awaited answer arrives: what the caller sends next leaves behind these bytes.
     pub near: Span,
 }
 
-/// A gap on the line that harms nobody: drives that miss their bytes wait for 10 ms at least (ND21 9.9).
+/// A gap on the line that no drive takes for a time-out: drives wait for at least 10 ms (ND21 9.9).
 pub(crate) const HARMLESS: Span = Span::from_millis(5);
 
 impl Lead {
-    /// Each byte is handed over when the line is free for it: time waits for whoever sends.
+    /// Each byte is handed over when the line is free for it: time waits for the sender.
     pub const NONE: Self = Self {
         far: Span::ZERO,
         near: Span::ZERO,
     };
 
-    /// The longest gap between bytes that is the computer's: of a longer one the sender knew.
+    /// The longest gap between bytes that a late computer explains; a longer one is the sender's own.
     #[must_use]
     pub fn gap(self) -> Span {
         match self {
@@ -162,15 +162,15 @@ pub trait Line: Send {
         0
     }
 
-    /// The next byte received that nobody has fetched.
+    /// Takes the next received byte that has not been fetched yet.
     fn receive(&mut self, ring: usize) -> Option<(Instant, Received)>;
 
-    /// Lets time pass until something happens, at most until `until`. False where nothing ever will
-    /// unless the master sends. What the last call has told of, and nobody has fetched a byte of since, need not be
-    /// told again. With [trouble](Self::trouble) time may stand still: who waits in a loop looks at it.
+    /// Lets time pass until something happens, at most until `until`. Returns false if nothing will ever happen unless the master
+    /// sends. Edge-triggered: input that was already reported and is still unread may not be reported again. With
+    /// [trouble](Self::trouble) time may stand still: a caller that waits in a loop must check for it.
     fn wait(&mut self, until: Instant) -> bool;
 
-    /// Somebody waits for what comes home from a ring at `at`: where time is real, he is awake then.
+    /// Hint: the caller expects a reply at `at`; real-time links busy-poll around that time.
     fn attend(&mut self, ring: usize, at: Instant) {
         let _always_awake = (ring, at);
     }
@@ -180,14 +180,14 @@ pub trait Line: Send {
         None
     }
 
-    /// When this line wants a pause next, on its own clock: a moment in which nobody has anything under way, and in which it asks
-    /// drives something by itself. `None` where it never does.
+    /// When this line next needs a [pause](Self::pause), on its own clock: a time without traffic in which it queries drives
+    /// itself. `None` if it never needs one.
     fn pause_due(&self) -> Option<Instant> {
         None
     }
 
-    /// Nothing is under way, everything that came has been fetched, and whoever talks waits: the line may ask what it wants to know.
-    /// Behind it drives are as they were, and which drive was addressed last too; only time has passed.
+    /// Lets the line make its own queries. The caller has nothing under way, has fetched all that was received, and waits. Afterwards the
+    /// drives are in the same state as before, and the same drive is the last one addressed; only time has passed.
     fn pause(&mut self) {}
 
     /// How far ahead of the line a driver may hand over its bytes.
@@ -196,7 +196,7 @@ pub trait Line: Send {
     }
 }
 
-/// A line that somebody else goes on with afterwards.
+/// A borrowed line: its owner goes on using it afterwards.
 impl<L: Line + ?Sized> Line for &mut L {
     fn byte_time(&self) -> Span {
         (**self).byte_time()
@@ -252,11 +252,11 @@ pub trait Link: Line {
     /// What this link can do beside sending and receiving.
     fn capabilities(&self) -> &[Capability];
 
-    /// Begins a conversation: time and bytes are counted anew, faults that have not happened are forgotten, and so is
-    /// what was received and not fetched. The drives go on as they are.
+    /// Begins a conversation: restarts the time and the byte counts, and drops pending faults and unread input. The drives keep
+    /// their state.
     fn begin(&mut self);
 
-    /// A step of a scenario begins, that at this place of its text: for links that remember.
+    /// Marks the start of the scenario step at this place of its text, for links that record.
     fn step(&mut self, place: usize) {
         let _forgotten = place;
     }
@@ -264,7 +264,7 @@ pub trait Link: Line {
     /// Whether bytes of the master's are still on their way round.
     fn busy(&self) -> bool;
 
-    /// Lets a fault happen.
+    /// Injects a fault.
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment);
 
     /// Whether a fault can be put on a link of a ring: 0 is the master's outgoing one.

@@ -46,7 +46,7 @@ pub enum Event {
     Trouble(Trouble),
     /// The bench looked at its ports; only where time is real. Bytes that had come since the last look follow it.
     Look(Look),
-    /// So many SYNCO were sent into a ring from this time on to let it spell out its address, and these bytes came.
+    /// A probe of a ring: its start time, how many SYNCO were sent to let it spell out its address, and the bytes received.
     Probe(usize, Instant, usize, Vec<Received>),
     /// What had arrived at the end of a link of a ring by this time, and had not been asked for before in this conversation.
     Tapped(usize, usize, Instant, Vec<Received>),

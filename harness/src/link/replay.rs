@@ -58,7 +58,7 @@ impl Default for Known {
 }
 
 impl Replay {
-    /// What was recorded on rings of so many drives, on a link that could do so much.
+    /// Replays events recorded on rings of these sizes, on a link with these capabilities.
     #[must_use]
     pub fn new(
         events: Vec<Event>,
@@ -509,7 +509,7 @@ mod tests {
         Replay::new(events, Rate::default(), tolerance, vec![1], Vec::new())
     }
 
-    /// Sends, looks for an answer until a time as whoever listens does, and sends what comes next.
+    /// Sends a byte, waits for answers until 50 ms, and sends the next byte.
     fn play(replay: &mut Replay) -> Vec<Instant> {
         replay.begin();
         replay.send(0, &[0x80]);

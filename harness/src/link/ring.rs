@@ -25,7 +25,7 @@ pub(crate) struct Ring {
     pub(crate) queue: VecDeque<(Instant, bool, Outgoing)>,
     /// When the line is free for the next byte.
     pub(crate) free: Instant,
-    /// When what somebody waits for comes home.
+    /// When the awaited reply is due.
     pub(crate) attended: Option<Instant>,
     pub(crate) received: VecDeque<(Instant, Received)>,
     pub(crate) last_arrival: Instant,

@@ -1,4 +1,4 @@
-//! What is sent to a wire by somebody else than its owner, when the owner does not move any more.
+//! Bytes that another thread sends to a wire when the wire's owner hangs.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 /// How long a wire may take them.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Coded bytes and a descriptor of their own.
+/// Coded bytes with their own descriptor of the wire.
 #[derive(Debug)]
 pub struct LastWords {
     pub(super) fd: OwnedFd,
@@ -16,13 +16,13 @@ pub struct LastWords {
     pub(super) bytes: Vec<u8>,
 }
 
-/// They could not be said.
+/// The bytes could not be sent.
 #[derive(Debug, thiserror::Error)]
 #[error("{name}: {error}")]
 pub struct Unsaid {
     /// The wire.
     name: String,
-    /// What the system said.
+    /// The operating system's error.
     error: std::io::Error,
 }
 

@@ -53,13 +53,13 @@ pub struct PortSettings {
 /// Why a port cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// Nothing there.
+    /// There is no such port.
     #[error("there is no port {0}: is the adapter plugged in?")]
     Missing(String),
-    /// No rights.
+    /// The user has no right to open it.
     #[error("no right to open {0}: on most systems its group is `dialout` (ls -l {0})")]
     Denied(String),
-    /// Somebody has it.
+    /// Another program has it.
     #[error("{0} is in use by another program")]
     InUse(String),
     /// Something else stands there.

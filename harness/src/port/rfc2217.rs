@@ -41,13 +41,13 @@ const FOR_LINE_STATE: Duration = Duration::from_millis(500);
 /// Why a server cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum NegotiationError {
-    /// It answers something else, or nothing.
+    /// It does not answer as RFC 2217 says, or not at all.
     #[error("the other end does not speak RFC 2217 (no answer to {0} within 3 s)")]
     Silent(&'static str),
     /// It does not do what is asked.
     #[error("the other end refuses the COM port options of RFC 2217")]
     Refused,
-    /// A setting that it answered otherwise.
+    /// It has set another value than was asked for.
     #[error("{what}: asked for {asked}, the other end set {got}")]
     Otherwise {
         /// Which setting.
@@ -114,7 +114,7 @@ impl Telnet {
         std::mem::take(&mut self.replies)
     }
 
-    /// How many line errors the server has told of since the last call.
+    /// How many line errors the server has reported since the last call.
     pub(super) fn take_errors(&mut self) -> u64 {
         std::mem::take(&mut self.errors)
     }
@@ -205,7 +205,7 @@ fn ask(command: u8, value: u32, size: usize) -> Vec<u8> {
     bytes
 }
 
-/// Asks for rate and 8O1 and for line errors to be told of, and checks every answer.
+/// Requests the rate, 8O1 and notification of line errors, and checks every answer.
 pub(super) fn negotiate(stream: &TcpStream, rate: Rate) -> Result<Telnet, NegotiationError> {
     let mut telnet = Telnet::default();
     let end = Instant::now() + PATIENCE;
@@ -230,7 +230,8 @@ pub(super) fn negotiate(stream: &TcpStream, rate: Rate) -> Result<Telnet, Negoti
     Ok(telnet)
 }
 
-/// Asks to be told of line errors. A server that says nothing may do it all the same; one that says something else does not.
+/// Requests notification of line errors. A server that does not answer may send them all the same; one that answers with another
+/// mask does not.
 fn notify(telnet: &mut Telnet, mut stream: &TcpStream) -> Result<(), NegotiationError> {
     const COMMAND: u8 = 10;
     let (what, asked) = ("notification of line errors", u32::from(LINE_ERRORS));
@@ -296,7 +297,7 @@ mod tests {
         bytes.iter().filter_map(|byte| telnet.push(*byte)).collect()
     }
 
-    /// RFC 854: a doubled FF is data; RFC 2217: line states are told beside the data.
+    /// RFC 854: a doubled FF is data; RFC 2217: line states are reported beside the data.
     #[test]
     fn data_and_line_states() {
         let mut telnet = Telnet::default();

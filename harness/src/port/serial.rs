@@ -128,15 +128,15 @@ fn set_marks(fd: impl AsFd, rate: Rate) -> Result<(), String> {
     Ok(())
 }
 
-/// A USB adapter collects bytes for up to 16 ms unless it is told not to.
+/// Lowers the latency timer of a USB adapter, which by default collects bytes for up to 16 ms.
 fn lower_latency(path: &Path) {
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if let Some(name) = path.file_name() {
         let timer = Path::new("/sys/bus/usb-serial/devices")
             .join(name)
             .join("latency_timer");
-        // Not every adapter has one, and not everybody may set it: bytes then come later, which the rig's
-        // check measures.
+        // Not every adapter has the timer, and not every user may set it. Bytes then arrive later, which the rig's check
+        // measures.
         let _as_it_is = std::fs::write(timer, "1");
     }
 }

@@ -98,10 +98,10 @@ impl Wire {
         self.fd.as_fd()
     }
 
-    /// Bytes that somebody else can send when the owner of this wire does not move any more, coded as it codes them.
+    /// Bytes that another thread can send when the owner of this wire hangs, coded as on this wire.
     ///
     /// # Errors
-    /// There is no descriptor left.
+    /// No more descriptors are available.
     pub fn last_words(&self, bytes: &[u8]) -> std::io::Result<LastWords> {
         let coded = bytes.iter().flat_map(|&byte| match &self.coding {
             Coding::Plain | Coding::Serial(..) => vec![byte],
@@ -131,7 +131,7 @@ impl Wire {
         }
     }
 
-    /// Whether bytes go to whoever plays the ring as they are handed over: no adapter takes them a millisecond's worth at a time.
+    /// Whether bytes reach the other end as soon as they are handed over: no adapter collects them for a millisecond.
     #[must_use]
     pub fn is_prompt(&self) -> bool {
         match self.coding {
@@ -140,7 +140,7 @@ impl Wire {
         }
     }
 
-    /// Line errors that the other end has told of without saying at which byte; counted since the last call.
+    /// Number of line errors that the other end has reported without their bytes since the last call.
     pub fn take_unplaced(&mut self) -> u64 {
         std::mem::take(&mut self.unplaced)
     }
@@ -196,7 +196,7 @@ impl Wire {
                 let (bytes, length) = telnet.escape(byte);
                 return self.queue(&bytes[..length]);
             }
-            // What a wire cannot send is sent as a good byte; whoever sends has asked what it can.
+            // What a wire cannot send is sent as a good byte; callers check its abilities first.
             (_, Outgoing::Byte(byte) | Outgoing::WrongParity(byte)) => {
                 return self.queue(&[byte]);
             }

@@ -28,7 +28,7 @@ pub(crate) const HEADER: usize = 12;
 pub(crate) const SECTION: u32 = 0x0A0D_0D0A;
 pub(crate) const INTERFACE: u32 = 1;
 pub(crate) const PACKET: u32 = 6;
-/// What the order of bytes in a section is told by.
+/// The byte-order magic of a section.
 pub(crate) const MAGIC: u32 = 0x1A2B_3C4D;
 /// Options.
 pub(crate) const END: u16 = 0;

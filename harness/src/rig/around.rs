@@ -38,7 +38,7 @@ impl Around {
         Ok(around)
     }
 
-    /// The rig has been opened: its power stays on unless its safe state says otherwise.
+    /// Notes that the rig has been opened: its power stays on unless its safe state requires it off.
     pub(crate) fn used(&mut self) {
         self.used = true;
     }

@@ -11,7 +11,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::MasterDeviation;
 
-/// What is said of an attempt in which the bench's own master is wrong: no drive is to blame.
+/// The remark on an attempt in which the bench's own master is wrong: no drive is to blame.
 const WRONG: &str =
     "the bench's own master: it sent or told something else than the master of the manual does";
 
@@ -50,7 +50,7 @@ impl Driven {
         })
     }
 
-    /// Whether the master was the right one; an attempt in which it was not is the bench's fault.
+    /// Whether the master was right. If it was not, the attempt is the bench's fault.
     pub(crate) fn judge(&self, outcome: &mut Outcome) -> bool {
         let right = self.is_explained_by(None);
         if !right {
@@ -60,7 +60,7 @@ impl Driven {
         right
     }
 
-    /// Whether a master with this deviation, or the right one, does and tells what was recorded.
+    /// Whether a master with this deviation, or the right one, would do and report what was recorded.
     #[must_use]
     pub fn is_explained_by(&self, master: Option<&'static MasterDeviation>) -> bool {
         let mut plan = self.plan.clone();
@@ -77,7 +77,8 @@ impl Driven {
             return false;
         };
         let told = (outcome.verdict, message(&outcome));
-        // Trouble of the rig is in the record and comes again; a replay has another one where the master did something else.
+        // Trouble of the rig is in the record, so a replay meets it again. A replay in other trouble means that the master did
+        // something else.
         let recorded = self.events.iter().find_map(|event| match event {
             Event::Trouble(trouble) => Some(trouble),
             _ => None,

@@ -1,5 +1,5 @@
-//! What may stand in a rig file. The JSON schema is derived from these types, and every file is checked
-//! against it; what is said of a key here is what `drivebench rig schema` says.
+//! The content of a rig file. The JSON schema is derived from these types, and every file is checked against it; `drivebench rig
+//! schema` prints these doc comments.
 
 use crate::file::values::{Speed, Time, Wire};
 use harness_proto::nd21::cells::{Cell, cell};

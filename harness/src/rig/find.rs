@@ -172,7 +172,7 @@ pub fn sizes(text: &str) -> Result<Vec<u8>, String> {
     }
 }
 
-/// The file of a simulated bench of which only the sizes of its rings are said.
+/// The file of a simulated bench, made from the sizes of its rings.
 fn simulated(sizes: &str) -> Result<String, String> {
     let sizes = self::sizes(sizes)?;
     let ring = |number: usize| {

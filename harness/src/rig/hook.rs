@@ -34,7 +34,7 @@ pub enum HookError {
     Start {
         /// Program and arguments.
         command: String,
-        /// What the system said.
+        /// The operating system's error.
         error: std::io::Error,
     },
     /// It was ended because it took too long.
@@ -47,7 +47,7 @@ pub enum HookError {
         /// The start of its standard error.
         stderr: String,
     },
-    /// It ended otherwise than with exit code 0.
+    /// It did not end with exit code 0.
     #[error("`{command}` failed ({}){}", .finished.status, said(&.finished.stderr))]
     Failed {
         /// Program and arguments.
@@ -68,7 +68,7 @@ fn said(stderr: &str) -> String {
 /// `DRIVEBENCH_RIG_FILE` (where the rig comes from) and `DRIVEBENCH_HOOK` (`name`) in its environment.
 ///
 /// # Errors
-/// It could not be started, took too long, or ended otherwise than with exit code 0.
+/// It could not be started, took too long, or did not end with exit code 0.
 pub fn run(
     rig: &Rig,
     name: &str,
@@ -143,7 +143,7 @@ fn collect(stream: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
     if let Some(mut stream) = stream {
         std::thread::spawn(move || {
             let mut kept = Vec::new();
-            // What was read until an error is kept; nobody may wait for it any more.
+            // What was read before an error is kept. The receiver may be gone already.
             let _cut = stream.by_ref().take(MAX_OUTPUT).read_to_end(&mut kept);
             let full = kept.len() as u64 == MAX_OUTPUT;
             if full {

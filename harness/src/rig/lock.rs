@@ -1,8 +1,8 @@
-//! Who holds a rig, and who holds a port.
+//! Locks of rigs and ports.
 //!
-//! A rig is held as long as a process has its lock file locked (flock). The lock goes with the process, however it
-//! ends; what stands in the file then is stale, and nobody heeds it. A reservation stands in the same file, is
-//! heeded without any process, and keeps out every other user until it is given back.
+//! A process holds a rig as long as it has the rig's lock file locked (flock). The kernel releases the lock when the process
+//! ends, for whatever reason; the holder that is then left in the file is stale and ignored. A reservation is written to the same
+//! file. It needs no running process and keeps out every other user until it is given back.
 
 use super::check::Rig;
 use super::state::{self, Holder};
@@ -26,14 +26,14 @@ const AT_LEAST: Duration = Duration::from_millis(100);
 /// Why there is no lock.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
-    /// Somebody else has it.
+    /// Another process holds it, or another user has reserved it.
     #[error("rig {rig} is {how} by {}", holder_text(.holder.as_deref()))]
     Busy {
         /// The rig's id.
         rig: String,
         /// `held` or `reserved`.
         how: &'static str,
-        /// Who; `None` where the file does not say (yet).
+        /// The holder; `None` if the file does not name one (yet).
         holder: Option<Box<Holder>>,
     },
     /// The lock file cannot be used.
@@ -45,7 +45,7 @@ pub enum LockError {
         rig: String,
         /// The folder of the lock file.
         folder: String,
-        /// What the system said.
+        /// The operating system's error.
         error: io::Error,
     },
 }
@@ -57,20 +57,20 @@ fn holder_text(holder: Option<&Holder>) -> String {
 /// What stands in a lock file.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 struct Record {
-    /// Who has it locked; stale where nobody has.
+    /// The process that has it locked; stale if the file is not locked.
     holder: Option<Holder>,
-    /// For whom it is kept.
+    /// The user who has reserved it.
     reserved: Option<Holder>,
 }
 
-/// Whether a rig can be had.
+/// Whether a rig is available.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// Nobody has it.
+    /// It is neither held nor reserved.
     Free,
-    /// A process has it.
+    /// A process holds it.
     Held(Option<Holder>),
-    /// It is kept for somebody.
+    /// A user has reserved it.
     Reserved(Holder),
 }
 
@@ -82,10 +82,11 @@ pub struct RigLock {
 }
 
 impl RigLock {
-    /// Takes a rig, and waits for it at most so long, or until `interrupt` is set. Simulated rigs need no lock: everyone has a copy.
+    /// Locks a rig. Waits for it for at most `wait` (at least 100 ms), or until `interrupt` is set. Simulated rigs need no lock:
+    /// each process has its own copy.
     ///
     /// # Errors
-    /// Somebody else has it, or its lock file cannot be used.
+    /// Another process or user has it, or its lock file cannot be used.
     pub fn acquire(
         rig: &Rig,
         purpose: &str,
@@ -158,7 +159,8 @@ fn open(folder: &Path, id: &str) -> io::Result<File> {
     match options.open(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let file = options.create(true).truncate(false).open(&path)?;
-            // The umask took bits away that other users need. Whoever came first has done it.
+            // The umask has cleared permissions that other users need. If another user created the file, that process has set
+            // them.
             let _not_ours = file.set_permissions(Permissions::from_mode(0o666));
             Ok(file)
         }
@@ -166,7 +168,7 @@ fn open(folder: &Path, id: &str) -> io::Result<File> {
     }
 }
 
-/// What stands in the file; nothing where it is new or was cut off.
+/// The file's content; empty if the file is new or truncated.
 fn record(file: &mut File) -> io::Result<Record> {
     file.rewind()?;
     Ok(serde_json::from_slice(&state::read(file)?).unwrap_or_default())
@@ -213,7 +215,7 @@ fn same(one: &Holder, other: &Holder) -> bool {
     one.uid == other.uid && one.user == other.user
 }
 
-/// Whether a rig can be had. A rig that was never locked is free, and no file is made for it.
+/// Whether a rig is available. A rig that was never locked is free, and no file is made for it.
 ///
 /// # Errors
 /// The lock file cannot be read.
@@ -232,21 +234,21 @@ pub fn standing(folder: &Path, id: &str) -> io::Result<Standing> {
     })
 }
 
-/// Keeps a rig for this user until it is given back with [`unreserve`].
+/// Reserves a rig for this user until [`unreserve`] gives it back.
 ///
 /// # Errors
-/// Somebody else has it, or its lock file cannot be used.
+/// Another process or user has it, or its lock file cannot be used.
 pub fn reserve(folder: &Path, id: &str, me: &Holder) -> Result<(), LockError> {
     let mut lock = RigLock::acquire_in(folder, id, me, Duration::ZERO)?;
     lock.record.reserved = Some(me.clone());
     lock.give_back(folder, id)
 }
 
-/// Gives a rig back, also that of another user with `force`; a process that holds it is not disturbed. Says
-/// for whom it was kept.
+/// Gives a reserved rig back; with `force` also one that another user has reserved. A process that holds it is not disturbed.
+/// Returns who had reserved it.
 ///
 /// # Errors
-/// It is kept for somebody else, a process holds it, or its lock file cannot be used.
+/// Another user has reserved it, a process holds it, or its lock file cannot be used.
 pub fn unreserve(
     folder: &Path,
     id: &str,
@@ -272,20 +274,20 @@ pub fn unreserve(
 }
 
 impl RigLock {
-    /// Writes what is to stay, so that a failure is told; dropping it tells nobody.
+    /// Releases the lock and returns a failure to write the file. Dropping the lock ignores such a failure.
     fn give_back(mut self, folder: &Path, id: &str) -> Result<(), LockError> {
         self.record.holder = None;
         write(&mut self.file, &self.record).map_err(|error| io_error(id, folder, error))
     }
 }
 
-/// Why a port cannot be had.
+/// Why a port cannot be locked.
 #[derive(Debug, thiserror::Error)]
 pub enum PortLockError {
     /// Another program has it.
     #[error("the port is in use by another program ({how})")]
     Busy {
-        /// By what it shows.
+        /// How this was detected: `flock` or `TIOCEXCL`.
         how: &'static str,
     },
     /// The system refused.
@@ -302,8 +304,8 @@ pub struct PortLock {
 }
 
 impl PortLock {
-    /// Takes an open port: flock first, so that nothing is changed of a port that somebody else has. That
-    /// somebody made it exclusive before shows in a second open, which fails with EBUSY; root does not see it.
+    /// Locks an open port. It calls flock first, so that a port in use by another program is not changed. A second open that
+    /// fails with EBUSY shows that another program has made the port exclusive; for root it does not fail.
     ///
     /// # Errors
     /// Another program has it, or the system refused. Then nothing of it was changed.

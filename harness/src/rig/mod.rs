@@ -1,8 +1,8 @@
-//! Benches: what stands in `rigs/*.toml`, who holds one, and what may be done with it.
+//! Benches: the files `rigs/*.toml`, locks, and what may be done with a bench.
 //!
-//! [`file`](mod@file) has the types of a rig file (the JSON schema is derived from them), `check` finds every mistake
-//! of a text with its place, and [`find`](mod@find) a rig by its name. [`lock`] says who holds a rig or a port, [`state`] where
-//! that is kept, and which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
+//! [`file`](mod@file) has the types of a rig file (the JSON schema is derived from them), `check` finds every mistake of a text
+//! with its place, and [`find`](mod@find) a rig by its name. [`lock`] locks rigs and ports, and [`state`] keeps the locks and
+//! which rigs must not be used. [`hook`] runs the programs that a rig names, [`scan`] finds ports.
 
 mod around;
 pub(crate) mod check;

@@ -15,7 +15,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// How long a simulated rig has been switched on when somebody comes to it: the self-tests are over (11.8).
+/// How long a simulated rig has been switched on when it is opened: the self-tests are over (11.8).
 const WARM: time::Span = time::Span::from_millis(200);
 
 /// Why a rig's ports cannot be used.
@@ -27,7 +27,7 @@ pub enum OpenRigError {
     /// No port, or several, fit what the file says of one.
     #[error(transparent)]
     Match(#[from] MatchError),
-    /// Somebody else uses a port.
+    /// Another program uses a port.
     #[error("{port}: {error}")]
     Lock {
         /// Which port.

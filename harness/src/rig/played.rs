@@ -25,7 +25,7 @@ pub struct Attempt {
     pub comparisons: Vec<Comparison>,
     /// What the links carried in the scenario itself, ring by ring.
     pub traces: Vec<Trace>,
-    /// Line errors that the transport told of without their bytes.
+    /// Number of line errors that the transport reported without their bytes.
     pub unplaced: u64,
     /// What the bench's own master did in it on a simulated rig, if it had a part.
     pub driven: Option<Driven>,
@@ -128,9 +128,9 @@ impl Played {
         played
     }
 
-    /// The attempt that was otherwise than the model and says something of the drives, and where it was. What did not come again may
-    /// have been the computer: drives that could not be made ready once, bytes that were late at another place or by another span the
-    /// next time.
+    /// The last attempt played and its differences from the model, if they say something about the drives. A difference that was not seen
+    /// again may be due to the computer: drives that could not be made ready once, or bytes that were late at another place or by another
+    /// time at the next attempt.
     #[must_use]
     pub fn telling(&self, tolerance: Span) -> Option<(&Attempt, Vec<&Divergence>)> {
         let last = self.last_played()?;
@@ -320,7 +320,7 @@ mod tests {
         assert_eq!(attempts(again, 1, &[(Failed, SILENT)]), 1);
     }
 
-    /// An attempt in which a byte at a place of the scenario is otherwise: late by so many milliseconds, or of another value.
+    /// An attempt in which the byte at a place of the scenario differs: it is `late` milliseconds late, or has another value.
     fn differing(attempt: Attempt, step: usize, late: Option<u64>) -> Attempt {
         let byte = |at| Some((Instant::START + Span::from_millis(at), Received::good(0x80)));
         let divergence = Divergence {

@@ -39,7 +39,7 @@ pub struct Run<'s> {
     twin: Twin,
     exactness: Exactness,
     byte_time: Span,
-    /// The sign of life of whoever only computes; see the session's watchdog.
+    /// Sign of life for the session's watchdog while the program only computes.
     beats: Option<Arc<AtomicU64>>,
     /// When a scenario is played once more.
     again: Again,
@@ -104,7 +104,7 @@ impl<'s> Run<'s> {
         self.session
     }
 
-    /// A twin that nobody has spoken to, its drives with what `lines` of a header say beside the rig's file.
+    /// A fresh twin. Its drives are set up as the rig's file and these header `lines` say.
     ///
     /// # Errors
     /// The lines have mistakes.
@@ -355,8 +355,8 @@ impl Way {
         }
     }
 
-    /// The conversations that are compared, and whether with a twin that nobody has spoken to. Where drives are reset, what
-    /// real ones did before is no matter, and how a ring comes out of the error mode in real time is a race (9.9).
+    /// The conversations to compare, and whether to compare them with a fresh twin. If drives are reset, what real ones did
+    /// before does not matter, and how a ring leaves the error mode in real time is a race (9.9).
     #[must_use]
     pub fn compared(
         &self,
@@ -368,7 +368,7 @@ impl Way {
         (all, self.anew && exactness.tolerance > Span::ZERO)
     }
 
-    /// How many conversations come before the reset of the drives: what was before the first one, and the health check. None where these are
+    /// How many conversations come before the reset of the drives: what was before the first one, and the health check. 0 if these are
     /// compared too.
     fn before_the_reset(&self, all: &[Conversation], exactness: Exactness) -> usize {
         let fresh = self.anew && exactness.tolerance > Span::ZERO;

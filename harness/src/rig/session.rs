@@ -33,22 +33,22 @@ const LONGEST_ROUND: Span = Span::from_millis(1_000);
 /// How a rig is used.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// What for; others who want it are told.
+    /// The purpose, shown to others who want the rig.
     pub purpose: String,
-    /// How long to wait for a rig that somebody else has.
+    /// How long to wait for a rig that is in use.
     pub wait: Duration,
-    /// Whether motors may turn, where the rig's file allows it too.
+    /// Whether motors may turn, if the rig's file allows it too.
     pub allow_motion: bool,
-    /// Whether a ring that is ill is taken all the same, to find out what it is.
+    /// Whether to open a ring that fails its health check, to find out what is wrong with it.
     pub ill_as_well: bool,
-    /// Set by whoever wants the program to end.
+    /// Set to end the program.
     pub interrupt: Arc<AtomicBool>,
-    /// What is done when the program shows no sign of life and the drives have been told to stop.
+    /// Called when the program shows no sign of life, after the watchdog has stopped the drives.
     pub alarm: Alarm,
 }
 
 impl Options {
-    /// An error once the program was told to end.
+    /// Returns an error once the program has been interrupted.
     fn unless_interrupted(&self, rig: &Rig) -> Result<(), SessionError> {
         match self.interrupt.load(Ordering::Relaxed) {
             false => Ok(()),
@@ -296,7 +296,7 @@ impl Session {
         longest.is_some_and(|longest| self.started.elapsed() > longest.0)
     }
 
-    /// Listens before anything is sent: a bench must not talk into somebody else's conversation.
+    /// Listens before anything is sent: a bench must not disturb another program's conversation.
     fn listen(&mut self) -> Result<(), SessionError> {
         if self.rig.is_simulated() {
             return Ok(());

@@ -10,7 +10,7 @@ use crate::rig::line_test::Cause;
 /// Why a rig cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// Somebody has it, or its lock cannot be used.
+    /// It is held or reserved, or its lock cannot be used.
     #[error(transparent)]
     Lock(#[from] LockError),
     /// It must not be used.
@@ -47,12 +47,12 @@ pub enum SessionError {
         /// Why.
         error: Box<HookError>,
     },
-    /// The program was told to end while the rig was being opened.
+    /// The program was interrupted while it opened the rig.
     #[error("rig {rig}: interrupted{}", .end.as_ref().map_or(" before anything was sent".to_owned(), |end| format!("; {end}")))]
     Interrupted {
         /// Which.
         rig: String,
-        /// How it was given back; `None` where nothing had been sent to its drives.
+        /// How it was given back; `None` if nothing had been sent to its drives.
         end: Option<Box<End>>,
     },
     /// It is not healthy.

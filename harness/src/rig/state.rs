@@ -1,4 +1,4 @@
-//! What the program keeps of rigs on this machine: the folder for it, and who did what when.
+//! The state of rigs that the program keeps on this machine, and the folder it is kept in.
 //!
 //! The folder is `$DRIVEBENCH_STATE`, else `/run/lock/drivebench`, which all users of a machine share, else
 //! `$XDG_RUNTIME_DIR/drivebench`, else `drivebench-UID` in the folder for temporary files. Of each rig it has
@@ -24,7 +24,7 @@ const SHARED: [&str; 2] = ["/run/lock", "drivebench"];
 /// The most bytes that are read of a file of ours.
 const MAX_SIZE: u64 = 1 << 16;
 
-/// Who does something with a rig, and since when.
+/// Who uses a rig, and since when.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Holder {
     /// The process.
@@ -161,7 +161,7 @@ pub(crate) fn read(file: &File) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What changes when the machine is started anew.
+/// The id of the current boot; empty if it cannot be read.
 fn boot() -> String {
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id");
     boot.map_or_else(|_| String::new(), |boot| boot.trim().to_owned())
@@ -171,7 +171,7 @@ fn rest_file(folder: &Path, id: &str) -> PathBuf {
     folder.join(format!("{id}.rest"))
 }
 
-/// Keeps that a rig was left with every drive waiting for a sync byte and none in the middle of a command.
+/// Notes that a rig was left at rest: every drive waits for a sync byte, and none is in the middle of a command.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -183,11 +183,11 @@ pub fn left_at_rest(folder: &Path, id: &str) -> io::Result<()> {
     file.write_all(boot().as_bytes())
 }
 
-/// Whether a rig was left so since the machine was started. It is asked once: whoever asks is about to send something.
+/// Whether a rig was left at rest since the last boot. Asking removes the note, because the caller is about to send something.
 pub fn take_rest(folder: &Path, id: &str) -> bool {
     let path = rest_file(folder, id);
     let kept = regular::read(&path, Links::Refuse, MAX_SIZE);
-    // What cannot be removed would be believed again later.
+    // A note that cannot be removed would be trusted again later.
     let taken = std::fs::remove_file(path).is_ok();
     let boot = boot();
     taken && !boot.is_empty() && kept.is_ok_and(|kept| kept == boot.as_bytes())
@@ -210,7 +210,7 @@ impl Rig {
     }
 }
 
-/// Why a rig must not be used, if somebody said so with [`set_quarantine`].
+/// Why a rig must not be used, if [`set_quarantine`] has put it in quarantine.
 ///
 /// # Errors
 /// The file cannot be read, or is not ours.
@@ -223,7 +223,7 @@ pub fn quarantine(folder: &Path, id: &str) -> io::Result<Option<Quarantine>> {
     Ok(Some(serde_json::from_slice(&read(&file)?)?))
 }
 
-/// Says that a rig must not be used from now on, or, with `None`, that it may be used again.
+/// Puts a rig in quarantine, or, with `None`, takes it out of it.
 ///
 /// # Errors
 /// The file cannot be written or removed.
@@ -239,7 +239,7 @@ pub fn set_quarantine(folder: &Path, id: &str, reason: Option<&str>) -> io::Resu
         since: utc(SystemTime::now()),
         reason: reason.to_owned(),
     };
-    // Beside it first: nobody reads half a file.
+    // Written beside it first and renamed, so that readers never see half a file.
     let new = path.with_extension(format!("quarantine.{}", std::process::id()));
     File::create_new(&new)?.write_all(&serde_json::to_vec(&quarantine)?)?;
     std::fs::rename(new, path)

@@ -1,5 +1,5 @@
-//! A thread that stops the drives when the program shows no sign of life: a terminal that is held, a disk that does not answer, a mistake
-//! of ours. It helps against neither `kill -9` nor a computer that stands still.
+//! A thread that stops the drives when the program shows no sign of life: a terminal that is held, a disk that does not answer, a bug. It
+//! does not help against `kill -9` or a computer that hangs.
 
 use crate::port::LastWords;
 use std::fmt;
@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 /// How often it looks, at most.
 const EVERY: Duration = Duration::from_millis(250);
 
-/// Gets a sentence that says why.
+/// Called with the reason, in a sentence.
 type Act = dyn Fn(&str) + Send + Sync;
 
-/// What is done once the drives have been told to stop.
+/// Called once the drives have been stopped.
 #[derive(Clone, Default)]
 pub struct Alarm(Option<Arc<Act>>);
 

@@ -20,7 +20,7 @@ pub enum Expected {
     Byte(u8),
     /// `xx`: any byte.
     Any,
-    /// The -checksum over so many bytes before it (ND21 9.6).
+    /// The -checksum over this many bytes before it (ND21 9.6).
     MinusChecksum(u8),
 }
 

@@ -162,7 +162,7 @@ pub fn shown(value: Value, scale: Scale) -> String {
     text.trim_end().to_owned()
 }
 
-/// A number with at most so many decimals, and no zeros behind the last that says something.
+/// A number with at most `decimals` decimals and no trailing zeros.
 fn trimmed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let short = if text.contains('.') {
@@ -279,8 +279,8 @@ pub(crate) fn ahead(scanner: &Scanner<'_>) -> bool {
     let hexadecimal = letters.value.chars().all(|c| c.is_ascii_hexdigit());
     let even = (digits.value.len() + letters.value.len()) % 2 == 0;
     if apart || hexadecimal {
-        // No byte has one digit: `5 A` and `95C` are numbers, `5A` and `5AB0` are bytes. Nobody writes the
-        // bytes AE FF as `Aeff`.
+        // No byte has one digit: `5 A` and `95C` are numbers, `5A` and `5AB0` are bytes. The bytes AE FF are never written as
+        // `Aeff`.
         return known && ends && (apart || !even || letters.value.len() > 1);
     }
     // `xx` is any byte, and `0x88` a mistake of another kind.

@@ -28,7 +28,7 @@ pub enum SourceError {
     Unreadable {
         /// The file.
         name: String,
-        /// What the system said.
+        /// The operating system's error.
         error: std::io::Error,
     },
     /// It is a folder, a device, a FIFO or the like.

@@ -1,8 +1,8 @@
-//! Verdicts, in order of gravity.
+//! Verdicts, the most serious last.
 
 use std::fmt;
 
-/// What came of a scenario. A later one is graver.
+/// The verdict on a scenario. A later one is more serious.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verdict {
     /// Not played: the rig lacks something.
@@ -13,9 +13,9 @@ pub enum Verdict {
     Marginal,
     /// One attempt of several was as the scenario says.
     Flaky,
-    /// The transport could not have shown the opposite.
+    /// The transport could not have shown a failure.
     Inconclusive,
-    /// The drive behaved otherwise.
+    /// A drive did not behave as the scenario says.
     Failed,
     /// It could not be played to its end.
     Aborted,

@@ -9,8 +9,9 @@ const MOST: Span = Span::from_micros(20);
 /// How many times the last handing over counts in what it takes.
 const LAST: u64 = 8;
 
-/// The clock of served rings. A write to a socket takes microseconds, a line's end none: the time in the rings is that much ahead of the
-/// system's, so that a byte is with the client when it comes home, and what a client sends has left it that much before it came here.
+/// The clock of served rings. A write to a socket takes microseconds, the end of a line takes none. The rings' time is therefore ahead of
+/// the system's by that much, so that a byte reaches the client when it is due; bytes from a client count as sent that much before they
+/// arrived here.
 #[derive(Debug)]
 pub(super) struct Clock {
     start: time::Instant,

@@ -1,4 +1,4 @@
-//! Lines of control: what somebody does to the rings beside the client, in the words of the scenario language.
+//! Lines of control: they act on the rings beside the client, in the words of the scenario language.
 
 use super::server::Server;
 use crate::link::{Link, Mode, Shown};

@@ -20,7 +20,7 @@ pub enum ControlPlace {
     Tcp(String),
 }
 
-/// A link between two stations of a ring at which somebody sits.
+/// A link between two stations of a ring to which a client connects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inner {
     /// Which ring, counted from 0.

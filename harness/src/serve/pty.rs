@@ -1,8 +1,8 @@
 //! A pseudo terminal with a link to it at a path of its own.
 //!
-//! It carries no parity, no rate and no break; what a client sets of them changes nothing. The server holds the client's end
-//! open, so that a client that goes does no harm; that one has come or gone is seen with inotify. A pseudo terminal cannot turn
-//! a second program away: whoever opens it reads its share.
+//! It carries no parity, rate or break; a client's settings of them have no effect. The server keeps the client's end open, so
+//! that a client that closes it does no harm, and detects with inotify when clients come and go. A pseudo terminal cannot turn a
+//! second program away: each program that opens it reads a share of the bytes.
 
 use super::shell::ServeError;
 use rustix::event::{PollFd, PollFlags};
@@ -85,7 +85,8 @@ impl Pty {
         &self.link
     }
 
-    /// Who has come or gone. Openings that follow one another may be told as one, so a byte read shows a client too.
+    /// Returns whether clients have come or gone. The kernel may report several openings in a row as one, so a byte read counts
+    /// as a client's arrival too.
     pub(super) fn changes(&mut self) -> Vec<Change> {
         let mut changes = Vec::new();
         let mut here = self.here;
@@ -109,12 +110,12 @@ impl Pty {
                 }
             }
         }
-        // Who has gone is here until `gone` is called: there may be bytes to be read.
+        // A client that has closed stays here until `gone` is called: its bytes may still have to be read.
         self.here |= !changes.is_empty();
         changes
     }
 
-    /// Bytes have come, so somebody is there; says whether that is news.
+    /// Notes that a client is there, because bytes have come; returns whether it was not known before.
     pub(super) fn heard(&mut self) -> bool {
         !std::mem::replace(&mut self.here, true)
     }
@@ -143,7 +144,7 @@ impl Pty {
 }
 
 impl Drop for Pty {
-    /// Removes the link, unless somebody has removed it or put something else there.
+    /// Removes the link, unless it has been removed or replaced.
     fn drop(&mut self) {
         if std::fs::read_link(&self.link).is_ok_and(|target| target == self.device) {
             let _gone = std::fs::remove_file(&self.link);

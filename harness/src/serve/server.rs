@@ -15,19 +15,19 @@ const SETTLED: Span = Span::from_millis(1);
 /// How much of a client's bytes waits for the line at most: the rest stays with the client.
 const WAITING: Span = Span::from_millis(500);
 
-/// While a client has given a lot ahead: how long what reaches the master waits for company.
+/// While a client has sent far ahead: how long bytes that reach the master are collected into a batch.
 const BATCH: Span = Span::from_millis(1);
 
-/// How much that is. Who has given less may wait for an answer, and no byte of it waits.
+/// How much counts as far ahead. A client that has sent less may be waiting for an answer, so its bytes are not collected.
 const AHEAD: Span = Span::from_millis(4);
 
-/// While nothing does: how often drives are let go on, so that it does not all come at once in front of the next byte.
+/// While nothing reaches the master: how often the drives are advanced, so that the work does not pile up before the next byte.
 const IDLE: Span = Span::from_millis(20);
 
-/// The most time that is made up for at once. A program that was stopped for longer goes on where it was.
+/// The most time that is made up for at once. A program that was stopped for longer resumes where it was.
 const CATCH_UP: Span = Span::from_millis(1_000);
 
-/// The most that one leap covers, in byte times: then the time is asked for again.
+/// The longest leap, in byte times; after it the clock is read again.
 const LEAP: u64 = 2_000;
 
 /// How many byte times a leap goes on where the master has nothing more to send.
@@ -36,7 +36,7 @@ const STRIDE: u64 = 4;
 /// What is taken at a time from a client that only listens, and dropped.
 const DROPPED: usize = 4096;
 
-/// The most bytes that wait for a client. What comes then is lost, as in a serial port that nobody reads.
+/// Maximum number of bytes that wait for a client. Further bytes are lost, as in a serial port that is not read.
 const UNREAD: usize = 64 << 10;
 
 /// How fast time passes in the rings.
@@ -131,7 +131,7 @@ impl Seat {
 }
 
 impl Server {
-    /// Serves the rings of a plan; nobody is there yet. The clock starts at [`Instant::START`].
+    /// Serves the rings of a plan, without clients at first. The clock starts at [`Instant::START`].
     #[must_use]
     pub fn new(plan: Plan, mut link: SimulatedLink, pace: Pace, marks: Marks) -> Self {
         link.stop_recording();
@@ -149,8 +149,7 @@ impl Server {
         }
     }
 
-    /// Adds a seat at an inner link, behind those there are. A link that is cut is open from now on, whether
-    /// somebody sits there or not.
+    /// Adds a seat at an inner link, behind the existing ones. A link that is cut is open from now on, with or without a client.
     pub fn add(&mut self, inner: Inner) {
         match inner.role {
             Role::Tap => self.link.tap(inner.ring, inner.link),
@@ -338,8 +337,8 @@ impl Server {
         self.seats.get(seat).map_or(0, |seat| seat.lost)
     }
 
-    /// When, by the clock, the next byte comes home that somebody may wait for: until then he cannot know what to send, and all by
-    /// which he has it later is lost on the line.
+    /// When, by the clock, the next byte arrives at a master that may be waiting for it. The client cannot know what to send before it has
+    /// this byte, so any delay in handing it over leaves the line idle.
     #[must_use]
     pub fn awaited(&self) -> Option<Instant> {
         let (from, to) = self.base;

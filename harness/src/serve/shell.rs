@@ -19,10 +19,10 @@ use std::path::PathBuf;
 /// Bytes read at a time.
 const CHUNK: usize = 4096;
 
-/// How long before a byte comes home that somebody waits for this program is woken: that takes longer than to hand the byte over.
+/// How long before an awaited byte is due the server stops sleeping and polls: waking up takes longer than handing the byte over.
 const AWAKE: Span = Span::from_micros(60);
 
-/// Answers that wait for whoever sends lines of control; further lines wait meanwhile.
+/// Maximum bytes of control answers that the client has not read yet; while they are reached, no further line is read.
 const UNREAD: usize = 64 << 10;
 
 /// What is served where, and for how long.
@@ -30,7 +30,7 @@ const UNREAD: usize = 64 << 10;
 pub struct Job {
     /// Where each seat of the server is served, in order: its rings, then its inner links.
     pub places: Vec<ServedAt>,
-    /// Where lines of control come from, if from anywhere.
+    /// Where lines of control come from, if there are any.
     pub control: Option<ControlPlace>,
     /// Whether sockets may listen at addresses that other machines reach.
     pub allow_remote: bool,
@@ -95,7 +95,7 @@ pub enum ServeError {
         /// Why.
         error: io::Error,
     },
-    /// The system does not let the program wait or be told of signals.
+    /// Waiting for events or setting up signals failed.
     #[error("failed to wait for clients: {0}")]
     Wait(io::Error),
     /// Results cannot be written.
@@ -103,7 +103,7 @@ pub enum ServeError {
     Output(io::Error),
 }
 
-/// Who is told.
+/// Receives the server's output.
 pub trait Host {
     /// A line for tools, without its end: a ring is ready, or the answer to a line of control.
     ///
@@ -227,9 +227,9 @@ struct Shell<'a> {
     here: usize,
     /// A client was there, and none is left.
     gone: bool,
-    /// Whether the client's marks were wrong; it is said once.
+    /// Whether each seat's client has sent wrong marks; reported once per client.
     garbled: Vec<bool>,
-    /// Whether the client has lost bytes; it is said once.
+    /// Whether each seat's client has lost bytes; reported once per client.
     losing: Vec<bool>,
 }
 
@@ -293,8 +293,8 @@ impl Shell<'_> {
         }
     }
 
-    /// Waits until something can be read or written, at most until then, and says whether something can. Whoever has a byte that
-    /// somebody waits for is awake when it comes home, as a line is.
+    /// Waits until something can be read or written, at most until `until`, and returns whether something can. In the last
+    /// [`AWAKE`] before an awaited byte is due it polls without sleeping, so that the byte is handed over on time.
     fn wait(&mut self, until: Instant) -> io::Result<bool> {
         let awaited = self.server.awaited();
         let mut fds = vec![PollFd::new(&self.signals.read, PollFlags::IN)];
@@ -370,7 +370,7 @@ impl Shell<'_> {
         }
         match (self.hear(seat), &mut self.ends[seat]) {
             (Err(error), _) => self.fail(seat, &error),
-            // Who has gone is still here until all that it sent has been read.
+            // Keeps the client's seat until its input is drained.
             (Ok(true), Seat::Pty(pty)) => {
                 for change in pty.changes() {
                     self.change(seat, change);
@@ -380,7 +380,8 @@ impl Shell<'_> {
         }
     }
 
-    /// A client's stream has failed: over a socket it has gone. At a pseudo terminal nobody is there, and that is seen otherwise.
+    /// Handles a failed stream. A socket's client has disconnected. At a pseudo terminal no client is left, which inotify
+    /// reports.
     fn fail(&mut self, seat: usize, error: &io::Error) {
         if let Seat::Tcp(tcp) = &mut self.ends[seat]
             && tcp.taken()
@@ -394,12 +395,12 @@ impl Shell<'_> {
         }
     }
 
-    /// Somebody has opened or closed a pseudo terminal.
+    /// Handles a client that opens or closes a pseudo terminal.
     fn change(&mut self, seat: usize, change: Change) {
         match change {
             Change::Came => self.come(seat, "a client came"),
             Change::Gone => {
-                // What it sent at the very end; a pseudo terminal that fails has nobody there.
+                // Reads what the client sent last. An error only means that no client is left.
                 let _read = self.hear(seat);
                 if let Seat::Pty(pty) = &mut self.ends[seat] {
                     pty.gone();
@@ -503,7 +504,7 @@ impl Shell<'_> {
             return Ok(());
         };
         if let Source::Tcp(tcp) = &mut control.source {
-            // Whoever comes second is turned away here too.
+            // A second client is turned away here too.
             let _visitors = tcp.accept();
         }
         let mut buffer = [0; CHUNK];
@@ -568,7 +569,7 @@ fn pass_on(control: &mut Control) {
     }
 }
 
-/// Reads standard input if something is there: it may be somebody else's too, so it is not made nonblocking.
+/// Reads standard input if input is available. Other processes may share it, so it is not made nonblocking.
 fn standard(buffer: &mut [u8]) -> io::Result<usize> {
     let stdin = rustix::stdio::stdin();
     let mut fds = [PollFd::from_borrowed_fd(stdin, PollFlags::IN)];

@@ -20,11 +20,11 @@ pub(super) struct Tcp {
     client: Option<Client>,
 }
 
-/// Somebody at the door.
+/// A new connection.
 pub(super) enum Visitor {
-    /// It is the client now.
+    /// It has become the client.
     Came(SocketAddr),
-    /// Another one is there already; the connection is closed.
+    /// There is a client already; the connection has been closed.
     TurnedAway(SocketAddr),
 }
 
@@ -64,18 +64,18 @@ impl Tcp {
         self.client.is_some()
     }
 
-    /// Takes those who wait at the door.
+    /// Accepts waiting connections.
     pub(super) fn accept(&mut self) -> Vec<Visitor> {
         let mut visitors = Vec::new();
         for _ in 0..TURNED_AWAY {
-            // What fails here has gone again, or comes again.
+            // A connection that fails here has closed again or will be accepted later.
             let Ok((stream, address)) = self.listener.accept() else {
                 break;
             };
             if self.client.is_some() {
                 visitors.push(Visitor::TurnedAway(address));
             } else if stream.set_nonblocking(true).is_ok() {
-                // A byte is to be on its way at once; without this it comes late, and comes.
+                // Bytes are to be sent at once. If this fails, they arrive later, but they arrive.
                 let _late = stream.set_nodelay(true);
                 self.client = Some(Client::new(stream, self.since));
                 visitors.push(Visitor::Came(address));
@@ -104,7 +104,7 @@ impl Tcp {
         self.client = None;
     }
 
-    /// What to wait for: the door, and the client where something is wanted of it.
+    /// What to wait for: the listener, and the client if any events of it are wanted.
     pub(super) fn polls(&self, events: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
         let door = PollFd::new(&self.listener, PollFlags::IN);
         let client = self.client.as_ref().filter(|_| !events.is_empty());

@@ -104,8 +104,8 @@ fn deadlines_are_prompt_when_busy_and_rare_when_idle() {
     }
 }
 
-/// Whoever has given little may wait for each byte that comes home, and the shell is awake for it; of what is given far ahead, and where
-/// nobody is, nothing is awaited.
+/// A client that has sent little may wait for each byte that arrives, so the shell is awake for it. Nothing is awaited if the client has
+/// sent far ahead, or if there is no client.
 #[test]
 fn a_byte_that_somebody_may_wait_for_is_awaited() {
     let mut server = server(HEADER, &[1], Pace::Line, Marks::None);

@@ -17,10 +17,10 @@ use std::io::{self, Stdout, stdout};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError, TryLockError};
 use std::time::Duration;
 
-/// Whether the terminal is taken. Whoever writes to it holds the lock, so that nothing is drawn behind its end.
+/// Whether the terminal is taken. A thread that writes to it holds the lock, so that nothing is drawn after it was given back.
 static TAKEN: Mutex<bool> = Mutex::new(false);
 
-/// How often and how long a panic waits for somebody who draws.
+/// How often and how long a panic waits for a thread that draws.
 const WAITS: u32 = 200;
 const WAIT: Duration = Duration::from_millis(1);
 
@@ -104,8 +104,7 @@ impl Drop for Screen {
     }
 }
 
-/// Gives the terminal back, if it is taken: on the way out of a program that ends without unwinding. Waits for nobody who draws
-/// for long.
+/// Gives the terminal back if it is taken, before a program ends without unwinding. Waits only briefly for a thread that draws.
 pub fn leave() {
     give_back_whoever_draws();
 }
@@ -130,13 +129,13 @@ fn key_of(code: KeyCode, control: bool) -> Option<Key> {
 
 fn give_back(own: &mut bool) {
     if std::mem::replace(own, false) {
-        // Where the terminal is gone, there is nothing to give back.
+        // If the terminal is gone, there is nothing to give back.
         let _gone = execute!(stdout(), LeaveAlternateScreen, Show);
         let _gone = disable_raw_mode();
     }
 }
 
-/// The message of a panic would vanish with the other screen.
+/// Gives the terminal back before a panic's message, which would vanish with the alternate screen.
 fn give_back_before_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -156,6 +155,6 @@ fn give_back_whoever_draws() {
             Err(TryLockError::WouldBlock) => std::thread::sleep(WAIT),
         }
     }
-    // It is this very thread that draws, or one that the terminal holds: it will not go on.
+    // This thread itself draws, or a thread that the terminal blocks: the lock will not be released.
     give_back(&mut true);
 }

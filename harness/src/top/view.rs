@@ -88,7 +88,7 @@ pub fn render(top: &mut Top, colour: bool, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// The page as plain text, as wide as said and as high as it needs.
+/// The page as plain text, `width` columns wide and as high as needed.
 #[must_use]
 pub fn page(top: &mut Top, width: u16) -> String {
     let height = head(top).len() + foot(top, width.into()).len() + 1 + top.rows().len();

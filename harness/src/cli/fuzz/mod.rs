@@ -1,4 +1,4 @@
-//! `drivebench fuzz`: conversations that nobody has written, and what the kept inputs of the fuzz targets reach.
+//! `drivebench fuzz`: generated conversations, and what the kept inputs of the fuzz targets reach.
 
 mod replay;
 pub(crate) mod rig;

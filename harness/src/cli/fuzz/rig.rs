@@ -131,7 +131,7 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
     let rig = session.rig().clone();
     let has = |capability| capabilities.contains(&capability);
     let link = session.link();
-    // Of a simulated ring that is tried as one behind a port only the master's own link is in reach.
+    // On a simulated ring that is tried like one behind a port, only the master's own link is in reach.
     let (first, second) = rings(&rig, |ring, place| match rig.is_simulated() {
         true => place == 0,
         false => link.reaches(ring, usize::from(place)),
@@ -142,9 +142,9 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
         Spice::Power => false,
         Spice::Flip | Spice::Framing => has(Capability::LineErrors) && reached,
         Spice::Slip => limits.allow_everything() && reached,
-        // What drives take a broken byte for is their choice.
+        // The manual leaves open what drives take a broken byte for.
         Spice::Late => false,
-        // Time-outs of drives are not judged in real time. A reset takes as long as a hundred commands; the tour has some.
+        // Time-outs of drives are not judged in real time. A reset takes as long as 100 commands; the tour has some.
         Spice::Silence | Spice::Reset => false,
         Spice::ProcessData => limits.motion,
         Spice::WriteIo => limits.outputs,

@@ -20,10 +20,10 @@ use harness_sim::novobus::deviation;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
-/// How many cases are tried where nothing is said, on simulated rings.
+/// The default number of cases on simulated rings.
 const CASES: u64 = 10_000;
 
-/// How long the line is used where nothing is said, on a rig with ports.
+/// The default time on the line, on a rig with ports.
 const WIRE: Duration = Duration::from_secs(60);
 
 /// After how many cases the progress is written, on simulated rings.

@@ -1,21 +1,21 @@
-//! What a run tells while it goes on.
+//! Output of a run while it goes on.
 
 use crate::cli::output::Output;
 use crate::explore::{Campaign, End, Finding, Pool, Progress, Swarm, Watcher};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// How long the progress is not told again.
+/// The shortest time between two reports of progress.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// Tells it: findings on standard output, all else on standard error.
+/// Writes findings to standard output and everything else to standard error.
 pub(crate) struct Telling<'o> {
     pub(crate) output: &'o mut Output,
-    /// Where the files of findings stand.
+    /// The folder with the files of findings.
     pub(crate) folder: Option<PathBuf>,
-    /// Whether rounds are told.
+    /// Whether rounds are reported.
     pub(crate) rounds: bool,
-    /// When the progress was told last.
+    /// When progress was last reported.
     pub(crate) told: Option<Instant>,
     /// Why standard output could not be written.
     pub(crate) failed: Option<std::io::Error>,

@@ -1,8 +1,8 @@
 //! One page of HTML for people: what was played, what came of it, and pictures of it.
 //!
-//! A page stands for itself: style, script and pictures are in it, nothing is loaded from anywhere (its own
-//! `Content-Security-Policy` forbids it), and without scripts the pictures and tables stand as they are. It never has more than
-//! [`MAX_PAGE`] bytes: where a run has more to show, the gravest comes first, and the page says what was left out.
+//! A page is self-contained: it includes its style, script and pictures and loads nothing (its own `Content-Security-Policy`
+//! forbids it). Without scripts, pictures and tables are still shown. It never has more than [`MAX_PAGE`] bytes: if a run has
+//! more to show, the most serious sections come first, and the page says what was left out.
 //!
 //! | file | what it makes |
 //! |---|---|
@@ -13,7 +13,7 @@
 //! | `diagram.rs` | the space-time diagram of a ring, and the data that the script shows of it |
 //! | `sequence.rs` | what the master and the drives said, one after another |
 //! | `lines.rs` | recorded cells against time |
-//! | `style.css`, `script.js` | how it looks, and what it does for whoever points at a byte |
+//! | `style.css`, `script.js` | how it looks, and what it shows when the pointer is on a byte |
 
 mod page;
 mod scenario;

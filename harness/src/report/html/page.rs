@@ -29,11 +29,11 @@ pub struct Section {
     pub heading: String,
     /// Its name in the page's addresses: letters, digits and `-`.
     pub id: String,
-    /// How grave it is: the gravest keep their parts first.
+    /// How serious it is: the most serious sections keep their parts first.
     pub gravity: u8,
-    /// What always stands there.
+    /// What is always shown.
     pub html: Html,
-    /// What stands below.
+    /// What is shown below, if the page has room.
     pub parts: Vec<Part>,
 }
 
@@ -154,8 +154,8 @@ fn whole(html: &mut Html, section: &Section, kept: &[bool]) {
     );
 }
 
-/// Which parts of which sections stay: those of the gravest sections first, and of these the shortest, so that as much as
-/// possible has room.
+/// Chooses the parts to keep: those of the most serious sections first, and of these the shortest, so that as many as possible
+/// fit.
 fn keep(sections: &[Section], kept: &mut [Vec<bool>], mut free: usize) {
     let mut order: Vec<_> = (0..sections.len())
         .flat_map(|section| (0..sections[section].parts.len()).map(move |part| (section, part)))
@@ -208,7 +208,7 @@ mod tests {
         }
     }
 
-    /// A run of any length gives a page within bounds, and the gravest keeps its picture.
+    /// A run of any length gives a page within bounds, and the most serious section keeps its picture.
     #[test]
     fn a_page_has_bounds() {
         let section = |id: usize, gravity: u8| {

@@ -220,7 +220,7 @@ fn expectations(html: &mut Html, played: &Played<'_>) -> bool {
     true
 }
 
-/// Whether what a line expects came: playing stops at the first thing that is otherwise.
+/// Whether the bytes expected by a line came: playing stops at the first difference.
 fn came(outcome: &Outcome, start: usize, end: usize) -> (&'static str, &'static str) {
     let known = outcome.finding.as_ref().map(|found| &found.span);
     match (outcome.verdict, known) {

@@ -73,7 +73,7 @@ impl Html {
         self.element("div", &attributes, inside);
     }
 
-    /// A picture of so many pixels, with a title and a description for who does not see it; their names are made of `id`.
+    /// A picture of this size in pixels, with a title and a description for screen readers; their ids begin with `id`.
     pub fn picture(
         &mut self,
         id: &str,

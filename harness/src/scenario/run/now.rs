@@ -1,4 +1,4 @@
-//! Steps that are done at once, beside a conversation that somebody else holds.
+//! Steps that are done at once, beside the conversation of another master.
 
 use super::player::{AtMismatch, Runner};
 use crate::link::Link;
@@ -7,7 +7,7 @@ use crate::scenario::plan::{Plan, PlannedAction, PlannedCheck, PlannedStep, Plan
 /// What came of a step that is done at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Now {
-    /// It is done, or it holds.
+    /// The step is done, or the check holds.
     Done,
     /// The check does not hold: what was found, in a sentence.
     Otherwise(String),

@@ -14,9 +14,9 @@ use harness_proto::time;
 pub struct Outcome {
     /// The verdict.
     pub verdict: Verdict,
-    /// The first thing that was otherwise; playing stops there.
+    /// The first thing that was not as a step says; playing stops there.
     pub finding: Option<Mismatch>,
-    /// What is worth saying although nothing failed.
+    /// Notes, also when nothing failed.
     pub remarks: Vec<String>,
     /// How long it took, on the line's clock.
     pub took: time::Span,
@@ -97,7 +97,8 @@ impl Outcome {
 }
 
 impl Trouble {
-    /// What an attempt comes to that this trouble ends: the bench's fault, but a denied command and an interruption are nobody's.
+    /// The verdict of an attempt that this trouble ends. Trouble is the bench's fault, except for a denied command and an
+    /// interruption.
     pub(crate) fn verdict(&self) -> Verdict {
         match self {
             Self::Lost(_) | Self::Garbled(_) | Self::Interlock(_) => Verdict::RigError,
@@ -106,7 +107,7 @@ impl Trouble {
     }
 }
 
-/// Something that was otherwise than a step says.
+/// Something that was not as a step says.
 #[derive(Clone, Debug)]
 pub struct Mismatch {
     /// The step.

@@ -106,7 +106,7 @@ pub(crate) struct Runner<'a> {
     pub(crate) line_before: Instant,
     deadline: time::Span,
     pub(crate) corrected: u64,
-    /// What the driver said was wrong in its last job, the first first.
+    /// The faults that the driver reported in its last job, in order.
     pub(crate) disturbed: Vec<Fault>,
     /// How the commands of that job have ended.
     pub(crate) ended: Vec<Ending>,
@@ -287,7 +287,7 @@ impl Runner<'_> {
         self.sent_to
     }
 
-    /// The next byte that nobody has asked for.
+    /// Takes the next received byte that no step has taken.
     pub(crate) fn take_next(&mut self, ring: usize) -> Option<(Instant, Received)> {
         self.fetch();
         let record = &mut self.rings[ring];
