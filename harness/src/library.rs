@@ -19,13 +19,13 @@ const MAX_FILES: usize = 10_000;
 /// How deep folders are searched.
 const MAX_DEPTH: usize = 16;
 
-/// Why there is no scenario.
+/// Why a scenario cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
     /// Neither a path nor the name of a built-in scenario.
     #[error("failed to find {name}: neither a file or folder nor a built-in scenario; {remedy}")]
     NotFound {
-        /// What was asked for.
+        /// The name as given.
         name: String,
         /// What to do about it.
         remedy: String,

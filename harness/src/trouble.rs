@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Why a link carries nothing more. It stays so: what is sent from then on is dropped.
+/// Why a link carries nothing more. This is permanent: what is sent from then on is dropped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trouble {
     /// The guard has denied a byte: what the bench does not allow never reaches a wire. The text names the command, the drive,

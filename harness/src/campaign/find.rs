@@ -9,15 +9,15 @@ use std::path::{Path, PathBuf};
 /// The campaigns that the binary carries, and their scenarios.
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/campaigns");
 
-/// Why there is no campaign.
+/// Why a campaign cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum FindError {
     /// Neither a file nor the name of a built-in campaign.
     #[error("failed to find {name}: neither a file nor a built-in campaign; {remedy}")]
     NotFound {
-        /// What was asked for.
+        /// The name as given.
         name: String,
-        /// What there is.
+        /// What to do about it.
         remedy: String,
     },
     /// A file is no text.

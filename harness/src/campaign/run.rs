@@ -44,14 +44,14 @@ enum Played {
     ByDriver(Box<ByDriver>),
 }
 
-/// What came of a case.
+/// The outcome of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
     /// The faults.
     pub case: Case,
-    /// What came of them.
+    /// The class of the outcome.
     pub class: Class,
-    /// Why it is this class.
+    /// The evidence for this class.
     pub evidence: Evidence,
 }
 

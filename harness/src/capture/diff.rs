@@ -41,7 +41,7 @@ pub struct Difference {
     pub around: Vec<(usize, Option<LineByte>, Option<LineByte>)>,
 }
 
-/// What came of a comparison.
+/// The result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// The first difference in time.

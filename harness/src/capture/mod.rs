@@ -39,7 +39,7 @@ pub struct Capture {
     pub traces: Vec<Trace>,
 }
 
-/// Why a file is no capture.
+/// Why a file is not a capture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CaptureError {
     /// It cannot be read.

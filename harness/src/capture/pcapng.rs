@@ -394,7 +394,7 @@ fn sent(comment: &[u8]) -> Option<Option<u8>> {
 /// A time in nanoseconds; `None` where it is out of all range. A resolution is a power of 10, or of 2 with its high bit set.
 fn nanoseconds(ticks: u64, resolution: u8, offset: i64) -> Option<u64> {
     const SECOND: u128 = 1_000_000_000;
-    // The most nanoseconds that a time of ours can hold.
+    // The most nanoseconds that an `Instant` can hold.
     const MOST: u128 = u64::MAX as u128 / 4;
     let ticks = u128::from(ticks);
     let nanos = if resolution == NANOSECONDS {

@@ -27,7 +27,7 @@ pub(crate) struct Findings {
     tolerance: Span,
     /// Where attempts differed, each with the name of its scenario.
     sightings: Vec<(String, Sighting)>,
-    /// What came of those that were tried with the drives' roles exchanged.
+    /// The outcomes of those that were tried with the drives' roles exchanged.
     trials: Vec<Trial>,
     /// The conversations of each attempt that differed.
     differing: Vec<Vec<Conversation>>,
@@ -65,7 +65,7 @@ impl Findings {
         }
     }
 
-    /// Notes what came of a scenario.
+    /// Notes the outcome of a scenario.
     pub(crate) fn note(&mut self, name: &str, played: &Played) {
         let verdict = played.outcome.verdict;
         let Some(last) = played.last_played() else {
@@ -166,14 +166,14 @@ impl Findings {
         Some(found)
     }
 
-    /// Notes what came of sightings that were tried with the roles exchanged.
+    /// Notes the outcomes of sightings that were tried with the roles exchanged.
     pub(crate) fn note_trials(&mut self, trials: Vec<Trial>) {
         self.trials.extend(trials);
     }
 
     /// The drive that alone explains where attempts differed, as far as the bytes and the trials say.
     fn culprit(&self) -> Option<Culprit> {
-        // What was seen once may have been a byte that was damaged on its way.
+        // What was seen only once may be a byte that was damaged on its way.
         let seen: Vec<_> = self.sightings.iter().map(|(_, own)| own.meant).collect();
         culprit(self.drives, &seen, &self.trials).filter(|_| seen.len() > 1)
     }

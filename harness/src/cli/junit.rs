@@ -27,7 +27,7 @@ impl Cases {
         }
     }
 
-    /// Notes what came of a scenario.
+    /// Notes the outcome of a scenario.
     pub(crate) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
         let found = outcome.finding.iter().map(|found| found.message.clone());
         let message: Vec<_> = found.chain(outcome.remarks.clone()).collect();

@@ -67,7 +67,7 @@ impl Output {
         let _unwritable = std::io::stderr().lock().write_all(text.as_bytes());
     }
 
-    /// Shows every mistake of a scenario with the line it stands in.
+    /// Shows every mistake of a scenario with its line.
     pub(crate) fn mistakes(&mut self, problems: &Problems) {
         let theme = if self.colour_err {
             GraphicalTheme::unicode()
@@ -84,7 +84,7 @@ impl Output {
         self.complain(&problems.to_string());
     }
 
-    /// Shows why there is no scenario.
+    /// Shows why a scenario cannot be loaded.
     pub(crate) fn library_error(&mut self, error: &LibraryError) {
         match error {
             LibraryError::Mistakes(problems) => self.mistakes(problems),

@@ -59,7 +59,7 @@ pub(crate) fn exit_of(error: &SessionError) -> Exit {
     }
 }
 
-/// Gives a rig back in its safe state and tells how; what ended the work early is graver than what came of it.
+/// Gives a rig back in its safe state and reports how. What ended the work early is more serious than its outcome.
 pub(crate) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -> (End, Exit) {
     let exit = match session.link().trouble() {
         Some(Trouble::Interrupted) => Exit::Interrupted,
@@ -79,7 +79,7 @@ pub(crate) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -
     (end, exit)
 }
 
-/// Tells how a rig was given back; a safe state that is not confirmed is graver than all else.
+/// Reports how a rig was given back. A safe state that is not confirmed is more serious than anything else.
 pub(crate) fn tell_end(end: &End, exit: Exit, output: &mut Output) -> Exit {
     for remark in &end.remarks {
         output.complain(remark);

@@ -226,7 +226,7 @@ fn all(
         }
     } else if job.qualify {
         match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
-            // What a drive does wrong is the drive's fault, whatever came of it.
+            // What a drive does wrong is the drive's fault, whatever the outcome.
             Exit::Failed => exit = Exit::Failed,
             // What is not settled takes no failure back.
             Exit::Incomplete if exit == Exit::Failed => {}

@@ -26,7 +26,7 @@ const WAITED: Span = Span::from_millis(1_000);
 /// What a remark begins with about a fault that was asked for and never happened.
 pub(super) const UNUSED: &str = "this fault never happened: ";
 
-/// An attempt as it stands in a record.
+/// An attempt as recorded.
 #[derive(Clone)]
 pub(super) struct Recorded {
     pub(super) name: String,
@@ -55,7 +55,7 @@ impl Recalled {
     }
 }
 
-/// What came of an attempt that was played again.
+/// The outcome of an attempt that was played again.
 pub(super) struct Again {
     pub(super) outcome: Outcome,
     /// The twin found something.

@@ -1,4 +1,4 @@
-//! What came of each scenario, settled again from its attempts, and whether a scenario was skipped for a reason.
+//! Derives the verdict of each scenario again from its attempts, and checks the reasons of skipped scenarios.
 
 use super::files::{SCENARIOS, sum};
 use super::record::Line;

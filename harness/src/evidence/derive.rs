@@ -92,7 +92,7 @@ struct Attempt {
     outcome: Option<Outcome>,
 }
 
-/// What came of a scenario, as a record says it.
+/// The outcome of a scenario, as recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Settled {
     name: String,

@@ -207,7 +207,7 @@ impl Folder {
         self.check()?;
         self.write(JUNIT, &xml(&self.path, &self.rig, &self.cases))?;
         self.write(REPORT, &plain(&self.rig, &self.cases))?;
-        // A page that cannot be made is no reason to leave a folder without its sums.
+        // The sums are written even if the page cannot be made.
         let page = derive(&self.path).and_then(|derived| self.write(PAGE, &derived.html));
         let sums = sums(&self.path)?;
         self.write(SUMS, &sums)?;

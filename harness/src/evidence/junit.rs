@@ -13,7 +13,7 @@ use std::time::Duration;
 pub struct Case {
     /// Its unique name: `9.7-parity-error[rig=lab-1,drives=3]`.
     pub name: String,
-    /// What came of it.
+    /// Its verdict.
     pub verdict: Verdict,
     /// What differed, as a text for people.
     pub message: String,

@@ -22,7 +22,7 @@ const SETTLED: u8 = 3;
 /// How many times in a row a byte must be late before the drive is blamed. A busy computer sometimes delays the same byte twice.
 const TIMES_LATE: u8 = 4;
 
-/// How far a run goes.
+/// The bounds of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// The number of cases.
@@ -137,13 +137,13 @@ impl Campaign {
         }
     }
 
-    /// Whether such a thing was found already, or was flaky often enough.
+    /// Whether this difference was found already, or was flaky often enough.
     fn is_settled(&self, difference: &Difference) -> bool {
         let times = self.known.get(&difference.key());
         times.is_some_and(|times| *times >= SETTLED)
     }
 
-    /// How far it has come.
+    /// The progress so far.
     #[must_use]
     pub const fn progress(&self) -> &Progress {
         &self.progress

@@ -19,7 +19,7 @@ pub enum ExploreError {
     /// A file that cannot be written although its path is right: the disk is full or broken.
     #[error("{0}")]
     Unwritable(String),
-    /// What was asked for cannot be; the text says what can.
+    /// The request cannot be met; the text says what is possible.
     #[error("{0}")]
     Usage(String),
     /// The line is gone.

@@ -70,7 +70,7 @@ pub enum LogLine {
         /// The case.
         case: Case,
     },
-    /// Something was found; its files stand in the folder.
+    /// Something was found; its files are in the folder.
     Finding {
         /// The number of its case.
         number: u64,
@@ -85,7 +85,7 @@ pub enum LogLine {
     Progress(Progress),
 }
 
-/// How far a run has come.
+/// The progress of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Progress {

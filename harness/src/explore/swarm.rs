@@ -125,7 +125,7 @@ impl Spice {
 pub struct Swarm(BTreeSet<Spice>);
 
 impl Swarm {
-    /// How many cases a round has: so long the subset stays.
+    /// How many cases a round has, all with the same subset.
     pub const ROUND: u64 = 100;
 
     /// The subset of a round of a run, of what the scope allows.

@@ -22,7 +22,7 @@ pub struct Rehearsal {
     pub of_model: Option<Difference>,
 }
 
-/// What came of a case.
+/// The outcome of a case.
 #[derive(Clone, Debug, Default)]
 pub struct Tried {
     /// How long the line was used for it.

@@ -59,7 +59,7 @@ enum Verdict {
     Harmless,
     /// A byte that the master sends arrives with these data bits inverted, and with an error.
     Damages { byte: u64, data: u8 },
-    /// Drives may be out of step behind it.
+    /// Drives may be out of step after it.
     Doubt,
     /// It cannot be judged what drives make of it.
     Open,

@@ -1,6 +1,6 @@
 //! What may leave the program: decides byte by byte, below scenarios, driver and fuzzer.
 //!
-//! This is no safety function in the sense of a machine's safety: an emergency stop must be wired.
+//! This is not a safety function in the sense of machine safety: an emergency stop must be wired.
 //!
 //! [`Guarded`] stands around a line or a link and asks the guard of each ring
 //! ([`harness_proto::novobus::guard`], where the reasoning is) about every byte. [`safe_state`] stops and blocks all drives and

@@ -239,7 +239,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
             self.tell();
             return more;
         };
-        // A wake-up without news is no event.
+        // A wake-up without anything new is not an event.
         let came = loop {
             let more = self.link.wait(until);
             let came = self.take_arrived();

@@ -94,7 +94,7 @@ impl Ring {
         if let Some(span) = passed.hold {
             queue(Outgoing::Break(span), span.max(byte_time));
         }
-        // A byte that is lost takes its time all the same.
+        // A lost byte takes its byte time too.
         self.free = free.max(begun + byte_time);
         self.carried += 1;
         if recording && self.log[0].len() < MOST_RECORDED {
@@ -102,7 +102,7 @@ impl Ring {
         }
     }
 
-    /// Gives the operating system what is due.
+    /// Gives the operating system the bytes that are due.
     pub(crate) fn transmit(&mut self, now: Instant) -> Result<(), Trouble> {
         while let Some(&(start, exact, outgoing)) = self.queue.front() {
             let lead = if exact { Span::ZERO } else { AHEAD };

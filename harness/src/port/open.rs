@@ -46,7 +46,7 @@ pub struct PortSettings {
     pub rate: Rate,
     /// Whether a pty or a socket carries line errors as in-band marks.
     pub marks: bool,
-    /// Whether to ask a USB adapter for its lowest latency; that it cannot is no error.
+    /// Whether to ask a USB adapter for its lowest latency. It is not an error if it cannot.
     pub low_latency: bool,
 }
 
@@ -62,7 +62,7 @@ pub enum OpenError {
     /// Another program has it.
     #[error("{0} is in use by another program")]
     InUse(String),
-    /// Something else stands there.
+    /// The path is something else than a port.
     #[error("{0} is no {1}")]
     NotA(String, &'static str),
     /// A pty where a serial port should be.

@@ -44,7 +44,7 @@ pub enum NegotiationError {
     /// It does not answer as RFC 2217 says, or not at all.
     #[error("the other end does not speak RFC 2217 (no answer to {0} within 3 s)")]
     Silent(&'static str),
-    /// It does not do what is asked.
+    /// It refuses the request.
     #[error("the other end refuses the COM port options of RFC 2217")]
     Refused,
     /// It has set another value than was asked for.
@@ -54,7 +54,7 @@ pub enum NegotiationError {
         what: &'static str,
         /// What was asked for, as the protocol codes it.
         asked: u32,
-        /// What it says that it set.
+        /// The value that it reports as set.
         got: u32,
     },
     /// The connection failed.

@@ -1,7 +1,7 @@
 //! A trace as pcapng, for Wireshark and its kin: one interface a link, one packet a byte, link type 250
 //! (`LINKTYPE_RTAC_SERIAL`).
 //!
-//! | block | what is in it |
+//! | block | content |
 //! |---|---|
 //! | section header | `shb_userappl` drivebench |
 //! | interface | `if_name` the link (`98->97`, `2:0->master`), `if_speed` the rate, `if_tsresol` 9: nanoseconds |
@@ -134,7 +134,7 @@ pub fn name(ring: usize, link: &LinkTrace) -> String {
     format!("{prefix}{}->{}", end(link.from), end(link.to))
 }
 
-/// A block that is being written; its length stands at both of its ends.
+/// A block that is being written; its length is at both of its ends.
 #[derive(Default)]
 struct Block {
     bytes: Vec<u8>,

@@ -23,7 +23,7 @@ pub struct Driven {
     way: Way,
     tolerance: Span,
     capabilities: Vec<Capability>,
-    /// What came of it, before a twin was heard.
+    /// The verdict before it was compared with a twin.
     verdict: Verdict,
     finding: Option<String>,
 }

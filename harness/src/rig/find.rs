@@ -16,21 +16,21 @@ pub const FOLDER_VARIABLE: &str = "DRIVEBENCH_RIGS";
 /// The most rigs that are taken from a folder.
 const MAX_RIGS: usize = 1000;
 
-/// Why there is no rig.
+/// Why a rig cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum FindError {
     /// Nothing has this name.
     #[error("failed to find the rig {name}: no file, and no rig of that name; {remedy}")]
     NotFound {
-        /// What was asked for.
+        /// The name as given.
         name: String,
         /// What there is.
         remedy: String,
     },
-    /// `sim:` with something behind it that is no size of rings.
+    /// `sim:` followed by something other than sizes of rings.
     #[error("failed to make the rig {name}: {reason}")]
     Simulated {
-        /// What was asked for.
+        /// The name as given.
         name: String,
         /// What is wrong with it.
         reason: String,

@@ -137,7 +137,7 @@ pub fn status(
     }
 }
 
-/// Keeps the start of a stream and takes the rest, so that its writer does not stand still.
+/// Keeps the start of a stream and discards the rest, so that its writer does not block.
 fn collect(stream: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
     let (sender, receiver): (Sender<Vec<u8>>, _) = channel();
     if let Some(mut stream) = stream {

@@ -23,7 +23,7 @@ const AGAIN: Duration = Duration::from_millis(50);
 /// How long a lock is tried at least: looking at it (`rig list`) takes it for a moment.
 const AT_LEAST: Duration = Duration::from_millis(100);
 
-/// Why there is no lock.
+/// Why a rig cannot be locked.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another process holds it, or another user has reserved it.
@@ -54,7 +54,7 @@ fn holder_text(holder: Option<&Holder>) -> String {
     holder.map_or_else(|| "somebody who left no name".to_owned(), Holder::to_string)
 }
 
-/// What stands in a lock file.
+/// The content of a lock file.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 struct Record {
     /// The process that has it locked; stale if the file is not locked.

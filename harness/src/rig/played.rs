@@ -17,7 +17,7 @@ const MOST_UNREADY: usize = 3;
 /// One attempt at a scenario.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// What came of it, the twin's word heard.
+    /// The outcome, after the comparison with the twin.
     pub outcome: Outcome,
     /// The conversations, those of the health check and of what is set up before among them.
     pub conversations: Vec<Conversation>,
@@ -78,7 +78,7 @@ impl Attempt {
 /// A scenario that was played as often as the rig's file says.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// What came of all attempts together.
+    /// The outcome of all attempts together.
     pub outcome: Outcome,
     /// The attempts, in order; none where it was skipped.
     pub attempts: Vec<Attempt>,
@@ -209,7 +209,7 @@ impl Again {
                 self.hopeless.extend(why.map(str::to_owned));
                 false
             }
-            // A busy computer is late now and then, a drive at the same byte each time.
+            // A busy computer is late sometimes, a drive at the same byte each time.
             Verdict::Marginal => played < MOST_UNTIMELY,
             _ => attempts.iter().filter(|own| own.failed()).count() < most,
         }

@@ -1,4 +1,4 @@
-//! What was found out about the drives of a rig, as a file that the simulator can load.
+//! A profile: what is known about the drives of a rig, as a file that the simulator can load.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -44,10 +44,10 @@ pub struct KnownProfile {
     pub lines: Vec<String>,
 }
 
-/// Why a text is no profile.
+/// Why a text is not a profile.
 #[derive(Debug, thiserror::Error)]
 pub enum ProfileError {
-    /// It is no TOML, or has other keys than a profile.
+    /// It is not TOML, or has other keys than a profile.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
     /// It is of another version.

@@ -24,7 +24,7 @@ use harness_sim::novobus::deviation::MasterDeviation;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Keeps attempts: events as they happen, and what came of each.
+/// Records attempts: events as they happen, and the outcome of each.
 pub trait Keeper: Sink {
     /// An attempt begins; the first has the number 1.
     fn begins(&mut self, attempt: usize);
@@ -123,7 +123,7 @@ impl<'s> Run<'s> {
     /// Plays a scenario, and again where it did not pass, as often as the rig's file says.
     ///
     /// # Errors
-    /// The rig is ill, so that nothing more can be played.
+    /// The rig fails its health check, so nothing more can be played.
     pub fn play(
         &mut self,
         plan: &Plan,
@@ -347,7 +347,7 @@ impl Way {
     /// Examines the rings, where they are examined before an attempt.
     ///
     /// # Errors
-    /// The ring that is ill.
+    /// Returns the ring that fails the health check.
     fn examine(&self, link: &mut dyn Link) -> Result<(), (usize, Unhealthy)> {
         match self.attempts {
             Some(attempts) => examine(link, &self.rings, attempts).map(|_| ()),
@@ -416,7 +416,7 @@ pub(crate) fn not_played(plan: &Plan, link: &dyn Link, rings: &[RingSize]) -> Op
 /// Plays a scenario once on any link, with what comes before it.
 ///
 /// # Errors
-/// The ring that is ill.
+/// Returns the ring that fails the health check.
 pub fn play_one(
     link: &mut dyn Link,
     plan: &Plan,

@@ -261,13 +261,13 @@ impl Session {
         limits(&self.rig, self.allow_motion)
     }
 
-    /// Whether it goes on although a ring is ill.
+    /// Whether the session goes on although a ring fails its health check.
     #[must_use]
     pub fn ill_as_well(&self) -> bool {
         self.ill_as_well
     }
 
-    /// What the health check at its opening found; `None` where there was none, or where it found a ring ill.
+    /// The result of the health check at opening; `None` if there was none, or if a ring failed it.
     #[must_use]
     pub fn opening(&self) -> Option<&Health> {
         self.opening.as_ref()
@@ -317,7 +317,7 @@ impl Session {
             for (ring, heard) in heard.iter_mut().enumerate() {
                 let before = heard.len();
                 heard.extend(self.take(ring));
-                // It may be what is left of a conversation whose bench was killed.
+                // These bytes may be the rest of a conversation whose bench was killed.
                 if heard.len() > before {
                     silent = self.link.now() + LISTEN;
                 }
@@ -507,7 +507,7 @@ impl Session {
         }
     }
 
-    /// The error for a ring that [`examine`] found ill.
+    /// The error for a ring that failed [`examine`].
     #[must_use]
     pub fn ill(&self, ring: usize, ill: Unhealthy) -> SessionError {
         SessionError::Ill {
@@ -629,7 +629,7 @@ pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
         reset: own.allow_reset,
         outputs: own.allow_outputs,
         monitoring: own.allow_monitoring,
-        // Cut off below; what is no number is no speed.
+        // Rounded down; what is not a number is not a speed.
         max_speed: slowest.map(|rpm| rpm.clamp(0.0, 65_535.0).floor() as u16),
         bytes_per_second: own.max_bytes_per_second,
         ..Limits::default()

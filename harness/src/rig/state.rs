@@ -18,10 +18,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// The folder, where the environment names one.
 pub const FOLDER_VARIABLE: &str = "DRIVEBENCH_STATE";
 
-/// The folder for all users, and what it stands in.
+/// The folder for all users: its parent and its name.
 const SHARED: [&str; 2] = ["/run/lock", "drivebench"];
 
-/// The most bytes that are read of a file of ours.
+/// The most bytes that are read of one of these files.
 const MAX_SIZE: u64 = 1 << 16;
 
 /// Who uses a rig, and since when.
@@ -154,7 +154,7 @@ fn make(folder: PathBuf, mode: u32) -> io::Result<PathBuf> {
     Ok(folder)
 }
 
-/// Reads at most 64 KiB of a file of ours.
+/// Reads at most 64 KiB of one of these files.
 pub(crate) fn read(file: &File) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.take(MAX_SIZE).read_to_end(&mut bytes)?;
@@ -198,7 +198,7 @@ fn quarantine_file(folder: &Path, id: &str) -> PathBuf {
 }
 
 impl Rig {
-    /// Why it must not be used: by its file, or by what stands in the folder.
+    /// Why it must not be used: by its own file, or by a quarantine file in the folder.
     ///
     /// # Errors
     /// As of [`quarantine`].

@@ -82,11 +82,11 @@ pub enum Expression {
     Last,
     /// The counter of a loop around the line.
     Counter(Counter),
-    /// Two numbers and what is done with them.
+    /// Two numbers and an operator.
     Operation(Box<Expression>, Operator, Box<Expression>),
 }
 
-/// What can be done with two numbers.
+/// An operator on two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operator {
     /// `+`

@@ -1,4 +1,4 @@
-//! What can be wrong with a scenario, shown with the line it stands in.
+//! Mistakes in a scenario, shown with their line.
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use std::fmt;
@@ -42,7 +42,7 @@ pub struct Spanned<T> {
     pub span: Span,
 }
 
-/// One mistake: what is wrong, where, what was expected, and a way out.
+/// One mistake: what is wrong, where, what was expected, and how to fix it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// What is wrong.

@@ -228,7 +228,7 @@ impl Quantity {
     }
 }
 
-/// How far a value may be off.
+/// The tolerance of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tolerance {
     /// `+-1%`, of the expected value.

@@ -105,7 +105,7 @@ impl<'a> Scanner<'a> {
         false
     }
 
-    /// Takes what comes next as long as `wanted` says so; `None` where that is nothing.
+    /// Takes the next characters as long as `wanted` accepts them; `None` if there are none.
     pub(crate) fn take_while(&mut self, wanted: impl Fn(char) -> bool) -> Option<Spanned<&'a str>> {
         let rest = self.rest();
         let length = rest.find(|c| !wanted(c)).unwrap_or(rest.len());
@@ -131,7 +131,7 @@ impl<'a> Scanner<'a> {
         self.take_while(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
     }
 
-    /// Takes whatever stands there up to the next white space, for a message.
+    /// Takes everything up to the next white space, for a message.
     pub(crate) fn chunk(&mut self) -> Spanned<&'a str> {
         let here = self.here();
         self.take_while(|c| !c.is_whitespace()).unwrap_or(Spanned {

@@ -5,10 +5,10 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The largest scenario, in bytes. The longest of ours has a fiftieth of it.
+/// The largest scenario, in bytes. The longest built-in one has a fiftieth of it.
 pub const MAX_SIZE: u64 = 1 << 20;
 
-/// The longest line, in bytes: mistakes are shown with the line they stand in.
+/// The longest line, in bytes: mistakes are shown with their line.
 pub const MAX_LINE: usize = 10_000;
 
 /// A text with the name under which people know it.
@@ -20,7 +20,7 @@ pub struct Source {
     pub text: Arc<str>,
 }
 
-/// Why a file is no scenario.
+/// Why a file is not a scenario.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// It cannot be read.
@@ -55,7 +55,7 @@ pub enum SourceError {
         /// Which line, counted from 1.
         line: usize,
     },
-    /// It is no text.
+    /// It is not text.
     #[error("{name} is not a text: byte {offset} is {byte:02X}; a scenario is UTF-8 text (*.scn)")]
     NotText {
         /// The file.

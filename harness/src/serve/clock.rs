@@ -32,12 +32,12 @@ impl Clock {
         self.at(time::Instant::now())
     }
 
-    /// When bytes that arrived here so long ago left the client.
+    /// When bytes that arrived here `ago` left the client.
     pub(super) fn left(&self, ago: Span) -> Instant {
         self.sent(time::Instant::now(), ago)
     }
 
-    /// Bytes have been handed over, and it took so long.
+    /// Notes how long handing over bytes took.
     pub(super) fn handed_over(&mut self, took: time::Duration) {
         let took = u64::try_from(took.as_nanos()).map_or(MOST, Span::from_nanos);
         let all = self.handing * (LAST - 1) + took.min(MOST);

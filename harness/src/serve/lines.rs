@@ -13,7 +13,8 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    /// Takes bytes and gives the lines that they end. What is no UTF-8 is replaced, and no line of the language then.
+    /// Takes bytes and returns the lines that they complete. Invalid UTF-8 is replaced, so such a line is not one of the
+    /// language.
     pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<ReadLine> {
         let mut lines = Vec::new();
         for &byte in bytes {

@@ -81,7 +81,7 @@ pub enum ServeError {
         /// Why.
         error: io::Error,
     },
-    /// Something stands at the path already.
+    /// The path exists already.
     #[error("{} is there already: name another path, or remove it if no program serves there", path.display())]
     Exists {
         /// The path.

@@ -3,7 +3,7 @@
 use super::write::Html;
 use sha2::{Digest, Sha256};
 
-/// The most bytes of a page, if what always stands in it has not more.
+/// The most bytes of a page, unless what is always shown is longer.
 pub const MAX_PAGE: usize = 1_990_000;
 
 /// How things look.
@@ -37,7 +37,7 @@ pub struct Section {
     pub parts: Vec<Part>,
 }
 
-/// A page with a title, what stands in front of its sections, and those.
+/// A page with a title, a front part and its sections.
 #[must_use]
 pub fn page(title: &str, front: &Html, sections: &[Section]) -> String {
     let mut kept: Vec<Vec<bool>> = sections

@@ -1,4 +1,4 @@
-//! The section of a scenario: what came of it, what was expected beside what was received, and its pictures.
+//! The section of a scenario: its outcome, what was expected beside what was received, and its pictures.
 
 use super::page::{Part, Section};
 use super::summary::{Row, Shown, colour};

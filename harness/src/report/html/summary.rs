@@ -1,4 +1,4 @@
-//! What stands in front of a run's sections: how many verdicts there are of each kind, and every scenario in a table.
+//! The front part of a run's page: how many verdicts there are of each kind, and a table of all scenarios.
 
 use super::page::{Section, page};
 use super::scenario::Played;

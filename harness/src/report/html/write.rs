@@ -1,5 +1,5 @@
 //! The writer of a page. Names of elements and attributes are the program's own words, and everything else is text: it goes
-//! through [`Html::text`] or stands in an attribute, and both escape it. No other way leads into a page.
+//! through [`Html::text`] or into an attribute, and both escape it. There is no other way into a page.
 
 use serde::Serialize;
 use std::fmt::{self, Display, Write as _};
@@ -20,7 +20,7 @@ impl Html {
         Self::default()
     }
 
-    /// An element with what stands in it.
+    /// An element with its content.
     pub fn element(
         &mut self,
         name: &'static str,
@@ -39,12 +39,12 @@ impl Html {
         self.element(name, attributes, |html| html.text(text));
     }
 
-    /// An element that nothing can stand in, as HTML writes it (`meta`).
+    /// An element without content, as HTML writes it (`meta`).
     pub fn void(&mut self, name: &'static str, attributes: &[Attribute<'_>]) {
         self.open(name, attributes, ">\n");
     }
 
-    /// An element of a picture that nothing stands in (`<path/>`).
+    /// An element of a picture without content (`<path/>`).
     pub fn shape(&mut self, name: &'static str, attributes: &[Attribute<'_>]) {
         self.open(name, attributes, "/>\n");
     }
@@ -129,7 +129,7 @@ impl Html {
         let json = serde_json::to_string(value).unwrap_or_else(|_| "null".to_owned());
         self.open("script", &[("type", &"application/json")], ">");
         for c in json.chars() {
-            // Inside JSON these stand in strings only.
+            // Inside JSON these occur in strings only.
             if matches!(c, '<' | '>' | '&' | '\u{2028}' | '\u{2029}') || is_invisible(c) {
                 let _infallible = write!(self.out, "\\u{:04x}", u32::from(c));
             } else {

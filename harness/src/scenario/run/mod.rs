@@ -1,4 +1,4 @@
-//! Plays a plan on a link and says what came of it.
+//! Plays a plan on a link and returns the outcome.
 
 pub(crate) mod halt;
 pub(crate) mod now;

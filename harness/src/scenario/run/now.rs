@@ -4,7 +4,7 @@ use super::player::{AtMismatch, Runner};
 use crate::link::Link;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen};
 
-/// What came of a step that is done at once.
+/// The outcome of a step that is done at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Now {
     /// The step is done, or the check holds.

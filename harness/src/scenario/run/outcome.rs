@@ -9,7 +9,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::time;
 
-/// What came of a scenario.
+/// The outcome of a scenario.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The verdict.

@@ -90,7 +90,7 @@ pub(crate) struct Runner<'a> {
     pub(crate) plan: &'a Plan,
     at_mismatch: AtMismatch,
     strict: bool,
-    /// Why nothing more can be played: no room for more in what is recorded, or trouble on the link.
+    /// Why nothing more can be played: the recording is full, or the link is in trouble.
     pub(crate) full: Option<Halt>,
     /// The first check on something that the link does not show.
     pub(crate) unseen: Option<Stop>,
@@ -309,7 +309,7 @@ impl Runner<'_> {
         }
     }
 
-    /// Lets the link ask drives what it wants to know, if nothing is under way. No line asks for what comes.
+    /// Lets the link query drives, if nothing is under way. No line expects the answers.
     pub(crate) fn pause(&mut self) {
         self.fetch();
         if !self.link.busy() {

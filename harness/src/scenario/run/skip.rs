@@ -119,7 +119,7 @@ impl Why {
     }
 }
 
-/// What a denial begins with in a record; the guard's words stand behind it.
+/// The start of a denial in a record; the guard's message follows.
 pub(crate) const DENIED: &str = "the rig's [limits] do not let it be played to its end: ";
 
 impl fmt::Display for Why {
