@@ -220,8 +220,8 @@ pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial]) -> Option<Culprit> 
     })
 }
 
-/// The drive to blame, and the deviations that agree with it. A known deviation that explains every byte says more than a drive, and where
-/// none agrees all are given, and no drive.
+/// The drive to blame, and the deviations that agree with it. A known deviation that explains every byte is more specific than a drive: if
+/// none agrees with the drive, all deviations are returned and no drive.
 #[must_use]
 pub fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culprit>, Vec<Named>) {
     let Some(blamed) = culprit else {

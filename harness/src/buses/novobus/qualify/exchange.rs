@@ -14,13 +14,13 @@ use std::fmt::Write as _;
 /// Bytes on a line at most.
 const BYTES_A_LINE: usize = 24;
 
-/// The most bytes of an attempt that is played again.
+/// Maximum number of bytes of an attempt that is played again.
 const MOST_BYTES: usize = 20_000;
 
 /// From so many bytes on only the telegrams of the drive in question are played again.
 const LONG: usize = 8_000;
 
-/// The ports of the EEPROM (ND21 14.10.5): what is written there outlives a reset.
+/// The ports of the EEPROM (ND21 14.10.5): values written there persist over a reset.
 pub(super) const EEPROM: std::ops::RangeInclusive<u16> = ram::EEPROM_BUFFER..=ram::EEPROM_CONTROL;
 
 /// What the master did in an attempt, in order.
@@ -31,7 +31,7 @@ enum Piece {
     Fault(String),
 }
 
-/// What the master sent in an attempt, conversation behind conversation.
+/// What the master sent in an attempt, conversation by conversation.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sent {
     pieces: Vec<Piece>,
@@ -41,8 +41,8 @@ pub(super) struct Sent {
 }
 
 impl Sent {
-    /// What was sent into a ring of `drives` behind the reset of the drives, up to the conversation `last`; `None` where it cannot be sent again as it was: into two rings, or
-    /// with faults elsewhere than at bytes of the master's own link.
+    /// What was sent into a ring of `drives` after the reset of the drives, up to the conversation `last`. `None` if it cannot be repeated:
+    /// because it went into two rings, or had faults at other places than bytes of the master's own link.
     pub(super) fn of(
         attempt: &[Conversation],
         last: usize,
@@ -81,7 +81,7 @@ impl Sent {
     }
 
     fn gap(&mut self, gap: Span) {
-        // What is shorter is the computer's own.
+        // Shorter gaps come from the computer.
         if gap < Span::from_micros(100) {
             return;
         }

@@ -6,26 +6,26 @@ use harness_proto::time::Span;
 /// A model with something changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hypothesis {
-    /// What is supposed, for people.
+    /// The assumption, as text for people.
     pub name: String,
     /// The header lines of the scenario language that make it so.
     pub lines: Vec<String>,
 }
 
-/// How well a hypothesis explains what came.
+/// How well a hypothesis explains the bytes received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Evidence {
     /// All differences of times together.
     pub apart: Span,
-    /// Whether every byte also came when it says.
+    /// Whether every byte also came at the predicted time.
     pub timely: bool,
 }
 
-/// The hypotheses under which every byte of all conversations is as it was, with how well; in the order given. Where
-/// one of them also explains the times, those that do not are left out.
+/// The hypotheses that explain every byte of all conversations, with their evidence, in the order given. If one of them also explains the
+/// times, those that do not are left out.
 ///
 /// # Errors
-/// What `twin` says of lines that make no ring.
+/// The error of `twin` for lines that do not describe a ring.
 pub fn explaining<'h, E>(
     hypotheses: &'h [Hypothesis],
     conversations: &[Conversation],

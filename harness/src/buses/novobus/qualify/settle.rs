@@ -1,4 +1,4 @@
-//! What the answers to a probe say of its property.
+//! Settles a property from the answers to its probe.
 
 use super::hypothesis::{Evidence, Hypothesis, explaining};
 use super::probes::{Asked, Probe, hypotheses};
@@ -7,14 +7,14 @@ use harness_proto::novobus::role::Role;
 use harness_proto::time::Span;
 use harness_sim::nd21::PROPERTIES;
 
-/// The most header lines of a hypothesis of the bus.
+/// Maximum number of header lines of a hypothesis of the bus.
 const MOST_LINES: usize = 3;
 
-/// How late the bench sees the first byte that a drive sends unasked (ND21 9.9), where time is real: its clock and the drive's differ, and
-/// the computer may be busy.
+/// How late the bench sees the first unasked byte of a drive (ND21 9.9) in real time: its clock and the drive's differ, and the computer
+/// may be busy.
 const LATENESS: Span = Span::from_millis(1);
 
-/// What came of a probe.
+/// The result of a probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// A value explains every byte.
@@ -26,7 +26,7 @@ pub enum Answer {
     },
     /// Every value explains every byte.
     NoDifference,
-    /// The drive was not done when it was asked for the last time, after so long.
+    /// The drive was not done at its last poll, after this time.
     NotDone(String),
     /// No value does.
     Unexplained,
@@ -82,7 +82,7 @@ pub fn answer<E>(
     }
 }
 
-/// What the conversations say of a property of one drive.
+/// What the conversations show of a property of one drive.
 fn of_the_drive<E>(
     property: &str,
     drive: u8,

@@ -9,9 +9,9 @@
 //! | `sent`, `received` | hexadecimal; empty for nothing |
 //! | `status` | `ok`, `parity`, `framing`, `break`, `overrun` or `dropped` |
 //! | `role` | what the byte is: `sync`, `address`, `data` ... |
-//! | `drive` | the number that the telegram means |
+//! | `drive` | the number of the addressed drive |
 //! | `meaning` | the same in words |
-//! | `section` | where the rule stands in the ND21 manual |
+//! | `section` | the section of the rule in the ND21 manual |
 //! | `mark` | what the sender remarked: `detected`, with the cause, `upstream`, `seventeenth`, `sequence`, `recovered` |
 
 use super::walk::{Reader, Seen, in_time};
@@ -99,7 +99,7 @@ pub(crate) fn remark(mark: &Mark) -> String {
     text
 }
 
-/// RFC 4180: what holds a comma stands in quotes.
+/// RFC 4180: a field with a comma is quoted.
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))

@@ -83,7 +83,7 @@ pub struct Meaning {
     pub answer: bool,
     /// The command, where one is known.
     pub command: Option<&'static Layout>,
-    /// The cell that a command speaks of, once its whole address has been on this link.
+    /// The cell that a command accesses, once its whole address has been on this link.
     pub cell: Option<u16>,
     /// For a checking byte, whether it fits (9.6).
     pub fits: Option<bool>,
@@ -323,7 +323,7 @@ impl Observer {
         }
     }
 
-    /// Whether the drive that is meant stands in front of this link.
+    /// Whether the addressed drive is in front of this link.
     fn answered(&self) -> bool {
         matches!((self.from, self.target), (Some(from), Some(target)) if from <= target)
     }

@@ -24,7 +24,7 @@ const ROWS: usize = 17;
 /// Changes shown at most; of a longer table the middle is left out.
 const CHANGES: usize = 60;
 
-/// What was recorded, as text; nothing where nothing was seen.
+/// A record as text; empty if nothing was seen.
 #[must_use]
 pub fn plot(record: &Record) -> String {
     let prefix = if record.ring == 0 { "" } else { "2:" };

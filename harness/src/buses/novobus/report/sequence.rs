@@ -1,5 +1,5 @@
-//! What the master and the drives said, one after another: jobs with their answers, faults on the line, the error mode and the way
-//! out of it (ND21 9.5, 9.7, 9.8). It is read from the links at both ends of the master, and from what drives remarked.
+//! A sequence diagram of the master and the drives: jobs with their answers, faults on the line, the error mode and the recovery from it
+//! (ND21 9.5, 9.7, 9.8). It is made from both links of the master and from the drives' marks.
 
 use crate::report::csv::{remark, status};
 use crate::report::html::Html;
@@ -21,7 +21,7 @@ const DRAWN: usize = 60;
 const LIFELINES: usize = 10;
 /// Faults on links shown one by one at most.
 const FAULTS: usize = 12;
-/// Drives that detected something shown one by one at most: behind the first one every drive does.
+/// Maximum number of drives shown individually as detecting a fault: after the first one, every drive detects it.
 const DETECTED: usize = 4;
 /// Maximum number of bytes written for an event.
 const BYTES: usize = 16;
@@ -381,7 +381,7 @@ fn lifelines(drawn: &[Event]) -> Vec<Who> {
     who
 }
 
-/// A line for each that speaks, and an arrow for each event.
+/// Draws a lifeline for each participant and an arrow for each event.
 fn picture(html: &mut Html, id: &str, events: &[Event]) {
     let drawn = &events[..events.len().min(DRAWN)];
     let who = lifelines(drawn);

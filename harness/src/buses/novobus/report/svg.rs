@@ -16,9 +16,9 @@ use harness_sim::record::Trace;
 use std::fmt::Write as _;
 use std::ops::Range;
 
-/// The most rows of a diagram; of a longer run the beginning is drawn.
+/// Maximum number of rows of a diagram; only the beginning of a longer run is drawn.
 pub const MAX_ROWS: usize = 4_000;
-/// The most rectangles of a picture: with the words for each it stays well below 2 MB.
+/// Maximum number of rectangles of a picture: with the text of each, it stays well below 2 MB.
 pub const MAX_AREAS: usize = 6_500;
 
 /// How rows are placed.
@@ -27,7 +27,7 @@ pub enum Scale {
     /// Row n is the n-th byte of each link.
     #[default]
     Index,
-    /// A byte stands where its time is.
+    /// A byte is placed at its time.
     Time,
 }
 

@@ -58,7 +58,7 @@ impl State {
         Self::Other,
     ];
 
-    /// What stands in a legend.
+    /// The text in a legend.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -15,7 +15,7 @@ use harness_proto::time::Span;
 const ROUNDS: usize = 64;
 /// How much longer than the ring needs a byte may take before it counts as lost.
 const PATIENCE: Span = Span::from_millis(300);
-/// Drives that are asked for their EEPROM at a time.
+/// Number of drives whose EEPROM is read at a time.
 const SIDE_BY_SIDE: usize = 25;
 
 /// What was measured on a ring.
@@ -31,12 +31,12 @@ pub struct RingFigures {
     pub rounds: Vec<Span>,
     /// SYNCO that did not come back, or not as such (9.2).
     pub lost: usize,
-    /// Bytes that came with a line error, and errors that the transport told of without their bytes.
+    /// Bytes received with a line error, and errors that the transport reported without their bytes.
     pub line_errors: u64,
 }
 
 impl RingFigures {
-    /// The shortest, the middle and the longest time round the ring; `None` where nothing came back.
+    /// The shortest, the median and the longest time round the ring; `None` if nothing came back.
     #[must_use]
     pub fn spread(&self) -> Option<[Span; 3]> {
         let first = *self.rounds.first()?;
@@ -50,7 +50,7 @@ impl RingFigures {
 pub struct DriveFigures {
     /// Which.
     pub axis: Axis,
-    /// What its EEPROM says of it (14.8).
+    /// Its identity in its EEPROM (14.8).
     pub identity: Identity,
     /// Its mode and error.
     pub state: State,
@@ -174,7 +174,7 @@ fn drives(
     Ok((drives, corrected))
 }
 
-/// What the rig's file says of a drive and the drive does not.
+/// How a drive contradicts the rig's file.
 fn contradiction(rig: &Rig, axis: Axis, identity: &Identity) -> Option<String> {
     let own = |entry: &&crate::rig::file::DriveEntry| {
         usize::from(entry.ring) == axis.ring() + 1 && entry.address == axis.drive()

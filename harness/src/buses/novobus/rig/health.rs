@@ -1,4 +1,4 @@
-//! Whether a ring is sound and as large as its rig's file says.
+//! Checks whether a ring is healthy and has the size given in the rig's file.
 
 use crate::buses::novobus::driver::{count_behind, recover};
 use crate::link::{Link, Trouble};
@@ -32,7 +32,7 @@ pub enum Unhealthy {
     /// Nothing comes back.
     #[error("nothing comes back for the bytes that were sent")]
     Silent,
-    /// What comes back is no ring's answer.
+    /// The bytes that come back are not the answer of a ring.
     #[error("the bytes that come back are not those of a ring: {bytes}")]
     Foreign {
         /// The first bytes.
@@ -65,10 +65,10 @@ pub struct Health {
     pub reported: Vec<(usize, u8)>,
 }
 
-/// Brings every ring back (9.8), counts its drives, and compares.
+/// Recovers every ring (9.8), counts its drives and compares the number with the rig's file.
 ///
 /// # Errors
-/// The first ring that is ill, and what is wrong with it.
+/// The first unhealthy ring, and what is wrong with it.
 pub fn examine(
     link: &mut dyn Link,
     rings: &[RingSize],

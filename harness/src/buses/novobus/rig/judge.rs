@@ -1,4 +1,4 @@
-//! The verdict of an attempt beside its twin.
+//! The verdict of an attempt, compared with its twin.
 
 use super::left_open;
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
@@ -16,7 +16,7 @@ use harness_sim::novobus::deviation;
 /// Cells that the twin took over and that are listed at most.
 const MOST_ADOPTED: usize = 8;
 
-/// What is known of an attempt beside its outcome.
+/// What is known of an attempt besides its outcome.
 pub(crate) struct Heard<'h> {
     /// The rig.
     pub(crate) rig: &'h Rig,
@@ -77,8 +77,8 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) {
     }
 }
 
-/// A drive could not be made ready. No step was played, so nothing makes it pass: not a known deviation, and not a twin that could not
-/// be made ready either.
+/// Judges an attempt whose drives could not be made ready. No step was played, so it cannot pass: neither with a known deviation, nor
+/// with a twin that could not be made ready either.
 fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, heard: &Heard<'_>) {
     match divergence {
         Some(divergence) => diverged(outcome, divergence, heard),

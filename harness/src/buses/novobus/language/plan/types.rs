@@ -30,7 +30,7 @@ pub struct Plan {
     pub rings: Vec<RingSize>,
     /// The rate of the line.
     pub rate: Rate,
-    /// Whether bytes that no line asked for are a failure.
+    /// Whether bytes that no line expects are a failure.
     pub strict: bool,
     /// How long a line without a time waits.
     pub deadline: time::Span,
@@ -337,7 +337,7 @@ pub enum PlannedCheck {
     Named(usize, usize, bool),
     /// The commands of the driver's last job have ended so.
     Ended(Ending),
-    /// What the driver has sent into this ring is as the manual says.
+    /// The bytes that the driver sent into this ring follow the manual.
     RulesKept(usize),
     /// This number of bytes was sent since the last check, in this time (and its tolerance).
     Sent(u64, Option<(time::Span, time::Span)>),

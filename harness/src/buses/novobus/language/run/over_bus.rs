@@ -112,8 +112,7 @@ impl Runner<'_> {
     }
 }
 
-/// Sends a command to a drive and gives the data of its answer; `None` where it does not answer as ND21 10.1 and 10.2
-/// say.
+/// Sends a command to a drive and returns the data of its answer; `None` if the answer is not as in ND21 10.1 and 10.2.
 fn exchange(link: &mut dyn Link, ring: usize, drive: u8, command: Command) -> Option<Vec<u8>> {
     let drives = link.drives(ring);
     exchange_in(link, drives, (ring, drive), command)
@@ -130,8 +129,8 @@ fn exchange_in(
     exchange_all(link, drives, ring, &[exchange])?.pop()
 }
 
-/// Sends telegrams one behind the other, since on a long ring a round takes much longer than a telegram, and gives the data of each
-/// answer; `None` where not all answers are as ND21 10.1 and 10.2 say.
+/// Sends telegrams without waiting for each answer, because on a long ring a round takes much longer than a telegram. Returns the data of
+/// each answer; `None` if not all answers are as in ND21 10.1 and 10.2.
 fn exchange_all(
     link: &mut dyn Line,
     drives: u8,
@@ -181,7 +180,7 @@ pub(crate) fn read_byte(
     read.first().copied()
 }
 
-/// Plays a plan on drives that only their bus leads to: cells of the header are set before, and set back behind it.
+/// Plays a plan on drives that are accessible only over their bus. Cells of the header are set before the plan and restored after it.
 pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
     if let Some(lacks) = lacks(plan, link) {
         return Outcome::skipped(lacks);
@@ -199,7 +198,7 @@ pub fn play_over_bus(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) 
     }
     link.begin();
     let restored = restore(link, &before).or_else(|_| restore(link, &before));
-    // What a drive held is known only when it is read: a denial leaves what was judged as it is.
+    // The contents of cells are known only after a read, so a denial does not change the verdict.
     let denied = link
         .trouble()
         .filter(|why| matches!(why, Trouble::Denied(_)));
@@ -267,7 +266,7 @@ fn is_own(address: u16) -> bool {
 /// How long drives may test themselves after a reset.
 const SELF_TEST: Span = Span::from_millis(10_000);
 
-/// How long the ring stays quiet before a drive that did not answer is asked again.
+/// How long the ring stays quiet before a drive that did not answer is polled again.
 const QUIET: Span = Span::from_millis(250);
 
 /// Resets every drive (ND21 10.5) and waits until all have tested themselves (11.8): RAM is then as their EEPROMs say.
@@ -521,7 +520,7 @@ fn read_all(link: &mut dyn Link, cells: &[Before]) -> Vec<Result<u8, NotReady>> 
     held
 }
 
-/// Writes to each of these cells, those of a ring together, or where not all answer each for itself.
+/// Writes to each of these cells: those of a ring together or, if not all drives answer, one by one.
 ///
 /// # Errors
 /// The first one that does not answer, in a sentence.
@@ -539,7 +538,7 @@ fn write_all(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
     Ok(())
 }
 
-/// A command for each of these cells of one ring, one behind the other.
+/// Sends a command for each of these cells of one ring, without waiting for each answer.
 fn together(
     link: &mut dyn Link,
     cells: &[Before],

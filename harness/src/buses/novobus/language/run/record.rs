@@ -6,7 +6,7 @@ use crate::scenario::run::player::Runner;
 use harness_proto::nd21::units::{self, Scale};
 use harness_proto::time::{Instant, Span};
 
-/// The most samples and changes that a run may note: its records are held in memory.
+/// Maximum number of samples and changes in a run: its records are kept in memory.
 pub const MAX_SAMPLES: usize = 1_000_000;
 
 /// What was recorded of a cell of a drive.
@@ -111,7 +111,7 @@ impl Recorder {
         self.looks += 1;
     }
 
-    /// Whether there was too much to record, in a sentence.
+    /// The message, if there was too much to record.
     pub(crate) fn too_much(&self) -> Option<String> {
         if self.samples > MAX_SAMPLES {
             return Some(format!(

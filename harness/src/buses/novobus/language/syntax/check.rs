@@ -17,7 +17,7 @@ pub enum Check {
     Located {
         /// Which drive.
         drive: Drives,
-        /// The most zeros; any number where `None`.
+        /// Maximum number of zeros; any number if `None`.
         within: Option<Located>,
     },
     /// It does so after at most this number of zeros (ND21 9.7: 25).
@@ -46,7 +46,7 @@ pub enum Check {
     },
     /// The commands of the driver's last job have ended so.
     Ended(Ending),
-    /// What the driver has sent into this ring is as the manual says.
+    /// The bytes that the driver sent into this ring follow the manual.
     RulesKept(usize),
     /// This number of bytes was sent since the last check, in this time.
     Sent {

@@ -31,7 +31,7 @@ pub enum Job {
         place: Option<CellPlace>,
         /// The data that are written, or that must be read.
         data: Option<Written>,
-        /// How far what is read may be off.
+        /// The tolerance of the value read.
         tolerance: Option<Tolerance>,
     },
     /// `master ...`: the driver does it, of one drive or of several at once (ND21 11 to 13).
@@ -115,7 +115,7 @@ pub enum JobKind {
 }
 
 impl Job {
-    /// What the job needs of a rig beside the bus itself.
+    /// The capability of a rig that the job needs in addition to the bus itself.
     pub(crate) fn needs(&self) -> Option<Capability> {
         match self {
             Self::Command {
