@@ -17,7 +17,7 @@ const BYTES_A_LINE: usize = 24;
 /// Maximum number of bytes of an attempt that is played again.
 const MOST_BYTES: usize = 20_000;
 
-/// From so many bytes on only the telegrams of the drive in question are played again.
+/// From this number of bytes on, only the telegrams to the drive in question are played again.
 const LONG: usize = 8_000;
 
 /// The ports of the EEPROM (ND21 14.10.5): values written there persist over a reset.
@@ -91,8 +91,9 @@ impl Sent {
         }
     }
 
-    /// The same without the telegrams to other drives, where it is long, and how many of the first `count` bytes are left. What a drive does is
-    /// decided by its own telegrams and by what passes all drives.
+    /// Removes the telegrams to other drives if it is long. Also returns how many of the first `count` bytes are left. The behaviour of a
+    /// drive
+    /// depends on its own telegrams and on bytes that pass all drives.
     pub(super) fn shortened(self, count: usize, drive: u8) -> (Self, usize) {
         let faults = self.pieces.iter().any(|own| matches!(own, Piece::Fault(_)));
         let kept = match count > LONG && !faults {

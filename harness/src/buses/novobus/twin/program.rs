@@ -1,5 +1,5 @@
-//! What the manual decides of cells that a drive's own program writes: the code of an error that a telegram has provoked (ND21 14.11.14), and
-//! what is read back from cells of the EEPROM (14.10.5).
+//! What the manual determines of cells that a drive's own program writes: the code of an error provoked by a telegram (ND21 14.11.14), and
+//! the data read back from cells of the EEPROM (14.10.5).
 
 use super::known::Write;
 use harness_proto::nd21::ram;
@@ -79,7 +79,7 @@ impl Program {
             (WRITE_BYTE, Some(address), Some(data)) if CUSTOMERS.contains(&address) => {
                 self.eeprom.insert(address, data);
             }
-            // What it writes nobody knows.
+            // It is unknown which cell such a command writes.
             _ => self.eeprom.clear(),
         }
     }
@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(drive.read(ram::ERRORCODE, 0, 0), Some(true));
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x05), Some(true));
         assert_eq!(drive.read(low, 0x07, 0x06), Some(false));
-        // Behind other bytes nobody knows whether it is the same code.
+        // After other bytes it is unknown whether this is still the same code.
         assert_eq!(drive.read(low, 0x07, 0x06), None);
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x00), Some(false));
         assert_eq!(drive.read(ram::ERRORCODE, 0x05, 0x02), None);
