@@ -197,8 +197,7 @@ impl Answers {
     }
 
     /// The place of the first wrong byte among those that came back for the bytes from `from` on and for SYNCO behind them; `None` if a
-    /// master
-    /// finds nothing wrong. A missing byte is wrong too.
+    /// master finds nothing wrong. A missing byte is wrong too.
     #[must_use]
     pub fn wrong(&self, heard: &[Received], from: usize) -> Option<usize> {
         for (index, byte) in heard.iter().enumerate() {

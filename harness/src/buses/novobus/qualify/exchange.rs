@@ -92,8 +92,7 @@ impl Sent {
     }
 
     /// Removes the telegrams to other drives if it is long. Also returns how many of the first `count` bytes are left. The behaviour of a
-    /// drive
-    /// depends on its own telegrams and on bytes that pass all drives.
+    /// drive depends on its own telegrams and on bytes that pass all drives.
     pub(super) fn shortened(self, count: usize, drive: u8) -> (Self, usize) {
         let faults = self.pieces.iter().any(|own| matches!(own, Piece::Fault(_)));
         let kept = match count > LONG && !faults {
