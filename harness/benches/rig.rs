@@ -15,6 +15,7 @@
 #![expect(clippy::print_stdout, reason = "figures are what it is for")]
 
 #[path = "../tests/served/ring.rs"]
+#[expect(dead_code, reason = "only tests write a rig file of it")]
 mod ring;
 
 use harness::library::Entry;
