@@ -2,7 +2,7 @@
 
 pub mod novobus;
 
-pub(crate) use novobus::{cli as commands, twin};
+pub(crate) use novobus::{cli as commands, qualify, twin};
 
 /// The buses of the product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

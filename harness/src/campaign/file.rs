@@ -62,7 +62,7 @@ pub struct CampaignFile {
     /// Two faults a case in place of one.
     #[serde(default)]
     pub pairs: Option<Pairs>,
-    /// So many cases, drawn from all; all of them where nothing is said.
+    /// Number of cases drawn from all; all of them by default.
     #[serde(default)]
     #[schemars(range(min = 1, max = 1_000_000))]
     pub sample: Option<u64>,
@@ -90,7 +90,7 @@ pub enum Kind {
     Overrun,
     /// Each byte of `inserted` arrives before it.
     Insert,
-    /// So many bytes from it on are lost.
+    /// Number of bytes lost from it on.
     Gap,
     /// It arrives later.
     Delay,

@@ -84,7 +84,7 @@ pub enum Command {
         /// Of what.
         of: SchemaName,
     },
-    /// Look for what nobody has thought of: conversations from a seed, on simulated rings or on a rig.
+    /// Look for unknown faults: conversations from a seed, on simulated rings or on a rig.
     Fuzz {
         /// What to do.
         #[command(subcommand)]
@@ -146,7 +146,7 @@ pub struct RunArguments {
     /// Let motors turn, where the rig's file allows it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that somebody else has, such as 30s.
+    /// How long to wait for a rig that another program holds, such as 30s.
     #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
     /// Keep the evidence of a run on a rig in this folder, which is not there or is empty; `verify` judges it again.
@@ -181,7 +181,7 @@ pub struct QualifyArguments {
     /// Let motors turn, where the rig's file allows it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that somebody else has, such as 30s.
+    /// How long to wait for a rig that another program holds, such as 30s.
     #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
     /// Where the evidence goes: a folder that is not there or is empty; evidence-RIG-DATE where nothing is said.

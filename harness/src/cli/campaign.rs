@@ -126,7 +126,7 @@ fn replay(name: &str, campaigns: &[Campaign], output: &mut Output) -> std::io::R
 /// The classes on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ClassName {
-    /// Nobody noticed, nothing is different.
+    /// Not noticed, and nothing differs.
     Harmless,
     /// The damaged link was named, everything is back.
     Located,
@@ -138,7 +138,7 @@ pub enum ClassName {
     NotRecovered,
     /// Noticed and repaired, but a cell is wrong.
     Corrupted,
-    /// Nobody noticed, and a value is wrong.
+    /// Not noticed, and a value is wrong.
     SilentCorruption,
 }
 

@@ -46,7 +46,7 @@ pub enum RigCommand {
     Unlock {
         /// A name, a file, or sim:N.
         rig: String,
-        /// Also one that is kept for somebody else. A running process is not disturbed.
+        /// Also one that is kept for another user. A running process is not disturbed.
         #[arg(long)]
         force: bool,
     },

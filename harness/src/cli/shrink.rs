@@ -35,7 +35,7 @@ pub struct ShrinkArguments {
     /// Let motors turn, where the rig's file allows it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that somebody else has, such as 30s.
+    /// How long to wait for a rig that another program holds, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
 }

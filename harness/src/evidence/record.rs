@@ -182,7 +182,7 @@ pub enum Line {
         /// The verdict.
         #[schemars(schema_with = "verdict_schema")]
         verdict: String,
-        /// What was otherwise, in a sentence.
+        /// What differed, in a sentence.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         finding: Option<String>,
         /// What is worth saying.
@@ -207,7 +207,7 @@ pub enum Line {
         /// The verdict.
         #[schemars(schema_with = "verdict_schema")]
         verdict: String,
-        /// What was otherwise, in a sentence.
+        /// What differed, in a sentence.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         finding: Option<String>,
         /// What is worth saying.

@@ -4,7 +4,7 @@ use super::attempt::reached;
 use super::files::sum;
 use super::record::Line;
 use super::verify::Opened;
-use crate::buses::novobus::qualify::{conversations, probes};
+use crate::buses::qualify::{conversations, probes};
 use crate::library::Entry;
 
 /// How the scenarios of a record compare with those that were to be played.

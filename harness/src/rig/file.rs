@@ -418,7 +418,7 @@ pub struct SafeState {
     pub speed_tolerance: Speed,
     /// How long it may take until all drives stand; default 5s.
     pub within: Time,
-    /// How long the program may show no sign of life before the drives are told to stop behind its back; default 10s, at
+    /// How long the program may show no sign of life before the watchdog stops the drives; default 10s, at
     /// least 1s.
     pub watchdog: Time,
 }
@@ -541,7 +541,7 @@ pub struct Limits {
     pub max_run: Option<Time>,
 }
 
-/// A known deviation: what drives of this rig do otherwise than the manual says.
+/// A known deviation of this rig's drives from the manual.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deviation {

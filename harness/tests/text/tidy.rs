@@ -86,7 +86,11 @@ fn imports_go_one_way() {
         ),
         (
             "harness/src/buses/novobus/language/run",
-            &["harness_sim", "SimulatedLink"],
+            &[
+                "harness_sim::novobus::ring",
+                "harness_sim::novobus::bench",
+                "SimulatedLink",
+            ],
         ),
         ("harness/src/report", &["crate::link", "crate::cli"]),
         (

@@ -16,7 +16,7 @@ pub(crate) use verify::verify;
 /// The commands of `fuzz`.
 #[derive(Debug, Subcommand)]
 pub enum FuzzCommand {
-    /// Make conversations from a seed and look for a byte that is otherwise than the manual says; every finding is a scenario.
+    /// Make conversations from a seed and look for a byte that differs from the manual; every finding is a scenario.
     Run(run::FuzzRunArguments),
     /// Try the conversations that a run has kept, or those of a corpus, the ones that show most first.
     Replay(replay::ReplayArguments),

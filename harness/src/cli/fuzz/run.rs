@@ -56,7 +56,7 @@ pub struct FuzzRunArguments {
     /// A finding counts when it is seen again K of N times, as K/N.
     #[arg(long, value_name = "K/N", default_value = "2/3", value_parser = k_of_n)]
     pub confirm: (u8, u8),
-    /// End with so many findings.
+    /// End after this number of findings.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     pub findings: usize,
     /// Where the run is kept: a folder that is not there or is empty; fuzz-RIG-DATE where nothing is said.
@@ -74,7 +74,7 @@ pub struct FuzzRunArguments {
     /// Let motors turn, where the rig's file allows it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that somebody else has, such as 30s.
+    /// How long to wait for a rig that another program holds, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
 }

@@ -96,7 +96,7 @@ fn facts(html: &mut Html, played: &Played<'_>) {
 }
 
 fn found(html: &mut Html, played: &Played<'_>, finding: &Mismatch) {
-    html.line("h3", &[], "What was otherwise");
+    html.line("h3", &[], "What differed");
     html.line("p", &[("class", &"bad")], &finding.message);
     let before = played.text.get(..finding.span.start);
     let line = played.text.get(finding.span.start..finding.span.end);

@@ -62,13 +62,13 @@ impl Class {
     #[must_use]
     pub const fn about(self) -> &'static str {
         match self {
-            Self::Harmless => "nobody noticed, nothing is different",
+            Self::Harmless => "not noticed, and nothing differs",
             Self::Located => "the damaged link named, all back",
             Self::Recovered => "no link named, all back",
             Self::Mislocated => "a sound link named, all back",
             Self::NotRecovered => "noticed, not all back",
             Self::Corrupted => "noticed and repaired, but a cell is wrong",
-            Self::SilentCorruption => "nobody noticed, and a value is wrong",
+            Self::SilentCorruption => "not noticed, and a value is wrong",
         }
     }
 }

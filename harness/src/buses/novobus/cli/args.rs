@@ -94,7 +94,7 @@ pub struct RigArguments {
     /// Without it all inputs GPIN3 and GPIN5 are high.
     #[arg(long, value_name = "FILE")]
     pub setup: Option<PathBuf>,
-    /// How long to wait for a bench that somebody else has, such as 30s.
+    /// How long to wait for a bench that another program holds, such as 30s.
     #[arg(long = "wait-for-rig", value_name = "TIME", value_parser = duration, default_value = "0ms")]
     pub patience: Span,
 }
@@ -103,7 +103,7 @@ pub struct RigArguments {
 #[derive(Clone, Copy, Debug, Args)]
 pub struct HoldArguments {
     /// Leave the drives as the command leaves them. Without it a bench with ports ends every command that changes
-    /// something in its safe state: stopped, standing and blocked. Motors may go on turning, and nobody looks after them.
+    /// something in its safe state: stopped, standing and blocked. Motors may go on turning without supervision.
     #[arg(long)]
     pub hold: bool,
 }

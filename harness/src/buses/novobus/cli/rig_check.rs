@@ -21,7 +21,7 @@ use std::time::Duration;
 pub struct CheckRigArguments {
     /// A name, a file, or sim:N.
     pub rig: String,
-    /// How long to wait for a rig that somebody else has, such as 30s.
+    /// How long to wait for a rig that another program holds, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = crate::cli::args::duration)]
     pub wait: Option<Duration>,
     /// In which form.

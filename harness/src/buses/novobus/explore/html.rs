@@ -106,7 +106,7 @@ fn findings(html: &mut Html, all: &[Shown]) {
     }
     html.element("table", &[], |html| {
         html.line("caption", &[], "Findings");
-        html.heads(&["Verdict", "Finding", "What was otherwise"]);
+        html.heads(&["Verdict", "Finding", "What differed"]);
         for Shown { row, section } in all {
             html.element("tr", &[], |html| {
                 html.line(
