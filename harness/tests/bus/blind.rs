@@ -30,6 +30,13 @@ impl<L: Link> Link for Blind<L> {
     fn capabilities(&self) -> &[Capability] {
         self.0.capabilities()
     }
+    // Nothing is skipped for want of a tap, and no tap shows anything.
+    fn listens(&self, _ring: usize, _link: usize) -> bool {
+        true
+    }
+    fn tapped(&mut self, _ring: usize, _link: usize) -> Option<Vec<Received>> {
+        None
+    }
     fn begin(&mut self) {
         self.0.begin();
     }
