@@ -113,7 +113,7 @@ impl<L: Line> Guarded<L> {
         self.trouble().is_none() && self.rings.iter().all(|ring| ring.guard.at_rest())
     }
 
-    /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](crate::buses::novobus::guard::safe_state).
+    /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](super::safe_state).
     pub fn reset_after_denial(&mut self) {
         if !matches!(self.trouble, Some(Trouble::Interlock(_))) {
             self.trouble = None;
