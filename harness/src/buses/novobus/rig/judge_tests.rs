@@ -328,6 +328,25 @@ fn every_command_that_sets_data_in_is_followed() {
     }
 }
 
+/// ND21 11.8: drives that are silent while they test themselves lose bytes. A value read behind that is still known to be the drive's.
+#[test]
+fn silent_self_tests_accuse_no_drive() {
+    let mut ring = link(
+        "drive 0..last property self-test-bus = silent\ndrive 0..last property self-test-time = 81ms\n\
+         drive 0..last eeprom 34 = 5A 3C",
+    );
+    let plan = plan("title x\nring 3\nread-byte 1 FF74\nread-byte 2 FF75\n".to_owned());
+    let way = Way {
+        rings: plan.rings.clone(),
+        attempts: None,
+        anew: true,
+    };
+    let outcome = judged_on(&mut ring, "", (&plan, &way), &|_| {});
+    let remarks = outcome.remarks.join("\n");
+    assert_eq!(outcome.verdict, Inconclusive, "{remarks}");
+    assert!(remarks.contains("self-test-bus = silent"), "{remarks}");
+}
+
 /// Every built-in scenario on drives that are right and not as the model: other contents, other clocks, other choices. None fails.
 #[test]
 fn no_right_drive_is_accused() {

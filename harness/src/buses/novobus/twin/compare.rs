@@ -68,6 +68,8 @@ impl Rows<'_> {
 /// What is compared, ring by ring.
 pub(crate) struct Comparer<'a> {
     pub(crate) exactness: Exactness,
+    /// How long a byte takes on the line.
+    pub(crate) byte_time: Span,
     /// What is known of the drives' cells.
     pub(super) knowledge: &'a mut Knowledge,
     /// Drives whose oscilloscope (14.10.6) may have recorded: it writes to its buffer only then.
@@ -87,7 +89,9 @@ impl Comparer<'_> {
         let expected = &answer.bytes[..];
         let sent = conversation.sent_in(ring);
         let received = &conversation.received_in(ring);
-        let (places, roles) = answered(size, &sent);
+        let way = self.byte_time * (u64::from(size.drives()) + 1);
+        let starts = conversation.sent_at(ring);
+        let (places, roles) = heard(answered(size, &sent), &starts, expected, way);
         let answered: Vec<u8> = places.iter().map(|place| sent[*place].0).collect();
         // A ring that gives back a byte for a byte (9.1) has each role at its place.
         let aligned = received.len() == roles.len() && expected.len() == roles.len();
@@ -456,6 +460,29 @@ fn answered(size: RingSize, sent: &[(u8, bool)]) -> (Vec<usize>, Vec<Role>) {
     answered.map(|(place, (role, _))| (place, role)).unzip()
 }
 
+/// The bytes that the model answers, of those that a ring answers where every drive listens. A drive that is silent while it tests itself
+/// (ND21 11.8) loses the bytes of that time. An answer comes one `way` round the ring behind the start of its byte.
+fn heard(
+    (places, roles): (Vec<usize>, Vec<Role>),
+    starts: &[Instant],
+    expected: &[(Instant, Received)],
+    way: Span,
+) -> (Vec<usize>, Vec<Role>) {
+    if expected.len() >= places.len() {
+        return (places, roles);
+    }
+    let comes = |place: usize| {
+        let due = starts[place] + way;
+        expected.binary_search_by_key(&due, |(at, _)| *at).is_ok()
+    };
+    let all = places.iter().copied().zip(roles.iter().copied());
+    let kept: (Vec<_>, Vec<_>) = all.filter(|(place, _)| comes(*place)).unzip();
+    match kept.0.len() == expected.len() {
+        true => kept,
+        false => (places, roles),
+    }
+}
+
 /// Up to where each byte received is known to stand for a byte sent, in a ring that does not give back a byte for a byte: up to the
 /// first one that meets a fault, or that is left out of a long run.
 fn known_places(
@@ -588,5 +615,22 @@ mod tests {
             .filter(|cell| own::kept(**cell, 0).bits == 0xFF)
             .collect();
         assert!(compared.is_empty(), "{compared:04X?}");
+    }
+
+    /// ND21 11.8: a telegram is lost while a drive tests itself; each byte that comes back stands for its own byte of the next one.
+    #[test]
+    fn lost_bytes_have_no_role() {
+        let starts: Vec<_> = (0..12)
+            .map(|n| Instant::START + Span::from_millis(n))
+            .collect();
+        let (way, all) = (
+            Span::from_millis(2),
+            ((0..12).collect(), vec![Role::Idle; 12]),
+        );
+        let back = starts[6..]
+            .iter()
+            .map(|at| (*at + way, Received::good(0x80)));
+        let (places, roles) = heard(all, &starts, &back.collect::<Vec<_>>(), way);
+        assert_eq!((places, roles.len()), ((6..12).collect::<Vec<_>>(), 6));
     }
 }

@@ -218,6 +218,7 @@ impl Twin {
         recording.extend(self.recording());
         let mut comparer = Comparer {
             exactness,
+            byte_time: self.link.byte_time(),
             knowledge: &mut self.knowledge,
             recording,
             comparison: Comparison {
