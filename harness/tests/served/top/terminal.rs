@@ -22,7 +22,9 @@ fn in_session(program: &Path, arguments: &[&str]) -> Command {
         false => Command::new(program),
     };
     if command.get_program() == "setsid" {
-        command.arg("--ctty").arg(program);
+        // Under `nohup` SIGHUP is ignored, also by the programs that it starts.
+        let hang_up = ["--ctty", "env", "--default-signal=HUP"];
+        command.args(hang_up).arg(program);
     }
     command.args(arguments);
     command
