@@ -6,6 +6,7 @@
 //! *ND21 User Manual 1/96*).
 //!
 //! * [`time`]: virtual time, exact for every rate of every line;
+//! * [`can`]: frames of a CAN bus, their length on the wire, bit rates;
 //! * [`line`](mod@line): an asynchronous serial line: its rate, and what a receiver reads from it;
 //! * [`marks`]: how a stream of bytes carries line errors;
 //! * [`novobus`]: the ring of the Novotron ND21;
@@ -17,6 +18,7 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+pub mod can;
 pub mod line;
 pub mod marks;
 pub mod nd21;
