@@ -2,7 +2,14 @@
 
 pub mod novobus;
 
-pub(crate) use novobus::{cli as commands, qualify, twin};
+pub(crate) use novobus::{cli as commands, qualify, serve::state_of, twin};
+
+/// What happens to a drive from outside the bus, by the bus that it is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stimulus {
+    /// To an ND21.
+    Novobus(harness_sim::nd21::Stimulus),
+}
 
 /// The buses of the product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -142,7 +142,7 @@ pub enum Line {
         #[schemars(with = "FaultWritten")]
         what: (String, u64),
     },
-    /// SYNCO were sent so that a ring spells out its address.
+    /// Bytes were sent beside the conversation, so that a ring spells out its address.
     Probe {
         /// Which ring.
         #[schemars(range(min = 1, max = 2))]
@@ -151,6 +151,10 @@ pub enum Line {
         t: u64,
         /// How many.
         count: usize,
+        /// Which; SYNCO, 80, where it is left out.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(regex(pattern = "^([0-9A-F]{2})*$"))]
+        sent: Option<String>,
         /// What came.
         #[schemars(with = "Vec<ByteWritten>")]
         bytes: Vec<(String, Option<String>)>,
@@ -246,6 +250,9 @@ struct ByteWritten(
     #[schemars(regex(pattern = "^[0-9A-F]{2}$"))] String,
     #[schemars(extend("enum" = ["parity", "framing", "break", "overrun", null]))] Option<String>,
 );
+
+/// The byte that a probe sends where its line does not name the bytes.
+const PROBED: u8 = 0x80;
 
 fn verdict_schema(_: &mut SchemaGenerator) -> Schema {
     let names = Verdict::ALL.map(Verdict::name);
@@ -409,11 +416,12 @@ impl Line {
                 t: units(at),
                 bytes: bytes.iter().map(|byte| written(*byte)).collect(),
             },
-            Event::Probe(ring, at, count, bytes) => Self::Probe {
+            Event::Probe(ring, at, sent, came) => Self::Probe {
                 ring: ring + 1,
                 t: units(at),
-                count: *count,
-                bytes: bytes.iter().map(|byte| written(*byte)).collect(),
+                count: sent.len(),
+                sent: sent.iter().any(|byte| *byte != PROBED).then(|| hex(sent)),
+                bytes: came.iter().map(|byte| written(*byte)).collect(),
             },
         })
     }
@@ -503,10 +511,14 @@ impl Line {
                 ring,
                 t,
                 count,
+                sent,
                 bytes,
             } => {
-                let bytes = all_received(bytes)?;
-                Event::Probe(index(ring)?, instant(t), *count, bytes)
+                let sent = match sent {
+                    Some(sent) => unhex(sent).filter(|sent| sent.len() == *count)?,
+                    None => vec![PROBED; *count],
+                };
+                Event::Probe(index(ring)?, instant(t), sent, all_received(bytes)?)
             }
             Self::Run { .. }
             | Self::Scenario { .. }

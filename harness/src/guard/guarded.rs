@@ -2,22 +2,18 @@
 
 use super::Watch;
 use crate::buses::novobus::driver::Axis;
-use crate::buses::novobus::guard::safe_state::telegram;
 use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::link::{
-    Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Shown, Stimulus,
-    Trouble,
+    Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Trouble,
 };
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-use harness_proto::novobus::command::Command;
-use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::guard::{Cause, Denial, Found, Guard, Limits, Setting};
-use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -358,14 +354,14 @@ impl<L: Line> Line for Guarded<L> {
         end
     }
 
-    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
         let Some(ring) = self.rings.get(ring) else {
             return false;
         };
         let mut guard = ring.guard.clone();
         let now = self.guard_time();
-        let mut bytes = telegram(ring.size, drive, command).into_iter();
-        self.trouble().is_none() && bytes.all(|byte| guard.admit(now, byte, false).is_ok())
+        let mut admits = |byte: &u8| guard.admit(now, *byte, false).is_ok();
+        self.trouble().is_none() && bytes.iter().all(&mut admits)
     }
 
     fn refused(&self) -> usize {
@@ -465,7 +461,7 @@ impl<L: Link> Link for Guarded<L> {
         self.inner.inject(ring, fault, moment);
     }
 
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
         let now = self.guard_time();
         let Some(state) = self.rings.get_mut(ring) else {
             return Vec::new();
@@ -474,32 +470,23 @@ impl<L: Link> Link for Guarded<L> {
             return Vec::new();
         }
         let mut guard = state.guard.clone();
-        if let Err(denial) = (0..count).try_for_each(|_| guard.admit(now, SYNCO, false)) {
+        if let Err(denial) = bytes
+            .iter()
+            .try_for_each(|byte| guard.admit(now, *byte, false))
+        {
             self.deny(format!("ring {}: {denial}", ring + 1), Some(denial.cause));
             return Vec::new();
         }
         // A simulated link probes a copy of itself.
         if !self.capabilities.contains(&Capability::Simulator) {
             state.guard = guard;
-            state.sent += count as u64;
+            state.sent += bytes.len() as u64;
         }
-        self.inner.probe(ring, count)
+        self.inner.probe(ring, bytes)
     }
 
-    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
-        self.inner.error_of(ring, drive)
-    }
-
-    fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
-        self.inner.stimulate(ring, drive, stimulus);
-    }
-
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
-        self.inner.shown(ring, drive)
-    }
-
-    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        self.inner.peek(ring, drive, address)
+    fn beside(&self) -> Option<&dyn Any> {
+        self.inner.beside()
     }
 
     fn unused_faults(&self) -> Vec<String> {

@@ -15,17 +15,16 @@ pub use crate::buses::novobus::link::SimulatedLink;
 pub use crate::buses::novobus::stream::{StreamLink, TOLERANCE};
 pub use crate::trouble::Trouble;
 pub use harness_sim::fault::{DriveFault, LinkFault};
-pub use harness_sim::nd21::{Mode, Shown, Stimulus};
 pub use inner::{Delay, InnerLink, Ports};
 pub use record::{Event, Look, Recording, Sink};
 pub use replay::Replay;
 pub use tamper::{needs_line_errors, only_simulated};
 
+use crate::buses::Stimulus;
 use harness_proto::line::Received;
-use harness_proto::novobus::command::Command;
-pub use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
+use std::any::Any;
 
 /// What a rig can be asked to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -151,9 +150,9 @@ pub trait Line: Send {
     /// have left.
     fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant;
 
-    /// Whether a telegram with this command to a drive may be sent now, as far as the line knows: a guarded one knows its limits.
-    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
-        let _any = (ring, drive, command);
+    /// Whether these bytes may be sent now, as far as the line knows: a guarded one knows its limits.
+    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
+        let _any = (ring, bytes);
         true
     }
 
@@ -210,8 +209,8 @@ impl<L: Line + ?Sized> Line for &mut L {
         (**self).send(ring, bytes)
     }
 
-    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
-        (**self).permits(ring, drive, command)
+    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
+        (**self).permits(ring, bytes)
     }
 
     fn refused(&self) -> usize {
@@ -300,30 +299,13 @@ pub trait Link: Line {
         Span::ZERO
     }
 
-    /// What the master receives when it goes on with `count` SYNCO, so that a ring in the error mode
-    /// can spell out its address. Where a link can, it leaves no trace of this.
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received>;
+    /// Sends `bytes` beside the conversation and returns what is received until they are back. Where a link can, it leaves no trace of
+    /// this.
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received>;
 
-    /// Whether a drive is in the error mode, and why; `None` where this cannot be seen.
-    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
-        let _unseen = (ring, drive);
-        None
-    }
-
-    /// Lets something happen to a drive from outside the bus, now.
-    fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
-        self.inject(ring, PlacedFault::Stimulus(drive, stimulus), Moment::Now);
-    }
-
-    /// What a drive shows outside the bus; `None` where this cannot be seen.
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
-        let _unseen = (ring, drive);
-        None
-    }
-
-    /// A drive's cell; `None` where this cannot be seen.
-    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        let _unseen = (ring, drive, address);
+    /// What stands beside the bus: the simulation itself, which only a bus's own code knows by its type. `None` on a rig and behind a
+    /// recording.
+    fn beside(&self) -> Option<&dyn Any> {
         None
     }
 

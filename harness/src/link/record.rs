@@ -6,11 +6,11 @@
 //! Where time is real, a recorded link shows its state as of the last [`Look`], and each look is an event. The caller sees nothing that is
 //! not in the record, so that [`Replay`](super::Replay) repeats the conversation exactly, decisions that depend on time included.
 
-use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Shown, Stimulus, Trouble};
-use crate::link::BusError;
+use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
+use std::any::Any;
 use std::collections::{BTreeMap, VecDeque};
 
 /// The most rings of a bench (ND21 8.4).
@@ -46,8 +46,8 @@ pub enum Event {
     Trouble(Trouble),
     /// The bench looked at its ports; only where time is real. Bytes that had come since the last look follow it.
     Look(Look),
-    /// A probe of a ring: its start time, how many SYNCO were sent to let it spell out its address, and the bytes received.
-    Probe(usize, Instant, usize, Vec<Received>),
+    /// A probe of a ring: its start time, the bytes sent, and the bytes received.
+    Probe(usize, Instant, Vec<u8>, Vec<Received>),
     /// What had arrived at the end of a link of a ring by this time, and had not been asked for before in this conversation.
     Tapped(usize, usize, Instant, Vec<Received>),
 }
@@ -337,17 +337,17 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         self.link.time_tolerance()
     }
 
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
         let at = self.now();
-        let bytes = self.link.probe(ring, count);
+        let came = self.link.probe(ring, bytes);
         self.sink
-            .take(&Event::Probe(ring, at, count, bytes.clone()));
+            .take(&Event::Probe(ring, at, bytes.to_vec(), came.clone()));
         self.look_now();
-        bytes
+        came
     }
 
-    fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
-        self.inject(ring, PlacedFault::Stimulus(drive, stimulus), Moment::Now);
+    fn beside(&self) -> Option<&dyn Any> {
+        self.link.beside().filter(|_| self.whole)
     }
 
     fn unused_faults(&self) -> Vec<String> {
@@ -368,20 +368,5 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
             Some(trace) => trace.clone(),
             None => self.link.trace(ring),
         }
-    }
-
-    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
-        let shown = self.whole.then(|| self.link.error_of(ring, drive));
-        shown.flatten()
-    }
-
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
-        let shown = self.whole.then(|| self.link.shown(ring, drive));
-        shown.flatten()
-    }
-
-    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        let shown = self.whole.then(|| self.link.peek(ring, drive, address));
-        shown.flatten()
     }
 }

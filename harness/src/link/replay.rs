@@ -131,7 +131,9 @@ impl Replay {
             Event::Sent(_, at, bytes) => Some(format!("sending {} bytes until {at}", bytes.len())),
             Event::Fault(_, at, ..) => Some(format!("a fault at {at}")),
             Event::Tapped(_, link, at, _) => Some(format!("a look at link {link} at {at}")),
-            Event::Probe(_, at, count, _) => Some(format!("{count} sync bytes from {at} on")),
+            Event::Probe(_, at, sent, _) => {
+                Some(format!("a probe with {} bytes from {at} on", sent.len()))
+            }
         };
         match &self.trouble {
             Some(_) if !exact => None,
@@ -439,20 +441,20 @@ impl Link for Replay {
         self.tolerance
     }
 
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
         match self.events.pop_front() {
-            Some(Event::Probe(own, at, known, bytes))
-                if (own, known) == (ring, count) && (self.known.is_none() || at == self.now) =>
+            Some(Event::Probe(own, at, sent, came))
+                if own == ring && sent == bytes && (self.known.is_none() || at == self.now) =>
             {
                 self.now = self.now.max(at);
                 self.look(None);
-                bytes
+                came
             }
             other => {
                 if let Some(other) = other {
                     self.events.push_front(other);
                 }
-                self.differs("the sync bytes that let the ring repeat its address");
+                self.differs("the bytes of a probe");
                 Vec::new()
             }
         }

@@ -1,13 +1,12 @@
 //! The two kinds of ring ends that a rig can have, as one link.
 
-use crate::link::BusError;
 use crate::link::{
-    Capability, Lead, Line, Link, Moment, PlacedFault, Shown, SimulatedLink, Stimulus, StreamLink,
-    Trouble,
+    Capability, Lead, Line, Link, Moment, PlacedFault, SimulatedLink, StreamLink, Trouble,
 };
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
+use std::any::Any;
 
 /// Where a rig's rings end: in the simulator, or at ports.
 #[derive(Debug)]
@@ -113,24 +112,12 @@ impl Link for Ends {
         each!(self, link => link.time_tolerance())
     }
 
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        each!(self, link => link.probe(ring, count))
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+        each!(self, link => link.probe(ring, bytes))
     }
 
-    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
-        each!(self, link => link.error_of(ring, drive))
-    }
-
-    fn stimulate(&mut self, ring: usize, drive: u8, stimulus: Stimulus) {
-        each!(self, link => link.stimulate(ring, drive, stimulus));
-    }
-
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
-        each!(self, link => link.shown(ring, drive))
-    }
-
-    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        each!(self, link => link.peek(ring, drive, address))
+    fn beside(&self) -> Option<&dyn Any> {
+        each!(self, link => link.beside())
     }
 
     fn unused_faults(&self) -> Vec<String> {

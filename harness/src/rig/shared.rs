@@ -3,7 +3,6 @@
 use super::session::{End, Session};
 use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Received;
-use harness_proto::novobus::command::Command;
 use harness_proto::time::{Instant, Span};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -107,10 +106,10 @@ impl Line for SharedLine {
         self.with(false, |line| line.wait(until))
     }
 
-    fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
+    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
         lock(&self.session)
             .as_mut()
-            .is_some_and(|session| session.link().permits(ring, drive, command))
+            .is_some_and(|session| session.link().permits(ring, bytes))
     }
 
     fn attend(&mut self, ring: usize, at: Instant) {

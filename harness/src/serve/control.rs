@@ -1,8 +1,8 @@
 //! Lines of control: they act on the rings beside the client, in the words of the scenario language.
 
 use super::server::Server;
-use crate::link::{Link, Mode, Shown};
-use crate::scenario::argument::{self, Memory};
+use crate::buses;
+use crate::scenario::argument;
 use crate::scenario::parse::parse_step;
 use crate::scenario::plan::plan_step;
 use crate::scenario::problem::Problems;
@@ -76,49 +76,8 @@ impl Server {
             .filter(|drive| *drive < self.drives(ring))
             .ok_or("`state` and a drive of the bench expected: `state 3`, `state 2:3` in the second ring")?;
         let cells = argument::cells(cells).map_err(|problems| first("", &problems))?;
-        let mut found = Vec::new();
-        for location in &cells {
-            if location.memory == Memory::Eeprom {
-                let name = location.name();
-                return Err(format!(
-                    "`{name}` is in the EEPROM; a cell of the memory expected"
-                ));
-            }
-            let bytes: Option<String> = (location.address()..=u16::MAX)
-                .take(usize::from(location.size))
-                .map(|address| self.link.peek(ring, drive, address))
-                .map(|byte| byte.map(|byte| format!("{byte:02X}")))
-                .collect();
-            let bytes = bytes.ok_or("the drive's memory cannot be seen")?;
-            found.push(format!("{}={bytes}", location.name()));
-        }
-        if cells.is_empty() {
-            let bus = match self.link.error_of(ring, drive).flatten() {
-                Some(error) => format!("{:04X}", error.code()),
-                None => "normal".to_owned(),
-            };
-            found.push(format!("bus={bus}"));
-            found.extend(self.link.shown(ring, drive).map(|shown| outside(&shown)));
-        }
-        Ok(found.join(" "))
+        buses::state_of(&self.link, ring, drive, &cells)
     }
-}
-
-/// What stands outside the bus (ND21 5.3, 11.8): the analogue output in mV.
-fn outside(shown: &Shown) -> String {
-    let level = |high| if high { "high" } else { "low" };
-    let contact = if shown.ready { "closed" } else { "open" };
-    let mode = Mode::NAMES.iter().find(|(_, mode)| *mode == shown.mode);
-    let mode = mode.map_or("", |(name, _)| name);
-    let digits = |digits: [u8; 3]| digits.iter().map(|digit| format!("{digit:X}")).collect();
-    let display: String = shown.display.map_or("blank".to_owned(), digits);
-    format!(
-        "mode={mode} GPO1={} GPO2={} ready={contact} analogue-output={} encoder={} display={display}",
-        level(shown.gpo1),
-        level(shown.gpo2),
-        shown.analogue,
-        shown.encoder,
-    )
 }
 
 /// The first mistake in a line, and where it stands: characters counted from 1.

@@ -46,8 +46,8 @@ impl<L: Link> Link for Blind<L> {
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
         self.0.inject(ring, fault, moment);
     }
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        self.0.probe(ring, count)
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+        self.0.probe(ring, bytes)
     }
     fn unused_faults(&self) -> Vec<String> {
         self.0.unused_faults()

@@ -82,8 +82,8 @@ impl Link for Busy {
         self.tolerance
     }
 
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        self.link.probe(ring, count)
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+        self.link.probe(ring, bytes)
     }
 
     fn unused_faults(&self) -> Vec<String> {

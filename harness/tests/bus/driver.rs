@@ -3,7 +3,7 @@
 use harness::buses::novobus::driver::{
     Axis, Bus, Error, Options, Recovery, Scope, SkStatus, Trigger, count_drives, recover,
 };
-use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink, Stimulus};
+use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::position::{Mode, Position};
@@ -17,7 +17,7 @@ use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
-use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, factory};
+use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, Stimulus, factory};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::ring::Ring;

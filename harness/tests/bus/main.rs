@@ -1,5 +1,6 @@
 //! The bus in virtual time: the codec, the driver, the language, the guard and the twin on simulated rings.
 
+mod beside;
 mod blind;
 mod busy;
 mod campaigns;

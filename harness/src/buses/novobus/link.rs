@@ -1,10 +1,11 @@
 //! A link to simulated rings, in virtual time.
 
-use crate::link::{Capability, Line, Link, Mode, Moment, PlacedFault, Shown, Stimulus, link_name};
+use crate::buses;
+use crate::link::{Capability, Line, Link, Moment, PlacedFault, link_name};
 use harness_proto::line::Received;
 use harness_proto::novobus::error::BusError;
-use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
+use harness_sim::nd21::{Mode, Shown, Stimulus};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
@@ -12,6 +13,7 @@ use harness_sim::novobus::ring::Ring;
 use harness_sim::novobus::witness::Complaint;
 use harness_sim::record::LineByte;
 use harness_sim::record::Trace;
+use std::any::Any;
 use std::collections::VecDeque;
 
 /// One or two simulated rings.
@@ -251,7 +253,7 @@ impl SimulatedLink {
         match fault {
             PlacedFault::Link(link, fault) => ring.suffer_link(link, fault),
             PlacedFault::Drive(drive, fault) => ring.suffer_drive(drive, fault),
-            PlacedFault::Stimulus(drive, stimulus) => {
+            PlacedFault::Stimulus(drive, buses::Stimulus::Novobus(stimulus)) => {
                 if let Some(drive) = ring.drive_mut(drive) {
                     // Planning has refused drives without an outside.
                     let _happened = drive.stimulate(stimulus);
@@ -348,42 +350,24 @@ impl Link for SimulatedLink {
         }
     }
 
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
         let mut copy = self.clone();
         while copy.receive(ring).is_some() {}
-        copy.send(ring, &vec![SYNCO; count]);
-        let mut bytes = Vec::new();
+        copy.send(ring, bytes);
+        let mut came = Vec::new();
         // Once round the ring and the bytes themselves, and as much again for what is delayed.
         let drives = u64::from(self.drives(ring));
-        let end = copy.now() + self.byte_time * (2 * (drives + count as u64));
+        let end = copy.now() + self.byte_time * (2 * (drives + bytes.len() as u64));
         while copy.busy() && copy.now() < end && copy.wait(end) {
             while let Some((_, byte)) = copy.receive(ring) {
-                bytes.push(byte);
+                came.push(byte);
             }
         }
-        bytes
+        came
     }
 
-    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
-        let device = self.ring(ring)?.drive(drive)?;
-        Some(device.cause().filter(|_| device.in_error()))
-    }
-
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
-        let ring = self.ring(ring)?;
-        let shown = ring.drive(drive)?.shown()?;
-        Some(if ring.powered(drive) {
-            shown
-        } else {
-            Shown {
-                encoder: shown.encoder,
-                ..DARK
-            }
-        })
-    }
-
-    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        Some(self.ring(ring)?.drive(drive)?.peek(address))
+    fn beside(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     fn unused_faults(&self) -> Vec<String> {
@@ -404,10 +388,10 @@ impl Link for SimulatedLink {
             unused.push(match fault {
                 PlacedFault::Link(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Drive(_, fault) => format!("{place} at {at}: {fault}"),
-                PlacedFault::Stimulus(_, Stimulus::Error(error)) => {
-                    format!("{place} at {at}: error {error}")
-                }
-                PlacedFault::Stimulus(_, stimulus) => format!("{place} at {at}: {stimulus:?}"),
+                PlacedFault::Stimulus(_, buses::Stimulus::Novobus(stimulus)) => match stimulus {
+                    Stimulus::Error(error) => format!("{place} at {at}: error {error}"),
+                    stimulus => format!("{place} at {at}: {stimulus:?}"),
+                },
             });
         }
         unused
@@ -438,4 +422,45 @@ impl Link for SimulatedLink {
         }
         trace
     }
+}
+
+/// What only a simulated ring shows: its drives beside the bus.
+pub trait BesideTheBus {
+    /// Whether a drive is in the error mode, and why; `None` where this cannot be seen.
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>>;
+
+    /// What a drive shows outside the bus; `None` where this cannot be seen.
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown>;
+
+    /// A drive's cell; `None` where this cannot be seen.
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8>;
+}
+
+impl<L: Link + ?Sized> BesideTheBus for L {
+    fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
+        let device = simulation(self)?.ring(ring)?.drive(drive)?;
+        Some(device.cause().filter(|_| device.in_error()))
+    }
+
+    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
+        let ring = simulation(self)?.ring(ring)?;
+        let shown = ring.drive(drive)?.shown()?;
+        Some(if ring.powered(drive) {
+            shown
+        } else {
+            Shown {
+                encoder: shown.encoder,
+                ..DARK
+            }
+        })
+    }
+
+    fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
+        Some(simulation(self)?.ring(ring)?.drive(drive)?.peek(address))
+    }
+}
+
+/// The simulated rings behind a link, if it shows them.
+fn simulation(link: &(impl Link + ?Sized)) -> Option<&SimulatedLink> {
+    link.beside()?.downcast_ref()
 }

@@ -13,6 +13,7 @@ pub mod locate;
 pub mod qualify;
 pub mod report;
 pub mod rig;
+pub(crate) mod serve;
 pub mod simulate;
 pub mod stream;
 pub mod top;

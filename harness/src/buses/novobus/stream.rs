@@ -13,7 +13,6 @@ use crate::link::{
 };
 use crate::port::{LastWords, Wire, wake_on_time};
 use harness_proto::line::{Rate, Received};
-use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{LinkTrace, Trace};
 use rustix::event::{Timespec, poll};
@@ -535,19 +534,19 @@ impl Link for StreamLink {
         self.tolerance
     }
 
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        let end = self.send(ring, &vec![SYNCO; count]);
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+        let end = self.send(ring, bytes);
         let end = end + self.rings.get(ring).map_or(Span::ZERO, |r| self.round(r));
-        let mut bytes = Vec::new();
+        let mut came = Vec::new();
         while self.busy() && self.now() < end && self.wait(end) {
             while let Some((_, byte)) = self.receive(ring) {
-                bytes.push(byte);
+                came.push(byte);
             }
         }
         while let Some((_, byte)) = self.receive(ring) {
-            bytes.push(byte);
+            came.push(byte);
         }
-        bytes
+        came
     }
 
     fn unused_faults(&self) -> Vec<String> {

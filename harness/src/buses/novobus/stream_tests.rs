@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::port::{Endpoint, PortSettings, open};
+use harness_proto::novobus::sync::SYNCO;
 use std::io::Write as _;
 use std::net::{TcpListener, TcpStream};
 

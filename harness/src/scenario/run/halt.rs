@@ -2,6 +2,7 @@
 
 use super::outcome::{Mismatch, Stop};
 use super::player::{MAX_ROUND, Runner};
+use crate::buses::novobus::link::BesideTheBus;
 use crate::link::Trouble;
 use crate::scenario::plan::MAX_CARRIED;
 

@@ -4,7 +4,7 @@ use crate::buses::Bus;
 use crate::buses::novobus::language::syntax::cell::{CellPlace, Written};
 use crate::buses::novobus::language::syntax::check::{Check, DriveCheck};
 use crate::buses::novobus::language::syntax::job::Job;
-use crate::link::{Capability, Stimulus};
+use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::{Span, Spanned};
@@ -13,6 +13,7 @@ use harness_proto::line::Rate;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::units::Device;
 use harness_sim::fault::{DriveFault, Flips};
+use harness_sim::nd21::Stimulus;
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
 use harness_sim::novobus::drive::Model;
 

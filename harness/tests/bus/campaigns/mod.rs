@@ -4,6 +4,7 @@
 mod cli;
 mod judge;
 
+use harness::buses::novobus::link::BesideTheBus as _;
 use harness::campaign::find::{find, names};
 use harness::campaign::report::{json, table};
 use harness::campaign::{Campaign, Case, Class, Finished, Wrong};

@@ -8,12 +8,12 @@ mod trouble;
 
 use harness::buses::novobus::driver::{Axis, Bus, Options};
 use harness::guard::{Guarded, Limits};
-use harness::link::{Link, SimulatedLink, Stimulus};
+use harness::link::{Link, SimulatedLink};
 use harness_proto::line::Rate;
 use harness_proto::nd21::io::Input;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::properties::Properties;
-use harness_sim::nd21::{Nd21Drive, Nd21Properties, factory};
+use harness_sim::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::ring::Ring;

@@ -2,6 +2,7 @@
 
 use super::{axis, bus, guarded, ring, size};
 use harness::buses::novobus::driver::Bus;
+use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits, SafeState, Standing, blind_stop, safe_state};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Rate;

@@ -198,8 +198,8 @@ impl<L: Link> Link for Failing<L> {
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
         self.link.inject(ring, fault, moment);
     }
-    fn probe(&mut self, ring: usize, count: usize) -> Vec<Received> {
-        self.link.probe(ring, count)
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+        self.link.probe(ring, bytes)
     }
     fn unused_faults(&self) -> Vec<String> {
         self.link.unused_faults()

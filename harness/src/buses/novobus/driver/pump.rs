@@ -1,6 +1,7 @@
 //! Couples masters to their link: sends a byte when the line is free for it and passes on the bytes received.
 
 use super::{Error, Options};
+use crate::buses::novobus::guard::safe_state::telegram;
 use crate::link::{Lead, Line, Trouble};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
@@ -76,7 +77,11 @@ impl<'l> Pump<'l> {
     }
 
     pub(crate) fn permits(&self, ring: usize, drive: u8, command: Command) -> bool {
-        self.link.permits(ring, drive, command)
+        let Some(own) = self.rings.get(ring) else {
+            return false;
+        };
+        let bytes = telegram(own.master.ring(), drive, command);
+        self.link.permits(ring, &bytes)
     }
 
     pub(crate) fn sizes(&self) -> Vec<RingSize> {

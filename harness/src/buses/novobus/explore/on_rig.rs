@@ -6,6 +6,7 @@ use super::judge::{Exchange, Judge, prologue};
 use super::oracle::{Difference, sent};
 use super::order::{Command, Order};
 use super::play::Seen;
+use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin;
 use crate::explore::ExploreError;
 use crate::explore::features;

@@ -5,6 +5,7 @@ use super::case::{Beside, Case, Harm, What};
 use super::order::Order;
 use super::play::Seen;
 use super::setup::{drive_name, is_first};
+use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin;
 use crate::link::{Line as _, Link, SimulatedLink, link_name};
 use harness_proto::line::Received;

@@ -5,6 +5,7 @@ use crate::link::{Link, Trouble};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::sync::SYNCO;
 use std::fmt::Write as _;
 
 /// Maximum number of unexpected bytes shown.
@@ -121,7 +122,7 @@ fn examine_once(
             stated: stated.drives(),
         }),
         _ => {
-            let bytes = link.probe(ring, 4 * usize::from(stated.drives()) + 8);
+            let bytes = link.probe(ring, &vec![SYNCO; 4 * usize::from(stated.drives()) + 8]);
             Err(match (recovery.after, bytes.is_empty()) {
                 (Some(drive), _) => Unhealthy::Broken(drive),
                 (None, true) => Unhealthy::Silent,

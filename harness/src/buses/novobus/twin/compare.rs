@@ -572,7 +572,8 @@ pub(crate) fn what_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::{Line, Link};
+    use crate::buses::novobus::link::BesideTheBus;
+    use crate::link::Line;
     use crate::scenario::simulate::bench;
     use crate::scenario::source::Source;
 

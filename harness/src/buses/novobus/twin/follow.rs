@@ -3,12 +3,12 @@
 use super::compare::Comparer;
 use super::comparison::{Comparison, Exactness};
 use super::known::Knowledge;
+use crate::buses::novobus::link::BesideTheBus;
 use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
 
@@ -70,14 +70,14 @@ impl Conversation {
                 Event::Fault(ring, at, fault, moment) => {
                     open.done.push((*ring, Done::Fault(*at, *fault, *moment)));
                 }
-                Event::Probe(ring, at, count, bytes) if !probes_a_copy => {
+                Event::Probe(ring, at, sent, came) if !probes_a_copy => {
                     let mut start = *at;
-                    for _ in 0..*count {
-                        open.done.push((*ring, Done::Sent(start, SYNCO)));
+                    for byte in sent {
+                        open.done.push((*ring, Done::Sent(start, *byte)));
                         start += byte_time;
                     }
                     // Their times are lost: each as soon as it can have come.
-                    let received = bytes.iter().map(|byte| (*ring, start, *byte));
+                    let received = came.iter().map(|byte| (*ring, start, *byte));
                     open.received.extend(received);
                 }
                 Event::Look(look) => open.end = open.end.max(look.at),

@@ -5,8 +5,9 @@ mod random;
 
 use super::size;
 use harness::buses::novobus::driver::{Bus, Options};
+use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits};
-use harness::link::{Line, Link, SimulatedLink, Stimulus};
+use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
 use harness_proto::line::Rate;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::io::Input;
@@ -15,7 +16,7 @@ use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
-use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, factory};
+use harness_sim::nd21::{Nd21Drive, Nd21Properties, SRampWire, Stimulus, factory};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::ring::Ring;
@@ -132,7 +133,8 @@ fn order_by_plc(line: &mut Guarded<SimulatedLink>, left: &Left) {
         return;
     }
     for high in [false, true] {
-        line.stimulate(0, 0, Stimulus::Input(Input::Gpin3, high));
+        let input = harness::buses::Stimulus::Novobus(Stimulus::Input(Input::Gpin3, high));
+        line.inject(0, PlacedFault::Stimulus(0, input), Moment::Now);
         watch(line, 4);
     }
 }

@@ -3,7 +3,6 @@
 
 use super::value::{assigned, bytes, cell_by_name, cell_check, cell_names, eeprom_place, place};
 use super::words::{deviates, drives, equals, named, required};
-use crate::link::{Mode, Stimulus};
 use crate::scenario::expression;
 use crate::scenario::problem::{Problem, Spanned};
 use crate::scenario::quantity::{self, Dimension};
@@ -15,6 +14,7 @@ use harness_proto::nd21::io::Input;
 use harness_proto::nd21::units::{Device, INCREMENTS_PER_TURN};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::nd21;
+use harness_sim::nd21::{Mode, Stimulus};
 use harness_sim::novobus::drive::Model;
 
 /// The words with which such a line begins.

@@ -6,7 +6,8 @@ use super::types::{
     Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedStep, PlannedWhen, PlannedWindow,
 };
 use super::unroll::Unroll;
-use crate::link::{Capability, Moment, PlacedFault, Stimulus, needs_line_errors, only_simulated};
+use crate::buses::Stimulus;
+use crate::link::{Capability, Moment, PlacedFault, needs_line_errors, only_simulated};
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::pattern::MAX_BYTES;
 use crate::scenario::problem::{Problem, Problems, Span};
@@ -20,6 +21,7 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::time::{self, Instant};
 use harness_sim::fault::LinkFault;
+use harness_sim::nd21;
 use harness_sim::novobus::drive::Model;
 use std::ops::RangeInclusive;
 
@@ -366,7 +368,7 @@ impl Planner {
                 };
                 self.only_nd21(&drives, "monitoring", drive.span)?;
                 let drive = self.drive(fault.ring, drive)?;
-                PlacedFault::Stimulus(drive, Stimulus::Error(*error))
+                PlacedFault::Stimulus(drive, Stimulus::Novobus(nd21::Stimulus::Error(*error)))
             }
         };
         let moment = match (&fault.byte, fault.at) {

@@ -8,6 +8,7 @@ use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
 use crate::scenario::syntax::Ending;
 use harness_proto::novobus::master::{End, Fault, RingLink};
+use harness_proto::novobus::sync::SYNCO;
 
 /// SYNCO sent to let a ring spell out an address: the bound of 25 zeros, and enough behind it to see
 /// that the address stays (ND21 9.7).
@@ -156,7 +157,7 @@ impl Runner<'_> {
             .map(|(_, byte)| *byte)
             .collect();
         locate::locate(&heard, size).or_else(|| {
-            heard.extend(self.link.probe(ring, PROBE));
+            heard.extend(self.link.probe(ring, &[SYNCO; PROBE]));
             locate::locate(&heard, size)
         })
     }

@@ -1,6 +1,7 @@
 //! What a step does to drives, and what it waits for or reads of them.
 
 use super::look::{Miss, judge};
+use crate::buses::Stimulus;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::plan::{LOOK, PlannedDriveCheck, Reading};
 use crate::scenario::problem::Span;
@@ -17,7 +18,8 @@ impl Influence {
             match self {
                 Self::Stimuli(stimuli) => {
                     for stimulus in stimuli {
-                        link.stimulate(ring, drive, *stimulus);
+                        let fault = PlacedFault::Stimulus(drive, Stimulus::Novobus(*stimulus));
+                        link.inject(ring, fault, Moment::Now);
                     }
                 }
                 Self::Power(on) => {

@@ -1,7 +1,7 @@
 //! Compares the visible state of drives with what must hold.
 
 use crate::buses::novobus::language::run::bytes::{Shown as Byte, matches};
-use crate::link::{Mode, Shown};
+use crate::buses::novobus::link::BesideTheBus;
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{CellTest, PlannedCell, PlannedCondition, PlannedDriveCheck, number};
 use crate::scenario::quantity::{Quantity, Tolerance, Unit};
@@ -10,6 +10,7 @@ use crate::scenario::syntax::{Relation, Showing};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits;
 use harness_proto::nd21::units::{self, Scale, Value};
+use harness_sim::nd21::{Mode, Shown};
 use std::ops::RangeInclusive;
 
 /// The difference that two computed numbers may have by rounding alone, as a part of the larger.

@@ -3,6 +3,7 @@
 //! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
+use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin::unknowable;
 use crate::link::{Line, Link, Trouble};
 use crate::scenario::pattern::Expected;

@@ -1,7 +1,6 @@
 //! What a scenario can check.
 
 use super::cell::{CellCheck, CellPlace};
-use crate::link::Mode;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::Span;
@@ -9,6 +8,7 @@ use crate::scenario::quantity::{Quantity, Tolerance};
 use crate::scenario::syntax::{Drives, LinkEnds};
 use crate::scenario::times::Duration;
 use harness_proto::novobus::error::BusError;
+use harness_sim::nd21::Mode;
 
 /// What must hold at a point of a scenario.
 #[derive(Clone, Debug)]

@@ -1,0 +1,84 @@
+//! What stands beside a bus, and a record that does not show it.
+
+use harness::buses::novobus::link::BesideTheBus as _;
+use harness::evidence::Line as Written;
+use harness::guard::{Guarded, Limits};
+use harness::link::{Event, Line as _, Link, Recording, Replay, SimulatedLink};
+use harness_proto::line::Rate;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::properties::Properties;
+use harness_proto::time::{Instant, Span};
+use harness_sim::novobus::bench::Bench;
+use harness_sim::novobus::drive::Drive;
+use harness_sim::novobus::plain::PlainDrive;
+use harness_sim::novobus::ring::Ring;
+
+fn link() -> SimulatedLink {
+    let size = RingSize::new(2).expect("1 to 250");
+    let drive = |_| Drive::Plain(PlainDrive::new(Properties::default(), [0; 256]));
+    SimulatedLink::new(Bench::one(Ring::new(size, Rate::Baud38400, drive)))
+}
+
+/// A simulation is shown by the link itself, through a guard and by a whole recording; a recording as of a rig hides it.
+#[test]
+fn only_a_recording_of_a_rig_hides_the_simulation() {
+    let sees = |link: &dyn Link| {
+        let cell = link.peek(0, 1, 0xFE00);
+        assert_eq!(cell.is_some(), link.error_of(0, 1).is_some());
+        cell.is_some()
+    };
+    assert!(sees(&link()));
+    let mut guarded = Guarded::new(link(), Limits::default());
+    assert!(sees(&guarded));
+    let mut events = Vec::new();
+    assert!(sees(&Recording::whole(&mut guarded, &mut events)));
+    assert!(!sees(&Recording::new(&mut guarded, &mut events)));
+}
+
+/// A probe is recorded with what was sent, and played back only for the same bytes.
+#[test]
+fn a_probe_is_played_back_for_the_same_bytes() {
+    let bytes = [0x80, 0x80, 0x88];
+    let mut link = link();
+    let mut events = Vec::new();
+    let mut recording = Recording::new(&mut link, &mut events);
+    recording.begin();
+    let came = recording.probe(0, &bytes);
+    assert_eq!(came.len(), bytes.len());
+    let written: Vec<_> = events.iter().filter_map(Written::of).collect();
+    let read: Vec<_> = written.iter().filter_map(Written::event).collect();
+    assert_eq!(read, events);
+    let replay = || {
+        Replay::new(
+            read.clone(),
+            Rate::default(),
+            Span::ZERO,
+            vec![2],
+            Vec::new(),
+        )
+    };
+    let mut same = replay();
+    same.begin();
+    assert_eq!(same.probe(0, &bytes), came);
+    assert_eq!((same.trouble(), same.left()), (None, None));
+    let mut other = replay();
+    other.begin();
+    assert!(other.probe(0, &[0x80; 3]).is_empty());
+    assert!(other.trouble().is_some());
+}
+
+/// Records name no bytes of a probe that sends SYNCO.
+#[test]
+fn a_probe_of_synco_is_written_by_its_number() {
+    let probe = Event::Probe(0, Instant::START, vec![0x80; 8], Vec::new());
+    let line = Written::of(&probe).expect("a line");
+    let text = serde_json::to_string(&line).expect("JSON");
+    assert_eq!(
+        text,
+        r#"{"kind":"probe","ring":1,"t":0,"count":8,"bytes":[]}"#
+    );
+    assert_eq!(line.event(), Some(probe));
+    let wrong = text.replace(r#""count":8"#, r#""count":8,"sent":"88""#);
+    let line: Written = serde_json::from_str(&wrong).expect("a line");
+    assert_eq!(line.event(), None, "1 byte is not 8");
+}
