@@ -1,29 +1,80 @@
 //! drivebench: a test bench for serial servo drives, physical or simulated.
 //!
-//! A [`scenario`] is a conversation with a bus in the manual's own notation. It is played on a
-//! [`link`], which is the ring as the master sees it; what came of it is shown by a [`report`]. The
-//! buses themselves are in `harness_proto`, the simulated rings in `harness_sim`.
+//! This crate is the program `drivebench`, and what another program may use of it:
+//!
+//! | type | what it is for |
+//! |---|---|
+//! | [`Scenario`], [`Played`], [`Verdict`] | a scenario on simulated rings, in a test of your own |
+//! | [`Drives`], [`Reading`], [`State`] | drives of a rig or of a simulated ring: read, write, move |
+//! | [`Served`] | a simulated ring for a controller under test |
+//! | [`Error`] | why one of these failed |
+//!
+//! # Play a scenario
+//!
+//! ```
+#![doc = include_str!("../examples/play_scenario.rs")]
+//! ```
+//!
+//! # Talk to drives
+//!
+//! ```
+#![doc = include_str!("../examples/drive_a_motor.rs")]
+//! ```
+//!
+//! # Serve a ring to a controller
+//!
+//! ```
+#![doc = include_str!("../examples/serve_a_ring.rs")]
+//! ```
+//!
+//! The three stand in `harness/examples`; `cargo run --example play_scenario` runs one. The modules of the bench itself are not shown here
+//! and may change with every version; `ARCHITECTURE.md` describes them, and `cargo doc --document-private-items` shows them.
 #![forbid(unsafe_code)]
 
-pub mod buses;
-pub mod campaign;
-pub mod capture;
-pub mod cli;
-pub mod evidence;
-pub mod explore;
-pub mod file;
-pub mod fuzz;
-pub mod guard;
-pub mod library;
-pub mod link;
-pub mod manual;
-pub mod port;
-pub mod qualify;
+pub use buses::driver::State;
+pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
+pub use scenario::verdict::Verdict;
+
+mod embed;
 mod regular;
-pub mod report;
-pub mod rig;
-pub mod scenario;
-pub mod serve;
 mod signals;
-pub mod top;
 mod trouble;
+
+#[doc(hidden)]
+pub mod buses;
+#[doc(hidden)]
+pub mod campaign;
+#[doc(hidden)]
+pub mod capture;
+#[doc(hidden)]
+pub mod cli;
+#[doc(hidden)]
+pub mod evidence;
+#[doc(hidden)]
+pub mod explore;
+#[doc(hidden)]
+pub mod file;
+#[doc(hidden)]
+pub mod fuzz;
+#[doc(hidden)]
+pub mod guard;
+#[doc(hidden)]
+pub mod library;
+#[doc(hidden)]
+pub mod link;
+#[doc(hidden)]
+pub mod manual;
+#[doc(hidden)]
+pub mod port;
+#[doc(hidden)]
+pub mod qualify;
+#[doc(hidden)]
+pub mod report;
+#[doc(hidden)]
+pub mod rig;
+#[doc(hidden)]
+pub mod scenario;
+#[doc(hidden)]
+pub mod serve;
+#[doc(hidden)]
+pub mod top;

@@ -2,7 +2,7 @@
 
 pub mod novobus;
 
-pub(crate) use novobus::{cli as commands, qualify, serve::state_of, twin};
+pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
 
 /// What happens to a drive from outside the bus, by the bus that it is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -18,6 +18,7 @@ use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtMismatch, Mismatch, Outcome, Skip, play};
 use crate::scenario::simulate::simulated;
+use crate::scenario::source::line_number;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
@@ -305,7 +306,7 @@ fn place(entry: &Entry, finding: &Mismatch) -> String {
         .text
         .get(..finding.span.start)
         .unwrap_or_default();
-    let line = before.matches('\n').count() + 1;
+    let line = line_number(&entry.source.text, finding.span.start);
     let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
     format!("{}:{line}:{column}", entry.name)
 }

@@ -1,5 +1,6 @@
 //! Mistakes in a scenario, shown with their line.
 
+use super::source::line_number;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use std::fmt;
 use std::sync::Arc;
@@ -64,6 +65,18 @@ impl Problem {
             span,
             expected: expected.into(),
             help: None,
+        }
+    }
+
+    /// What is wrong, what was expected, and the suggestion, in one line.
+    pub(crate) fn sentence(&self) -> String {
+        let mut text = self.message.clone();
+        if !text.contains("expected") {
+            text = format!("{text}; {}", self.expected);
+        }
+        match &self.help {
+            Some(help) => format!("{text} ({help})"),
+            None => text,
         }
     }
 
@@ -143,6 +156,19 @@ impl Problems {
     #[must_use]
     pub fn all(&self) -> &[Problem] {
         &self.problems
+    }
+
+    /// Each mistake on a line: `file:line: what is wrong; what was expected (help)`.
+    pub(crate) fn lines(&self) -> String {
+        let line = |problem: &Problem| {
+            let number = line_number(self.source.inner(), problem.span.start);
+            format!("{}:{number}: {}", self.source.name(), problem.sentence())
+        };
+        self.problems
+            .iter()
+            .map(line)
+            .collect::<Vec<_>>()
+            .join("\n")
     }
 
     /// Each mistake as something that can be shown.

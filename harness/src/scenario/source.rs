@@ -67,6 +67,12 @@ pub enum SourceError {
     },
 }
 
+/// The number of the line in which a byte of a text stands, counted from 1.
+pub(crate) fn line_number(text: &str, at: usize) -> usize {
+    let before = text.bytes().take(at);
+    1 + before.filter(|byte| *byte == b'\n').count()
+}
+
 impl Source {
     /// Reads a scenario from a file, or from the pipe of a shell substitution.
     ///

@@ -17,3 +17,4 @@ pub use control::Answer;
 pub use place::{ControlPlace, Inner, Role, ServedAt};
 pub use server::{Marks, Pace, Server};
 pub use shell::{End, Host, Job, ServeError, serve};
+pub(crate) use shell::{Ending, serve_until};

@@ -43,7 +43,7 @@ pub struct Job {
 /// Why serving has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// A signal that ends programs, such as SIGINT, SIGTERM or SIGHUP.
+    /// A signal that ends programs, such as SIGINT, SIGTERM or SIGHUP; or the drop of the handle.
     Interrupted,
     /// The time is over.
     TimeOver,
@@ -113,6 +113,11 @@ pub trait Host {
 
     /// A line for people, without its end.
     fn say(&mut self, line: &str);
+
+    /// A socket listens.
+    fn listens(&mut self, at: SocketAddr) {
+        let _told_by_a_line = at;
+    }
 }
 
 /// Serves rings until the job is done. Links to pseudo terminals are removed on every way out.
@@ -120,6 +125,20 @@ pub trait Host {
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
 pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, ServeError> {
+    let ending = Ending::by_signals().map_err(ServeError::Wait)?;
+    serve_until(ending, server, job, host)
+}
+
+/// The same, until `ending`.
+///
+/// # Errors
+/// As [`serve`].
+pub(crate) fn serve_until(
+    ending: Ending,
+    server: Server,
+    job: &Job,
+    host: &mut dyn Host,
+) -> Result<End, ServeError> {
     if job.places.len() != server.seats() {
         let inner = server.seats() - server.rings();
         return Err(ServeError::Places {
@@ -127,7 +146,6 @@ pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, Serv
             rings: server.rings(),
         });
     }
-    let signals = Signals::new().map_err(ServeError::Wait)?;
     let mut ends = Vec::new();
     for place in &job.places {
         ends.push(match place {
@@ -150,7 +168,7 @@ pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, Serv
         ends,
         control,
         host,
-        signals,
+        ending,
         clock: Clock::start(),
         here: 0,
         gone: false,
@@ -159,14 +177,16 @@ pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, Serv
     shell.run(job)
 }
 
-/// The signals that end the program, as a stream.
-struct Signals {
+/// What ends serving from outside, as a stream that is readable then.
+#[derive(Debug)]
+pub(crate) struct Ending {
     read: UnixStream,
     ids: Vec<signal_hook::SigId>,
 }
 
-impl Signals {
-    fn new() -> io::Result<Self> {
+impl Ending {
+    /// The signals that end the program.
+    fn by_signals() -> io::Result<Self> {
         let (read, write) = UnixStream::pair()?;
         read.set_nonblocking(true)?;
         let mut ids = Vec::new();
@@ -176,9 +196,20 @@ impl Signals {
         }
         Ok(Self { read, ids })
     }
+
+    /// The drop of a handle.
+    ///
+    /// # Errors
+    /// The system has no sockets left.
+    pub(crate) fn by_handle() -> io::Result<(UnixStream, Self)> {
+        let (read, write) = UnixStream::pair()?;
+        read.set_nonblocking(true)?;
+        let ids = Vec::new();
+        Ok((write, Self { read, ids }))
+    }
 }
 
-impl Drop for Signals {
+impl Drop for Ending {
     fn drop(&mut self) {
         for id in &self.ids {
             signal_hook::low_level::unregister(*id);
@@ -221,7 +252,7 @@ struct Shell<'a> {
     ends: Vec<Seat>,
     control: Option<Control>,
     host: &'a mut dyn Host,
-    signals: Signals,
+    ending: Ending,
     clock: Clock,
     /// Clients there are.
     here: usize,
@@ -239,7 +270,10 @@ impl Shell<'_> {
         let mut lines = Vec::new();
         for (seat, end) in self.ends.iter().enumerate() {
             let place = match end {
-                Seat::Tcp(tcp) => tcp.address().to_string(),
+                Seat::Tcp(tcp) => {
+                    self.host.listens(tcp.address());
+                    tcp.address().to_string()
+                }
                 Seat::Pty(pty) => pty.link().display().to_string(),
             };
             let name = self.server.name(seat);
@@ -297,7 +331,7 @@ impl Shell<'_> {
     /// [`AWAKE`] before an awaited byte is due it polls without sleeping, so that the byte is handed over on time.
     fn wait(&mut self, until: Instant) -> io::Result<bool> {
         let awaited = self.server.awaited();
-        let mut fds = vec![PollFd::new(&self.signals.read, PollFlags::IN)];
+        let mut fds = vec![PollFd::new(&self.ending.read, PollFlags::IN)];
         for (seat, end) in self.ends.iter().enumerate() {
             let mut stream = PollFlags::empty();
             stream.set(PollFlags::IN, self.server.room(seat) > 0);
@@ -350,7 +384,8 @@ impl Shell<'_> {
 
     fn interrupted(&mut self) -> bool {
         let mut byte = [0];
-        self.signals.read.read(&mut byte).is_ok_and(|read| read > 0)
+        // A handle that was dropped reads as the end of the stream.
+        self.ending.read.read(&mut byte).is_ok()
     }
 
     /// Lets clients come, speak and go.

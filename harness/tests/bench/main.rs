@@ -4,6 +4,7 @@
 mod debian;
 #[path = "../common/edits.rs"]
 mod edits;
+mod embedded;
 mod evidence;
 mod explore;
 mod named;

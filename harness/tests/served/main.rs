@@ -5,6 +5,7 @@ mod bench;
 mod debian;
 #[path = "../common/edits.rs"]
 mod edits;
+mod embedded;
 mod evidence;
 mod explore;
 mod inner;

@@ -8,6 +8,7 @@ mod debian;
 mod html;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;
+mod public_api;
 #[path = "../common/record.rs"]
 mod record;
 mod reports;

@@ -4,6 +4,7 @@ pub mod campaign;
 pub mod capture;
 pub(crate) mod cli;
 pub mod driver;
+pub mod drives;
 pub mod explore;
 pub mod fuzz;
 pub mod guard;

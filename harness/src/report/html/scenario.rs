@@ -7,6 +7,7 @@ use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
 use crate::scenario::run::{Difference, Mismatch, Outcome, Shown as Byte, show};
+use crate::scenario::source::line_number;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
@@ -98,10 +99,9 @@ fn facts(html: &mut Html, played: &Played<'_>) {
 fn found(html: &mut Html, played: &Played<'_>, finding: &Mismatch) {
     html.line("h3", &[], "What differed");
     html.line("p", &[("class", &"bad")], &finding.message);
-    let before = played.text.get(..finding.span.start);
     let line = played.text.get(finding.span.start..finding.span.end);
-    if let (Some(before), Some(line)) = (before, line.filter(|line| !line.is_empty())) {
-        let number = before.matches('\n').count() + 1;
+    if let Some(line) = line.filter(|line| !line.is_empty()) {
+        let number = line_number(played.text, finding.span.start);
         html.line(
             "p",
             &[],

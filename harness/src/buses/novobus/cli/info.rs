@@ -2,10 +2,10 @@
 
 use super::args::{Form, InfoArguments};
 use super::axes;
-use super::cell::{Found, find};
 use super::failure::Failure;
 use super::read::columns;
 use super::rig::{self, Bench, Use};
+use crate::buses::novobus::driver::cell::{Found, find};
 use crate::buses::novobus::driver::{Axis, Identity, State};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;

@@ -2,7 +2,6 @@
 
 mod args;
 mod axes;
-mod cell;
 pub(crate) mod cells;
 mod control;
 pub(crate) mod coverage;

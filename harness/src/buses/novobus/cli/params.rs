@@ -1,12 +1,12 @@
 //! `drivebench params`: the parameters of a drive are saved, loaded and compared.
 
 use super::args::{LoadArguments, ParamsArguments, ParamsCommand};
-use super::cell::{self, Found, find, hex};
 use super::failure::Failure;
 use super::params_file::{self, Entry, parameters};
 use super::rig::{self, Bench, Use};
 use super::{axes, file};
 use crate::buses::novobus::driver::Axis;
+use crate::buses::novobus::driver::cell::{self, Found, find, hex};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::scenario::argument::{Location, Memory};

@@ -6,7 +6,7 @@
 //! "nRampe+" = "off"         # FF6C 14.5.4    acceleration ramp
 //! ```
 
-use super::cell::{Found, hex};
+use crate::buses::novobus::driver::cell::{Found, hex};
 use crate::scenario::argument::{Location, Memory, value_at};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;

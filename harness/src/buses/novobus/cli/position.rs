@@ -2,10 +2,10 @@
 
 use super::args::PositionArguments;
 use super::axes;
-use super::cell::find;
 use super::failure::Failure;
 use super::rig::{self, Bench, Use};
 use crate::buses::novobus::driver::Axis;
+use crate::buses::novobus::driver::cell::find;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::scenario::argument::{Location, cells};

@@ -2,9 +2,9 @@
 
 use super::args::{Form, ReadArguments};
 use super::axes;
-use super::cell::{Found, find};
 use super::failure::Failure;
 use super::rig::{self, Bench, Use};
+use crate::buses::novobus::driver::cell::{Found, find};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::scenario::argument::{Location, Memory, cells};

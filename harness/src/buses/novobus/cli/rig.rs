@@ -4,14 +4,14 @@
 use super::args::RigArguments;
 use super::failure::Failure;
 use crate::buses::novobus::driver::{Axis, Bus, Options};
+use crate::buses::novobus::drives;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use crate::link::{Line, SimulatedLink, Trouble};
-use crate::rig::sim::all_nd21;
 use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
-use crate::scenario::plan::{Plan, plan};
+use crate::scenario::plan::Plan;
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
@@ -22,9 +22,6 @@ use harness_proto::time::Span;
 use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
-
-/// Default header of a simulated bench: every drive is released and started by its inputs.
-const RELEASED: &str = "drive 0..last input GPIN3 GPIN5 high\n";
 
 /// How long a simulated bench has been on when a command starts: the self-tests are over (11.8).
 const WARM: Span = Span::from_millis(200);
@@ -260,45 +257,23 @@ pub(crate) fn link(
         Some(RigName::Simulated(sizes)) => Some(sizes),
         None => None,
     };
-    let sizes = given.cloned().unwrap_or_else(|| vec![3]);
-    let source = match &arguments.setup {
-        Some(path) => read(path)?,
-        None => released(&sizes),
+    let source = match (&arguments.setup, given) {
+        (Some(path), _) => read(path)?,
+        (None, sizes) => drives::released_header(sizes.map_or(&[3], Vec::as_slice)),
     };
-    let mut scenario = parse_setup(&source, &sizes)?;
     if let Some(sizes) = given {
-        if sizes.len() != scenario.rings.len() {
+        let stated = parse_setup(&source, sizes)?.rings.len();
+        if sizes.len() != stated {
             return Err(Failure::refused(format!(
-                "{} is for {} ring(s), the bench has {}",
+                "{} is for {stated} ring(s), the bench has {}",
                 source.name,
-                scenario.rings.len(),
                 sizes.len()
             )));
         }
-        for (range, size) in scenario.rings.iter_mut().zip(sizes) {
-            range.default = *size;
-        }
     }
-    all_nd21(&mut scenario);
-    let plan = plan(&scenario, &source, None)?;
-    let mut link = simulate::bench(&plan);
-    link.stop_recording();
-    Ok((plan, link))
+    Ok(drives::simulated(&source, given.map(Vec::as_slice))?)
 }
 
 fn read(path: &Path) -> Result<Source, Failure> {
     Source::read(path).map_err(|error| Failure::File(error.into()))
-}
-
-/// The default header of a simulated bench.
-fn released(sizes: &[u8]) -> Source {
-    let second = RELEASED.replace("0..last", "2:0..last");
-    let text = match sizes {
-        [_, _] => format!("{RELEASED}{second}"),
-        _ => RELEASED.to_owned(),
-    };
-    Source {
-        name: "the simulated bench".to_owned(),
-        text: text.into(),
-    }
 }

@@ -1,12 +1,12 @@
 //! `drivebench scope`: the drive's oscilloscope is programmed, records and is plotted (ND21 14.10.6).
 
 use super::args::{Edge, ScopeArguments};
-use super::cell::Found;
 use super::failure::Failure;
 use super::rig::{self, Bench, Use};
 use super::signal::Signal;
 use super::write::Orders;
 use super::{axes, file};
+use crate::buses::novobus::driver::cell::Found;
 use crate::buses::novobus::driver::{Axis, Error, Measurement, Scope, Trigger};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;

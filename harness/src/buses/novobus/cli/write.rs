@@ -2,10 +2,10 @@
 
 use super::args::WriteArguments;
 use super::axes;
-use super::cell::{self, Found, find, hex};
 use super::failure::Failure;
 use super::rig::{self, Bench, Use};
 use crate::buses::novobus::driver::Axis;
+use crate::buses::novobus::driver::cell::{self, Found, find, hex};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::scenario::argument::{Location, Memory, assignments, encode};

@@ -9,6 +9,7 @@
 
 mod access;
 mod axis;
+pub(crate) mod cell;
 mod control;
 mod discovery;
 mod eeprom;

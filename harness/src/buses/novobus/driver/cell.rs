@@ -1,6 +1,6 @@
 //! Cells of drives: read, written, shown.
 
-use crate::buses::novobus::driver::{Axis, Bus, Error};
+use super::{Axis, Bus, Error};
 use crate::scenario::argument::{Location, Memory};
 use crate::scenario::quantity::shown;
 use harness_proto::nd21::bits;
