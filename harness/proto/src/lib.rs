@@ -11,6 +11,7 @@
 //! * [`marks`]: how a stream of bytes carries line errors;
 //! * [`novobus`]: the ring of the Novotron ND21;
 //! * [`nd21`]: the cells of that drive that its bus end itself needs.
+//! * [`unitek`]: registers of UNITEK drives over CAN frames.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -24,3 +25,4 @@ pub mod marks;
 pub mod nd21;
 pub mod novobus;
 pub mod time;
+pub mod unitek;

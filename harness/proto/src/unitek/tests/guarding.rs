@@ -1,0 +1,230 @@
+//! The guard: classes, the lock, load, new identifiers (what a write may do to a physical drive).
+
+use super::super::guard::{Class, Denial, Gate, Limits, Missing, NAMED, class};
+use super::*;
+
+fn gate(limits: Limits) -> Gate {
+    Gate::new(
+        limits,
+        BitRate::K500,
+        &[(DEFAULT_RX, DEFAULT_TX), (0x202, 0x182)],
+    )
+}
+
+fn denied(gate: &mut Gate, text: &str) -> Option<Denial> {
+    gate.admit(Instant::START, &frame(text)).err()
+}
+
+fn missing(register: u8, missing: Missing) -> Option<Denial> {
+    Some(Denial::NotPermitted { register, missing })
+}
+
+/// every register that takes writes has a class of its own but the ones listed here.
+#[test]
+fn classes_cover_the_table() {
+    let unlisted: Vec<u8> = REGISTERS
+        .iter()
+        .filter(|r| matches!(r.access, Access::RW | Access::SP | Access::FN))
+        .filter(|r| class(r.number) == Class::Unlisted && r.number != super::super::frame::READ)
+        .map(|r| r.number)
+        .collect();
+    assert_eq!(unlisted, Vec::<u8>::new());
+    for r in &REGISTERS {
+        match r.access {
+            Access::RO => assert_eq!(class(r.number), Class::Unlisted, "{:02X}", r.number),
+            Access::UK => assert_eq!(class(r.number), Class::Never, "{:02X}", r.number),
+            _ => {}
+        }
+    }
+    for number in NAMED {
+        assert_eq!(class(number), Class::Named);
+    }
+}
+
+/// With no permission at all.
+#[test]
+fn without_permissions() {
+    let mut gate = gate(Limits::default());
+    for text in [
+        "201#3D4000",
+        "201#3D30FF",
+        "201#510400",
+        "201#511400",
+        "201#520C00",
+        "201#R3",
+        "201#3D",
+        "201#100100",
+    ] {
+        assert_eq!(denied(&mut gate, text), None, "{text}");
+    }
+    // Locked: stopping is harmless. 10..16 too, but not the read only 11.
+    for text in ["201#310000", "201#900000", "201#170100", "201#180100"] {
+        assert_eq!(denied(&mut gate, text), None, "{text}");
+    }
+    for (text, register, what) in [
+        ("201#511000", 0x51, Missing::Motion),
+        ("201#510000", 0x51, Missing::Motion),
+        ("201#510500", 0x51, Missing::All),
+        ("201#310100", 0x31, Missing::Motion),
+        ("201#6E00000000", 0x6E, Missing::Motion),
+        ("201#8E0000", 0x8E, Missing::Motion),
+        ("201#840000", 0x84, Missing::Eeprom),
+        ("201#C80000", 0xC8, Missing::Eeprom),
+        ("201#681002", 0x68, Missing::BusSettings),
+        ("201#D02C01", 0xD0, Missing::BusSettings),
+        ("201#110000", 0x11, Missing::All),
+        ("201#850100", 0x85, Missing::Named),
+        // Wider frames, as the drive reads them.
+        ("201#5110000000", 0x51, Missing::Motion),
+        ("201#51000000FFFFFFFF", 0x51, Missing::Motion),
+        ("201#51000000", 0x51, Missing::Motion),
+    ] {
+        assert_eq!(denied(&mut gate, text), missing(register, what), "{text}");
+    }
+    for register in [0xB0, 0x04, 0xB7, 0x5A, 0x62, 0x67, 0x00, 0xFF] {
+        let text = format!("201#{register:02X}0000");
+        assert_eq!(denied(&mut gate, &text), Some(Denial::Never { register }));
+        let mut open = super::guarding::gate(Limits::unlimited());
+        assert_eq!(denied(&mut open, &text), Some(Denial::Never { register }));
+    }
+    for text in ["203#3D4000", "181#40810100", "00000201#3D4000", "000#0000"] {
+        assert_eq!(denied(&mut gate, text), Some(Denial::Identifier), "{text}");
+    }
+}
+
+/// A lock counts only if every drive reads the frame so, and no longer than another master or a restart leaves it.
+#[test]
+fn a_lock_that_is_in_force() {
+    let motion = missing(0x31, Missing::Motion);
+    let stop = "201#310000";
+    let mut fresh = gate(Limits::default());
+    assert_eq!(denied(&mut fresh, stop), motion);
+    assert_eq!(denied(&mut fresh, "201#51040000"), None);
+    assert_eq!(denied(&mut fresh, stop), motion, "4 bytes may be ignored");
+    assert_eq!(denied(&mut fresh, "202#510400"), None);
+    assert_eq!(denied(&mut fresh, stop), motion, "the other drive");
+    assert_eq!(denied(&mut fresh, "201#510400"), None);
+    assert_eq!(denied(&mut fresh, stop), None);
+    let mut other = fresh.clone();
+    other.overhear(&frame("201#51000000"));
+    assert_eq!(
+        denied(&mut other, stop),
+        motion,
+        "another master released it"
+    );
+    let mut restarted = fresh.clone();
+    restarted.doubt();
+    assert_eq!(denied(&mut restarted, stop), motion);
+}
+
+/// cycles up to half of the bit rate, with the longest replies.
+#[test]
+fn cycles_load_the_bus() {
+    let mut gate = gate(Limits::default());
+    // 115 bits of 500 a millisecond are 23 %.
+    assert_eq!(denied(&mut gate, "201#3D3001"), None);
+    assert_eq!(denied(&mut gate, "202#3D3001"), None);
+    assert_eq!(denied(&mut gate, "201#3D2010"), None);
+    assert_eq!(
+        denied(&mut gate, "201#3D2701"),
+        Some(Denial::Load { permille: 704 })
+    );
+    assert_eq!(
+        denied(&mut gate, "201#3D300A"),
+        None,
+        "a longer interval replaces it"
+    );
+    assert_eq!(denied(&mut gate, "201#3D2701"), None);
+    assert_eq!(denied(&mut gate, "201#3D28FF"), None);
+    assert_eq!(
+        gate.cycles().collect::<Vec<_>>(),
+        [(0x201, 0x20), (0x201, 0x30), (0x201, 0x27), (0x202, 0x30)]
+    );
+    // 4 bytes may be ignored: the cycle goes on for the gate.
+    assert_eq!(denied(&mut gate, "202#3D30FF00"), None);
+    assert_eq!(gate.cycles().count(), 4);
+    assert_eq!(denied(&mut gate, "202#3D30FF"), None);
+    assert_eq!(gate.cycles().count(), 3);
+}
+
+/// The guard follows a drive to its new identifier, and asks before it is stored.
+#[test]
+fn a_drive_that_moves() {
+    let mut gate = gate(Limits {
+        bus_settings: true,
+        eeprom: true,
+        ..Limits::default()
+    });
+    assert_eq!(denied(&mut gate, "201#681002"), None);
+    assert_eq!(
+        denied(&mut gate, "210#510000"),
+        missing(0x51, Missing::Motion)
+    );
+    assert_eq!(
+        denied(&mut gate, "201#510000"),
+        missing(0x51, Missing::Motion)
+    );
+    assert_eq!(
+        gate.moved().collect::<Vec<_>>(),
+        [((0x201, 0x181), (0x210, 0x181))]
+    );
+    assert_eq!(denied(&mut gate, "210#840000"), Some(Denial::LostDrive));
+    assert_eq!(
+        denied(&mut gate, "210#732540"),
+        missing(0x73, Missing::WayBack)
+    );
+    assert_eq!(denied(&mut gate, "210#680102"), None);
+    assert_eq!(gate.moved().count(), 0);
+}
+
+/// 84 at most once a minute; 35 and ED only whole.
+#[test]
+fn wear_and_ramps() {
+    let mut gate = gate(Limits::unlimited());
+    let at = |s: u64| Instant::START + Span::from_millis(1000 * s);
+    let store = frame("201#840000");
+    assert_eq!(gate.admit(at(0), &store), Ok(()));
+    assert_eq!(gate.admit(at(59), &store), Err(Denial::EepromWear));
+    assert_eq!(gate.admit(at(60), &store), Ok(()));
+    assert_eq!(gate.eeprom_writes(), 2);
+    for register in [0x35, 0xED] {
+        assert_eq!(
+            denied(&mut gate, &format!("201#{register:02X}E803")),
+            Some(Denial::HalfRamp { register })
+        );
+        assert_eq!(
+            denied(&mut gate, &format!("201#{register:02X}E8030100")),
+            None
+        );
+    }
+}
+
+proptest! {
+    /// Without permissions no frame that passes writes to anything but harmless registers, however the drive reads it.
+    #[test]
+    fn nothing_dangerous_passes(frames in prop::collection::vec((prop_oneof![Just(0x201u16), Just(0x202), 0..0x800u16], prop::collection::vec(any::<u8>(), 0..=8)), 0..30)) {
+        let mut gate = gate(Limits::default());
+        let mut locked = [false; 2];
+        for (id, data) in frames {
+            let frame = Frame::base(id, &data).unwrap();
+            if gate.admit(Instant::START, &frame).is_err() {
+                continue;
+            }
+            let place = usize::from(id) - 0x201;
+            for dlc4 in [Dlc4::As3, Dlc4::Ignore] {
+                let Ok(Request::Write { register, data }) = Request::decode(&frame, id, dlc4) else { continue };
+                let value = data.bits() & 0xFFFF;
+                match register {
+                    0x51 => {
+                        prop_assert_eq!(value & !0x10, 4);
+                        locked[place] |= frame.dlc() != 4;
+                    }
+                    0x31 | 0x90 => prop_assert!(value == 0 && locked[place]),
+                    0x17 | 0x18 => prop_assert!(locked[place]),
+                    0x52 | 0x10 | 0x12..=0x16 => {}
+                    _ => prop_assert!(false, "{} passed", frame),
+                }
+            }
+        }
+    }
+}
