@@ -93,7 +93,7 @@ impl Entry {
     /// Its mistakes.
     pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
         let scenario = parse(&source)?;
-        let range = scenario.rings.first();
+        let range = scenario.header.rings.first();
         let fits = |n: &u8| range.is_some_and(|own| (own.smallest..=own.largest).contains(n));
         Self::new(source, drives.filter(fits))
     }

@@ -24,8 +24,17 @@ pub fn scenario(campaign: &Campaign, case: &Case) -> Result<String, Contradictio
         let _infallible = writeln!(text, "source  {}", source.text);
     }
     let _infallible = writeln!(text, "ring    {drives}");
-    let _infallible = writeln!(text, "line    {}", entry.scenario.rate.bits_per_second());
-    for setup in &entry.scenario.setups {
+    let _infallible = writeln!(
+        text,
+        "line    {}",
+        entry
+            .scenario
+            .header
+            .rate
+            .unwrap_or_default()
+            .bits_per_second()
+    );
+    for setup in &entry.scenario.header.setups {
         let _infallible = writeln!(text, "{}", slice(setup.span.start, setup.span.end).trim());
     }
     let _infallible = write!(text, "\n# {}: {}", outcome.class, outcome.class.about());

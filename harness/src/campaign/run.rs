@@ -126,7 +126,7 @@ impl Campaign {
             ))
         };
         let deviates = |setup: &&Setup| matches!(setup.what, SetupKind::Deviates(_));
-        if let Some(setup) = entry.scenario.setups.iter().find(deviates) {
+        if let Some(setup) = entry.scenario.header.setups.iter().find(deviates) {
             let message = "what a wrong drive does is no measure of the bus";
             return Err(own(Problem::new(
                 setup.span,
@@ -134,7 +134,7 @@ impl Campaign {
                 "drives by the manual expected in a campaign",
             )));
         }
-        if let Some(master) = &entry.scenario.master {
+        if let Some(master) = &entry.scenario.header.master {
             let message = "what a wrong master does is no measure of the bus";
             return Err(own(Problem::new(
                 master.span,

@@ -29,6 +29,7 @@ pub(crate) fn list(selection: &Selection, output: &mut Output) -> std::io::Resul
             .collect();
         let rings: Vec<_> = entry
             .scenario
+            .header
             .rings
             .iter()
             .map(|ring| {

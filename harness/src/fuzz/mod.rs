@@ -8,7 +8,7 @@
 pub mod input;
 mod text;
 
-pub use text::{rig, scenario};
+pub use text::{rig, scenario, written};
 
 use crate::buses::novobus::fuzz::noted;
 /// The targets that reach transitions of the one bus that is fuzzed today.

@@ -6,6 +6,7 @@ use crate::scenario::plan::plan;
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
+use crate::scenario::write::write;
 
 /// The longest text that is looked at, in bytes; what lies behind is left out.
 const LONGEST: usize = 8_192;
@@ -19,7 +20,7 @@ const SIZES: [Option<u8>; 4] = [None, Some(1), Some(3), Some(250)];
 /// A text as a scenario: read, and settled for rings of several sizes.
 ///
 /// # Panics
-/// A mistake stands outside the text or within a character, or says nothing; there are many more mistakes than bytes; or a newline at
+/// What is written of it is another scenario; a mistake stands outside the text or within a character, or says nothing; there are many more mistakes than bytes; or a newline at
 /// the end makes a difference.
 pub fn scenario(data: &[u8]) {
     let Some((text, source)) = source("input.scn", data) else {
@@ -27,7 +28,10 @@ pub fn scenario(data: &[u8]) {
     };
     let read = parse(&source);
     let shown = match &read {
-        Ok(scenario) => settled(scenario, &source),
+        Ok(scenario) => {
+            written(scenario);
+            settled(scenario, &source)
+        }
         Err(problems) => check(problems, &source),
     };
     if let Some(longer) = with_newline(&text) {
@@ -37,6 +41,31 @@ pub fn scenario(data: &[u8]) {
         };
         assert_eq!(again, shown, "a newline at the end makes a difference");
     }
+}
+
+/// Writes a scenario and reads it again: it must be the same one.
+///
+/// # Panics
+/// It is another one.
+pub fn written(scenario: &Scenario) {
+    let text = write(scenario);
+    let source = Source {
+        name: "written.scn".to_owned(),
+        text: text.as_str().into(),
+    };
+    let again = parse(&source).unwrap_or_else(|problems| panic!("{problems:#?}\n{text}"));
+    assert_eq!(said(scenario), said(&again), "{text}");
+    assert_eq!(text, write(&again));
+}
+
+/// All that a scenario says, without the places where it says it.
+fn said(scenario: &Scenario) -> String {
+    let text = format!("{scenario:?}");
+    let mut pieces = text.split("Span { start: ");
+    let first = pieces.next().unwrap_or_default().to_owned();
+    pieces.fold(first, |all, piece| {
+        all + piece.split_once('}').map_or("", |(_, behind)| behind)
+    })
 }
 
 /// A text as a rig file.

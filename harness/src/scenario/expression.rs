@@ -2,6 +2,7 @@
 
 use super::problem::{Problem, Span};
 use super::scanner::Scanner;
+use std::fmt::{self, Display};
 
 /// How deep parentheses may nest.
 const MAX_DEPTH: u32 = 32;
@@ -65,8 +66,8 @@ impl Counter {
     }
 }
 
-impl std::fmt::Display for Counter {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for Counter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.0)
     }
 }
@@ -146,6 +147,64 @@ impl Located {
             expression: Expression::Number(value),
             span: Span { start: 0, end: 0 },
         }
+    }
+}
+
+impl Operator {
+    /// The sign of the operator.
+    const fn sign(self) -> char {
+        match self {
+            Self::Add => '+',
+            Self::Subtract => '-',
+            Self::Multiply => '*',
+            Self::Divide => '/',
+            Self::Remainder => '%',
+            Self::And => '&',
+            Self::Or => '|',
+            Self::ExclusiveOr => '^',
+        }
+    }
+
+    /// Whether it joins the terms of a sum; the others join the factors of a product.
+    const fn joins_terms(self) -> bool {
+        matches!(
+            self,
+            Self::Add | Self::Subtract | Self::Or | Self::ExclusiveOr
+        )
+    }
+}
+
+impl fmt::Display for Located {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.expression.fmt(f)
+    }
+}
+
+impl fmt::Display for Expression {
+    /// As the language writes it, with the parentheses that it needs and no others.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(f),
+            Self::Size => f.write_str("N"),
+            Self::Last => f.write_str("last"),
+            Self::Counter(counter) => counter.fmt(f),
+            Self::Operation(left, operator, right) => {
+                let sum =
+                    |side: &Self| matches!(side, Self::Operation(_, own, _) if own.joins_terms());
+                let product = |side: &Self| matches!(side, Self::Operation(..)) && !sum(side);
+                let of_terms = operator.joins_terms();
+                parenthesized(f, left, sum(left) && !of_terms)?;
+                write!(f, "{}", operator.sign())?;
+                parenthesized(f, right, sum(right) || product(right) && !of_terms)
+            }
+        }
+    }
+}
+
+fn parenthesized(f: &mut fmt::Formatter<'_>, side: &Expression, needed: bool) -> fmt::Result {
+    match needed {
+        true => write!(f, "({side})"),
+        false => side.fmt(f),
     }
 }
 

@@ -16,6 +16,7 @@ pub mod source;
 pub mod syntax;
 pub(crate) mod times;
 pub mod verdict;
+pub mod write;
 
 /// What is settled, simulated and read by the one bus that is played today.
 pub use crate::buses::novobus::{

@@ -1,8 +1,9 @@
 //! Bytes in a scenario: `88 FB`, `1234`, `80*12`, `xx`, `(2-N)`, `[EC 63]*3`.
 
-use super::expression::{self, Located, Scope};
+use super::expression::{self, Expression, Located, Scope};
 use super::problem::{Problem, Span};
 use super::scanner::Scanner;
+use std::fmt::{self, Display};
 
 /// The most bytes that the lines of one scenario may send, and that they may expect.
 pub const MAX_BYTES: usize = 1_000_000;
@@ -24,16 +25,27 @@ pub enum Expected {
     MinusChecksum(u8),
 }
 
+impl fmt::Display for Expected {
+    /// As a scenario and as reports write it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Byte(byte) => write!(f, "{byte:02X}"),
+            Self::Any => f.write_str("xx"),
+            Self::MinusChecksum(_) => f.write_str("-checksum"),
+        }
+    }
+}
+
 /// An item of a list of bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Item {
-    what: What,
+    what: ItemKind,
     times: Option<Located>,
     span: Span,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum What {
+enum ItemKind {
     Bytes(Vec<Expected>),
     Number(Located),
     Group(Vec<Item>),
@@ -47,7 +59,73 @@ pub struct Pattern {
     pub span: Span,
 }
 
+impl fmt::Display for Pattern {
+    /// As the language writes it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_items(f, &self.items)
+    }
+}
+
+fn write_items(f: &mut fmt::Formatter<'_>, items: &[Item]) -> fmt::Result {
+    for (index, item) in items.iter().enumerate() {
+        if index > 0 {
+            f.write_str(" ")?;
+        }
+        match &item.what {
+            ItemKind::Bytes(bytes) => bytes.iter().try_for_each(|byte| byte.fmt(f))?,
+            ItemKind::Number(number) => write!(f, "({number})")?,
+            ItemKind::Group(items) => {
+                f.write_str("[")?;
+                write_items(f, items)?;
+                f.write_str("]")?;
+            }
+        }
+        match item.times.as_ref().map(|times| &times.expression) {
+            None => {}
+            Some(times @ (Expression::Number(_) | Expression::Size | Expression::Last)) => {
+                write!(f, "*{times}")?;
+            }
+            Some(times) => write!(f, "*({times})")?,
+        }
+    }
+    Ok(())
+}
+
 impl Pattern {
+    /// These bytes. A run of at least `run` equal ones becomes one item, such as `80*12`.
+    #[must_use]
+    pub fn of(bytes: &[Expected], run: usize) -> Self {
+        let item = |byte: &Expected, times| Item {
+            what: ItemKind::Bytes(vec![*byte]),
+            times,
+            span: Span::default(),
+        };
+        let mut items = Vec::new();
+        for equal in bytes.chunk_by(|one, other| one == other) {
+            match (equal, i64::try_from(equal.len())) {
+                ([byte, ..], Ok(times)) if equal.len() >= run => {
+                    items.push(item(byte, Some(Located::number(times))));
+                }
+                _ => items.extend(equal.iter().map(|byte| item(byte, None))),
+            }
+        }
+        Self {
+            items,
+            span: Span::default(),
+        }
+    }
+
+    /// The same bytes on several lines, with at most `most` items each.
+    #[must_use]
+    pub fn lines(&self, most: usize) -> Vec<Self> {
+        let lines = self.items.chunks(most);
+        let line = |items: &[Item]| Self {
+            items: items.to_vec(),
+            ..self.clone()
+        };
+        lines.map(line).collect()
+    }
+
     /// The bytes in this scope; `most` of them at most.
     ///
     /// # Errors
@@ -102,9 +180,9 @@ fn expand(
         }
         let before = bytes.len();
         match &item.what {
-            What::Bytes(known) => bytes.extend(known),
-            What::Number(number) => bytes.push(Expected::Byte(low_byte(number, scope)?)),
-            What::Group(items) => expand(items, scope, most, bytes)?,
+            ItemKind::Bytes(known) => bytes.extend(known),
+            ItemKind::Number(number) => bytes.push(Expected::Byte(low_byte(number, scope)?)),
+            ItemKind::Group(items) => expand(items, scope, most, bytes)?,
         }
         let one = bytes.len() - before;
         if one.saturating_mul(times).saturating_add(before) > most {
@@ -162,7 +240,7 @@ fn items(scanner: &mut Scanner<'_>, depth: u32) -> Result<Vec<Item>, Problem> {
             if !scanner.eat(")") {
                 return Err(scanner.unexpected("`)`"));
             }
-            What::Number(number)
+            ItemKind::Number(number)
         } else if next == '[' {
             if depth == MAX_DEPTH {
                 return Err(scanner.unexpected("a byte (brackets nest too deep)"));
@@ -172,14 +250,22 @@ fn items(scanner: &mut Scanner<'_>, depth: u32) -> Result<Vec<Item>, Problem> {
             if !scanner.eat("]") {
                 return Err(scanner.unexpected("`]`"));
             }
-            What::Group(inner)
+            ItemKind::Group(inner)
         } else {
-            What::Bytes(literal(scanner)?)
+            ItemKind::Bytes(literal(scanner)?)
         };
         let times = if scanner.eat("*") {
             Some(count(scanner)?)
         } else {
             None
+        };
+        // Brackets that nothing is counted of only say that these are bytes.
+        let what = match what {
+            ItemKind::Group(inner) if times.is_none() && !inner.is_empty() => {
+                items.extend(inner);
+                continue;
+            }
+            what => what,
         };
         items.push(Item {
             what,
@@ -203,10 +289,10 @@ fn count(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
     let mut ahead = scanner.clone();
     let word = ahead.take_while(|c| c.is_ascii_alphanumeric());
     let expression = match word.map(|word| word.value) {
-        Some("N") => expression::Expression::Size,
-        Some("last") => expression::Expression::Last,
+        Some("N") => Expression::Size,
+        Some("last") => Expression::Last,
         Some(digits) => match digits.parse() {
-            Ok(number) => expression::Expression::Number(number),
+            Ok(number) => Expression::Number(number),
             Err(_) => return Err(scanner.unexpected("how many times, such as 17")),
         },
         None => return Err(scanner.unexpected("how many times, such as 17")),

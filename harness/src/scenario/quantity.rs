@@ -11,6 +11,9 @@ const TURN_DECIMALS: usize = 5;
 /// Significant digits that are shown of everything else: a word has no more.
 const DIGITS: usize = 5;
 
+/// Maximum number of digits of a number.
+const MOST_DIGITS: u32 = 12;
+
 /// What a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
@@ -191,6 +194,21 @@ impl fmt::Display for Quantity {
 }
 
 impl Quantity {
+    /// As the language writes it, to the last digit: `1500rpm`; `5 A`, as `5A` would be a byte.
+    pub(crate) fn written(self) -> String {
+        let (n, d) = self.unit.factor;
+        let value = decimal(
+            i128::from(self.value.numerator()) * d,
+            i128::from(self.value.denominator()) * n,
+        );
+        let is_byte = self.unit.name.bytes().all(|c| c.is_ascii_hexdigit());
+        format!(
+            "{value}{}{}",
+            if is_byte { " " } else { "" },
+            self.unit.name
+        )
+    }
+
     /// The same, if it measures this.
     fn of(self, dimension: Dimension) -> Result<Self, Problem> {
         if self.unit.dimension == dimension {
@@ -238,6 +256,17 @@ pub enum Tolerance {
 }
 
 impl Tolerance {
+    /// As the language writes it, to the last digit: `+-1%`.
+    pub(crate) fn written(self) -> String {
+        match self {
+            Self::Percent(percent) => {
+                let (n, d) = (percent.numerator(), percent.denominator());
+                format!("+-{}%", decimal(i128::from(n), i128::from(d)))
+            }
+            Self::Absolute(quantity) => format!("+-{}", quantity.written()),
+        }
+    }
+
     /// How far a value may be from `expected`, in the unit of the scales.
     #[must_use]
     pub fn around(self, expected: f64) -> f64 {
@@ -415,7 +444,7 @@ fn number(scanner: &mut Scanner<'_>) -> Result<(i64, u32), Problem> {
     }
     // Twelve digits times the factor of any unit fit.
     match (digits.parse::<i64>(), u32::try_from(decimals)) {
-        (Ok(number), Ok(decimals)) if digits.len() <= 12 => {
+        (Ok(number), Ok(decimals)) if digits.len() <= MOST_DIGITS as usize => {
             Ok((if negative { -number } else { number }, decimals))
         }
         _ => Err(too_many_digits(scanner.since(start))),
@@ -428,6 +457,19 @@ fn too_many_digits(span: Span) -> Problem {
         "the number has too many digits",
         "a shorter number expected here",
     )
+}
+
+/// A fraction as digits with a point: exact where it has at most twelve decimals, as every number of a scenario has.
+fn decimal(numerator: i128, denominator: i128) -> String {
+    let exact = |places: u32| (numerator * 10_i128.pow(places)) % denominator == 0;
+    let places = (0..MOST_DIGITS).find(|n| exact(*n)).unwrap_or(MOST_DIGITS);
+    let digits = numerator * 10_i128.pow(places) / denominator;
+    let places = places as usize;
+    let text = format!("{:0>width$}", digits.abs(), width = places + 1);
+    let (whole, fraction) = text.split_at(text.len() - places);
+    let sign = if digits < 0 { "-" } else { "" };
+    let point = if places == 0 { "" } else { "." };
+    format!("{sign}{whole}{point}{fraction}")
 }
 
 /// A fraction in lowest terms, if it fits.

@@ -3,6 +3,7 @@
 use super::problem::{Problem, Span, Spanned};
 use super::scanner::Scanner;
 use harness_proto::time;
+use std::fmt;
 
 /// The longest time that a scenario can speak of: ten minutes.
 const MAX: time::Span = time::Span::from_millis(600_000);
@@ -37,6 +38,42 @@ const UNITS: [(&str, Unit); 6] = [
 ];
 
 impl Duration {
+    /// A number of nanoseconds.
+    #[must_use]
+    pub const fn nanos(number: u64) -> Self {
+        Self::of(number, time::Span::from_nanos(1))
+    }
+
+    /// A number of microseconds.
+    #[must_use]
+    pub const fn micros(number: u64) -> Self {
+        Self::of(number, time::Span::from_micros(1))
+    }
+
+    /// A number of milliseconds.
+    #[must_use]
+    pub const fn millis(number: u64) -> Self {
+        Self::of(number, time::Span::from_millis(1))
+    }
+
+    /// The same digits with one more of them behind the point: a tenth of the time.
+    #[must_use]
+    pub const fn tenth(self) -> Self {
+        Self {
+            decimals: self.decimals + 1,
+            ..self
+        }
+    }
+
+    const fn of(digits: u64, unit: time::Span) -> Self {
+        Self {
+            digits,
+            decimals: 0,
+            unit: Unit::Time(unit),
+            span: Span { start: 0, end: 0 },
+        }
+    }
+
     /// The time on a line with the given byte time.
     #[must_use]
     pub fn on(self, byte_time: time::Span) -> time::Span {
@@ -66,6 +103,19 @@ impl Duration {
     }
 }
 
+impl fmt::Display for Duration {
+    /// As the language writes it: every digit, and no space in front of the unit.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let decimals = self.decimals as usize;
+        let digits = format!("{:0>width$}", self.digits, width = decimals + 1);
+        let (whole, fraction) = digits.split_at(digits.len() - decimals);
+        let point = if decimals == 0 { "" } else { "." };
+        let own = UNITS.iter().find(|(_, unit)| *unit == self.unit);
+        let unit = own.map_or("", |(name, _)| name);
+        write!(f, "{whole}{point}{fraction}{unit}")
+    }
+}
+
 /// A time, or a window between two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
@@ -80,6 +130,25 @@ impl Window {
     #[must_use]
     pub fn is_exact(self) -> bool {
         self.from == self.to
+    }
+}
+
+impl From<Duration> for Window {
+    /// One exact time.
+    fn from(time: Duration) -> Self {
+        Self {
+            from: time,
+            to: time,
+        }
+    }
+}
+
+impl fmt::Display for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.is_exact() {
+            true => self.from.fmt(f),
+            false => write!(f, "{}..{}", self.from, self.to),
+        }
     }
 }
 

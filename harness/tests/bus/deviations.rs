@@ -66,7 +66,7 @@ impl Candidate {
         let text = entry.source.text.to_string();
         let at = text.find("\nring ")? + 1;
         let at = at + text[at..].find('\n')? + 1;
-        let rings = &entry.scenario.rings;
+        let rings = &entry.scenario.header.rings;
         let mut candidate = Self {
             name: entry.short_name().to_owned(),
             text,

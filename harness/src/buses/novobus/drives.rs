@@ -58,7 +58,12 @@ pub(crate) fn simulated(
     sizes: Option<&[u8]>,
 ) -> Result<(Plan, SimulatedLink), Problems> {
     let mut scenario = parse_setup(source, sizes.unwrap_or(&[3]))?;
-    for (range, size) in scenario.rings.iter_mut().zip(sizes.unwrap_or_default()) {
+    for (range, size) in scenario
+        .header
+        .rings
+        .iter_mut()
+        .zip(sizes.unwrap_or_default())
+    {
         range.default = *size;
     }
     all_nd21(&mut scenario);

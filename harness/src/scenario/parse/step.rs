@@ -139,6 +139,12 @@ pub(crate) fn behind_the_first(span: Span, word: &str) -> Problem {
     )
 }
 
+/// A header line of one word and its value among the steps.
+pub(crate) fn header_too_late(span: Span, word: &str) -> Problem {
+    let help = format!("move the line up, above the first step (line `{word}`)");
+    behind_the_first(span, word).help(help)
+}
+
 /// What a drive is set to hold or to be, among the steps.
 pub(crate) fn not_a_step(span: Span, what: &SetupKind) -> Problem {
     let help = match what {
@@ -191,10 +197,9 @@ fn job_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
         }
         None => {
             let mut known = job::names();
-            known.extend([
-                "title", "source", "bus", "ring", "drive", "needs", "line", "strict", "deadline",
-                "until", "wait", "record", "for", "end",
-            ]);
+            known.extend(super::header::WORDS);
+            known.extend(super::bus_header::WORDS);
+            known.extend(["until", "wait", "record", "for", "end"]);
             let problem = scanner.unexpected(expected);
             Err(match nearest(name.value, &known) {
                 Some(near) => problem.help(format!("did you mean `{near}`?")),

@@ -7,5 +7,8 @@ pub use crate::buses::novobus::language::syntax::cell::{CellCheck, CellPlace, Re
 pub use crate::buses::novobus::language::syntax::check::{
     Check, Condition, DriveCheck, Ending, Showing,
 };
+pub use crate::buses::novobus::language::syntax::header::{
+    Drives, Header, Influence, RingRange, Setup, SetupKind,
+};
 pub use crate::buses::novobus::language::syntax::job::{Job, JobKind, MasterCall, Target};
 pub use scenario::*;

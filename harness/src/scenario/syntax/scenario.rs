@@ -1,21 +1,17 @@
 //! The scenario, its header and its steps.
 
 use crate::buses::Bus;
-use crate::buses::novobus::language::syntax::cell::{CellPlace, Written};
+use crate::buses::novobus::language::syntax::cell::CellPlace;
 use crate::buses::novobus::language::syntax::check::{Check, DriveCheck};
+use crate::buses::novobus::language::syntax::header::{Drives, Header, Influence};
 use crate::buses::novobus::language::syntax::job::Job;
 use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::{Span, Spanned};
+use crate::scenario::problem::Span;
 use crate::scenario::times::{Duration, Window};
-use harness_proto::line::Rate;
 use harness_proto::nd21::errors::ErrorCode;
-use harness_proto::nd21::units::Device;
 use harness_sim::fault::{DriveFault, Flips};
-use harness_sim::nd21::Stimulus;
-use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
-use harness_sim::novobus::drive::Model;
 
 /// A scenario: what it is, the ring it needs, and its steps.
 #[derive(Clone, Debug)]
@@ -26,14 +22,8 @@ pub struct Scenario {
     pub sources: Vec<Citation>,
     /// Which bus.
     pub bus: Bus,
-    /// The rings it can be played on; one or two.
-    pub rings: Vec<RingRange>,
-    /// The rate of the line.
-    pub rate: Rate,
-    /// What drives hold and how they behave before anything is sent.
-    pub setups: Vec<Setup>,
-    /// How the bench's own master breaks the manual, on purpose: `master deviates NAME`.
-    pub master: Option<Spanned<&'static MasterDeviation>>,
+    /// The header lines of the bus.
+    pub header: Header,
     /// What it says that it needs of a rig.
     pub needs: Vec<Capability>,
     /// Whether bytes that no line asked for are a failure.
@@ -51,71 +41,6 @@ pub struct Citation {
     pub text: String,
     /// Where it stands.
     pub span: Span,
-}
-
-/// The sizes of ring that a scenario can be played on.
-#[derive(Clone, Debug)]
-pub struct RingRange {
-    /// The smallest.
-    pub smallest: u8,
-    /// The largest.
-    pub largest: u8,
-    /// The one to take where nothing else is asked for.
-    pub default: u8,
-    /// Where it stands.
-    pub span: Span,
-}
-
-/// Drives: one, or all from one to another, in ring 1 or ring 2.
-#[derive(Clone, Debug)]
-pub struct Drives {
-    /// Which ring, counted from 0.
-    pub ring: usize,
-    /// From.
-    pub from: Located,
-    /// To; `None` for a single drive.
-    pub to: Option<Located>,
-}
-
-/// What drives hold or how they behave before anything is sent.
-#[derive(Clone, Debug)]
-pub struct Setup {
-    /// Which drives.
-    pub drives: Drives,
-    /// What.
-    pub what: SetupKind,
-    /// Where it stands.
-    pub span: Span,
-}
-
-/// The kinds of a [`Setup`].
-#[derive(Clone, Debug)]
-pub enum SetupKind {
-    /// `memory CELL = VALUE`
-    Memory(CellPlace, Written),
-    /// `eeprom CELL = VALUE`
-    Eeprom(CellPlace, Written),
-    /// `model NAME`
-    Model(Model),
-    /// `type NUMBER`
-    Type(Device),
-    /// Something from outside the bus, before anything is sent.
-    Influence(Influence),
-    /// `property NAME = WORD`
-    Word(Spanned<String>, Spanned<String>),
-    /// `property NAME = TIME`
-    Time(Spanned<String>, Duration),
-    /// `deviates NAME`
-    Deviates(&'static Deviation),
-}
-
-/// What happens to drives from outside the bus: `input GPIN5 high`, `power off`.
-#[derive(Clone, Debug)]
-pub enum Influence {
-    /// At the plugs or the motor.
-    Stimuli(Vec<Stimulus>),
-    /// The power is switched on or off.
-    Power(bool),
 }
 
 /// A cell that is recorded: `record drive 0 nist every 10ms`.

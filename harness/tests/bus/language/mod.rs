@@ -16,6 +16,7 @@ mod driver;
 mod drives;
 mod masters;
 mod records;
+mod written;
 
 fn entry(text: &str) -> Result<Entry, Vec<Problem>> {
     let source =

@@ -262,7 +262,7 @@ pub(crate) fn link(
         (None, sizes) => drives::released_header(sizes.map_or(&[3], Vec::as_slice)),
     };
     if let Some(sizes) = given {
-        let stated = parse_setup(&source, sizes)?.rings.len();
+        let stated = parse_setup(&source, sizes)?.header.rings.len();
         if sizes.len() != stated {
             return Err(Failure::refused(format!(
                 "{} is for {stated} ring(s), the bench has {}",

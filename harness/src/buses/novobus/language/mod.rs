@@ -5,3 +5,4 @@ pub(crate) mod parse;
 pub mod plan;
 pub(crate) mod run;
 pub(crate) mod syntax;
+pub(crate) mod write;

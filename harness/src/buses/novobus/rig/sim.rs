@@ -96,15 +96,15 @@ fn type_line(drive: &DriveEntry) -> Option<String> {
 /// Makes every drive a whole ND21, where the header names no model at all.
 pub(crate) fn all_nd21(scenario: &mut Scenario) {
     let says_model = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
-    if scenario.setups.iter().any(says_model) {
+    if scenario.header.setups.iter().any(says_model) {
         return;
     }
-    for ring in 0..scenario.rings.len() {
+    for ring in 0..scenario.header.rings.len() {
         let last = Located {
             expression: Expression::Last,
             ..Located::number(0)
         };
-        scenario.setups.push(Setup {
+        scenario.header.setups.push(Setup {
             drives: Drives {
                 ring,
                 from: Located::number(0),

@@ -26,7 +26,7 @@ const MAX_TURNS: i32 = 16_384;
 /// Maximum resistance in ohms: more is an open circuit.
 const MAX_OHM: i32 = 10_000_000;
 
-const DEVICES: [(&str, Device); 4] = [
+pub(crate) const DEVICES: [(&str, Device); 4] = [
     ("5605", Device::Nd5605),
     ("5610", Device::Nd5610),
     ("5615", Device::Nd5615),

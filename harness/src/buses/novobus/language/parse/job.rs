@@ -11,9 +11,9 @@ use crate::scenario::syntax::{CellPlace, Drives, Job, JobKind, MasterCall, Writt
 
 /// What stands behind a job's name.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Form {
-    name: &'static str,
-    kind: JobKind,
+pub(crate) struct Form {
+    pub(crate) name: &'static str,
+    pub(crate) kind: JobKind,
     cell: bool,
     data: Data,
 }
@@ -34,7 +34,7 @@ const fn form(name: &'static str, kind: JobKind, cell: bool, data: Data) -> Form
     }
 }
 
-const FORMS: [Form; 13] = [
+pub(crate) const FORMS: [Form; 13] = [
     form("read-byte", JobKind::ReadByte, true, Data::Read),
     form("read-word", JobKind::ReadWord, true, Data::Read),
     form("read-long", JobKind::ReadLong, true, Data::Read),

@@ -77,7 +77,7 @@ fn one_call(scanner: &mut Scanner<'_>) -> Result<(Drives, MasterCall), Problem> 
         let mut known = super::job::names();
         known.extend(CALLS);
         known.retain(|name| !["master", "recover"].contains(name));
-        known.extend([crate::scenario::parse::header::DEVIATES, "once"]);
+        known.extend([super::header::DEVIATES, "once"]);
         let problem = scanner.unexpected("what the driver is to do");
         return Err(problem.did_you_mean(name, &known));
     }

@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub(crate) mod drive;
+pub(crate) mod header;
 pub(crate) mod job;
 pub(crate) mod master;
 pub(crate) mod value;

@@ -42,7 +42,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
     let problems = |all| Problems::new(&source.name, source.text.clone(), all);
     let rings = sizes(scenario, size).map_err(|problem| problems(vec![problem]))?;
     let mut planner = Planner {
-        byte_time: scenario.rate.byte_time(),
+        byte_time: scenario.header.rate.unwrap_or_default().byte_time(),
         rings,
         setups: Vec::new(),
         units: Vec::new(),
@@ -50,7 +50,7 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         models: Vec::new(),
         scope: Scope::default(),
     };
-    let mut found = planner.set_up(&scenario.setups);
+    let mut found = planner.set_up(&scenario.header.setups);
     let mut running = Running::default();
     let mut steps = Vec::new();
     let mut needs = scenario.needs.clone();
@@ -122,17 +122,23 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
     }
     needs.extend(planner.setups.iter().filter_map(|setup| setup.what.needs()));
     // The effect of a wrong master on a machine is unknown.
-    needs.extend(scenario.master.as_ref().map(|_| Capability::Simulator));
+    needs.extend(
+        scenario
+            .header
+            .master
+            .as_ref()
+            .map(|_| Capability::Simulator),
+    );
     needs.sort();
     needs.dedup();
     Ok(Plan {
-        rate: scenario.rate,
+        rate: scenario.header.rate.unwrap_or_default(),
         strict: scenario.strict,
         deadline: scenario
             .deadline
             .map_or(DEADLINE, |deadline| deadline.on(planner.byte_time)),
         needs,
-        master: scenario.master.as_ref().map(|master| master.value),
+        master: scenario.header.master.as_ref().map(|master| master.value),
         steps,
         setups: planner.setups,
         units: planner.units,
@@ -168,7 +174,7 @@ pub fn plan_step(plan: &Plan, step: &Step, source: &Source) -> Result<PlannedSte
 
 fn sizes(scenario: &Scenario, size: Option<u8>) -> Result<Vec<RingSize>, Problem> {
     let mut rings = Vec::new();
-    for (index, range) in scenario.rings.iter().enumerate() {
+    for (index, range) in scenario.header.rings.iter().enumerate() {
         let wanted = size.filter(|_| index == 0).unwrap_or(range.default);
         if !(range.smallest..=range.largest).contains(&wanted) {
             return Err(Problem::new(

@@ -219,17 +219,21 @@ impl Planner {
 /// The default model: `nd21` if no line names a model and a line needs a feature that only this model has.
 pub(crate) fn model_unless_said(scenario: &Scenario) -> Model {
     let said = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
-    if scenario.setups.iter().any(said) {
+    if scenario.header.setups.iter().any(said) {
         return Model::default();
     }
-    let set = scenario.setups.iter().any(|setup| match &setup.what {
-        SetupKind::Influence(Influence::Stimuli(_)) => true,
-        SetupKind::Deviates(deviation) => deviation.behind_the_bus,
-        SetupKind::Word(name, _) | SetupKind::Time(name, _) => {
-            PROPERTIES.iter().any(|own| own.name == name.value)
-        }
-        _ => false,
-    });
+    let set = scenario
+        .header
+        .setups
+        .iter()
+        .any(|setup| match &setup.what {
+            SetupKind::Influence(Influence::Stimuli(_)) => true,
+            SetupKind::Deviates(deviation) => deviation.behind_the_bus,
+            SetupKind::Word(name, _) | SetupKind::Time(name, _) => {
+                PROPERTIES.iter().any(|own| own.name == name.value)
+            }
+            _ => false,
+        });
     let shows = |check: &DriveCheck| matches!(check.condition, Condition::Shows(_));
     let done = scenario.steps.iter().any(|step| match &step.action {
         Action::Influence(_, Influence::Stimuli(_)) => true,

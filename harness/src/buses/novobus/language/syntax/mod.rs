@@ -2,4 +2,5 @@
 
 pub(crate) mod cell;
 pub(crate) mod check;
+pub(crate) mod header;
 pub(crate) mod job;

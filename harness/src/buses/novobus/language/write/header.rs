@@ -1,0 +1,143 @@
+//! The header: rings, rate, and what drives hold and are before anything is sent.
+
+use super::{cell, drives, named};
+use crate::buses::novobus::language::parse::drive::DEVICES;
+use crate::buses::novobus::language::syntax::header::{
+    Drives, Header, Influence, RingRange, Setup, SetupKind,
+};
+use harness_proto::nd21::units::INCREMENTS_PER_TURN;
+use harness_sim::nd21::Stimulus;
+use harness_sim::novobus::drive::Model;
+
+/// Digits behind the point of a position in turns: enough to tell one increment from the next.
+const TURN_DECIMALS: usize = 6;
+
+/// The lines of a header, each with the word that it begins with and the rest.
+pub(crate) fn header(header: &Header) -> Vec<(&'static str, String)> {
+    let mut lines = Vec::new();
+    if !header.rings.is_empty() {
+        let sizes: Vec<_> = header.rings.iter().map(sizes).collect();
+        lines.push(("ring", sizes.join(", ")));
+    }
+    if let Some(rate) = header.rate {
+        lines.push(("line", rate.bits_per_second().to_string()));
+    }
+    lines
+}
+
+/// The lines of a header that begin with `drive` or `master`.
+pub(crate) fn devices(header: &Header) -> Vec<String> {
+    let setups = header.setups.iter();
+    let setup = |own: &Setup| format!("drive {} {}", drives(&own.drives), setup(&own.what));
+    let master = header.master.iter();
+    let master = master.map(|own| format!("master deviates {}", own.value.name));
+    setups.map(setup).chain(master).collect()
+}
+
+fn sizes(range: &RingRange) -> String {
+    let RingRange {
+        smallest,
+        largest,
+        default,
+        ..
+    } = range;
+    let sizes = match smallest == largest {
+        true => smallest.to_string(),
+        false => format!("{smallest}..{largest}"),
+    };
+    match default == smallest {
+        true => sizes,
+        false => format!("{sizes} default {default}"),
+    }
+}
+
+fn setup(what: &SetupKind) -> String {
+    match what {
+        SetupKind::Memory(place, value) => {
+            format!("memory {} = {}", cell::place(place), cell::value(value))
+        }
+        SetupKind::Eeprom(place, value) => {
+            format!("eeprom {} = {}", cell::place(place), cell::value(value))
+        }
+        SetupKind::Model(model) => format!("model {}", named(&Model::NAMES, *model)),
+        SetupKind::Type(device) => format!("type {}", named(&DEVICES, *device)),
+        SetupKind::Influence(own) => influence(own),
+        SetupKind::Word(name, word) => format!("property {} = {}", name.value, word.value),
+        SetupKind::Time(name, time) => format!("property {} = {time}", name.value),
+        SetupKind::Deviates(deviation) => format!("deviates {}", deviation.name),
+    }
+}
+
+/// What happens to drives from outside the bus: `drive 3 power off`.
+pub(crate) fn influence_on(whom: &Drives, what: &Influence) -> String {
+    format!("drive {} {}", drives(whom), influence(what))
+}
+
+/// `input GPIN3 GPIN5 high`, `power off`
+fn influence(influence: &Influence) -> String {
+    let on = |on: bool| if on { "on" } else { "off" };
+    let stimuli = match influence {
+        Influence::Power(state) => return format!("power {}", on(*state)),
+        Influence::Stimuli(stimuli) => stimuli,
+    };
+    let inputs: Vec<_> = stimuli
+        .iter()
+        .filter_map(|stimulus| match stimulus {
+            Stimulus::Input(input, level) => Some((input.name(), *level)),
+            _ => None,
+        })
+        .collect();
+    if let Some((_, high)) = inputs.first() {
+        let names: Vec<_> = inputs.iter().map(|(name, _)| *name).collect();
+        let level = if *high { "high" } else { "low" };
+        return format!("input {} {level}", names.join(" "));
+    }
+    stimuli.first().map_or_else(String::new, stimulus)
+}
+
+fn stimulus(stimulus: &Stimulus) -> String {
+    let on = |on: bool| if on { "on" } else { "off" };
+    match *stimulus {
+        Stimulus::Input(input, high) => {
+            format!(
+                "input {} {}",
+                input.name(),
+                if high { "high" } else { "low" }
+            )
+        }
+        Stimulus::Cam(input, from, to) => {
+            format!("cam {} {}..{}", input.name(), turns(from), turns(to))
+        }
+        Stimulus::Analogue(millivolts) => format!("analogue {millivolts}mV"),
+        Stimulus::Frequency(hertz) => format!("frequency {hertz}Hz"),
+        Stimulus::Cooler(tenths) => {
+            let sign = if tenths < 0 { "-" } else { "" };
+            let tenths = tenths.unsigned_abs();
+            format!("cooler {sign}{}.{}C", tenths / 10, tenths % 10)
+        }
+        Stimulus::MotorSensor(ohms) => format!("motor-sensor {ohms}ohm"),
+        Stimulus::Rail(volts) => format!("rail {volts}V"),
+        Stimulus::Load(milliamperes) => format!("load {milliamperes}mAeff"),
+        Stimulus::Resolver(plugged) => format!("resolver {}", on(plugged)),
+        Stimulus::Jammed(held) => format!("rotor {}", if held { "jammed" } else { "free" }),
+        Stimulus::Short(short) => format!("phases {}", if short { "shorted" } else { "sound" }),
+        // A step gives it as a fault; no line of this kind does.
+        Stimulus::Error(error) => format!("error {:04X}", error.code()),
+    }
+}
+
+/// A position in increments as turns.
+fn turns(increments: i64) -> String {
+    let per_turn = i64::from(INCREMENTS_PER_TURN);
+    let unit = 10_i64.pow(6);
+    let parts = (increments * unit * 2 + per_turn).div_euclid(per_turn * 2);
+    let sign = if parts < 0 { "-" } else { "" };
+    let parts = parts.unsigned_abs();
+    let unit = unit.unsigned_abs();
+    format!(
+        "{sign}{}.{:0width$}turns",
+        parts / unit,
+        parts % unit,
+        width = TURN_DECIMALS
+    )
+}

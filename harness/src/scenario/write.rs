@@ -1,0 +1,135 @@
+//! Writes scenarios: `parse` reads back what was written as the same scenario.
+//!
+//! Everything that makes a scenario, from a fuzzing run to a capture, makes the values of [`syntax`](super::syntax) and leaves the text to
+//! this file and to the buses' `write`.
+
+use super::syntax::{Action, Bus, Scenario, Step, When};
+use crate::buses::novobus::language::write as bus;
+use std::fmt::Write as _;
+
+/// The column at which a comment behind a step begins, if the step is not longer.
+const COMMENT_AT: usize = 32;
+
+/// The longest line of a remark, in characters.
+const MOST_REMARK: usize = 100;
+
+/// A scenario as text.
+#[must_use]
+pub fn write(scenario: &Scenario) -> String {
+    let mut text = Text::default();
+    text.header(scenario);
+    text.empty_line();
+    for step in &scenario.steps {
+        text.step(step, "");
+    }
+    text.into()
+}
+
+/// The text of a scenario, line by line.
+#[derive(Clone, Debug, Default)]
+pub struct Text {
+    lines: String,
+}
+
+impl From<Text> for String {
+    fn from(text: Text) -> Self {
+        text.lines
+    }
+}
+
+impl Text {
+    /// Writes the header of a scenario.
+    pub fn header(&mut self, scenario: &Scenario) {
+        if !scenario.title.is_empty() {
+            self.word("title", &scenario.title);
+        }
+        for source in &scenario.sources {
+            self.word("source", &source.text);
+        }
+        if scenario.bus != Bus::DEFAULT {
+            self.word("bus", scenario.bus.name());
+        }
+        for (word, value) in bus::header(&scenario.header) {
+            self.word(word, &value);
+        }
+        if scenario.strict {
+            self.line("strict");
+        }
+        if let Some(deadline) = scenario.deadline {
+            self.word("deadline", &deadline.to_string());
+        }
+        if !scenario.needs.is_empty() {
+            let needs: Vec<_> = scenario.needs.iter().map(|need| need.name()).collect();
+            self.word("needs", &needs.join(", "));
+        }
+        for line in bus::devices(&scenario.header) {
+            self.line(&line);
+        }
+    }
+
+    /// Writes a step, with a comment behind it if that is not empty.
+    pub fn step(&mut self, step: &Step, comment: &str) {
+        let step = written(step);
+        // Writing to a String cannot fail.
+        let _infallible = match comment {
+            "" => writeln!(self.lines, "{step}"),
+            _ => writeln!(self.lines, "{step:<COMMENT_AT$} # {comment}"),
+        };
+    }
+
+    /// Writes a remark, on as many lines as it needs.
+    pub fn remark(&mut self, remark: &str) {
+        let mut line = String::new();
+        for word in remark.split_whitespace() {
+            if !line.is_empty() && line.len() + word.len() >= MOST_REMARK {
+                self.line(&format!("# {line}"));
+                line.clear();
+            }
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+        self.line(&format!("# {line}"));
+    }
+
+    /// Writes an empty line.
+    pub fn empty_line(&mut self) {
+        self.line("");
+    }
+
+    fn word(&mut self, word: &str, value: &str) {
+        self.line(&format!("{word:<7} {value}"));
+    }
+
+    fn line(&mut self, line: &str) {
+        self.lines.push_str(line);
+        self.lines.push('\n');
+    }
+}
+
+/// A step as text.
+fn written(step: &Step) -> String {
+    let when = match step.when {
+        When::Now => String::new(),
+        When::After(window) => format!("+{window} "),
+        When::At(window) => format!("@{window} "),
+    };
+    let side = |ring: usize| if ring == 0 { "" } else { "2" };
+    let action = match &step.action {
+        Action::Send { ring, bytes } => format!("{}> {bytes}", side(*ring)),
+        Action::Receive { ring, bytes } => format!("{}< {bytes}", side(*ring)),
+        Action::Fault(fault) => format!("! {}", bus::fault(fault)),
+        Action::Check(check) => format!("? {}", bus::check(check)),
+        Action::Until(check, within) => {
+            format!("until {} within {within}", bus::drive_check(check))
+        }
+        Action::Wait(time) => format!("wait {time}"),
+        Action::Influence(drives, influence) => bus::influence_on(drives, influence),
+        Action::Record(recording) => bus::record(recording),
+        Action::Job(job) => bus::job(job),
+        Action::For(counter, from, to) => format!("for {counter} in {from}..{to}"),
+        Action::End => "end".to_owned(),
+    };
+    when + &action
+}
