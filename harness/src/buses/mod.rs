@@ -2,6 +2,7 @@
 
 pub mod novobus;
 
+pub(crate) use novobus::language::write;
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
 
 /// What happens to a drive from outside the bus, by the bus that it is on.

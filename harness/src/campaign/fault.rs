@@ -2,6 +2,8 @@
 
 use crate::file::values::{Time, Wire};
 use crate::link::{LinkFault, link_name};
+use crate::scenario::syntax::LinkFaultKind;
+use crate::scenario::times;
 use harness_proto::time::Span;
 use harness_sim::fault::Flips;
 use std::fmt;
@@ -143,17 +145,19 @@ impl What {
         }
     }
 
-    /// The same in the words of the scenario language, with the distance in bytes of each line.
+    /// The same as a scenario has it, with the distance in bytes of each line.
     #[must_use]
-    pub fn lines(self) -> Vec<(u64, String)> {
-        // The language knows microseconds, and a time as people write it.
-        let micros = |time: Time| format!("{}us", time.0.as_micros());
+    pub fn lines(self) -> Vec<(u64, LinkFaultKind)> {
+        let micros = |time: Time| {
+            let micros = time.0.as_micros();
+            times::Duration::micros(u64::try_from(micros).unwrap_or(u64::MAX))
+        };
         match self {
-            Self::Delay(time) => vec![(0, format!("delay {}", micros(time)))],
-            Self::Break(time) => vec![(0, format!("break {}", micros(time)))],
+            Self::Delay(time) => vec![(0, LinkFaultKind::Delay(micros(time)))],
+            Self::Break(time) => vec![(0, LinkFaultKind::Break(micros(time)))],
             _ => {
                 let faults = self.on_link().into_iter();
-                faults.map(|(at, fault)| (at, fault.to_string())).collect()
+                faults.map(|(at, fault)| (at, fault.into())).collect()
             }
         }
     }

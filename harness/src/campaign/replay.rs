@@ -3,10 +3,16 @@
 use super::fault::Case;
 use super::run::{Campaign, Contradiction};
 use crate::link::link_name;
-use std::fmt::Write as _;
+use crate::scenario::pattern::{Expected, Pattern};
+use crate::scenario::syntax::{Action, Fault, Header, Job, LinkEnds, Scenario};
+use crate::scenario::write::Text;
+use harness_proto::line::Rate;
 
-/// Bytes in a line.
-const BYTES: usize = 24;
+/// Maximum number of bytes, and of runs of equal ones, on a line.
+const ITEMS_A_LINE: usize = 24;
+
+/// The shortest run of equal bytes that is written as one.
+const RUN: usize = 3;
 
 /// The scenario that replays a case: the header of the campaign's scenario, the faults, and the bytes that the master sent in
 /// this case; or, if the driver plays, its calls.
@@ -17,80 +23,46 @@ pub fn scenario(campaign: &Campaign, case: &Case) -> Result<String, Contradictio
     let (outcome, said) = campaign.play(case)?;
     let drives = campaign.shape.drives;
     let entry = &campaign.entry;
-    let slice = |start: usize, end: usize| entry.source.text.get(start..end).unwrap_or_default();
-    // Writing to a String cannot fail.
-    let mut text = format!("title   {} of {}\n", case.name(drives), entry.short_name());
-    for source in &entry.scenario.sources {
-        let _infallible = writeln!(text, "source  {}", source.text);
-    }
-    let _infallible = writeln!(text, "ring    {drives}");
-    let _infallible = writeln!(
-        text,
-        "line    {}",
-        entry
-            .scenario
-            .header
-            .rate
-            .unwrap_or_default()
-            .bits_per_second()
-    );
-    for setup in &entry.scenario.header.setups {
-        let _infallible = writeln!(text, "{}", slice(setup.span.start, setup.span.end).trim());
-    }
-    let _infallible = write!(text, "\n# {}: {}", outcome.class, outcome.class.about());
+    let title = format!("{} of {}", case.name(drives), entry.short_name());
+    let header = Header {
+        rate: entry.scenario.header.rate.or_else(|| Some(Rate::default())),
+        ..entry.scenario.header.and(&Header::of_rings(&[drives]))
+    };
+    let mut text = Text::default();
+    text.header(&Scenario {
+        sources: entry.scenario.sources.clone(),
+        ..Scenario::new(&title, header)
+    });
+    text.empty_line();
+    let mut about = format!("{}: {}", outcome.class, outcome.class.about());
     if let Some(link) = outcome.evidence.named {
-        let _infallible = write!(text, "; named was {}", link_name(0, drives, link));
+        about += &format!("; named was {}", link_name(0, drives, link));
     }
-    text.push('\n');
+    text.remark(&about);
     for wrong in &outcome.evidence.wrong {
-        let _infallible = writeln!(text, "# {wrong}");
+        text.remark(&wrong.to_string());
     }
     for fault in case.faults() {
         for (distance, what) in fault.what.lines() {
-            let link = link_name(0, drives, fault.link);
-            let _infallible = writeln!(text, "! {link} byte {}: {what}", fault.byte + distance);
+            let ends = LinkEnds::of_place(drives, fault.link);
+            let fault = Fault::on_link(0, ends, what, fault.byte + distance);
+            text.step(&Action::Fault(fault).into(), "");
         }
     }
     if campaign.by_driver() {
         for step in &entry.scenario.steps {
-            let line = slice(step.span.start, step.span.end).trim();
-            if line.starts_with("master") {
-                let _infallible = writeln!(text, "{line}");
+            if let Action::Job(Job::Master { .. } | Job::Count(..)) = step.action {
+                text.step(step, "");
             }
         }
     }
     for said in said {
-        let _infallible = writeln!(text, "\n# {}", said.why);
-        for line in said
-            .bytes
-            .chunk_by(|a, b| a == b)
-            .collect::<Runs<'_>>()
-            .lines()
-        {
-            let _infallible = writeln!(text, "> {line}");
+        text.empty_line();
+        text.remark(said.why);
+        let bytes: Vec<_> = said.bytes.iter().copied().map(Expected::Byte).collect();
+        for bytes in Pattern::of(&bytes, RUN).lines(ITEMS_A_LINE) {
+            text.step(&Action::Send { ring: 0, bytes }.into(), "");
         }
     }
-    Ok(text)
-}
-
-/// Runs of equal bytes, for lines such as `88 FB 80*12`.
-struct Runs<'a>(Vec<&'a [u8]>);
-
-impl<'a> FromIterator<&'a [u8]> for Runs<'a> {
-    fn from_iter<I: IntoIterator<Item = &'a [u8]>>(runs: I) -> Self {
-        Self(runs.into_iter().collect())
-    }
-}
-
-impl Runs<'_> {
-    fn lines(self) -> Vec<String> {
-        let mut words = Vec::new();
-        for run in self.0 {
-            match run {
-                [byte, _, _, ..] => words.push(format!("{byte:02X}*{}", run.len())),
-                few => words.extend(few.iter().map(|byte| format!("{byte:02X}"))),
-            }
-        }
-        words.chunks(BYTES).map(|line| line.join(" ")).collect()
-    }
+    Ok(text.into())
 }

@@ -1,6 +1,7 @@
 //! What was damaged on a link, in the words of the scenario language.
 
-use crate::report::pcapng::name;
+use crate::scenario::syntax::{Fault, LinkEnds};
+use crate::scenario::times::Duration;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
@@ -10,12 +11,14 @@ use harness_sim::record::LinkTrace;
 /// A run of lost bytes longer than this is a cut cable.
 const CUT: usize = 8;
 
-/// The faults of a link, a line each. Bytes do not always show what a cable did: a break is assumed to last as long as bytes were
+/// The faults of a link. Bytes do not always show what a cable did: a break is assumed to last as long as bytes were
 /// lost behind it, and many lost bytes are taken for a cut. A delay is not seen.
-pub(crate) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
-    let name = name(ring, link);
+pub(crate) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<Fault> {
     let bytes = &link.bytes;
-    let mut lines = Vec::new();
+    let ends = || LinkEnds::between(link.from, link.to);
+    let at_byte =
+        |number: u64, fault: LinkFault| Fault::on_link(ring, ends(), fault.into(), number);
+    let mut faults = Vec::new();
     let mut number = 0_u64;
     let mut place = 0;
     while let Some(byte) = bytes.get(place) {
@@ -24,50 +27,54 @@ pub(crate) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<String> {
             .iter()
             .take_while(|next| next.received.is_none() && next.sent.is_some())
             .count();
-        let own = |fault: LinkFault| format!("! {name} byte {number}: {}", words(fault));
+        let own = |fault: LinkFault| at_byte(number, fault);
         match (byte.sent, byte.received) {
             (None, Some(_)) if byte.error == Some(LineError::Break) => {
                 let start = byte.at - rate.byte_time();
                 let span = break_span(byte, bytes.get(place + lost), rate);
-                let at = start.since_start().as_nanos();
-                lines.push(format!("! {name} @{at}ns: break {}ns", span.as_nanos()));
+                let at = Duration::nanos(start.since_start().as_nanos());
+                faults.push(Fault {
+                    byte: None,
+                    at: Some(at),
+                    ..own(LinkFault::Break(span))
+                });
                 number += lost as u64;
                 place += lost;
             }
             (None, Some(received)) => {
                 let before = place.checked_sub(1).and_then(|place| bytes.get(place));
-                lines.push(if doubled(before, byte, rate) {
+                faults.push(if doubled(before, byte, rate) {
                     own(LinkFault::Duplicate)
                 } else {
-                    format!("! {name} byte {}: insert {received:02X}", number + 1)
+                    at_byte(number + 1, LinkFault::Insert(received))
                 });
             }
             (Some(_), Some(_)) if byte.error == Some(LineError::Break) => {
                 let span = break_span(byte, bytes.get(place + lost), rate);
-                lines.push(own(LinkFault::Break(span)));
+                faults.push(own(LinkFault::Break(span)));
                 number += lost as u64;
                 place += lost;
             }
             (Some(_), None) => {
                 if lost + 1 >= CUT {
-                    lines.push(own(LinkFault::Cut));
+                    faults.push(own(LinkFault::Cut));
                     number += lost as u64;
                     place += lost;
                     if place + 1 < bytes.len() {
-                        lines.push(format!("! {name} byte {}: join", number + 1));
+                        faults.push(at_byte(number + 1, LinkFault::Join));
                     }
                 } else {
-                    lines.push(own(LinkFault::Drop));
+                    faults.push(own(LinkFault::Drop));
                 }
             }
             (Some(sent), Some(received)) => {
-                lines.extend(damage(sent, received, byte.error).map(own));
+                faults.extend(damage(sent, received, byte.error).map(own));
             }
             (None, None) => {}
         }
         place += 1;
     }
-    lines
+    faults
 }
 
 /// Whether a byte that was not sent repeats the byte before it.
@@ -111,12 +118,4 @@ fn break_span(byte: &LineByte, last: Option<&LineByte>, rate: Rate) -> Span {
         .map_or(byte.at, |last| last.at);
     let half = rate.bit_time() * 5;
     until.since(start).saturating_sub(half)
-}
-
-/// As a scenario writes it: times in nanoseconds, not in rounded milliseconds.
-fn words(fault: LinkFault) -> String {
-    match fault {
-        LinkFault::Break(span) => format!("break {}ns", span.as_nanos()),
-        other => other.to_string(),
-    }
 }

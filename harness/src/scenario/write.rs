@@ -4,7 +4,7 @@
 //! this file and to the buses' `write`.
 
 use super::syntax::{Action, Bus, Scenario, Step, When};
-use crate::buses::novobus::language::write as bus;
+use crate::buses::write as bus;
 use std::fmt::Write as _;
 
 /// The column at which a comment behind a step begins, if the step is not longer.

@@ -11,7 +11,7 @@ use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::Span;
 use crate::scenario::times::{Duration, Window};
 use harness_proto::nd21::errors::ErrorCode;
-use harness_sim::fault::{DriveFault, Flips};
+use harness_sim::fault::{DriveFault, Flips, LinkFault};
 
 /// A scenario: what it is, the ring it needs, and its steps.
 #[derive(Clone, Debug)]
@@ -32,6 +32,23 @@ pub struct Scenario {
     pub deadline: Option<Duration>,
     /// The steps, in order.
     pub steps: Vec<Step>,
+}
+
+impl Scenario {
+    /// A scenario without steps.
+    #[must_use]
+    pub fn new(title: &str, header: Header) -> Self {
+        Self {
+            title: title.to_owned(),
+            sources: Vec::new(),
+            bus: Bus::DEFAULT,
+            header,
+            needs: Vec::new(),
+            strict: false,
+            deadline: None,
+            steps: Vec::new(),
+        }
+    }
 }
 
 /// A reference to a manual: `nd21 9.7`, `nd21 8.2 exchange-6`.
@@ -74,6 +91,17 @@ pub struct Step {
     pub action: Action,
     /// Where it stands.
     pub span: Span,
+}
+
+impl From<Action> for Step {
+    /// A step without a time in front.
+    fn from(action: Action) -> Self {
+        Self {
+            when: When::Now,
+            action,
+            span: Span::default(),
+        }
+    }
 }
 
 /// A time in front of a step.
@@ -137,6 +165,19 @@ pub struct Fault {
     pub at: Option<Duration>,
 }
 
+impl Fault {
+    /// A fault on a link of a ring, counted from 0, at a byte, counted from 1.
+    #[must_use]
+    pub fn on_link(ring: usize, ends: LinkEnds, kind: LinkFaultKind, byte: u64) -> Self {
+        Self {
+            ring,
+            what: FaultKind::Link(Located::number(0), ends, kind),
+            byte: Some(Located::number(byte.cast_signed())),
+            at: None,
+        }
+    }
+}
+
 /// Where a fault happens, and what.
 #[derive(Clone, Debug)]
 pub enum FaultKind {
@@ -155,6 +196,26 @@ pub struct LinkEnds {
     pub from: Option<Located>,
     /// The receiver; `None` for the master.
     pub to: Option<Located>,
+}
+
+impl LinkEnds {
+    /// The ends of the link that goes from one drive to another; `None` is the master.
+    #[must_use]
+    pub fn between(from: Option<u8>, to: Option<u8>) -> Self {
+        let end = |drive: u8| Located::number(drive.into());
+        Self {
+            from: from.map(end),
+            to: to.map(end),
+        }
+    }
+
+    /// The ends of a link of a ring of `drives`, by its place: 0 for the link that begins at the master.
+    #[must_use]
+    pub fn of_place(drives: u8, place: usize) -> Self {
+        let behind = |place: usize| u8::try_from(usize::from(drives).checked_sub(place)?).ok();
+        let from = behind(place).filter(|_| place > 0);
+        Self::between(from, behind(place + 1))
+    }
 }
 
 /// What happens on a link.
@@ -180,4 +241,22 @@ pub enum LinkFaultKind {
     Cut,
     /// `join`
     Join,
+}
+
+impl From<LinkFault> for LinkFaultKind {
+    /// The same fault; times to the nanosecond.
+    fn from(fault: LinkFault) -> Self {
+        match fault {
+            LinkFault::Flip(flips) => Self::Flip(flips),
+            LinkFault::Replace(byte) => Self::Replace(byte),
+            LinkFault::Drop => Self::Drop,
+            LinkFault::Duplicate => Self::Duplicate,
+            LinkFault::Insert(byte) => Self::Insert(byte),
+            LinkFault::Delay(time) => Self::Delay(Duration::nanos(time.as_nanos())),
+            LinkFault::Break(time) => Self::Break(Duration::nanos(time.as_nanos())),
+            LinkFault::Overrun => Self::Overrun,
+            LinkFault::Cut => Self::Cut,
+            LinkFault::Join => Self::Join,
+        }
+    }
 }

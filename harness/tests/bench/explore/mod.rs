@@ -12,6 +12,7 @@ use harness::explore::{
     About, Bounds, Campaign, Difference, End, ExploreError, Finding, OnSim, Planted, Pool,
     Progress, Rehearsal, RingScope, Scope, Setup, Spice, Swarm, Target, Tried, Watcher,
 };
+use harness::scenario::syntax::Header;
 use harness_proto::novobus::guard::Limits;
 
 /// The seed of every random test: `DRIVEBENCH_SEED`, or always the same.
@@ -48,7 +49,7 @@ fn scope_of(drives: u8, second: Option<u8>) -> Scope {
 
 fn planted(drive: u8, name: &str) -> Setup {
     Setup {
-        header: Vec::new(),
+        header: Header::default(),
         deviates: vec![Planted {
             ring: 0,
             drive,

@@ -10,12 +10,13 @@ use harness::explore::{
     by_novelty, play,
 };
 use harness::link::Line as _;
+use harness::scenario::syntax::Header;
 use harness_proto::time::Span;
 use std::path::Path;
 
 fn planted(ring: usize, drive: u8, name: &str) -> Setup {
     Setup {
-        header: Vec::new(),
+        header: Header::default(),
         deviates: vec![Planted {
             ring,
             drive,
@@ -76,7 +77,7 @@ fn a_deviating_drive_of_either_ring() {
         let small = shrink(subject, finding.difference.clone(), 300, &mut ask).expect("rings");
         assert_eq!(small.subject.case.sizes(), [1]);
         assert_eq!(
-            small.subject.setup.lines_with_deviations(),
+            small.subject.setup.with_deviations().lines(),
             ["drive 0 deviates writes-ignored"]
         );
     }

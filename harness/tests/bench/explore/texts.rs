@@ -35,7 +35,7 @@ fn cases_with(scope: &Scope, ring: usize, count: u64) -> Vec<Case> {
 fn scenario(case: &Case, setup: &Setup, seen: &Seen) -> String {
     let page = Page {
         title: "a case",
-        header: &setup.header,
+        header: Some(&setup.header),
         expected: Some(Expected {
             seen,
             any: &[],

@@ -7,9 +7,9 @@ use harness::explore::{Campaign, Finding, OnSim, Planted, Setup, Spice};
 
 /// A run on three whole drives; nothing knows of the deviation that is hidden in one of them.
 fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, u64) {
-    let header = ["model nd21", "input GPIN3 GPIN5 high"];
+    let lines = r#"["drive 0..last model nd21", "drive 0..last input GPIN3 GPIN5 high"]"#;
     let sound = Setup {
-        header: header.map(|what| format!("drive 0..last {what}")).to_vec(),
+        header: serde_json::from_str(lines).expect("a header"),
         deviates: Vec::new(),
     };
     let setup = match hidden {

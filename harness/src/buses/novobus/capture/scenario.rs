@@ -4,14 +4,19 @@ use super::stimuli::{Told, told};
 use crate::capture::Capture;
 use crate::capture::faults::faults;
 use crate::scenario::parse::parse;
+use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
+use crate::scenario::syntax::{
+    Action, CellPlace, Drives, Header, Scenario, Setup, SetupKind, Step, When, Written,
+};
+use crate::scenario::times::Duration;
+use crate::scenario::write::Text;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use harness_sim::record::{LinkTrace, Trace};
-use std::fmt::Write as _;
 
 /// Bytes on a line of a scenario, where it is not a long one.
 const A_LINE: usize = 16;
@@ -75,20 +80,27 @@ pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, Sket
         .map(|r| r.first.bytes.len() + r.received.len())
         .sum();
     let width = (bytes * 2 / LINES).clamp(A_LINE, MOST_A_LINE);
-    let mut lines = head(capture, options, &rings)?;
+    let mut text = Text::default();
+    text.header(&head(capture, options, &rings)?);
+    text.empty_line();
     for (index, trace) in capture.traces.iter().enumerate() {
         for link in &trace.links {
-            lines.extend(faults(index, link, capture.rate));
+            for fault in faults(index, link, capture.rate) {
+                text.step(&Action::Fault(fault).into(), "");
+            }
         }
     }
-    lines.extend(sends(&rings, capture.rate, options.tolerance, width));
+    for step in sends(&rings, capture.rate, options.tolerance, width) {
+        text.step(&step, "");
+    }
     for (index, ring) in rings.iter().enumerate() {
-        lines.extend(receives(index, ring, width));
+        receives(&mut text, index, ring, width);
     }
-    if lines.len() > LINES {
-        return Err(SketchError::TooLong(lines.len()));
+    let text = String::from(text);
+    match text.lines().count() {
+        lines if lines > LINES => Err(SketchError::TooLong(lines)),
+        _ => Ok(text),
     }
-    Ok(lines.join("\n") + "\n")
 }
 
 /// What matters of a ring.
@@ -125,55 +137,48 @@ fn head(
     capture: &Capture,
     options: &Options<'_>,
     rings: &[Ring<'_>],
-) -> Result<Vec<String>, SketchError> {
-    let mut lines = vec![
-        format!("title   {}", title(options.title)),
-        format!(
-            "ring    {}",
-            rings
-                .iter()
-                .map(|ring| ring.size.drives().to_string())
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
-    ];
-    if capture.rate != Rate::default() {
-        lines.push(format!("line    {}", capture.rate.bits_per_second()));
-    }
+) -> Result<Scenario, SketchError> {
+    let sizes: Vec<_> = rings.iter().map(|ring| ring.size.drives()).collect();
+    // A setup also defines the contents of the cells.
+    let setups = match options.setup {
+        Some(setup) => parse(setup).map_err(Box::new)?.header.setups,
+        None => cells(rings),
+    };
+    let header = Header {
+        rate: Some(capture.rate).filter(|rate| *rate != Rate::default()),
+        setups,
+        ..Header::of_rings(&sizes)
+    };
     // Whatever the gaps are, the byte behind them is waited for.
     let millis = capture.end().since_start().as_nanos() / 1_000_000 + 1_000;
-    lines.push(format!("deadline {}ms", millis.min(600_000)));
-    match options.setup {
-        // A setup also defines the contents of the cells.
-        Some(setup) => lines.extend(setup_lines(setup)?),
-        None => lines.extend(cells(rings)),
-    }
-    lines.push(String::new());
-    Ok(lines)
+    Ok(Scenario {
+        deadline: Some(Duration::millis(millis.min(600_000))),
+        ..Scenario::new(&title(options.title), header)
+    })
 }
 
 /// What cells held before, as far as the drives said it.
-fn cells(rings: &[Ring<'_>]) -> Vec<String> {
-    let mut lines = Vec::new();
+fn cells(rings: &[Ring<'_>]) -> Vec<Setup> {
+    let mut setups = Vec::new();
     for (index, ring) in rings.iter().enumerate() {
-        let prefix = if index == 0 { "" } else { "2:" };
         let mut cells = ring.told.cells.iter().peekable();
         while let Some(((drive, address), value)) = cells.next() {
-            let mut bytes = format!("{value:02X}");
+            let mut bytes = vec![Expected::Byte(*value)];
             let mut next = address.checked_add(1);
             while let Some(((_, _), value)) =
                 cells.next_if(|((d, a), _)| d == drive && Some(*a) == next)
             {
-                // Writing to a String cannot fail.
-                let _infallible = write!(bytes, " {value:02X}");
+                bytes.push(Expected::Byte(*value));
                 next = next.and_then(|next| next.checked_add(1));
             }
-            lines.push(format!(
-                "drive {prefix}{drive} memory {address:04X} = {bytes}"
+            let value = Written::Bytes(Pattern::of(&bytes, usize::MAX));
+            setups.push(Setup::new(
+                Drives::one(index, *drive),
+                SetupKind::Memory(CellPlace::at(*address), value),
             ));
         }
     }
-    lines
+    setups
 }
 
 /// One line without what a scenario takes for a comment.
@@ -188,20 +193,8 @@ fn title(text: &str) -> String {
     }
 }
 
-/// The lines of a header that describe the drives.
-fn setup_lines(setup: &Source) -> Result<Vec<String>, SketchError> {
-    let scenario = parse(setup).map_err(Box::new)?;
-    let steps = scenario.steps.first().map(|step| step.span.start);
-    let header = setup.text.get(..steps.unwrap_or(setup.text.len()));
-    let own = header.unwrap_or_default().lines().filter(|line| {
-        let word = line.split_whitespace().next();
-        word == Some("drive")
-    });
-    Ok(own.map(str::to_owned).collect())
-}
-
 /// What the master sent, each run of bytes at its time.
-fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<String> {
+fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<Step> {
     // Times are cut off to nanoseconds.
     let gap = tolerance.units().max(6);
     let byte_time = rate.byte_time();
@@ -220,51 +213,46 @@ fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<S
         }
     }
     runs.sort_by_key(|(at, ..)| *at);
-    let mut lines = Vec::new();
+    let mut steps = Vec::new();
     for (at, ring, run) in runs {
-        let arrow = if ring == 0 { ">" } else { "2>" };
         // To the nearest nanosecond.
         let at = at + Span::from_units(1);
         let mut when = match at.since_start().as_nanos() {
-            0 => String::new(),
-            nanos => format!("@{nanos}ns "),
+            0 => When::Now,
+            nanos => When::At(Duration::nanos(nanos).into()),
         };
-        for bytes in run.chunks(width) {
-            lines.push(format!("{when}{arrow} {}", hex(bytes)));
-            when.clear();
+        let run: Vec<_> = run.into_iter().map(Expected::Byte).collect();
+        for bytes in Pattern::of(&run, usize::MAX).lines(width) {
+            let step = Step::from(Action::Send { ring, bytes });
+            steps.push(Step { when, ..step });
+            when = When::Now;
         }
     }
-    lines
+    steps
 }
 
-fn hex(bytes: &[u8]) -> String {
-    let digits: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-    digits.join(" ")
-}
-
-/// What came back, up to the first byte that the master received with a line error: no line can ask for one.
-fn receives(index: usize, ring: &Ring<'_>, width: usize) -> Vec<String> {
-    let arrow = if index == 0 { "<" } else { "2<" };
+/// Writes what came back, up to the first byte that the master received with a line error: no line can ask for one.
+fn receives(text: &mut Text, index: usize, ring: &Ring<'_>, width: usize) {
     let good = ring.received.iter().position(|byte| byte.error.is_some());
     let end = good.unwrap_or(ring.received.len());
-    let mut lines = Vec::new();
-    for (chunk, bytes) in ring.received[..end].chunks(width).enumerate() {
-        let shown = bytes.iter().enumerate().map(|(place, byte)| {
-            match ring.told.unforeseen.contains(&(chunk * width + place)) {
-                true => "xx".to_owned(),
-                false => format!("{:02X}", byte.byte),
-            }
-        });
-        let shown: Vec<_> = shown.collect();
-        lines.push(format!("{arrow} {}", shown.join(" ")));
+    let shown = ring.received[..end].iter().enumerate();
+    let shown: Vec<_> = shown
+        .map(
+            |(place, byte)| match ring.told.unforeseen.contains(&place) {
+                true => Expected::Any,
+                false => Expected::Byte(byte.byte),
+            },
+        )
+        .collect();
+    for bytes in Pattern::of(&shown, usize::MAX).lines(width) {
+        text.step(&Action::Receive { ring: index, bytes }.into(), "");
     }
     if end < ring.received.len() {
-        lines.push(format!(
-            "# byte {} arrived with a line error; what follows is not asked for",
+        text.remark(&format!(
+            "byte {} arrived with a line error; what follows is not asked for",
             end + 1
         ));
     }
-    lines
 }
 
 /// Bytes received, counted from 0, that cannot be foretold, ring by ring.

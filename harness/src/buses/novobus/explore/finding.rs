@@ -9,6 +9,7 @@ use crate::explore::Seen;
 use crate::explore::Setup;
 use crate::explore::files::{read_text, write_whole};
 use crate::manual::tables;
+use crate::scenario::syntax::Header;
 use harness_proto::novobus::address::RingSize;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -102,6 +103,16 @@ impl Finding {
     /// # Errors
     /// The model cannot be made.
     pub fn scenario(&self, title: &str, sources: &[String]) -> Result<String, ExploreError> {
+        self.scenario_on(&self.setup.header, title, sources)
+    }
+
+    /// The same for rings with another header.
+    pub(crate) fn scenario_on(
+        &self,
+        header: &Header,
+        title: &str,
+        sources: &[String],
+    ) -> Result<String, ExploreError> {
         let seen = self.setup.model_answers(&self.case)?;
         let any = match self.ports {
             true => unknowable(&self.case, &seen),
@@ -115,7 +126,7 @@ impl Finding {
         let page = Page {
             title,
             sources,
-            header: &self.setup.header,
+            header: Some(header),
             remarks: &remarks,
             expected: Some(Expected {
                 seen: &seen,

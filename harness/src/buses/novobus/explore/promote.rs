@@ -92,7 +92,7 @@ pub fn promote(finding: &Finding, naming: &Naming, top: &Path) -> Result<Promote
     };
     let text = finding.scenario(&title, &sources)?;
     let snapshot = snapshot(name, &text)?;
-    let fails_on_deviating = deviating_fails(finding, &text)?;
+    let fails_on_deviating = deviating_fails(finding)?;
     let input = input(&finding.case, &title);
     for (file, text) in files.iter().zip([&text, &input, &snapshot]) {
         if let Err(error) = write_whole(file, text) {
@@ -154,18 +154,16 @@ fn sources(finding: &Finding, naming: &Naming) -> Result<Vec<String>, ExploreErr
 }
 
 /// Whether the ring under test fails the scenario.
-fn deviating_fails(finding: &Finding, text: &str) -> Result<Option<bool>, ExploreError> {
+fn deviating_fails(finding: &Finding) -> Result<Option<bool>, ExploreError> {
     if finding.setup.deviates.is_empty() {
         return Ok(None);
     }
-    // The header ends with the first empty line.
-    let (head, steps) = text.split_once("\n\n").unwrap_or((text, ""));
-    let planted = finding.setup.deviates.iter();
-    let planted: String = planted.map(|own| format!("\n{}", own.line())).collect();
+    let header = finding.setup.with_deviations();
+    let text = finding.scenario_on(&header, "the ring under test", &[])?;
     let entry = Entry::new(
         Source {
             name: "the ring under test".to_owned(),
-            text: format!("{head}{planted}\n\n{steps}").into(),
+            text: text.into(),
         },
         None,
     )?;

@@ -2,19 +2,16 @@
 
 use super::case::Case;
 use super::play::{Seen, play};
-use super::text::{Page, head};
-use crate::library::Entry;
 use crate::link::SimulatedLink;
 use crate::rig::Rig;
+use crate::scenario::expression::{Located, Scope};
+use crate::scenario::plan::plan_header;
 use crate::scenario::problem::Problems;
 use crate::scenario::simulate;
-use crate::scenario::source::Source;
+use crate::scenario::syntax::{Drives, Header, Setup as HeaderLine, SetupKind};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::novobus::deviation;
 use serde::{Deserialize, Serialize};
-
-/// The lines that make every drive of a ring a whole ND21.
-const ALL_ND21: [&str; 2] = ["drive 0..last model nd21", "drive 2:0..last model nd21"];
 
 /// A deviation that is planted in a drive.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,15 +41,25 @@ impl Planted {
         let drive = drive_name(self.ring, self.drive);
         format!("drive {drive} deviates {}", self.name)
     }
+
+    /// The same as a header; `None` where there is no such deviation.
+    #[must_use]
+    pub fn setup(&self) -> Option<HeaderLine> {
+        let known = deviation::deviation(&self.name)?;
+        Some(HeaderLine::deviates(
+            Drives::one(self.ring, self.drive),
+            known,
+        ))
+    }
 }
 
 /// What simulated rings are made of.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Setup {
-    /// Lines of a header, without deviations.
+    /// The header of the rings, without deviations; a list of its lines in a file.
     #[serde(default)]
-    pub header: Vec<String>,
+    pub header: Header,
     /// What is planted in the ring under test, and not in its model.
     #[serde(default)]
     pub deviates: Vec<Planted>,
@@ -63,24 +70,23 @@ impl Setup {
     /// which the reference model knows too, unless a deviation needs a whole ND21 or `whole` asks for it.
     #[must_use]
     pub fn of_rig(rig: &Rig, more: &[Planted], whole: bool) -> Self {
-        let own = rig.file.sim.iter().flat_map(|sim| &sim.setup);
-        let (planted, mut header): (Vec<_>, Vec<_>) =
-            own.cloned().partition(|line| line.contains(" deviates "));
-        let mut deviates: Vec<_> = planted
+        let own = rig.header();
+        let mut header = own.only(|setup| planted_by(setup, rig).is_empty());
+        let mut deviates: Vec<_> = own
+            .setups
             .iter()
-            .flat_map(|line| planted_by(line, rig))
+            .flat_map(|setup| planted_by(setup, rig))
             .collect();
         deviates.extend_from_slice(more);
-        let says_model = header.iter().any(|line| line.contains(" model "));
         let behind = |planted: &Planted| {
             deviation::deviation(&planted.name).is_some_and(|known| known.behind_the_bus)
         };
         let nothing_said = rig.is_simulated() && rig.id().starts_with("sim-");
-        if !says_model {
+        if !header.names_a_model() {
             if nothing_said && !whole && !deviates.iter().any(behind) {
-                header.clear();
+                header = Header::default();
             } else {
-                header.splice(0..0, all_nd21(rig.rings().count()));
+                header = Header::whole(rig.rings().count()).and(&header);
             }
         }
         Self { header, deviates }
@@ -89,7 +95,7 @@ impl Setup {
     /// Adds a hidden deviation: the model has it as well.
     #[must_use]
     pub fn hides(mut self, planted: &Planted) -> Self {
-        self.header.push(planted.line());
+        self.header.setups.extend(planted.setup());
         self
     }
 
@@ -97,7 +103,7 @@ impl Setup {
     #[must_use]
     pub fn of_ports(rings: usize) -> Self {
         Self {
-            header: all_nd21(rings),
+            header: Header::whole(rings),
             deviates: Vec::new(),
         }
     }
@@ -105,14 +111,13 @@ impl Setup {
     /// The setup of one ring, as for a bench without another; the ring is counted from 0.
     #[must_use]
     pub fn of_ring(&self, ring: usize) -> Self {
-        let own = |line: &String| match (line.strip_prefix("drive 2:"), ring) {
-            (None, 0) => Some(line.clone()),
-            (Some(rest), 1) => Some(format!("drive {}", rest.trim_start())),
-            _ => None,
-        };
+        let mut header = self.header.only(|setup| setup.drives.ring == ring);
+        for setup in &mut header.setups {
+            setup.drives.ring = 0;
+        }
         let planted = self.deviates.iter().filter(|own| own.ring == ring);
         Self {
-            header: self.header.iter().filter_map(own).collect(),
+            header,
             deviates: planted
                 .map(|own| Planted {
                     ring: 0,
@@ -131,21 +136,20 @@ impl Setup {
     /// The first line that sets a bus property that the manual leaves open. The reference model, which judges if no deviation is planted,
     /// knows only the defaults.
     #[must_use]
-    pub fn sets_property(&self) -> Option<&str> {
-        let sets = |line: &&String| {
-            let (_, setting) = line.split_once(" property ")?;
-            let name = setting.split(['=', ' ']).find(|word| !word.is_empty())?;
-            PROPERTIES.iter().find(|known| known.name == name)
-        };
-        let line = self.header.iter().find(|line| sets(line).is_some());
-        line.map(String::as_str)
+    pub fn sets_property(&self) -> Option<String> {
+        let of_the_bus = |name: &str| PROPERTIES.iter().any(|known| known.name == name);
+        let mut setups = self.header.setups.iter();
+        let first = setups.find(|setup| setup.sets().is_some_and(of_the_bus));
+        first.map(ToString::to_string)
     }
 
-    /// The lines with the deviations.
+    /// The header with the deviations.
     #[must_use]
-    pub fn lines_with_deviations(&self) -> Vec<String> {
-        let planted = self.deviates.iter().map(Planted::line);
-        self.header.iter().cloned().chain(planted).collect()
+    pub fn with_deviations(&self) -> Header {
+        let mut header = self.header.clone();
+        let planted = self.deviates.iter().filter_map(Planted::setup);
+        header.setups.extend(planted);
+        header
     }
 
     /// The model: rings of these sizes without deviations.
@@ -161,7 +165,7 @@ impl Setup {
     /// # Errors
     /// The same.
     pub fn under_test(&self, sizes: &[u8]) -> Result<SimulatedLink, Box<Problems>> {
-        rings(sizes, &self.lines_with_deviations())
+        rings(sizes, &self.with_deviations())
     }
 
     /// What the model answers.
@@ -179,59 +183,30 @@ pub(crate) fn drive_name(ring: usize, drive: u8) -> String {
     format!("{prefix}{drive}")
 }
 
-fn all_nd21(rings: usize) -> Vec<String> {
-    let lines = ALL_ND21.iter().take(rings);
-    lines.map(|line| (*line).to_owned()).collect()
-}
-
-/// The deviations of a header line, drive by drive.
-fn planted_by(line: &str, rig: &Rig) -> Vec<Planted> {
-    let Some((whom, name)) = line.split_once(" deviates ") else {
+/// The deviations that a line of a header plants, drive by drive.
+fn planted_by(setup: &HeaderLine, rig: &Rig) -> Vec<Planted> {
+    let SetupKind::Deviates(deviation) = setup.what else {
         return Vec::new();
     };
-    let whom = whom.trim().trim_start_matches("drive").trim();
-    let (ring, whom) = match whom.strip_prefix("2:") {
-        Some(whom) => (1, whom),
-        None => (0, whom),
+    let Drives { ring, from, to } = &setup.drives;
+    let drives = rig.rings().nth(*ring).map_or(0, |(_, own)| own.drives);
+    let number = |end: &Located| {
+        let value = end.value(Scope::new(drives.into())).ok();
+        value.and_then(|value| u8::try_from(value).ok())
     };
-    let Some((_, own)) = rig.rings().nth(ring) else {
+    let (Some(from), Some(to)) = (number(from), number(to.as_ref().unwrap_or(from))) else {
         return Vec::new();
     };
-    let last = own.drives.saturating_sub(1);
-    let (from, to) = whom.split_once("..").unwrap_or((whom, whom));
-    let number = |text: &str| match text.trim() {
-        "last" | "N-1" => Some(last),
-        other => other.parse::<u8>().ok(),
-    };
-    let (Some(from), Some(to)) = (number(from), number(to)) else {
-        return Vec::new();
-    };
-    let name = name.split('#').next().unwrap_or_default().trim();
     let planted = |drive| Planted {
-        ring,
+        ring: *ring,
         drive,
-        name: name.to_owned(),
+        name: deviation.name.to_owned(),
     };
-    (from..=to.min(last)).map(planted).collect()
+    let drives = from.min(to)..=from.max(to).min(drives.saturating_sub(1));
+    drives.map(planted).collect()
 }
 
-fn rings(sizes: &[u8], header: &[String]) -> Result<SimulatedLink, Box<Problems>> {
-    let page = Page {
-        title: "rings",
-        header,
-        ..Page::default()
-    };
-    let entry = Entry::new(
-        Source {
-            name: "the rig".to_owned(),
-            // A scenario has a step.
-            text: (head(sizes, false, &page) + "\n> 80\n").into(),
-        },
-        None,
-    )?;
-    // Novobus is the bus where none is named.
-    Ok(entry
-        .plan
-        .as_ref()
-        .map_or_else(|| SimulatedLink::new(Default::default()), simulate::bench))
+fn rings(sizes: &[u8], header: &Header) -> Result<SimulatedLink, Box<Problems>> {
+    let plan = plan_header("the rig", header, sizes).map_err(Box::new)?;
+    Ok(simulate::bench(&plan))
 }

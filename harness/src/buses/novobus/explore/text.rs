@@ -3,20 +3,23 @@
 use super::case::{Act, Case, Harm, Talk, To, What};
 use super::oracle::{answered, sent};
 use super::play::Seen;
-use super::setup::drive_name;
-use crate::link::link_name;
+use crate::scenario::expression::Located;
+use crate::scenario::pattern::{Expected as Byte, Pattern};
+use crate::scenario::problem::Span;
+use crate::scenario::syntax::{
+    Action, Citation, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, Scenario, Step, When,
+};
+use crate::scenario::times::Duration;
+use crate::scenario::write::Text;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::roles;
-use std::fmt::Write as _;
+use harness_sim::fault::DriveFault;
 
-/// Bytes on a line at most.
-const BYTES_A_LINE: usize = 24;
+/// Maximum number of bytes, and of runs of equal ones, on a line.
+const ITEMS_A_LINE: usize = 24;
 
-/// Where a comment begins, if the line is not longer.
-const COMMENT_AT: usize = 32;
-
-/// How long a line of a remark may be.
-const MOST_REMARK: usize = 100;
+/// The shortest run of equal bytes that is written as one.
+const RUN: usize = 4;
 
 /// How long a comment may be.
 const MOST_COMMENT: usize = 60;
@@ -28,8 +31,8 @@ pub struct Page<'a> {
     pub title: &'a str,
     /// The tables that it pins, such as `nd21 9.7`.
     pub sources: &'a [String],
-    /// More lines of the header, such as `drive 0..last model nd21`.
-    pub header: &'a [String],
+    /// What drives are before anything is sent.
+    pub header: Option<&'a Header>,
     /// Remarks in front of the steps.
     pub remarks: &'a [String],
     /// What the master must receive.
@@ -47,34 +50,25 @@ pub struct Expected<'a> {
     pub timed: Option<usize>,
 }
 
-/// The lines in front of the first empty one, for rings of these sizes.
-pub(crate) fn head(sizes: &[u8], strict: bool, page: &Page<'_>) -> String {
-    let mut text = format!("title   {}\n", page.title);
-    // Writing to a String cannot fail.
-    for source in page.sources {
-        let _infallible = writeln!(text, "source  {source}");
-    }
-    let sizes: Vec<_> = sizes.iter().map(u8::to_string).collect();
-    let _infallible = writeln!(text, "ring    {}", sizes.join(", "));
-    if strict {
-        text.push_str("strict\n");
-    }
-    for line in page.header {
-        let _infallible = writeln!(text, "{line}");
-    }
-    text
-}
-
 /// The text of a scenario.
 #[must_use]
 pub fn text(case: &Case, page: &Page<'_>) -> String {
-    let strict = page
-        .expected
-        .is_some_and(|expected| is_strict(case, expected));
-    let mut text = head(&case.sizes(), strict, page);
-    text.push('\n');
-    for line in page.remarks.iter().flat_map(|remark| wrapped(remark)) {
-        let _infallible = writeln!(text, "# {line}");
+    let none = Header::default();
+    let header = page.header.unwrap_or(&none);
+    let header = Header::of_rings(&case.sizes()).and(header);
+    let source = |text: &String| Citation {
+        text: text.clone(),
+        span: Span::default(),
+    };
+    let mut text = Text::default();
+    text.header(&Scenario {
+        sources: page.sources.iter().map(source).collect(),
+        strict: page.expected.is_some_and(|own| is_strict(case, own)),
+        ..Scenario::new(page.title, header)
+    });
+    text.empty_line();
+    for remark in page.remarks {
+        text.remark(remark);
     }
     let mut faults = case.faults().into_iter();
     for act in &case.acts {
@@ -85,30 +79,15 @@ pub fn text(case: &Case, page: &Page<'_>) -> String {
             0
         };
         for (link, byte, harm) in faults.by_ref().take(own) {
-            let place = link_name(case.ring(), case.drives, usize::from(link));
-            let _infallible = writeln!(text, "! {place} byte {byte}: {}", fault(harm));
+            let ends = LinkEnds::of_place(case.drives, usize::from(link));
+            let fault = Fault::on_link(case.ring(), ends, kind(harm), byte);
+            text.step(&Action::Fault(fault).into(), "");
         }
     }
     if let Some(expected) = page.expected {
         answers(&mut text, case, expected);
     }
-    text
-}
-
-/// A remark as lines that are not too long.
-fn wrapped(remark: &str) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in remark.split_whitespace() {
-        match lines.last_mut() {
-            Some(last) if last.is_empty() => last.push_str(word),
-            Some(last) if last.len() + word.len() < MOST_REMARK => {
-                last.push(' ');
-                last.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
+    text.into()
 }
 
 /// Whether the scenario expects every byte that the ring returns. This is not possible with unasked zeros (9.9), which drives send
@@ -117,70 +96,35 @@ fn is_strict(case: &Case, expected: Expected<'_>) -> bool {
     expected.seen.received.len() <= case.bytes().len()
 }
 
-/// The prefix of `>` and `<` lines, which names ring 2 for a case with that ring.
-fn side(case: &Case) -> &'static str {
-    ["", "2"][case.ring()]
-}
-
-fn steps(text: &mut String, act: &Act, case: &Case) {
+fn steps(text: &mut Text, act: &Act, case: &Case) {
+    let ring = case.ring();
     match act.what {
-        What::Wait(ms) => line(text, &format!("wait {ms}ms"), ""),
+        What::Wait(ms) => {
+            text.step(&Action::Wait(Duration::millis(ms.into())).into(), "");
+        }
         What::Power { drive, on } => {
-            let state = if on { "on" } else { "off" };
-            let drive = drive_name(case.ring(), drive);
-            line(text, &format!("! drive {drive}: {state}"), "");
+            let power = if on { DriveFault::On } else { DriveFault::Off };
+            let fault = Fault {
+                ring,
+                what: FaultKind::Drive(Located::number(drive.into()), power),
+                byte: None,
+                at: None,
+            };
+            text.step(&Action::Fault(fault).into(), "");
         }
         _ => {
             let words = words(&act.what);
             let parts = act.parts(case.drives);
             for (index, part) in parts.iter().enumerate() {
-                let comment = if index == 0 { &words[..] } else { "its rest" };
-                let mut comment = Some(comment);
-                for bytes in packed(part) {
-                    line(
-                        text,
-                        &format!("{}> {bytes}", side(case)),
-                        comment.take().unwrap_or_default(),
-                    );
+                let mut comment = if index == 0 { &words[..] } else { "its rest" };
+                let known: Vec<_> = part.iter().copied().map(Byte::Byte).collect();
+                for bytes in Pattern::of(&known, RUN).lines(ITEMS_A_LINE) {
+                    text.step(&Action::Send { ring, bytes }.into(), comment);
+                    comment = "";
                 }
             }
         }
     }
-}
-
-fn line(text: &mut String, what: &str, comment: &str) {
-    let _infallible = if comment.is_empty() {
-        writeln!(text, "{what}")
-    } else {
-        writeln!(text, "{what:<COMMENT_AT$} # {comment}")
-    };
-}
-
-/// Bytes as lines of a scenario hold them: long runs of one byte as `80*12`.
-fn packed(bytes: &[u8]) -> Vec<String> {
-    let shown = bytes.iter().map(|byte| format!("{byte:02X}"));
-    pack(&shown.collect::<Vec<_>>())
-}
-
-fn pack(words: &[String]) -> Vec<String> {
-    let mut runs: Vec<(usize, &String)> = Vec::new();
-    for word in words {
-        match runs.last_mut() {
-            Some((count, last)) if *last == word => *count += 1,
-            _ => runs.push((1, word)),
-        }
-    }
-    let mut parts = Vec::new();
-    for (count, word) in runs {
-        match count {
-            1..=3 => parts.extend(std::iter::repeat_n(word.clone(), count)),
-            _ => parts.push(format!("{word}*{count}")),
-        }
-    }
-    parts
-        .chunks(BYTES_A_LINE)
-        .map(|chunk| chunk.join(" "))
-        .collect()
 }
 
 /// What an act is, in the manual's words.
@@ -226,17 +170,16 @@ fn of_talk(talk: &Talk) -> String {
     format!("{whom}: {}", what.join(", "))
 }
 
-fn fault(harm: Harm) -> String {
+fn kind(harm: Harm) -> LinkFaultKind {
     match harm {
-        // The language's numbers have no spaces before their units.
-        Harm::Delay(us) => format!("delay {us}us"),
-        Harm::Break(us) => format!("break {us}us"),
-        other => other.fault().to_string(),
+        Harm::Delay(us) => LinkFaultKind::Delay(Duration::micros(us.into())),
+        Harm::Break(us) => LinkFaultKind::Break(Duration::micros(us.into())),
+        other => other.fault().into(),
     }
 }
 
 /// Lines with what must be received: act by act, where a byte comes for a byte.
-fn answers(text: &mut String, case: &Case, expected: Expected<'_>) {
+fn answers(text: &mut Text, case: &Case, expected: Expected<'_>) {
     let received = &expected.seen.received;
     let mut from = 0;
     let sent = sent(case);
@@ -252,7 +195,7 @@ fn answers(text: &mut String, case: &Case, expected: Expected<'_>) {
             rest = (own.1, later.1);
         }
     }
-    let step = 4 * BYTES_A_LINE;
+    let step = 4 * ITEMS_A_LINE;
     while from < received.len() {
         let to = (from + step).min(received.len());
         answer(text, case, from..to, expected);
@@ -260,29 +203,27 @@ fn answers(text: &mut String, case: &Case, expected: Expected<'_>) {
     }
 }
 
-fn answer(text: &mut String, case: &Case, range: std::ops::Range<usize>, expected: Expected<'_>) {
+fn answer(text: &mut Text, case: &Case, range: std::ops::Range<usize>, expected: Expected<'_>) {
     let received = &expected.seen.received;
-    let side = side(case);
     let word = |index: usize| match expected.any.contains(&index) {
-        true => "xx".to_owned(),
-        false => format!("{:02X}", received[index].1.byte),
+        true => Byte::Any,
+        false => Byte::Byte(received[index].1.byte),
     };
     // A byte with a time in front begins a line.
     let timed = expected.timed.filter(|timed| range.contains(timed));
     let middle = timed.unwrap_or(range.end);
     for (part, at) in [(range.start..middle, None), (middle..range.end, timed)] {
         let words: Vec<_> = part.map(word).collect();
-        for (index, bytes) in pack(&words).into_iter().enumerate() {
-            match at.filter(|_| index == 0) {
-                None => line(text, &format!("{side}< {bytes}"), ""),
+        let mut at = at;
+        for bytes in Pattern::of(&words, RUN).lines(ITEMS_A_LINE) {
+            let ring = case.ring();
+            let step = Step::from(Action::Receive { ring, bytes });
+            match at.take() {
+                None => text.step(&step, ""),
                 Some(at) => {
-                    let time = received[at].0.since_start().as_nanos();
-                    let (us, tenth) = (time / 1_000, time / 100 % 10);
-                    line(
-                        text,
-                        &format!("@{us}.{tenth}us {side}< {bytes}"),
-                        "at this time",
-                    );
+                    let tenths = received[at].0.since_start().as_nanos() / 100;
+                    let when = When::At(Duration::micros(tenths).tenth().into());
+                    text.step(&Step { when, ..step }, "at this time");
                 }
             }
         }

@@ -2,14 +2,17 @@
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
 use crate::buses::novobus::twin::{Conversation, Done};
-use crate::link::{Moment, PlacedFault, link_name};
+use crate::link::{Moment, PlacedFault};
+use crate::scenario::pattern::{Expected, Pattern};
+use crate::scenario::syntax::{Action, Fault, Header, LinkEnds, Scenario};
+use crate::scenario::times::Duration;
+use crate::scenario::write::Text;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::{Addressing, SyncByte};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
-use std::fmt::Write as _;
 
 /// Bytes on a line at most.
 const BYTES_A_LINE: usize = 24;
@@ -28,7 +31,8 @@ pub(super) const EEPROM: std::ops::RangeInclusive<u16> = ram::EEPROM_BUFFER..=ra
 enum Piece {
     Gap(Span),
     Byte,
-    Fault(String),
+    /// A fault on the master's own link, at a byte counted from 1 over all bytes sent.
+    Fault(u64, LinkFault),
 }
 
 /// What the master sent in an attempt, conversation by conversation.
@@ -65,10 +69,7 @@ impl Sent {
                     Done::Fault(_, PlacedFault::Link(0, fault), Moment::Byte(number))
                         if is_written_as_read(fault) =>
                     {
-                        let place = link_name(0, drives, 0);
-                        let number = before + number;
-                        own.pieces
-                            .push(Piece::Fault(format!("! {place} byte {number}: {fault}")));
+                        own.pieces.push(Piece::Fault(before + number, *fault));
                     }
                     Done::Fault(..) => return None,
                     Done::Step(_) => {}
@@ -94,7 +95,10 @@ impl Sent {
     /// Removes the telegrams to other drives if it is long. Also returns how many of the first `count` bytes are left. The behaviour of a
     /// drive depends on its own telegrams and on bytes that pass all drives.
     pub(super) fn shortened(self, count: usize, drive: u8) -> (Self, usize) {
-        let faults = self.pieces.iter().any(|own| matches!(own, Piece::Fault(_)));
+        let faults = self
+            .pieces
+            .iter()
+            .any(|own| matches!(own, Piece::Fault(..)));
         let kept = match count > LONG && !faults {
             true => self.kept(drive),
             false => None,
@@ -116,7 +120,7 @@ impl Sent {
                 }
                 // The gap behind a telegram belongs to it.
                 Piece::Gap(gap) if index == 0 || kept[index - 1] => own.gap(gap),
-                Piece::Gap(_) | Piece::Fault(_) => {}
+                Piece::Gap(_) | Piece::Fault(..) => {}
             }
         }
         let count = kept[..count].iter().filter(|kept| **kept).count();
@@ -190,41 +194,45 @@ impl Sent {
     }
 
     fn text(&self, bytes: &[(u8, bool)], drives: u8, step: u8) -> String {
-        let mut text = format!(
-            "title   The same conversation, each telegram {step} addresses on\nring    {drives}\n\n"
-        );
-        let mut left = bytes.iter();
-        let mut open = 0;
-        let end = |text: &mut String, open: &mut usize| {
-            if std::mem::take(open) > 0 {
-                text.push('\n');
-            }
-        };
-        // Writing to a String cannot fail.
-        for piece in &self.pieces {
-            match piece {
-                Piece::Byte => {
-                    let Some((byte, _)) = left.next() else { break };
-                    text.push_str(if open == 0 { ">" } else { "" });
-                    let _infallible = write!(text, " {byte:02X}");
-                    open += 1;
-                    if open == BYTES_A_LINE {
-                        end(&mut text, &mut open);
-                    }
+        let title = format!("The same conversation, each telegram {step} addresses on");
+        let mut text = Text::default();
+        text.header(&Scenario::new(&title, Header::of_rings(&[drives])));
+        text.empty_line();
+        let mut left = bytes.iter().map(|(byte, _)| Expected::Byte(*byte));
+        // Bytes stand together up to a gap or a fault.
+        for run in self
+            .pieces
+            .chunk_by(|one, other| one.is_byte() && other.is_byte())
+        {
+            let actions = match run {
+                [Piece::Gap(gap)] => vec![Action::Wait(Duration::micros(gap.as_nanos() / 1_000))],
+                [Piece::Fault(byte, fault)] => {
+                    let ends = LinkEnds::of_place(drives, 0);
+                    vec![Action::Fault(Fault::on_link(
+                        0,
+                        ends,
+                        (*fault).into(),
+                        *byte,
+                    ))]
                 }
-                Piece::Gap(gap) => {
-                    end(&mut text, &mut open);
-                    let us = gap.as_nanos() / 1_000;
-                    let _infallible = writeln!(text, "wait {us}us");
+                run => {
+                    let bytes: Vec<_> = left.by_ref().take(run.len()).collect();
+                    let lines = Pattern::of(&bytes, usize::MAX).lines(BYTES_A_LINE);
+                    let send = |bytes| Action::Send { ring: 0, bytes };
+                    lines.into_iter().map(send).collect()
                 }
-                Piece::Fault(line) => {
-                    end(&mut text, &mut open);
-                    let _infallible = writeln!(text, "{line}");
-                }
+            };
+            for action in actions {
+                text.step(&action.into(), "");
             }
         }
-        end(&mut text, &mut open);
-        text
+        text.into()
+    }
+}
+
+impl Piece {
+    const fn is_byte(&self) -> bool {
+        matches!(self, Self::Byte)
     }
 }
 

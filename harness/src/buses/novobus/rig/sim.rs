@@ -1,5 +1,6 @@
 //! Simulated rigs: what their drives are before anything is sent.
 
+use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::rig::check::Rig;
 use crate::rig::file::{DriveEntry, Hooks, RigFile};
 use crate::rig::profile::KnownProfile;
@@ -8,7 +9,7 @@ use crate::scenario::parse::parse_header;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::{Problems, Span};
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Drives, Scenario, Setup, SetupKind};
+use crate::scenario::syntax::{Drives, Header, Scenario, Setup, SetupKind};
 use harness_sim::novobus::drive::Model;
 
 /// The types of the device that a header knows, and a model of a rig's file begins with behind `ND21-`.
@@ -40,6 +41,18 @@ impl Rig {
     /// None of a rig that was read: its lines were settled then.
     pub fn plan(&self) -> Result<Plan, Problems> {
         self.plan_with(&[])
+    }
+
+    /// The header that `[sim]` gives the drives.
+    #[must_use]
+    pub fn header(&self) -> Header {
+        let lines = self.file.sim.iter().flat_map(|sim| &sim.setup);
+        let source = Source {
+            name: self.origin.clone(),
+            text: lines.cloned().collect::<Vec<_>>().join("\n").into(),
+        };
+        // The lines were read when the rig was.
+        parse_lines(&source).unwrap_or_default()
     }
 
     /// The same with more lines of a header behind those of the file.

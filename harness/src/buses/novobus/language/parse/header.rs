@@ -8,7 +8,7 @@ use crate::scenario::parse::step;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Scenario;
+use crate::scenario::syntax::{Scenario, Step};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::{MAX_DRIVES, RingSize};
 
@@ -115,6 +115,25 @@ pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> 
     Ok(scenario)
 }
 
+/// Reads lines of a header that may leave out the `ring` line.
+///
+/// # Errors
+/// Every line that cannot be understood, and every step.
+pub(crate) fn parse_lines(source: &Source) -> Result<Header, Problems> {
+    let scenario = read(source, Part::Header)?;
+    let problems: Vec<_> = scenario.steps.iter().map(no_header_line).collect();
+    match problems.is_empty() {
+        true => Ok(scenario.header),
+        false => Err(Problems::new(&source.name, source.text.clone(), problems)),
+    }
+}
+
+fn no_header_line(step: &Step) -> Problem {
+    let what = "this is a step, and nothing is played here";
+    let expected = "a line of a header expected here, such as `drive 1 input GPIN3 high`";
+    Problem::new(step.span, what, expected)
+}
+
 /// Reads the header of rings of these sizes, where no step may stand.
 ///
 /// # Errors
@@ -125,12 +144,8 @@ pub fn parse_header(source: &Source, rings: &[u8]) -> Result<Scenario, Problems>
     if own.is_empty() {
         *own = rings.iter().copied().map(RingRange::of).collect();
     }
-    let mut problems = Vec::new();
-    for step in scenario.steps.drain(..) {
-        let what = "this is a step, and nothing is played here";
-        let expected = "a line of a header expected here, such as `drive 1 input GPIN3 high`";
-        problems.push(Problem::new(step.span, what, expected));
-    }
+    let steps = scenario.steps.drain(..);
+    let mut problems: Vec<_> = steps.map(|step| no_header_line(&step)).collect();
     let fits = |(range, size): (&RingRange, &u8)| (range.smallest..=range.largest).contains(size);
     if own.len() != rings.len() || !own.iter().zip(rings).all(fits) {
         let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();

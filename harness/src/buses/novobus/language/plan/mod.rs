@@ -12,7 +12,7 @@ mod unroll;
 pub(crate) use drive::{MAX_LOOKS, number};
 pub(crate) use job::Exchange;
 pub(crate) use planner::MAX_CARRIED;
-pub use planner::{plan, plan_step};
+pub use planner::{plan, plan_header, plan_step};
 pub(crate) use setup::{in_memory, number_bytes};
 pub(crate) use types::PlannedSetupKind;
 pub use types::{

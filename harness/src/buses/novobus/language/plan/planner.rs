@@ -9,11 +9,12 @@ use super::unroll::Unroll;
 use crate::buses::Stimulus;
 use crate::link::{Capability, Moment, PlacedFault, needs_line_errors, only_simulated};
 use crate::scenario::expression::{Located, Scope};
+use crate::scenario::parse::parse_header;
 use crate::scenario::pattern::MAX_BYTES;
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::{
-    Action, Check, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Scenario, Step, When,
+    Action, Check, Drives, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, Scenario, Step, When,
 };
 use crate::scenario::times::Window;
 use harness_proto::nd21::units;
@@ -144,6 +145,27 @@ pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Pl
         units: planner.units,
         models: planner.models,
         rings: planner.rings,
+    })
+}
+
+/// Settles a header for rings of these sizes: what a bench is before anything is sent.
+///
+/// # Errors
+/// Everything that cannot be in these rings, placed in the lines of the header as they are written. `name` says where they come from.
+pub fn plan_header(name: &str, header: &Header, sizes: &[u8]) -> Result<Plan, Problems> {
+    let source = Source {
+        name: name.to_owned(),
+        text: header.lines().join("\n").into(),
+    };
+    let whole = header.and(&Header::of_rings(sizes));
+    let settled = plan(&Scenario::new("", whole), &source, None);
+    settled.map_err(|mistakes| {
+        // What was put together from several texts has its places in none of them.
+        let placed = parse_header(&source, sizes).map(|own| plan(&own, &source, None));
+        match placed {
+            Err(placed) | Ok(Err(placed)) => placed,
+            Ok(Ok(_)) => mistakes,
+        }
     })
 }
 

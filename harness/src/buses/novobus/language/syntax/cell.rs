@@ -4,7 +4,7 @@ use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
-use harness_proto::nd21::cells::Cell;
+use harness_proto::nd21::cells::{self, Cell};
 use harness_proto::nd21::units::Scale;
 
 /// A place in a drive's RAM, its registers or its EEPROM.
@@ -25,6 +25,19 @@ pub struct CellPlace {
 }
 
 impl CellPlace {
+    /// The place at an address of the RAM, without a name.
+    #[must_use]
+    pub fn at(address: u16) -> Self {
+        Self {
+            name: format!("{address:04X}"),
+            address,
+            offset: None,
+            cell: cells::cell_at(address).filter(|cell| cell.address == address),
+            named: false,
+            span: Span::default(),
+        }
+    }
+
     /// The scale of the number that begins there.
     #[must_use]
     pub fn scale(&self) -> Option<Scale> {

@@ -1,14 +1,20 @@
 //! The header of a scenario: the rings that it needs, and what their drives are before anything is sent.
 
 use super::cell::{CellPlace, Written};
+use crate::buses::novobus::language::parse::header::parse_lines;
+use crate::buses::novobus::language::write;
 use crate::scenario::expression::{Expression, Located};
 use crate::scenario::problem::{Span, Spanned};
+use crate::scenario::source::Source;
 use crate::scenario::times::Duration;
 use harness_proto::line::Rate;
 use harness_proto::nd21::units::Device;
 use harness_sim::nd21::Stimulus;
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
 use harness_sim::novobus::drive::Model;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
 
 /// The header lines of a scenario that belong to this bus.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +27,109 @@ pub struct Header {
     pub setups: Vec<Setup>,
     /// How the bench's own master breaks the manual, on purpose: `master deviates NAME`.
     pub master: Option<Spanned<&'static MasterDeviation>>,
+}
+
+impl PartialEq for Header {
+    /// Headers are equal if they are written alike.
+    fn eq(&self, other: &Self) -> bool {
+        write::lines(self) == write::lines(other)
+    }
+}
+
+impl Eq for Header {}
+
+impl Serialize for Header {
+    /// As the lines that a scenario has.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        write::lines(self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Header {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let lines = Vec::<String>::deserialize(deserializer)?;
+        let source = Source {
+            name: "the header".to_owned(),
+            text: lines.join("\n").into(),
+        };
+        parse_lines(&source).map_err(|problems| D::Error::custom(problems.lines()))
+    }
+}
+
+impl From<Setup> for Header {
+    fn from(setup: Setup) -> Self {
+        Self {
+            setups: vec![setup],
+            ..Self::default()
+        }
+    }
+}
+
+impl Header {
+    /// A header with rings of these sizes.
+    #[must_use]
+    pub fn of_rings(sizes: &[u8]) -> Self {
+        Self {
+            rings: sizes.iter().copied().map(RingRange::of).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Every drive of this number of rings is a whole ND21.
+    #[must_use]
+    pub fn whole(rings: usize) -> Self {
+        let setups =
+            (0..rings).map(|ring| Setup::new(Drives::all(ring), SetupKind::Model(Model::Nd21)));
+        Self {
+            setups: setups.collect(),
+            ..Self::default()
+        }
+    }
+
+    /// The same with the lines of another header behind its own. A later line about the same thing of the same drive holds, as in a
+    /// scenario; rings, rate and master are those of the other header where it says them.
+    #[must_use]
+    pub fn and(&self, more: &Self) -> Self {
+        let rings = match more.rings.as_slice() {
+            [] => &self.rings,
+            _ => &more.rings,
+        };
+        Self {
+            rings: rings.clone(),
+            rate: more.rate.or(self.rate),
+            setups: [self.setups.as_slice(), &more.setups].concat(),
+            master: more.master.clone().or_else(|| self.master.clone()),
+        }
+    }
+
+    /// The same without the lines about drives for which `keep` is false.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(&Setup) -> bool) -> Self {
+        let kept = self.setups.iter().filter(|setup| keep(setup));
+        Self {
+            setups: kept.cloned().collect(),
+            ..self.clone()
+        }
+    }
+
+    /// Whether it says nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether a line names the model of a drive.
+    #[must_use]
+    pub fn names_a_model(&self) -> bool {
+        let names = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
+        self.setups.iter().any(names)
+    }
+
+    /// Its lines, as a scenario has them.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        write::lines(self)
+    }
 }
 
 /// The sizes of ring that a scenario can be played on.
@@ -94,6 +203,57 @@ pub struct Setup {
     pub what: SetupKind,
     /// Where it stands.
     pub span: Span,
+}
+
+impl fmt::Display for Setup {
+    /// The line, as a scenario has it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&write::setup(self))
+    }
+}
+
+impl Setup {
+    /// A setup that stands in no text.
+    #[must_use]
+    pub fn new(drives: Drives, what: SetupKind) -> Self {
+        let span = Span::default();
+        Self { drives, what, span }
+    }
+
+    /// `property NAME = WORD`
+    #[must_use]
+    pub fn property(drives: Drives, name: &str, word: &str) -> Self {
+        let spanned = |value: &str| Spanned {
+            value: value.to_owned(),
+            span: Span::default(),
+        };
+        Self::new(drives, SetupKind::Word(spanned(name), spanned(word)))
+    }
+
+    /// `property NAME = TIME`
+    #[must_use]
+    pub fn timed(drives: Drives, name: &str, time: Duration) -> Self {
+        let name = Spanned {
+            value: name.to_owned(),
+            span: Span::default(),
+        };
+        Self::new(drives, SetupKind::Time(name, time))
+    }
+
+    /// `deviates NAME`
+    #[must_use]
+    pub fn deviates(drives: Drives, deviation: &'static Deviation) -> Self {
+        Self::new(drives, SetupKind::Deviates(deviation))
+    }
+
+    /// The name of the property that it sets, if it sets one.
+    #[must_use]
+    pub fn sets(&self) -> Option<&str> {
+        match &self.what {
+            SetupKind::Word(name, _) | SetupKind::Time(name, _) => Some(&name.value),
+            _ => None,
+        }
+    }
 }
 
 /// The kinds of a [`Setup`].

@@ -25,10 +25,21 @@ pub(crate) fn header(header: &Header) -> Vec<(&'static str, String)> {
     lines
 }
 
+/// All lines of a header.
+pub(crate) fn lines(header: &Header) -> Vec<String> {
+    let words = self::header(header).into_iter();
+    let words = words.map(|(word, value)| format!("{word} {value}"));
+    words.chain(devices(header)).collect()
+}
+
+/// A line about drives: `drive 3 model nd21`.
+pub(crate) fn setup(own: &Setup) -> String {
+    format!("drive {} {}", drives(&own.drives), kind(&own.what))
+}
+
 /// The lines of a header that begin with `drive` or `master`.
 pub(crate) fn devices(header: &Header) -> Vec<String> {
     let setups = header.setups.iter();
-    let setup = |own: &Setup| format!("drive {} {}", drives(&own.drives), setup(&own.what));
     let master = header.master.iter();
     let master = master.map(|own| format!("master deviates {}", own.value.name));
     setups.map(setup).chain(master).collect()
@@ -51,7 +62,7 @@ fn sizes(range: &RingRange) -> String {
     }
 }
 
-fn setup(what: &SetupKind) -> String {
+fn kind(what: &SetupKind) -> String {
     match what {
         SetupKind::Memory(place, value) => {
             format!("memory {} = {}", cell::place(place), cell::value(value))

@@ -8,7 +8,7 @@ mod job;
 
 pub(crate) use check::{check, drive_check, record};
 pub(crate) use fault::fault;
-pub(crate) use header::{devices, header, influence_on};
+pub(crate) use header::{devices, header, influence_on, lines, setup};
 pub(crate) use job::job;
 
 use crate::scenario::syntax::{Drives, LinkEnds};
