@@ -6,7 +6,7 @@
 use divan::counter::ItemsCount;
 use harness::campaign::find::find;
 use harness::campaign::{Campaign, Case};
-use harness::link::Line;
+use harness::link::Octets;
 use harness::scenario::simulate::bench;
 use std::path::Path;
 
@@ -58,9 +58,9 @@ fn ring(bencher: divan::Bencher<'_, '_>, name: &str) {
         .bench_local(|| {
             for bytes in &said {
                 let mut link = start.clone();
-                let end = link.send(0, bytes);
+                let end = link.send_octets(0, bytes);
                 link.run_until(end);
-                while link.receive(0).is_some() {}
+                while link.receive_octet(0).is_some() {}
             }
         });
 }

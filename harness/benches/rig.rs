@@ -19,7 +19,7 @@
 mod ring;
 
 use harness::library::Entry;
-use harness::link::{Line, Link};
+use harness::link::{Line, Link, Octets};
 use harness::port::Endpoint;
 use harness::rig::{Options, Rig, Run, Session, parse};
 use harness::scenario::plan::Plan;

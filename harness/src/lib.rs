@@ -65,6 +65,8 @@ pub mod link;
 #[doc(hidden)]
 pub mod manual;
 #[doc(hidden)]
+pub mod medium;
+#[doc(hidden)]
 pub mod port;
 #[doc(hidden)]
 pub mod qualify;

@@ -53,6 +53,50 @@ impl Rate {
     }
 }
 
+/// The parity bit of an asynchronous line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Parity {
+    /// No parity bit.
+    None,
+    /// The data bits and the parity bit hold an odd number of ones.
+    Odd,
+    /// They hold an even number of ones.
+    Even,
+}
+
+/// The format of an asynchronous line with 8 data bits: its rate, parity and stop bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Format {
+    /// Bits a second; 3,000,000,000 is a multiple of it where times are to be exact.
+    pub bits_per_second: u32,
+    /// The parity bit.
+    pub parity: Parity,
+    /// The number of stop bits, 1 or 2.
+    pub stop_bits: u8,
+}
+
+impl Format {
+    /// How long an octet takes, start bit to last stop bit; zero for a rate of 0.
+    #[must_use]
+    pub fn octet_time(self) -> Span {
+        let parity = u64::from(self.parity != Parity::None);
+        let bits = 1 + 8 + parity + u64::from(self.stop_bits);
+        let bit = 3_000_000_000u64.checked_div(self.bits_per_second.into());
+        Span::from_units(bit.unwrap_or(0)) * bits
+    }
+}
+
+impl From<Rate> for Format {
+    /// 8O1, as the ND21 has it (ND21 8.3).
+    fn from(rate: Rate) -> Self {
+        Self {
+            bits_per_second: rate.bits_per_second(),
+            parity: Parity::Odd,
+            stop_bits: 1,
+        }
+    }
+}
+
 /// What a receiver noticed to be wrong with a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LineError {
@@ -128,6 +172,29 @@ mod tests {
                 rate.bit_time().units() * u64::from(rate.bits_per_second()),
                 3_000_000_000
             );
+            assert_eq!(Format::from(rate).octet_time(), rate.byte_time());
         }
+    }
+
+    /// PROFIBUS DP: 8E1, 11 bits (12 Mbit/s is whole in thirds of a nanosecond).
+    #[test]
+    fn other_formats() {
+        let even = Format {
+            bits_per_second: 12_000_000,
+            parity: Parity::Even,
+            stop_bits: 1,
+        };
+        assert_eq!(even.octet_time().units(), 250 * 11);
+        let none = Format {
+            parity: Parity::None,
+            stop_bits: 2,
+            ..even
+        };
+        assert_eq!(none.octet_time(), even.octet_time());
+        let stopped = Format {
+            bits_per_second: 0,
+            ..even
+        };
+        assert_eq!(stopped.octet_time(), Span::ZERO);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::output::Output;
 use crate::buses::twin::{Conversation, Exactness};
-use crate::link::Line as _;
+use crate::link::Octets;
 use crate::qualify::{Culprit, Meant, Named, Seen, Sighting, Trial, agreed, culprit};
 use crate::rig::{Attempt, Driven, Played, Run};
 use crate::scenario::verdict::Verdict;

@@ -11,7 +11,7 @@ use super::run::{details, drives, line, progress_bar};
 use super::tally::Tally;
 use crate::evidence::{About, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
-use crate::link::{Line, Trouble};
+use crate::link::{Line, Octets, Trouble};
 use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Options, Played, Rig, Run, Session, SessionError};

@@ -18,6 +18,7 @@
 mod attempt;
 mod cases;
 mod derive;
+mod events;
 mod files;
 mod folder;
 pub mod fuzz;

@@ -151,13 +151,18 @@ impl Ends {
             .or(conversations.last());
         for event in played.into_iter().flat_map(|own| own.iter()) {
             match event {
-                Event::Sent(ring, end, bytes) => {
+                Event::Sent(ring, end, sent) => {
+                    let bytes = sent.as_out().octets();
                     for (left, byte) in (0..bytes.len() as u64).rev().zip(bytes) {
                         let at = *end - byte_time * left;
                         ends.carry(*ring, 0, at, Received::good(*byte));
                     }
                 }
-                Event::Received(ring, at, byte) => ends.carry(*ring, 1, *at, *byte),
+                Event::Received(ring, at, heard) => {
+                    if let Some(byte) = heard.octet() {
+                        ends.carry(*ring, 1, *at, byte);
+                    }
+                }
                 Event::Fault(ring, _, PlacedFault::Link(link, _), _) => {
                     let last = opened.header.drives.get(*ring).copied().unwrap_or(0);
                     match *link {

@@ -4,8 +4,9 @@ use super::Watch;
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::link::{
-    Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, PlacedFault, Trouble,
+    Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, Octets, PlacedFault, Trouble,
 };
+use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
@@ -17,6 +18,9 @@ use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Why no frame leaves through this guard.
+const NO_GATE: &str = "frames are not sent: the guard judges the bytes of a ring only";
 
 /// A line or a link that sends nothing that the limits do not allow. After a denial it is in
 /// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
@@ -89,7 +93,7 @@ impl<L: Line> Guarded<L> {
     /// it commands pass, as far as they are allowed.
     pub fn synchronise(&mut self) {
         for (ring, size) in self.sizes().into_iter().enumerate() {
-            let sent = self.send(ring, &CHECK_SEQUENCE);
+            let sent = self.send_octets(ring, &CHECK_SEQUENCE);
             let end = sent + self.byte_time() * (u64::from(size.drives()) + 8);
             while self.now() < end && self.wait(end) {}
             while self.receive(ring).is_some() {}
@@ -316,28 +320,32 @@ impl<L: Line> Line for Guarded<L> {
         }
     }
 
-    fn byte_time(&self) -> Span {
-        self.inner.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.inner.medium(port)
     }
 
     fn now(&self) -> Instant {
         self.inner.now()
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
         let now = self.inner.now();
         let guard_time = self.on_guard_clock(now);
         let Some(state) = self.rings.get_mut(ring) else {
             self.deny(format!("ring {} is not in the rig's file", ring + 1), None);
             return now;
         };
-        self.refused = bytes.len();
+        self.refused = what.len();
         if self.trouble.is_some() {
+            return now;
+        }
+        if !what.frames().is_empty() {
+            self.deny(NO_GATE.to_owned(), None);
             return now;
         }
         let mut admitted = 0;
         let mut denial = None;
-        for &byte in bytes {
+        for &byte in what.octets() {
             match state.admit(guard_time, byte) {
                 Ok(()) => admitted += 1,
                 Err(why) => {
@@ -346,29 +354,30 @@ impl<L: Line> Line for Guarded<L> {
                 }
             }
         }
-        self.refused = bytes.len() - admitted;
-        let end = self.inner.send(ring, &bytes[..admitted]);
+        self.refused = what.len() - admitted;
+        let end = self.inner.send(ring, what.first(admitted));
         if let Some(denial) = denial {
             self.deny(format!("ring {}: {denial}", ring + 1), Some(denial.cause));
         }
         end
     }
 
-    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
+    fn permits(&self, ring: usize, what: Out<'_>) -> bool {
         let Some(ring) = self.rings.get(ring) else {
             return false;
         };
         let mut guard = ring.guard.clone();
         let now = self.guard_time();
         let mut admits = |byte: &u8| guard.admit(now, *byte, false).is_ok();
-        self.trouble().is_none() && bytes.iter().all(&mut admits)
+        let judged = what.frames().is_empty();
+        self.trouble().is_none() && judged && what.octets().iter().all(&mut admits)
     }
 
     fn refused(&self) -> usize {
         self.refused
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         self.inner.receive(ring)
     }
 
@@ -461,7 +470,7 @@ impl<L: Link> Link for Guarded<L> {
         self.inner.inject(ring, fault, moment);
     }
 
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+    fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
         let now = self.guard_time();
         let Some(state) = self.rings.get_mut(ring) else {
             return Vec::new();
@@ -470,7 +479,7 @@ impl<L: Link> Link for Guarded<L> {
             return Vec::new();
         }
         let mut guard = state.guard.clone();
-        if let Err(denial) = bytes
+        if let Err(denial) = octets
             .iter()
             .try_for_each(|byte| guard.admit(now, *byte, false))
         {
@@ -480,9 +489,9 @@ impl<L: Link> Link for Guarded<L> {
         // A simulated link probes a copy of itself.
         if !self.capabilities.contains(&Capability::Simulator) {
             state.guard = guard;
-            state.sent += bytes.len() as u64;
+            state.sent += octets.len() as u64;
         }
-        self.inner.probe(ring, bytes)
+        self.inner.probe(ring, octets)
     }
 
     fn beside(&self) -> Option<&dyn Any> {

@@ -5,6 +5,7 @@
 
 pub(crate) mod inner;
 pub(crate) mod lateness;
+mod octets;
 mod record;
 mod replay;
 pub(crate) mod ring;
@@ -16,11 +17,13 @@ pub use crate::buses::novobus::stream::{StreamLink, TOLERANCE};
 pub use crate::trouble::Trouble;
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use inner::{Delay, InnerLink, Ports};
+pub use octets::Octets;
 pub use record::{Event, Look, Recording, Sink};
 pub use replay::Replay;
 pub use tamper::{needs_line_errors, only_simulated};
 
 use crate::buses::Stimulus;
+use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -118,6 +121,9 @@ pub struct Lead {
     pub near: Span,
 }
 
+/// The longest [probe](Link::probe): far more than the longest round.
+const PROBED: Span = Span::from_millis(10_000);
+
 /// A gap on the line that no drive takes for a time-out: drives wait for at least 10 ms (ND21 9.9).
 pub(crate) const HARMLESS: Span = Span::from_millis(5);
 
@@ -138,31 +144,32 @@ impl Lead {
     }
 }
 
-/// One or two rings as the master sees them: bytes and time, and nothing else.
+/// A bus as the bench's own station sees it: what its ports carry and the time, and nothing else. A port is a place where the bench
+/// itself speaks, counted from 0.
 pub trait Line: Send {
-    /// How long a byte takes.
-    fn byte_time(&self) -> Span;
+    /// What a port carries, and how fast. That of the first port for a port that the line does not have.
+    fn medium(&self, port: usize) -> Medium;
 
     /// The time.
     fn now(&self) -> Instant;
 
-    /// Sends bytes one after another, behind what is still to be sent. Returns when the last one will
-    /// have left.
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant;
+    /// Sends pieces one after another, behind what is still to be sent. Returns when the last one will have left, as far as the line
+    /// knows: on a bus that other stations use, it can be later. Pieces of another medium than the port's are not sent.
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant;
 
-    /// Whether these bytes may be sent now, as far as the line knows: a guarded one knows its limits.
-    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
-        let _any = (ring, bytes);
+    /// Whether this may be sent now, as far as the line knows: a guarded one knows its limits.
+    fn permits(&self, port: usize, what: Out<'_>) -> bool {
+        let _any = (port, what);
         true
     }
 
-    /// How many of the bytes of the last [`Self::send`] were not taken: those from the first that was denied on.
+    /// How many of the pieces of the last [`Self::send`] were not taken: those from the first that was denied on.
     fn refused(&self) -> usize {
         0
     }
 
-    /// Takes the next received byte that has not been fetched yet.
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)>;
+    /// Takes the next piece that was received and has not been fetched yet.
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)>;
 
     /// Lets time pass until something happens, at most until `until`. Returns false if nothing will ever happen unless the master
     /// sends. Edge-triggered: input that was already reported and is still unread may not be reported again. With
@@ -170,8 +177,8 @@ pub trait Line: Send {
     fn wait(&mut self, until: Instant) -> bool;
 
     /// Hint: the caller expects a reply at `at`; real-time links busy-poll around that time.
-    fn attend(&mut self, ring: usize, at: Instant) {
-        let _always_awake = (ring, at);
+    fn attend(&mut self, port: usize, at: Instant) {
+        let _always_awake = (port, at);
     }
 
     /// Why nothing more is carried; `None` while all is well. A simulated link has no trouble.
@@ -197,36 +204,36 @@ pub trait Line: Send {
 
 /// A borrowed line: its owner goes on using it afterwards.
 impl<L: Line + ?Sized> Line for &mut L {
-    fn byte_time(&self) -> Span {
-        (**self).byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        (**self).medium(port)
     }
 
     fn now(&self) -> Instant {
         (**self).now()
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        (**self).send(ring, bytes)
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
+        (**self).send(port, what)
     }
 
-    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
-        (**self).permits(ring, bytes)
+    fn permits(&self, port: usize, what: Out<'_>) -> bool {
+        (**self).permits(port, what)
     }
 
     fn refused(&self) -> usize {
         (**self).refused()
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        (**self).receive(ring)
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+        (**self).receive(port)
     }
 
     fn wait(&mut self, until: Instant) -> bool {
         (**self).wait(until)
     }
 
-    fn attend(&mut self, ring: usize, at: Instant) {
-        (**self).attend(ring, at);
+    fn attend(&mut self, port: usize, at: Instant) {
+        (**self).attend(port, at);
     }
 
     fn trouble(&self) -> Option<&Trouble> {
@@ -246,7 +253,7 @@ impl<L: Line + ?Sized> Line for &mut L {
     }
 }
 
-/// One or two rings as a scenario sees them.
+/// A bus as a scenario sees it.
 pub trait Link: Line {
     /// What this link can do beside sending and receiving.
     fn capabilities(&self) -> &[Capability];
@@ -260,11 +267,11 @@ pub trait Link: Line {
         let _forgotten = place;
     }
 
-    /// Whether bytes of the master's are still on their way round.
+    /// Whether what the bench has sent is still on its way, or its answers are.
     fn busy(&self) -> bool;
 
     /// Injects a fault.
-    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment);
+    fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment);
 
     /// Whether a fault can be put on a link of a ring: 0 is the master's outgoing one.
     fn reaches(&self, ring: usize, link: usize) -> bool {
@@ -299,9 +306,18 @@ pub trait Link: Line {
         Span::ZERO
     }
 
-    /// Sends `bytes` beside the conversation and returns what is received until they are back. Where a link can, it leaves no trace of
+    /// Sends octets beside the conversation and returns those received until the answers are back. Where a link can, it leaves no trace of
     /// this.
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received>;
+    fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {
+        self.send_octets(port, octets);
+        let mut came = Vec::new();
+        let end = self.now() + PROBED;
+        while self.busy() && self.now() < end && self.wait(end) {
+            came.extend(std::iter::from_fn(|| self.receive_octet(port)).map(|(_, octet)| octet));
+        }
+        came.extend(std::iter::from_fn(|| self.receive_octet(port)).map(|(_, octet)| octet));
+        came
+    }
 
     /// What stands beside the bus: the simulation itself, which only a bus's own code knows by its type. `None` on a rig and behind a
     /// recording.
@@ -312,12 +328,12 @@ pub trait Link: Line {
     /// Faults whose moment never came, in words.
     fn unused_faults(&self) -> Vec<String>;
 
-    /// How many bytes all links together have carried, as far as they are recorded.
+    /// How many pieces all channels together have carried, as far as they are recorded.
     fn carried(&self) -> u64;
 
-    /// How many drives a ring has.
-    fn drives(&self, ring: usize) -> u8;
+    /// How many stations a port has beside the bench: the drives of a ring.
+    fn drives(&self, port: usize) -> u8;
 
-    /// Everything seen on a ring.
-    fn trace(&self, ring: usize) -> Trace;
+    /// Everything seen of a port.
+    fn trace(&self, port: usize) -> Trace;
 }

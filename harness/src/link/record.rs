@@ -7,14 +7,15 @@
 //! not in the record, so that [`Replay`](super::Replay) repeats the conversation exactly, decisions that depend on time included.
 
 use super::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
+use crate::medium::{Heard, Medium, Out, Pieces};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
 use std::collections::{BTreeMap, VecDeque};
 
-/// The most rings of a bench (ND21 8.4).
-const RINGS: usize = 2;
+/// The most ports of a line: the two rings of a bench (ND21 8.4).
+const PORTS: usize = 2;
 
 /// State of a link in real time, as the caller sees it until the next look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,17 +37,17 @@ pub enum Event {
     Begin(Instant),
     /// A step of the scenario began, that at this place of its text.
     Step(usize),
-    /// Bytes were sent into a ring, counted from 0; the last one will have left at this time.
-    Sent(usize, Instant, Vec<u8>),
-    /// A byte was received from a ring.
-    Received(usize, Instant, Received),
+    /// Pieces were sent through a port, counted from 0; the last one will have left at this time.
+    Sent(usize, Instant, Pieces),
+    /// A piece was received at a port.
+    Received(usize, Instant, Heard),
     /// A fault was asked for, at this time.
     Fault(usize, Instant, PlacedFault, Moment),
     /// The link carries nothing more.
     Trouble(Trouble),
     /// The bench looked at its ports; only where time is real. Bytes that had come since the last look follow it.
     Look(Look),
-    /// A probe of a ring: its start time, the bytes sent, and the bytes received.
+    /// A probe through a port: its start time, the octets sent, and those received.
     Probe(usize, Instant, Vec<u8>, Vec<Received>),
     /// What had arrived at the end of a link of a ring by this time, and had not been asked for before in this conversation.
     Tapped(usize, usize, Instant, Vec<Received>),
@@ -90,7 +91,7 @@ struct Known {
     lead: Lead,
     pause: Option<Instant>,
     /// Bytes that are recorded and not yet fetched.
-    came: [VecDeque<(Instant, Received)>; RINGS],
+    came: [VecDeque<(Instant, Heard)>; PORTS],
 }
 
 impl Known {
@@ -152,18 +153,18 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
     }
 
     /// Takes what has come from the link.
-    fn take_arrived(&mut self) -> Vec<(usize, Instant, Received)> {
+    fn take_arrived(&mut self) -> Vec<(usize, Instant, Heard)> {
         let mut came = Vec::new();
-        for ring in 0..RINGS {
-            while let Some((at, byte)) = self.link.receive(ring) {
-                came.push((ring, at, byte));
+        for port in 0..PORTS {
+            while let Some((at, byte)) = self.link.receive(port) {
+                came.push((port, at, byte));
             }
         }
         came
     }
 
     /// Records the state of the link and what has come, where time is real.
-    fn look(&mut self, came: Vec<(usize, Instant, Received)>) {
+    fn look(&mut self, came: Vec<(usize, Instant, Heard)>) {
         let Some(known) = &mut self.known else {
             return;
         };
@@ -179,9 +180,9 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
         };
         known.lead = lead;
         self.sink.take(&Event::Look(look));
-        for (ring, at, byte) in came {
-            self.sink.take(&Event::Received(ring, at, byte));
-            known.came[ring].push_back((at, byte));
+        for (port, at, byte) in came {
+            self.sink.take(&Event::Received(port, at, byte));
+            known.came[port].push_back((at, byte));
         }
     }
 
@@ -196,8 +197,8 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
 }
 
 impl<L: Link + ?Sized> Line for Recording<'_, L> {
-    fn byte_time(&self) -> Span {
-        self.link.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
     }
 
     fn now(&self) -> Instant {
@@ -205,16 +206,16 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         known.map_or_else(|| self.link.now(), |known| known.now)
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
         self.tell();
         if self.trouble.is_some() {
             return self.now();
         }
-        let end = self.link.send(ring, bytes);
-        let taken = bytes.len().saturating_sub(self.link.refused());
+        let end = self.link.send(port, what);
+        let taken = what.len().saturating_sub(self.link.refused());
         if taken > 0 {
             self.sink
-                .take(&Event::Sent(ring, end, bytes[..taken].to_vec()));
+                .take(&Event::Sent(port, end, what.first(taken).to_pieces()));
             if let Some(known) = &mut self.known {
                 known.busy = true;
             }
@@ -223,12 +224,12 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         if taken > 0 { end } else { self.now() }
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
         if let Some(known) = &mut self.known {
-            return known.came.get_mut(ring)?.pop_front();
+            return known.came.get_mut(port)?.pop_front();
         }
-        let (at, byte) = self.link.receive(ring)?;
-        self.sink.take(&Event::Received(ring, at, byte));
+        let (at, byte) = self.link.receive(port)?;
+        self.sink.take(&Event::Received(port, at, byte));
         self.tell();
         Some((at, byte))
     }
@@ -254,8 +255,8 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         !self.trouble.as_ref().is_some_and(Trouble::stops_the_line)
     }
 
-    fn attend(&mut self, ring: usize, at: Instant) {
-        self.link.attend(ring, at);
+    fn attend(&mut self, port: usize, at: Instant) {
+        self.link.attend(port, at);
     }
 
     fn trouble(&self) -> Option<&Trouble> {
@@ -286,8 +287,8 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
     fn begin(&mut self) {
         self.sink.take(&Event::Begin(self.link.now()));
         if std::mem::take(&mut self.stepped) {
-            let rings = (0..2).filter(|ring| self.link.drives(*ring) > 0);
-            self.scenario = rings.map(|ring| self.link.trace(ring)).collect();
+            let ports = (0..PORTS).filter(|port| self.link.drives(*port) > 0);
+            self.scenario = ports.map(|port| self.link.trace(port)).collect();
         }
         self.link.begin();
         self.tapped.clear();
@@ -309,27 +310,27 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         known.map_or_else(|| self.link.busy(), |known| known.busy)
     }
 
-    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+    fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
         let at = self.now();
-        self.sink.take(&Event::Fault(ring, at, fault, moment));
-        self.link.inject(ring, fault, moment);
+        self.sink.take(&Event::Fault(port, at, fault, moment));
+        self.link.inject(port, fault, moment);
         self.tell();
     }
 
-    fn reaches(&self, ring: usize, link: usize) -> bool {
-        self.link.reaches(ring, link)
+    fn reaches(&self, port: usize, link: usize) -> bool {
+        self.link.reaches(port, link)
     }
 
-    fn listens(&self, ring: usize, link: usize) -> bool {
-        self.link.listens(ring, link)
+    fn listens(&self, port: usize, link: usize) -> bool {
+        self.link.listens(port, link)
     }
 
-    fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
-        let all = self.link.tapped(ring, link)?;
+    fn tapped(&mut self, port: usize, link: usize) -> Option<Vec<Received>> {
+        let all = self.link.tapped(port, link)?;
         let at = self.now();
-        let known = self.tapped.insert((ring, link), all.len()).unwrap_or(0);
+        let known = self.tapped.insert((port, link), all.len()).unwrap_or(0);
         let new = all.get(known..).unwrap_or_default().to_vec();
-        self.sink.take(&Event::Tapped(ring, link, at, new));
+        self.sink.take(&Event::Tapped(port, link, at, new));
         Some(all)
     }
 
@@ -337,11 +338,11 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         self.link.time_tolerance()
     }
 
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+    fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {
         let at = self.now();
-        let came = self.link.probe(ring, bytes);
+        let came = self.link.probe(port, octets);
         self.sink
-            .take(&Event::Probe(ring, at, bytes.to_vec(), came.clone()));
+            .take(&Event::Probe(port, at, octets.to_vec(), came.clone()));
         self.look_now();
         came
     }
@@ -358,15 +359,15 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         self.link.carried()
     }
 
-    fn drives(&self, ring: usize) -> u8 {
-        self.link.drives(ring)
+    fn drives(&self, port: usize) -> u8 {
+        self.link.drives(port)
     }
 
     /// That of the conversation of the scenario, if there has been one: cells are set back in another one.
-    fn trace(&self, ring: usize) -> Trace {
-        match self.scenario.get(ring) {
+    fn trace(&self, port: usize) -> Trace {
+        match self.scenario.get(port) {
             Some(trace) => trace.clone(),
-            None => self.link.trace(ring),
+            None => self.link.trace(port),
         }
     }
 }

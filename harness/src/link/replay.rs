@@ -7,7 +7,9 @@
 //! schema 1 have no looks: of these only the order is repeated, and a driver that depends on the time may send something else.
 
 use super::{Capability, Event, Lead, Line, Link, LinkFault, Look, Moment, PlacedFault, Trouble};
-use harness_proto::line::{Rate, Received};
+use crate::medium::{Heard, Medium, Out, Pieces};
+use harness_proto::can;
+use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::collections::{BTreeMap, VecDeque};
@@ -17,7 +19,7 @@ use std::collections::{BTreeMap, VecDeque};
 pub struct Replay {
     events: VecDeque<Event>,
     now: Instant,
-    rate: Rate,
+    medium: Medium,
     tolerance: Span,
     drives: Vec<u8>,
     capabilities: Vec<Capability>,
@@ -37,7 +39,7 @@ struct Known {
     busy: bool,
     lead: Lead,
     pause: Option<Instant>,
-    came: [VecDeque<(Instant, Received)>; 2],
+    came: [VecDeque<(Instant, Heard)>; 2],
     /// When each line is free.
     free: [Instant; 2],
     /// For how long faults of this conversation may hold bytes.
@@ -58,11 +60,11 @@ impl Default for Known {
 }
 
 impl Replay {
-    /// Replays events recorded on rings of these sizes, on a link with these capabilities.
+    /// Replays events recorded at ports of this medium with these numbers of stations, on a link with these capabilities.
     #[must_use]
     pub fn new(
         events: Vec<Event>,
-        rate: Rate,
+        medium: impl Into<Medium>,
         tolerance: Span,
         drives: Vec<u8>,
         capabilities: Vec<Capability>,
@@ -87,7 +89,7 @@ impl Replay {
                 .filter(|event| looks || !matches!(event, Event::Step(_)))
                 .collect(),
             now: Instant::START,
-            rate,
+            medium: medium.into(),
             tolerance,
             drives,
             capabilities,
@@ -124,16 +126,19 @@ impl Replay {
         let words = |event: &Event| match event {
             Event::Trouble(_) => None,
             Event::Received(..) | Event::Step(_) | Event::Look(_) if !exact => None,
-            Event::Received(_, at, byte) => Some(format!("{:02X} received at {at}", byte.byte)),
+            Event::Received(_, at, byte) => Some(format!("{} received at {at}", words_of(*byte))),
             Event::Step(place) => Some(format!("a step at byte {place} of the scenario")),
             Event::Look(look) => Some(format!("a look at {}", look.at)),
             Event::Begin(_) => Some("another conversation".to_owned()),
-            Event::Sent(_, at, bytes) => Some(format!("sending {} bytes until {at}", bytes.len())),
+            Event::Sent(_, at, sent) => {
+                Some(format!("sending {} until {at}", counted(sent.as_out())))
+            }
             Event::Fault(_, at, ..) => Some(format!("a fault at {at}")),
             Event::Tapped(_, link, at, _) => Some(format!("a look at link {link} at {at}")),
-            Event::Probe(_, at, sent, _) => {
-                Some(format!("a probe with {} bytes from {at} on", sent.len()))
-            }
+            Event::Probe(_, at, sent, _) => Some(format!(
+                "a probe with {} from {at} on",
+                counted(Out::Octets(sent))
+            )),
         };
         match &self.trouble {
             Some(_) if !exact => None,
@@ -200,8 +205,9 @@ impl Replay {
             let known_times = before.0..=at;
             if held == Span::ZERO && !known_times.contains(&arrived) {
                 wrong.get_or_insert(format!(
-                    "{:02X} came at {arrived}, between looks at {} and {at}",
-                    byte.byte, before.0
+                    "{} came at {arrived}, between looks at {} and {at}",
+                    words_of(byte),
+                    before.0
                 ));
             }
             self.events.pop_front();
@@ -220,47 +226,51 @@ impl Replay {
         }
     }
 
-    /// Whether bytes that were sent now can have left at `end`.
-    fn can_leave(&mut self, ring: usize, count: usize, end: Instant) {
+    /// Whether pieces that were sent now can have left at `end`.
+    fn can_leave(&mut self, port: usize, what: Out<'_>, end: Instant) {
         let next = self.next_look();
-        let took = self.rate.byte_time() * count as u64;
+        let took = self.medium.time_of(what);
         let now = self.now;
+        // A frame waits for those of other stations, so that only a line of the bench's own says when it has left at the latest.
+        let shared = matches!(self.medium, Medium::Frames(_));
         let Some(known) = &mut self.known else {
             return;
         };
-        let free = std::mem::replace(&mut known.free[ring.min(1)], end);
+        let free = std::mem::replace(&mut known.free[port.min(1)], end);
         let earliest = free.max(now) + took;
         let latest = next.map(|next| free.max(next) + took + known.held);
-        if end < earliest || latest.is_some_and(|latest| end > latest) {
+        if end < earliest || latest.is_some_and(|latest| !shared && end > latest) {
+            let pieces = counted(what);
             self.fails(format!(
-                "the times of the record cannot be: {count} bytes sent at {now} have not left at {end}"
+                "the times of the record cannot be: {pieces} sent at {now} have not left at {end}"
             ));
         }
     }
 }
 
 impl Line for Replay {
-    fn byte_time(&self) -> Span {
-        self.rate.byte_time()
+    fn medium(&self, _port: usize) -> Medium {
+        self.medium
     }
 
     fn now(&self) -> Instant {
         self.now
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        if self.trouble.is_some() || bytes.is_empty() {
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
+        if self.trouble.is_some() || what.is_empty() {
             return self.now;
         }
         match self.events.front() {
             // What was denied was not sent.
             Some(Event::Sent(own, end, sent))
-                if *own == ring
-                    && (sent == bytes || bytes.starts_with(sent) && self.denied_behind()) =>
+                if *own == port
+                    && (sent.as_out() == what
+                        || begins_with(what, sent) && self.denied_behind()) =>
             {
-                let (end, count) = (*end, sent.len());
+                let (end, count) = (*end, sent.as_out().len());
                 self.events.pop_front();
-                self.can_leave(ring, count, end);
+                self.can_leave(port, what.first(count), end);
                 if let Some(known) = &mut self.known {
                     known.busy = true;
                 }
@@ -279,14 +289,14 @@ impl Line for Replay {
         }
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
         if let Some(known) = &mut self.known {
-            return known.came.get_mut(ring)?.pop_front();
+            return known.came.get_mut(port)?.pop_front();
         }
         // In real time a wait until a time may have ended later, and what came meanwhile was fetched.
         let late = self.tolerance > Span::ZERO;
         match self.events.front() {
-            Some(Event::Received(own, at, byte)) if *own == ring && (late || *at <= self.now) => {
+            Some(Event::Received(own, at, byte)) if *own == port && (late || *at <= self.now) => {
                 let byte = (*at, *byte);
                 self.events.pop_front();
                 self.now = self.now.max(byte.0);
@@ -395,15 +405,15 @@ impl Link for Replay {
         known.map_or_else(byte, |known| known.busy)
     }
 
-    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+    fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
         match self.events.front() {
             Some(Event::Fault(own, at, what, then))
-                if (*own, *what, *then) == (ring, fault, moment)
+                if (*own, *what, *then) == (port, fault, moment)
                     && (self.known.is_none() || *at == self.now) =>
             {
                 self.events.pop_front();
                 if let (Some(known), PlacedFault::Link(_, what)) = (&mut self.known, fault) {
-                    known.held = known.held + held_by(what, self.rate.byte_time());
+                    known.held = known.held + held_by(what, self.medium.octet_time());
                 }
                 self.trouble_comes();
             }
@@ -412,18 +422,18 @@ impl Link for Replay {
         }
     }
 
-    fn reaches(&self, ring: usize, link: usize) -> bool {
-        self.reaches.contains(&(ring, link))
+    fn reaches(&self, port: usize, link: usize) -> bool {
+        self.reaches.contains(&(port, link))
     }
 
-    fn listens(&self, ring: usize, link: usize) -> bool {
-        self.listens.contains(&(ring, link))
+    fn listens(&self, port: usize, link: usize) -> bool {
+        self.listens.contains(&(port, link))
     }
 
-    fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
+    fn tapped(&mut self, port: usize, link: usize) -> Option<Vec<Received>> {
         match self.events.pop_front() {
-            Some(Event::Tapped(own, place, _, bytes)) if (own, place) == (ring, link) => {
-                let all = self.tapped.entry((ring, link)).or_default();
+            Some(Event::Tapped(own, place, _, bytes)) if (own, place) == (port, link) => {
+                let all = self.tapped.entry((port, link)).or_default();
                 all.extend(bytes);
                 Some(all.clone())
             }
@@ -441,10 +451,10 @@ impl Link for Replay {
         self.tolerance
     }
 
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+    fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {
         match self.events.pop_front() {
             Some(Event::Probe(own, at, sent, came))
-                if own == ring && sent == bytes && (self.known.is_none() || at == self.now) =>
+                if own == port && sent == octets && (self.known.is_none() || at == self.now) =>
             {
                 self.now = self.now.max(at);
                 self.look(None);
@@ -468,16 +478,39 @@ impl Link for Replay {
         0
     }
 
-    fn drives(&self, ring: usize) -> u8 {
-        self.drives.get(ring).copied().unwrap_or(0)
+    fn drives(&self, port: usize) -> u8 {
+        self.drives.get(port).copied().unwrap_or(0)
     }
 
-    fn trace(&self, ring: usize) -> Trace {
+    fn trace(&self, port: usize) -> Trace {
         Trace {
-            drives: self.drives(ring),
+            drives: self.drives(port),
             links: Vec::new(),
             marks: Vec::new(),
         }
+    }
+}
+
+/// Whether what was recorded is the beginning of this.
+fn begins_with(what: Out<'_>, sent: &Pieces) -> bool {
+    let sent = sent.as_out();
+    what.first(sent.len()) == sent
+}
+
+/// A number of pieces, in words.
+fn counted(what: Out<'_>) -> String {
+    match what {
+        Out::Octets(octets) => format!("{} bytes", octets.len()),
+        Out::Frames(frames) => format!("{} frames", frames.len()),
+    }
+}
+
+/// What was heard, in words.
+fn words_of(heard: Heard) -> String {
+    match heard {
+        Heard::Octet(octet) => format!("{:02X}", octet.byte),
+        Heard::Frame(can::Heard::Frame(frame)) => frame.to_string(),
+        Heard::Frame(can::Heard::Error(error)) => error.to_string(),
     }
 }
 
@@ -494,6 +527,8 @@ fn held_by(fault: LinkFault, byte_time: Span) -> Span {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::link::Octets;
+    use harness_proto::line::Rate;
 
     fn ms(at: u64) -> Instant {
         Instant::START + Span::from_millis(at)
@@ -501,12 +536,12 @@ mod tests {
 
     /// A byte that comes long behind the time until which it was waited for, and one that is sent then.
     fn overslept(tolerance: Span) -> Replay {
-        let byte = Received::good(0x80);
+        let byte = Heard::Octet(Received::good(0x80));
         let events = vec![
             Event::Begin(Instant::START),
-            Event::Sent(0, ms(1), vec![0x80]),
+            Event::Sent(0, ms(1), Pieces::Octets(vec![0x80])),
             Event::Received(0, ms(300), byte),
-            Event::Sent(0, ms(301), vec![0x81]),
+            Event::Sent(0, ms(301), Pieces::Octets(vec![0x81])),
         ];
         Replay::new(events, Rate::default(), tolerance, vec![1], Vec::new())
     }
@@ -514,7 +549,7 @@ mod tests {
     /// Sends a byte, waits for answers until 50 ms, and sends the next byte.
     fn play(replay: &mut Replay) -> Vec<Instant> {
         replay.begin();
-        replay.send(0, &[0x80]);
+        replay.send_octets(0, &[0x80]);
         let mut came = Vec::new();
         while replay.now() < ms(50) {
             replay.wait(ms(50));
@@ -522,7 +557,7 @@ mod tests {
                 came.push(at);
             }
         }
-        replay.send(0, &[0x81]);
+        replay.send_octets(0, &[0x81]);
         came
     }
 

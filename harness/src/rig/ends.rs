@@ -3,6 +3,7 @@
 use crate::link::{
     Capability, Lead, Line, Link, Moment, PlacedFault, SimulatedLink, StreamLink, Trouble,
 };
+use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
@@ -46,19 +47,19 @@ impl Ends {
 }
 
 impl Line for Ends {
-    fn byte_time(&self) -> Span {
-        each!(self, link => link.byte_time())
+    fn medium(&self, port: usize) -> Medium {
+        each!(self, link => link.medium(port))
     }
 
     fn now(&self) -> Instant {
         each!(self, link => link.now())
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        each!(self, link => link.send(ring, bytes))
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+        each!(self, link => link.send(ring, what))
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         each!(self, link => link.receive(ring))
     }
 
@@ -112,8 +113,8 @@ impl Link for Ends {
         each!(self, link => link.time_tolerance())
     }
 
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
-        each!(self, link => link.probe(ring, bytes))
+    fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
+        each!(self, link => link.probe(ring, octets))
     }
 
     fn beside(&self) -> Option<&dyn Any> {

@@ -8,7 +8,7 @@ use super::session::Session;
 use super::session_error::SessionError;
 use crate::buses::twin::{Comparison, Conversation, Exactness, Twin};
 use crate::guard::Guarded;
-use crate::link::{Capability, Event, Line, Link, Recording, Sink, Trouble};
+use crate::link::{Capability, Event, Line, Link, Octets, Recording, Sink, Trouble};
 use crate::rig::health::{Unhealthy, examine};
 use crate::rig::judge::{Heard, by_hand, judge};
 use crate::scenario::plan::Plan;

@@ -12,7 +12,7 @@ use super::watchdog::{Alarm, Watchdog};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, blind_stop, safe_state};
-use crate::link::{Line, Link, StreamLink, Trouble};
+use crate::link::{Line, Link, Octets, StreamLink, Trouble};
 use crate::rig::health::{self, Health, Unhealthy, examine};
 use crate::rig::interlock::Interlocks;
 use crate::rig::line_test::{self, Cause};
@@ -470,7 +470,7 @@ impl Session {
     }
 
     fn take(&mut self, ring: usize) -> Vec<Received> {
-        std::iter::from_fn(|| self.link.receive(ring).map(|(_, byte)| byte)).collect()
+        std::iter::from_fn(|| self.link.receive_octet(ring).map(|(_, byte)| byte)).collect()
     }
 
     /// Brings every ring back (9.8), counts its drives, and compares with the rig's file; as often as the file says.

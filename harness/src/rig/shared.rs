@@ -2,8 +2,9 @@
 
 use super::session::{End, Session};
 use crate::link::{Lead, Line, Trouble};
-use harness_proto::line::Received;
-use harness_proto::time::{Instant, Span};
+use crate::medium::{Heard, Medium, Out};
+use harness_proto::line::Rate;
+use harness_proto::time::Instant;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A rig in use. Its [line](Self::line) goes to a driver, and behind the driver the rig is given back. Clones are handles of the
@@ -17,7 +18,8 @@ pub struct Shared {
 #[derive(Debug)]
 pub struct SharedLine {
     session: Arc<Mutex<Option<Session>>>,
-    byte_time: Span,
+    /// That of its first port, for when the rig has been given back.
+    medium: Medium,
     trouble: Option<Trouble>,
 }
 
@@ -38,12 +40,12 @@ impl Shared {
     /// Its line.
     #[must_use]
     pub fn line(&self) -> SharedLine {
-        let byte_time = lock(&self.session)
+        let medium = lock(&self.session)
             .as_mut()
-            .map_or(Span::ZERO, |session| session.link().byte_time());
+            .map_or(Rate::default().into(), |session| session.link().medium(0));
         SharedLine {
             session: Arc::clone(&self.session),
-            byte_time,
+            medium,
             trouble: None,
         }
     }
@@ -84,8 +86,10 @@ impl SharedLine {
 }
 
 impl Line for SharedLine {
-    fn byte_time(&self) -> Span {
-        self.byte_time
+    fn medium(&self, port: usize) -> Medium {
+        lock(&self.session)
+            .as_mut()
+            .map_or(self.medium, |session| session.link().medium(port))
     }
 
     fn now(&self) -> Instant {
@@ -94,11 +98,11 @@ impl Line for SharedLine {
             .map_or(Instant::START, |session| session.link().now())
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        self.with(Instant::START, |line| line.send(ring, bytes))
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+        self.with(Instant::START, |line| line.send(ring, what))
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         self.with(None, |line| line.receive(ring))
     }
 
@@ -106,10 +110,10 @@ impl Line for SharedLine {
         self.with(false, |line| line.wait(until))
     }
 
-    fn permits(&self, ring: usize, bytes: &[u8]) -> bool {
+    fn permits(&self, ring: usize, what: Out<'_>) -> bool {
         lock(&self.session)
             .as_mut()
-            .is_some_and(|session| session.link().permits(ring, bytes))
+            .is_some_and(|session| session.link().permits(ring, what))
     }
 
     fn attend(&mut self, ring: usize, at: Instant) {

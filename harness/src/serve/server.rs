@@ -1,7 +1,7 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
 use super::place::{Inner, Role};
-use crate::link::{Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink, link_name};
+use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, SimulatedLink, link_name};
 use crate::scenario::plan::Plan;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
@@ -302,7 +302,7 @@ impl Server {
         for seat in &mut self.seats {
             match seat.at {
                 At::Master(ring) => {
-                    while let Some((_, read)) = self.link.receive(ring) {
+                    while let Some((_, read)) = self.link.receive_octet(ring) {
                         seat.give(read, self.marks);
                     }
                 }
@@ -396,7 +396,7 @@ fn send(link: &mut SimulatedLink, seat: &mut Seat, ring: usize, read: &[Received
     if !read.is_empty() {
         let bytes: Vec<_> = read.iter().map(|read| read.byte).collect();
         seat.sent += bytes.len() as u64;
-        seat.sent_by = link.send(ring, &bytes);
+        seat.sent_by = link.send_octets(ring, &bytes);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Served rings in virtual time: the clock is a number.
 
 use super::*;
+use crate::link::Octets;
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::plan;
 use crate::scenario::simulate;

@@ -1,24 +1,25 @@
 //! A link of which only the bytes at the master can be seen.
 
 use harness::link::{Capability, Line, Link, Moment, PlacedFault};
+use harness::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
-use harness_proto::time::{Instant, Span};
+use harness_proto::time::Instant;
 use harness_sim::record::Trace;
 
 /// A link that shows nothing of its drives: a ring of which only the master's ends are known.
 pub(crate) struct Blind<L>(pub(crate) L);
 
 impl<L: Link> Line for Blind<L> {
-    fn byte_time(&self) -> Span {
-        self.0.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.0.medium(port)
     }
     fn now(&self) -> Instant {
         self.0.now()
     }
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        self.0.send(ring, bytes)
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+        self.0.send(ring, what)
     }
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         self.0.receive(ring)
     }
     fn wait(&mut self, until: Instant) -> bool {
@@ -46,8 +47,8 @@ impl<L: Link> Link for Blind<L> {
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
         self.0.inject(ring, fault, moment);
     }
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
-        self.0.probe(ring, bytes)
+    fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
+        self.0.probe(ring, octets)
     }
     fn unused_faults(&self) -> Vec<String> {
         self.0.unused_faults()

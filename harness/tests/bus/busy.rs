@@ -2,6 +2,7 @@
 
 use harness::library::Entry;
 use harness::link::{Capability, Lead, Line, Link, Moment, PlacedFault, SimulatedLink, Trouble};
+use harness::medium::{Heard, Medium, Out};
 use harness::scenario::run::{AtMismatch, play_over_bus};
 use harness::scenario::simulate::bench;
 use harness::scenario::source::Source;
@@ -21,15 +22,15 @@ struct Busy {
 }
 
 impl Line for Busy {
-    fn byte_time(&self) -> Span {
-        self.link.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
     }
 
     fn now(&self) -> Instant {
         self.link.now()
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
         self.sends += 1;
         if self.sends == 2 {
             let until = self.link.now() + BUSY;
@@ -37,10 +38,10 @@ impl Line for Busy {
                 self.link.wait(until);
             }
         }
-        self.link.send(ring, bytes)
+        self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         self.link.receive(ring)
     }
 
@@ -82,8 +83,8 @@ impl Link for Busy {
         self.tolerance
     }
 
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
-        self.link.probe(ring, bytes)
+    fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
+        self.link.probe(ring, octets)
     }
 
     fn unused_faults(&self) -> Vec<String> {

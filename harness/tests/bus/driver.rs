@@ -3,7 +3,8 @@
 use harness::buses::novobus::driver::{
     Axis, Bus, Error, Options, Recovery, Scope, SkStatus, Trigger, count_drives, recover,
 };
-use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use harness::link::{Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use harness::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::position::{Mode, Position};
@@ -148,20 +149,20 @@ struct DamagesReads {
 }
 
 impl Line for DamagesReads {
-    fn byte_time(&self) -> Span {
-        self.link.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
     }
 
     fn now(&self) -> Instant {
         self.link.now()
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        self.link.send(ring, bytes)
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+        self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
-        let (at, mut received) = self.link.receive(ring)?;
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
+        let (at, mut received) = self.link.receive_octet(ring)?;
         // Its check byte follows.
         if self.heard == [0x82, 0x81, 0x8A, 0xFD] && self.left > 0 {
             self.damages = !self.damages;
@@ -172,7 +173,7 @@ impl Line for DamagesReads {
         }
         self.heard.rotate_left(1);
         self.heard[3] = received.byte;
-        Some((at, received))
+        Some((at, Heard::Octet(received)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
@@ -331,7 +332,7 @@ fn discovery() {
         let mut link = SimulatedLink::new(Bench::one(ring(drives, Nd21Properties::default())));
         assert_eq!(count_drives(&mut link, 0), Ok(size(drives)));
         // Also out of the error mode.
-        link.send(0, &[0x11, 0x22]);
+        link.send_octets(0, &[0x11, 0x22]);
         assert_eq!(count_drives(&mut link, 0), Ok(size(drives)));
     }
     let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
@@ -372,7 +373,7 @@ fn recovery_of_9_8() {
         PlacedFault::Link(1, LinkFault::Replace(0x11)),
         Moment::Now,
     );
-    link.send(0, &[0x80]);
+    link.send_octets(0, &[0x80]);
     let damaged = Recovery {
         before: Some(2),
         ..fine
@@ -490,28 +491,28 @@ impl Hostile {
 }
 
 impl Line for Hostile {
-    fn byte_time(&self) -> Span {
-        Rate::Baud38400.byte_time()
+    fn medium(&self, _port: usize) -> Medium {
+        Rate::Baud38400.into()
     }
 
     fn now(&self) -> Instant {
         self.now
     }
 
-    fn send(&mut self, _ring: usize, bytes: &[u8]) -> Instant {
-        self.waiting += self.answers * bytes.len() as u64;
-        self.last = bytes.last().copied().unwrap_or(self.last);
-        self.now + self.byte_time() * bytes.len() as u64
+    fn send(&mut self, _ring: usize, what: Out<'_>) -> Instant {
+        self.waiting += self.answers * what.len() as u64;
+        self.last = what.octets().last().copied().unwrap_or(self.last);
+        self.now + self.byte_time() * what.len() as u64
     }
 
-    fn receive(&mut self, _ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, _ring: usize) -> Option<(Instant, Heard)> {
         self.waiting = self.waiting.checked_sub(100)?;
         let byte = if self.echo && !self.random().is_multiple_of(50) {
             self.last
         } else {
             self.random().to_le_bytes()[0]
         };
-        Some((self.now, Received::good(byte)))
+        Some((self.now, Heard::Octet(Received::good(byte))))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

@@ -7,6 +7,7 @@ mod campaigns;
 mod corpora;
 mod deviations;
 mod driver;
+mod frames;
 mod guard;
 mod language;
 mod naming;

@@ -4,7 +4,7 @@
 
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
-use harness::link::{Capability, Event, Line, Recording, SimulatedLink};
+use harness::link::{Capability, Event, Octets, Recording, SimulatedLink};
 use harness::qualify::{
     Answer, Culprit, Meant, Named, Seen, Sighting, Whose, agreed, answer, conversations, culprit,
     exchange, hypotheses, name, probes,

@@ -2,7 +2,7 @@
 
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin, What};
 use harness::library::{Entry, sources};
-use harness::link::{Event, Link, Recording, Replay};
+use harness::link::{Event, Link, Octets, Recording, Replay};
 use harness::qualify::{
     Answer, Asked, Hypothesis, Probe, Seen, answer, explaining, hypotheses, name, probes,
 };

@@ -3,8 +3,8 @@
 
 use harness::library::Entry;
 use harness::link::{
-    InnerLink, Line, Link, LinkFault, Moment, PlacedFault, Ports, SimulatedLink, StreamLink,
-    Trouble,
+    InnerLink, Line, Link, LinkFault, Moment, Octets, PlacedFault, Ports, SimulatedLink,
+    StreamLink, Trouble,
 };
 use harness::port::{Endpoint, PortSettings, Wire, open};
 use harness::scenario::run::{AtMismatch, lacks, play_over_bus, start_anew};
@@ -125,14 +125,14 @@ fn simulated() -> SimulatedLink {
 
 /// Sends bytes and gives what comes back until the ring is quiet.
 fn exchange(link: &mut dyn Link, bytes: &[u8]) -> Vec<Received> {
-    let end = link.send(0, bytes) + Span::from_millis(5_000);
+    let end = link.send_octets(0, bytes) + Span::from_millis(5_000);
     let mut back = Vec::new();
     while link.busy() && link.now() < end && link.wait(end) {
-        while let Some((_, byte)) = link.receive(0) {
+        while let Some((_, byte)) = link.receive_octet(0) {
             back.push(byte);
         }
     }
-    while let Some((_, byte)) = link.receive(0) {
+    while let Some((_, byte)) = link.receive_octet(0) {
         back.push(byte);
     }
     assert_eq!(link.trouble(), None);
@@ -257,7 +257,7 @@ fn an_interposer_goes_on_behind_an_interruption() {
     let interrupt: Arc<AtomicBool> = Arc::default();
     let mut link = StreamLink::new(ring, vec![inner], Rate::default(), Arc::clone(&interrupt));
     link.begin();
-    link.send(0, &READS);
+    link.send_octets(0, &READS);
     interrupt.store(true, Ordering::Relaxed);
     let passed = |link: &StreamLink| link.inner_links()[0].delay().bytes;
     let end = link.now() + Span::from_millis(5_000);

@@ -3,7 +3,7 @@
 
 use crate::ring::Served;
 use harness::library::{Entry, sources};
-use harness::link::{Line, StreamLink};
+use harness::link::{Line, Octets, StreamLink};
 use harness::port::{Endpoint, PortSettings, Wire, open};
 use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, run, start_anew};
 use harness::scenario::simulate::simulated;
@@ -184,7 +184,7 @@ fn bytes_that_lie_there_are_no_news() {
     let looks = link.beats().load(Ordering::Relaxed);
     assert!(looks < 50, "{looks} looks at the port in 300 ms");
     for left in (0..8).rev() {
-        assert!(link.receive(0).is_some(), "{left} bytes behind it");
+        assert!(link.receive_octet(0).is_some(), "{left} bytes behind it");
         if left > 0 {
             let before = link.beats().load(Ordering::Relaxed);
             link.wait(link.now() + Span::from_millis(10_000));

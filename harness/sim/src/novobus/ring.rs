@@ -152,6 +152,12 @@ impl<D: Device> Ring<D> {
         self.size
     }
 
+    /// The rate of its line.
+    #[must_use]
+    pub const fn rate(&self) -> Rate {
+        self.rate
+    }
+
     /// How long a byte takes on this line.
     #[must_use]
     pub fn byte_time(&self) -> Span {

@@ -1,10 +1,11 @@
 //! A link to simulated rings, in virtual time.
 
 use crate::buses;
-use crate::link::{Capability, Line, Link, Moment, PlacedFault, link_name};
-use harness_proto::line::Received;
+use crate::link::{Capability, Line, Link, Moment, Octets, PlacedFault, link_name};
+use crate::medium::{Heard, Medium, Out};
+use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::error::BusError;
-use harness_proto::time::{Instant, Span};
+use harness_proto::time::Instant;
 use harness_sim::nd21::{Mode, Shown, Stimulus};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::device::Device;
@@ -20,7 +21,7 @@ use std::collections::VecDeque;
 #[derive(Clone, Debug)]
 pub struct SimulatedLink {
     bench: Bench,
-    byte_time: Span,
+    rate: Rate,
     /// When the conversation began, on the bench's clock.
     origin: Instant,
     /// Faults that wait for their time, in order of it.
@@ -56,10 +57,10 @@ impl SimulatedLink {
     /// A link to the rings of a bench.
     #[must_use]
     pub fn new(bench: Bench) -> Self {
-        let byte_time = bench.rings().first().map_or(Span::ZERO, Ring::byte_time);
+        let rate = bench.rings().first().map_or(Rate::default(), Ring::rate);
         Self {
             bench,
-            byte_time,
+            rate,
             origin: Instant::START,
             scheduled: VecDeque::new(),
         }
@@ -79,7 +80,7 @@ impl SimulatedLink {
     /// and has no witness.
     #[must_use]
     pub fn witness(&mut self) -> bool {
-        let byte_time = self.byte_time;
+        let byte_time = self.rate.byte_time();
         let mut all = true;
         self.each_drive(|drive| all &= drive.witness(byte_time));
         all
@@ -264,26 +265,26 @@ impl SimulatedLink {
 }
 
 impl Line for SimulatedLink {
-    fn byte_time(&self) -> Span {
-        self.byte_time
+    fn medium(&self, _port: usize) -> Medium {
+        self.rate.into()
     }
 
     fn now(&self) -> Instant {
         self.since_origin(self.bench.now())
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
         let now = self.bench.now();
         let sent_by = self.bench.ring_mut(ring).map_or(now, |ring| {
-            ring.send(now, bytes);
+            ring.send(now, what.octets());
             ring.sent_by()
         });
         self.since_origin(sent_by)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         let (at, received, _) = self.receive_with_cause(ring)?;
-        Some((at, received))
+        Some((at, Heard::Octet(received)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
@@ -350,17 +351,17 @@ impl Link for SimulatedLink {
         }
     }
 
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+    fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
         let mut copy = self.clone();
-        while copy.receive(ring).is_some() {}
-        copy.send(ring, bytes);
+        while copy.receive_octet(ring).is_some() {}
+        copy.send_octets(ring, octets);
         let mut came = Vec::new();
         // Once round the ring and the bytes themselves, and as much again for what is delayed.
         let drives = u64::from(self.drives(ring));
-        let end = copy.now() + self.byte_time * (2 * (drives + bytes.len() as u64));
+        let end = copy.now() + self.rate.byte_time() * (2 * (drives + octets.len() as u64));
         while copy.busy() && copy.now() < end && copy.wait(end) {
-            while let Some((_, byte)) = copy.receive(ring) {
-                came.push(byte);
+            while let Some((_, octet)) = copy.receive_octet(ring) {
+                came.push(octet);
             }
         }
         came

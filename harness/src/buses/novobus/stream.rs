@@ -11,8 +11,9 @@ use crate::link::tamper::Tamper;
 use crate::link::{
     Capability, HARMLESS, Lead, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name,
 };
+use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Wire, wake_on_time};
-use harness_proto::line::{Rate, Received};
+use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{LinkTrace, Trace};
 use rustix::event::{Timespec, poll};
@@ -361,8 +362,8 @@ impl StreamLink {
 }
 
 impl Line for StreamLink {
-    fn byte_time(&self) -> Span {
-        self.rate.byte_time()
+    fn medium(&self, _port: usize) -> Medium {
+        self.rate.into()
     }
 
     fn now(&self) -> Instant {
@@ -371,10 +372,10 @@ impl Line for StreamLink {
         now
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
         let now = self.now();
         let rest = !self.ring_busy(ring, now);
-        let byte_time = self.byte_time();
+        let byte_time = self.rate.byte_time();
         let recording = self.recording;
         let sound = self.trouble.is_none();
         let Some(own) = self.rings.get_mut(ring).filter(|_| sound) else {
@@ -385,7 +386,7 @@ impl Line for StreamLink {
             let inner = self.inner.iter_mut().filter(|inner| inner.ring == ring);
             inner.for_each(InnerLink::rest);
         }
-        for byte in bytes {
+        for byte in what.octets() {
             own.send(now, *byte, byte_time, recording);
         }
         let free = own.free;
@@ -393,12 +394,13 @@ impl Line for StreamLink {
         free
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         if !self.has_come(self.rings.get(ring)?) {
             return None;
         }
         self.lying = false;
-        self.rings.get_mut(ring)?.received.pop_front()
+        let (at, octet) = self.rings.get_mut(ring)?.received.pop_front()?;
+        Some((at, Heard::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
@@ -532,21 +534,6 @@ impl Link for StreamLink {
 
     fn time_tolerance(&self) -> Span {
         self.tolerance
-    }
-
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
-        let end = self.send(ring, bytes);
-        let end = end + self.rings.get(ring).map_or(Span::ZERO, |r| self.round(r));
-        let mut came = Vec::new();
-        while self.busy() && self.now() < end && self.wait(end) {
-            while let Some((_, byte)) = self.receive(ring) {
-                came.push(byte);
-            }
-        }
-        while let Some((_, byte)) = self.receive(ring) {
-            came.push(byte);
-        }
-        came
     }
 
     fn unused_faults(&self) -> Vec<String> {

@@ -1,6 +1,7 @@
 //! Tests when the link is awake for an answer.
 
 use super::*;
+use crate::link::Octets;
 use crate::port::{Endpoint, PortSettings, open};
 use harness_proto::novobus::sync::SYNCO;
 use std::io::Write as _;
@@ -34,7 +35,7 @@ fn link() -> (StreamLink, TcpStream) {
 fn who_waits_is_awake_for_the_last_byte() {
     let (mut link, _ring) = link();
     assert_eq!(link.awaited(link.now()), None, "nothing is under way");
-    let free = link.send(0, &[0x88, 0xFF]);
+    let free = link.send_octets(0, &[0x88, 0xFF]);
     let home = free + link.byte_time() * u64::from(DRIVES);
     assert_eq!(link.awaited(Instant::START), Some(home));
     assert_eq!(link.awaited(home), Some(home));
@@ -49,7 +50,7 @@ fn who_waits_is_awake_for_the_last_byte() {
 #[test]
 fn who_waits_says_for_what() {
     let (mut link, _ring) = link();
-    let free = link.send(0, &[0x88, SYNCO, SYNCO]);
+    let free = link.send_octets(0, &[0x88, SYNCO, SYNCO]);
     let home = free + link.byte_time() * u64::from(DRIVES);
     let said = home - link.byte_time() * 2;
     link.attend(0, said);
@@ -63,9 +64,9 @@ fn who_waits_says_for_what() {
 #[test]
 fn what_has_come_is_not_waited_for() {
     let (mut link, mut ring) = link();
-    let end = link.send(0, &[0x88]) + Span::from_millis(60_000);
+    let end = link.send_octets(0, &[0x88]) + Span::from_millis(60_000);
     ring.write_all(&[0x8B]).expect("room");
-    while link.receive(0).is_none() {
+    while link.receive_octet(0).is_none() {
         assert!(link.now() < end && link.wait(end), "{:?}", link.trouble());
     }
     assert_eq!(link.awaited(Instant::START), None);
@@ -75,7 +76,7 @@ fn what_has_come_is_not_waited_for() {
 #[test]
 fn who_was_away_waits_for_lost_bytes_as_much_longer() {
     let (mut link, _ring) = link();
-    link.send(0, &[0x80]);
+    link.send_octets(0, &[0x80]);
     let calm = link.round(&link.rings[0]);
     let now = time::Instant::now();
     link.late.woken(now, now + time::Duration::from_secs(8));
@@ -87,7 +88,7 @@ fn who_was_away_waits_for_lost_bytes_as_much_longer() {
 #[test]
 fn who_was_away_looks_before_a_byte_counts_as_lost() {
     let (mut link, mut ring) = link();
-    let free = link.send(0, &[0x80]);
+    let free = link.send_octets(0, &[0x80]);
     ring.write_all(&[0x80]).expect("room");
     let over = free + link.round(&link.rings[0]);
     while link.now() <= over {
@@ -96,9 +97,9 @@ fn who_was_away_looks_before_a_byte_counts_as_lost() {
     assert!(link.busy(), "nobody has looked");
     assert!(link.wait(link.now() + Span::from_millis(60_000)));
     assert!(!link.busy());
-    assert_eq!(link.receive(0).map(|(_, byte)| byte.byte), Some(0x80));
+    assert_eq!(link.receive_octet(0).map(|(_, byte)| byte.byte), Some(0x80));
     // A missing byte counts as lost at the first poll behind its time, without a sleep.
-    let free = link.send(0, &[0x80]);
+    let free = link.send_octets(0, &[0x80]);
     let over = free + link.round(&link.rings[0]);
     while link.now() <= over {
         std::thread::sleep(time::Duration::from_millis(5));
@@ -115,7 +116,7 @@ fn who_stands_still_while_awake_is_late() {
     let long = Span::from_millis(60_000);
     while link.awake.is_none() {
         // The computer may be late here too: then try again with the next byte.
-        let free = link.send(0, &[0x88]);
+        let free = link.send_octets(0, &[0x88]);
         let home = free + link.byte_time() * u64::from(DRIVES);
         while link.awake.is_none() && link.now() < home + STAY {
             assert!(link.wait(home + long));

@@ -4,7 +4,7 @@ use super::halt::Halt;
 use super::outcome::{Difference, Outcome, Stop};
 use super::{Shown, matches, resolve, show};
 use crate::buses::novobus::language::run::record::Recorder;
-use crate::link::{Capability, Link, Moment};
+use crate::link::{Capability, Link, Moment, Octets};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
 use crate::scenario::problem::Span;
@@ -282,7 +282,7 @@ impl Runner<'_> {
         if let Some(record) = self.rings.get_mut(ring) {
             record.sent.extend(bytes.iter().copied().map(good));
         }
-        self.line_before = self.link.send(ring, bytes);
+        self.line_before = self.link.send_octets(ring, bytes);
         self.sent_to = self.line_before;
         self.sent_to
     }
@@ -344,7 +344,7 @@ impl Runner<'_> {
 
     pub(crate) fn fetch(&mut self) {
         for (index, record) in self.rings.iter_mut().enumerate() {
-            while let Some(byte) = self.link.receive(index) {
+            while let Some(byte) = self.link.receive_octet(index) {
                 record.received.push(byte);
                 if ends_with_sequence(&record.received[record.since_recovery..]) {
                     record.since_recovery = record.received.len();

@@ -10,6 +10,7 @@ use harness::explore::{
     by_novelty, play,
 };
 use harness::link::Line as _;
+use harness::link::Octets;
 use harness::scenario::syntax::Header;
 use harness_proto::time::Span;
 use std::path::Path;
@@ -106,7 +107,7 @@ fn the_other_ring_stays_silent() {
     play(&mut link, &case);
     assert_eq!(beside(&case, &link), None);
     let other = 1 - case.ring();
-    link.send(other, &[0x80]);
+    link.send_octets(other, &[0x80]);
     link.run_until(link.now() + Span::from_millis(1));
     let found = beside(&case, &link).expect("a byte");
     assert_eq!((found.ring, &found.section[..]), (other, "12.2"));

@@ -9,7 +9,7 @@ use harness::campaign::find::{find, names};
 use harness::campaign::report::{json, table};
 use harness::campaign::{Campaign, Case, Class, Finished, Wrong};
 use harness::library::Entry;
-use harness::link::{Line, Link};
+use harness::link::{Link, Octets};
 use harness::scenario::problem::Problems;
 use harness::scenario::run::{AtMismatch, play};
 use harness::scenario::simulate::simulated;

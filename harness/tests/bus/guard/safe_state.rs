@@ -4,7 +4,9 @@ use super::{axis, bus, guarded, ring, size};
 use harness::buses::novobus::driver::Bus;
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits, SafeState, Standing, blind_stop, safe_state};
-use harness::link::{DriveFault, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
+use harness::link::{
+    DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault, SimulatedLink,
+};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::ram;
@@ -70,7 +72,7 @@ fn the_last_words_are_allowed() {
     for drives in [1, 3, 250] {
         let mut line = guarded(drives, Limits::default());
         let bytes = blind_stop(size(drives));
-        line.send(0, &bytes);
+        line.send_octets(0, &bytes);
         assert_eq!(line.trouble(), None);
         while line.busy() && line.wait(line.now() + Span::from_millis(1_000)) {}
         let stopped = |drive: u8| {
@@ -87,7 +89,7 @@ fn half_a_telegram_does_not_keep_it_away() {
     let limits = Limits::default();
     let mut line = guarded(2, limits);
     let before = line.peek(0, 1, ram::STATUS);
-    line.send(0, &[0x8A, 0xFF, 0x82, 0x00, 0x00, 0xFF, 0x81]);
+    line.send_octets(0, &[0x8A, 0xFF, 0x82, 0x00, 0x00, 0xFF, 0x81]);
     assert!(line.trouble().is_some());
     assert_eq!(line.peek(0, 1, ram::STATUS), before);
     line.reset_after_denial();
@@ -164,7 +166,7 @@ fn two_rings() {
     let rings = [size(1), size(3)];
     line.assume_fresh();
     for ring in 0..2 {
-        line.send(ring, &[0x8A, 0xFF, 0x82, 0x00]);
+        line.send_octets(ring, &[0x8A, 0xFF, 0x82, 0x00]);
     }
     assert_eq!(line.trouble(), None);
     line.reset_after_denial();

@@ -5,7 +5,7 @@ use harness::buses::novobus::driver::{Bus, Error, count_drives, recover};
 use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
 use harness::link::{
-    Capability, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink, Trouble,
+    Capability, Line, Link, LinkFault, Moment, Octets, PlacedFault, SimulatedLink, Trouble,
 };
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
@@ -185,8 +185,8 @@ fn the_greatest_speed() {
     ] {
         let mut line = guarded(1, limits);
         // `DataIn` points at `nsoll`.
-        line.send(0, &[0x8A, 0xFF, 0x82, 0x08, 0x32, 0xFF, 0xBB]);
-        line.send(0, bytes);
+        line.send_octets(0, &[0x8A, 0xFF, 0x82, 0x08, 0x32, 0xFF, 0xBB]);
+        line.send_octets(0, bytes);
         assert_eq!(
             line.trouble().is_none(),
             passes,
@@ -205,7 +205,7 @@ fn counting_and_recovering_pass() {
         ..Flips::default()
     };
     line.inject(0, PlacedFault::Link(0, LinkFault::Flip(flips)), Moment::Now);
-    line.send(
+    line.send_octets(
         0,
         &[0x80, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
     );
@@ -234,9 +234,9 @@ fn caps() {
     ] {
         let mut line = guarded(1, limits);
         // 22 bytes were the recovery.
-        line.send(0, &[0x80; 38]);
+        line.send_octets(0, &[0x80; 38]);
         assert_eq!(line.trouble(), None);
-        line.send(0, &[0x80]);
+        line.send_octets(0, &[0x80]);
         let trouble = line.trouble().expect("denied").to_string();
         assert!(trouble.contains(text), "{trouble}");
     }
@@ -246,18 +246,18 @@ fn caps() {
 #[test]
 fn after_a_denial() {
     let mut line = guarded(1, Limits::default());
-    line.send(0, &[0x88, 0xFF, 0xA4, 0x7E, 0x00, 0x22, 0x80]);
+    line.send_octets(0, &[0x88, 0xFF, 0xA4, 0x7E, 0x00, 0x22, 0x80]);
     let text = line.trouble().expect("denied").to_string();
     assert!(
         text.contains("And 7E into FF00 (Status) to drive 0 needs `allow_motion`"),
         "{text}"
     );
     let before = line.carried();
-    line.send(0, &[0x80]);
+    line.send_octets(0, &[0x80]);
     assert_eq!(line.carried(), before);
     line.reset_after_denial();
     // A SYNCO would stand in the place of the checking byte.
-    line.send(0, &[0x80]);
+    line.send_octets(0, &[0x80]);
     assert!(line.trouble().is_some());
 }
 

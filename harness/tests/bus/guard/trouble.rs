@@ -7,6 +7,7 @@ use harness::library::Entry;
 use harness::link::{
     Capability, Event, Line, Link, Moment, PlacedFault, Recording, Replay, Trouble,
 };
+use harness::medium::{Heard, Medium, Out};
 use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtMismatch, Outcome, play, play_over_bus};
 use harness::scenario::simulate::bench;
@@ -152,22 +153,22 @@ impl<L: Link> Failing<L> {
 }
 
 impl<L: Link> Line for Failing<L> {
-    fn byte_time(&self) -> Span {
-        self.link.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
     }
     fn now(&self) -> Instant {
         self.link.now()
     }
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
         if self.failed {
             return self.link.now();
         }
-        let end = self.link.send(ring, bytes);
-        self.counts[0] += bytes.len();
+        let end = self.link.send(ring, what);
+        self.counts[0] += what.len();
         self.look();
         end
     }
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         let byte = self.link.receive(ring)?;
         self.counts[1] += 1;
         self.look();
@@ -198,8 +199,8 @@ impl<L: Link> Link for Failing<L> {
     fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
         self.link.inject(ring, fault, moment);
     }
-    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
-        self.link.probe(ring, bytes)
+    fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
+        self.link.probe(ring, octets)
     }
     fn unused_faults(&self) -> Vec<String> {
         self.link.unused_faults()

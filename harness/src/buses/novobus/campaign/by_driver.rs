@@ -5,7 +5,8 @@ use super::class::{Evidence, Wrong, named};
 use super::sound::{Sound, all_back};
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options};
 use crate::campaign::fault::Case;
-use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use crate::link::{Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use crate::medium::{Heard, Medium, Out};
 use crate::scenario::plan::PlannedCall;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
@@ -196,7 +197,7 @@ impl Evidence {
 fn settle(link: &mut SimulatedLink) {
     let end = link.now() + Span::from_millis(3_600_000);
     while link.busy() && link.now() < end && link.wait(end) {}
-    while link.receive(0).is_some() {}
+    while link.receive_octet(0).is_some() {}
 }
 
 /// A link that keeps what the master sends and notes what drives hold.
@@ -209,22 +210,22 @@ struct Spied {
 }
 
 impl Line for Spied {
-    fn byte_time(&self) -> Span {
-        self.link.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
     }
 
     fn now(&self) -> Instant {
         self.link.now()
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
         if !self.quiet {
-            self.sent.extend_from_slice(bytes);
+            self.sent.extend_from_slice(what.octets());
         }
-        self.link.send(ring, bytes)
+        self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, harness_proto::line::Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         self.link.receive(ring)
     }
 

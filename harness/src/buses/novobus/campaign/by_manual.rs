@@ -7,7 +7,7 @@ use super::conversation::Answers;
 use super::sound::{Sound, all_back};
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
 use crate::campaign::fault::{Case, link_index};
-use crate::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use crate::link::{Link, Moment, Octets, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::sync::SYNCO;
@@ -52,9 +52,9 @@ struct Play<'a> {
 }
 
 fn send(link: &mut SimulatedLink, bytes: &[u8]) -> Vec<Received> {
-    let end = link.send(0, bytes);
+    let end = link.send_octets(0, bytes);
     link.run_until(end);
-    std::iter::from_fn(|| link.receive(0).map(|(_, byte)| byte)).collect()
+    std::iter::from_fn(|| link.receive_octet(0).map(|(_, byte)| byte)).collect()
 }
 
 /// What came back for `sent`, without the SYNCO that were under way before it.

@@ -3,7 +3,7 @@
 use super::error::in_words;
 use super::{Axis, Bus, Error};
 use crate::buses::novobus::locate::locate;
-use crate::link::Line;
+use crate::link::{Line, Octets};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::errors::display_digits;
@@ -74,13 +74,13 @@ fn listen<T>(
     bytes: &[u8],
     mut heard: impl FnMut(Received) -> Option<T>,
 ) -> Option<T> {
-    while link.receive(ring).is_some() {}
-    let sent = link.send(ring, bytes);
+    while link.receive_octet(ring).is_some() {}
+    let sent = link.send_octets(ring, bytes);
     let end = sent + link.byte_time() * (u64::from(MAX_DRIVES) + 8) + Span::from_millis(50);
     // Where the link carries nothing more, its time may stand still.
     while link.now() < end && link.trouble().is_none() {
         link.wait(end);
-        while let Some((_, received)) = link.receive(ring) {
+        while let Some((_, received)) = link.receive_octet(ring) {
             if let Some(found) = heard(received) {
                 return Some(found);
             }

@@ -2,7 +2,8 @@
 
 use super::{Error, Options};
 use crate::buses::novobus::guard::safe_state::telegram;
-use crate::link::{Lead, Line, Trouble};
+use crate::link::{Lead, Line, Octets, Trouble};
+use crate::medium::Out;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
@@ -81,7 +82,7 @@ impl<'l> Pump<'l> {
             return false;
         };
         let bytes = telegram(own.master.ring(), drive, command);
-        self.link.permits(ring, &bytes)
+        self.link.permits(ring, Out::Octets(&bytes))
     }
 
     pub(crate) fn sizes(&self) -> Vec<RingSize> {
@@ -170,7 +171,7 @@ impl<'l> Pump<'l> {
         let now = self.link.now();
         let mut news = false;
         for (index, ring) in self.rings.iter_mut().enumerate() {
-            while let Some((at, received)) = self.link.receive(index) {
+            while let Some((at, received)) = self.link.receive_octet(index) {
                 ring.master.handle_byte(at, received);
             }
             if ring.master.poll_timeout().is_some_and(|due| due <= now) {
@@ -273,7 +274,7 @@ impl<'l> Pump<'l> {
             return next;
         }
         // If a fault holds the line, everything is later than computed. If the link carries nothing, bytes take no time.
-        let free = self.link.send(index, &bytes);
+        let free = self.link.send_octets(index, &bytes);
         let held = free.since(ring.free);
         ring.free = free;
         ring.home += held;

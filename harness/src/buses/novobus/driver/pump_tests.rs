@@ -2,7 +2,8 @@
 
 use crate::buses::novobus::driver::{Axis, Bus, Options};
 use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
-use harness_proto::line::{Rate, Received};
+use crate::medium::{Heard, Medium, Out};
+use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::bench::Bench;
@@ -27,19 +28,19 @@ struct Ahead<'l> {
 }
 
 impl Line for Ahead<'_> {
-    fn byte_time(&self) -> Span {
-        self.link.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
     }
 
     fn now(&self) -> Instant {
         self.link.now()
     }
 
-    fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        self.link.send(ring, bytes)
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+        self.link.send(ring, what)
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
         self.link.receive(ring)
     }
 

@@ -12,7 +12,9 @@ use crate::explore::ExploreError;
 use crate::explore::features;
 use crate::explore::{Rehearsal, Target, Tried};
 use crate::guard::Guarded;
-use crate::link::{Capability, Line as _, Link, Moment, PlacedFault, SimulatedLink, Trouble};
+use crate::link::{
+    Capability, Line as _, Link, Moment, Octets, PlacedFault, SimulatedLink, Trouble,
+};
 use crate::rig::{Run, examine};
 use crate::scenario::run::start_anew;
 use crate::scenario::simulate;
@@ -284,7 +286,7 @@ fn converse(
         }
         let parts = act.parts(case.drives);
         for part in parts.iter().filter(|part| !part.is_empty()) {
-            let end = link.send(ring, part);
+            let end = link.send_octets(ring, part);
             let length = part.len() as u64;
             due.extend((0..length).rev().map(|left| end - byte_time * left));
         }
@@ -304,7 +306,7 @@ fn await_bytes(
     received: &mut Vec<(Instant, Received)>,
 ) {
     loop {
-        received.extend(std::iter::from_fn(|| link.receive(ring)));
+        received.extend(std::iter::from_fn(|| link.receive_octet(ring)));
         if received.len() >= count || link.now() >= end || link.trouble().is_some() {
             return;
         }

@@ -7,7 +7,7 @@ use super::play::Seen;
 use super::setup::{drive_name, is_first};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin;
-use crate::link::{Line as _, Link, SimulatedLink, link_name};
+use crate::link::{Link, Octets, SimulatedLink, link_name};
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;

@@ -1,7 +1,7 @@
 //! A case on simulated rings without the way over its text: thousands a second. A test holds that both ways are one.
 
 use super::case::{Case, What};
-use crate::link::{DriveFault, Line, Link, Moment, PlacedFault, SimulatedLink};
+use crate::link::{DriveFault, Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 
@@ -42,7 +42,7 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
                     .iter()
                     .filter(|part| !part.is_empty())
                 {
-                    line_before = link.send(ring, part);
+                    line_before = link.send_octets(ring, part);
                 }
             }
         }
@@ -50,7 +50,7 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
     let end = link.now() + MOST_ROUND;
     while link.busy() && link.now() < end && link.wait(end) {}
     Seen {
-        received: std::iter::from_fn(|| link.receive(ring)).collect(),
+        received: std::iter::from_fn(|| link.receive_octet(ring)).collect(),
         took: link.now().since_start(),
     }
 }

@@ -1,8 +1,8 @@
 //! The safe state of a bench: every drive stopped, standing and blocked, and read back.
 
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Order, recover};
-use crate::link::{Lead, Line, Trouble};
-use harness_proto::line::Received;
+use crate::link::{Lead, Line, Octets, Trouble};
+use crate::medium::{Heard, Medium, Out};
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
@@ -273,7 +273,7 @@ fn wait_until_seen(bus: &Bus<'_>, drives: &mut [Told], told: u8, standing: &Stan
 fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), String> {
     let mut why = String::new();
     for _ in 0..ATTEMPTS {
-        let sent = line.send(ring, &CHECK_SEQUENCE);
+        let sent = line.send_octets(ring, &CHECK_SEQUENCE);
         while line.now() < sent && line.wait(sent) {}
         let recovery = recover(line, ring);
         if recovery.drives == Some(size) {
@@ -328,7 +328,7 @@ fn stop_blindly(line: &mut dyn Line, ring: usize, size: RingSize) {
     if matches!(line.trouble(), Some(Trouble::Lost(_))) {
         return;
     }
-    let sent = line.send(ring, &blind_stop(size));
+    let sent = line.send_octets(ring, &blind_stop(size));
     while line.now() < sent && line.wait(sent) {}
 }
 
@@ -368,19 +368,19 @@ struct OneRing<'l> {
 }
 
 impl Line for OneRing<'_> {
-    fn byte_time(&self) -> Span {
-        self.line.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.line.medium(port)
     }
 
     fn now(&self) -> Instant {
         self.line.now()
     }
 
-    fn send(&mut self, _: usize, bytes: &[u8]) -> Instant {
-        self.line.send(self.ring, bytes)
+    fn send(&mut self, _: usize, what: Out<'_>) -> Instant {
+        self.line.send(self.ring, what)
     }
 
-    fn receive(&mut self, _: usize) -> Option<(Instant, Received)> {
+    fn receive(&mut self, _: usize) -> Option<(Instant, Heard)> {
         self.line.receive(self.ring)
     }
 

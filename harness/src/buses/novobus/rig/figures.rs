@@ -2,7 +2,7 @@
 
 use super::line_test;
 use crate::buses::novobus::driver::{self, Axis, Bus, Identity, State};
-use crate::link::{Line, Link};
+use crate::link::{Line, Link, Octets};
 use crate::rig::Rig;
 use crate::rig::session::{End, Session};
 use crate::rig::shared::Shared;
@@ -110,10 +110,10 @@ fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     let mut rounds = Vec::new();
     let (mut lost, mut line_errors) = (0, 0);
     for _ in 0..ROUNDS {
-        let sent = link.send(ring, &[SYNCO]);
+        let sent = link.send_octets(ring, &[SYNCO]);
         let end = sent + nominal + PATIENCE;
         let back = loop {
-            match link.receive(ring) {
+            match link.receive_octet(ring) {
                 Some(back) => break Some(back),
                 None if link.now() >= end || link.trouble().is_some() => break None,
                 None => {

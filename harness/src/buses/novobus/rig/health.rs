@@ -1,7 +1,7 @@
 //! Checks whether a ring is healthy and has the size given in the rig's file.
 
 use crate::buses::novobus::driver::{count_behind, recover};
-use crate::link::{Link, Trouble};
+use crate::link::{Link, Octets, Trouble};
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
@@ -84,7 +84,7 @@ pub fn examine(
         let mut left = attempts.max(1);
         loop {
             // Behind it commands pass the guard.
-            let sent = link.send(ring, &CHECK_SEQUENCE);
+            let sent = link.send_octets(ring, &CHECK_SEQUENCE);
             while link.now() < sent && link.wait(sent) {}
             match examine_once(link, ring, *size) {
                 Ok(reported) => {

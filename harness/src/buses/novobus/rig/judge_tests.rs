@@ -3,7 +3,7 @@
 use super::{Heard, judge};
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::{Entry, sources};
-use crate::link::{Capability, Event, Line, Recording, SimulatedLink};
+use crate::link::{Capability, Event, Octets, Recording, SimulatedLink};
 use crate::rig::check::parse;
 use crate::rig::run::{Way, known, play_one, twin};
 use crate::scenario::plan::Plan;

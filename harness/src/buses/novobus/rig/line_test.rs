@@ -5,6 +5,7 @@
 use super::health::Unhealthy;
 use crate::buses::novobus::locate::locate;
 use crate::link;
+use crate::link::Octets;
 use crate::rig::Rig;
 use crate::rig::file::{Endpoint, Hooks, LineFormat, Marks, Transport};
 use harness_proto::line::{Rate, Received};
@@ -121,7 +122,7 @@ pub(crate) fn listen(line: &mut dyn link::Line, ring: usize) -> Heard {
     let mut unasked = Vec::new();
     while line.now() < end && line.trouble().is_none() {
         line.wait(end);
-        unasked.extend(std::iter::from_fn(|| line.receive(ring)).map(|(_, byte)| byte));
+        unasked.extend(std::iter::from_fn(|| line.receive_octet(ring)).map(|(_, byte)| byte));
         if unasked.len() > SENT {
             break;
         }
@@ -132,14 +133,14 @@ pub(crate) fn listen(line: &mut dyn link::Line, ring: usize) -> Heard {
 
 /// What comes back for SYNCO without a gap.
 fn pass(line: &mut dyn link::Line, ring: usize) -> Pass {
-    while line.receive(ring).is_some() {}
-    let sent = line.send(ring, &[SYNCO; SENT]);
+    while line.receive_octet(ring).is_some() {}
+    let sent = line.send_octets(ring, &[SYNCO; SENT]);
     let mut end = sent + FIRST_BYTE;
     let mut heard = Pass::new();
     // At a quarter of the rate four times the bytes would not come; twice as many as were sent are noise.
     while heard.len() < 2 * SENT && line.now() < end && line.trouble().is_none() {
         line.wait(end);
-        heard.extend(std::iter::from_fn(|| line.receive(ring)));
+        heard.extend(std::iter::from_fn(|| line.receive_octet(ring)));
         if let Some((last, _)) = heard.last() {
             end = (*last).max(sent) + PASS_ENDS;
             if heard.len() == SENT {
@@ -156,12 +157,12 @@ const WITH_FF: [u8; 5] = [0x82, 0x00, 0xFF, SYNCO, SYNCO];
 /// Whether a ring behind a port with in-band marks answers as one that knows none: it sees FF FF in place of the net byte FF, and the
 /// second one is no sync byte (ND21 9.2). Its FF and the first zero of its error mode then look like a damaged byte.
 pub(crate) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
-    while line.receive(ring).is_some() {}
-    let end = line.send(ring, &WITH_FF) + FIRST_BYTE;
+    while line.receive_octet(ring).is_some() {}
+    let end = line.send_octets(ring, &WITH_FF) + FIRST_BYTE;
     let mut heard: Vec<Received> = Vec::new();
     while heard.len() < WITH_FF.len() && line.now() < end && line.trouble().is_none() {
         line.wait(end);
-        heard.extend(std::iter::from_fn(|| line.receive(ring)).map(|(_, byte)| byte));
+        heard.extend(std::iter::from_fn(|| line.receive_octet(ring)).map(|(_, byte)| byte));
     }
     matches!(heard[..], [sync, address, damaged, ..]
         if sync.is(WITH_FF[0]) && address.error.is_none() && damaged.byte == 0 && damaged.error.is_some())

@@ -573,7 +573,7 @@ pub(crate) fn what_of(
 mod tests {
     use super::*;
     use crate::buses::novobus::link::BesideTheBus;
-    use crate::link::Line;
+    use crate::link::{Line, Octets};
     use crate::scenario::simulate::bench;
     use crate::scenario::source::Source;
 
@@ -598,7 +598,7 @@ mod tests {
         };
         let mut changed = BTreeSet::new();
         for sent in [&[][..], &turn] {
-            link.send(0, sent);
+            link.send_octets(0, sent);
             link.run_until(link.now() + Span::from_millis(10));
             let before = cells(&link);
             for _ in 0..300 {

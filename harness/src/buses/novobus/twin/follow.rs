@@ -4,7 +4,7 @@ use super::compare::Comparer;
 use super::comparison::{Comparison, Exactness};
 use super::known::Knowledge;
 use crate::buses::novobus::link::BesideTheBus;
-use crate::link::{Event, Line, Link, Moment, PlacedFault, SimulatedLink};
+use crate::link::{Event, Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;
@@ -55,7 +55,8 @@ impl Conversation {
                     });
                 }
                 Event::Step(place) => open.done.push((0, Done::Step(*place))),
-                Event::Sent(ring, end, bytes) => {
+                Event::Sent(ring, end, sent) => {
+                    let bytes = sent.as_out().octets();
                     let mut start = *end - byte_time * bytes.len() as u64;
                     for byte in bytes {
                         open.done.push((*ring, Done::Sent(start, *byte)));
@@ -63,8 +64,9 @@ impl Conversation {
                     }
                     open.end = open.end.max(*end);
                 }
-                Event::Received(ring, at, byte) => {
-                    open.received.push((*ring, *at, *byte));
+                Event::Received(ring, at, heard) => {
+                    open.received
+                        .extend(heard.octet().map(|byte| (*ring, *at, byte)));
                     open.end = open.end.max(*at);
                 }
                 Event::Fault(ring, at, fault, moment) => {
@@ -317,7 +319,7 @@ impl Twin {
                         next += byte_time;
                     }
                     self.link.run_until(*at);
-                    self.link.send(*ring, &bytes);
+                    self.link.send_octets(*ring, &bytes);
                 }
                 Done::Fault(at, fault, moment) => {
                     if *moment == Moment::Now {

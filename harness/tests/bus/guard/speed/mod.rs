@@ -7,7 +7,7 @@ use super::size;
 use harness::buses::novobus::driver::{Bus, Options};
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits};
-use harness::link::{Line, Link, Moment, PlacedFault, SimulatedLink};
+use harness::link::{Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
 use harness_proto::line::Rate;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::io::Input;
@@ -196,7 +196,7 @@ fn play(
     let mut most = 0.0_f64;
     for (place, bytes) in telegrams.iter().enumerate() {
         order_by_plc(line, left);
-        line.send(0, bytes);
+        line.send_octets(0, bytes);
         most = most.max(watch(line, 10));
         if line.trouble().is_some() {
             return (Some(place), most.max(watch(line, 400)));
@@ -263,7 +263,7 @@ fn the_range_of_speeds() {
     }
     let mut line = Guarded::new(super::link(1), limits());
     line.synchronise();
-    line.send(0, &word(ram::NSOLL, 567));
+    line.send_octets(0, &word(ram::NSOLL, 567));
     let why = line.trouble().expect("denied").to_string();
     assert!(why.contains("range is not known"), "{why}");
 }
@@ -272,7 +272,7 @@ fn the_range_of_speeds() {
 #[test]
 fn what_is_forgotten() {
     let known = |line: &mut Guarded<SimulatedLink>, bytes: &[u8]| {
-        line.send(0, bytes);
+        line.send_octets(0, bytes);
         line.trouble().is_none()
     };
     let run = or(ram::FLAGS2, 0x08);

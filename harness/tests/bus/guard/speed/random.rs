@@ -3,7 +3,7 @@
 use super::{
     GO, Left, MOST, OVERSHOOT, and, bench, byte, limits, or, order_by_plc, telegram, watch, word,
 };
-use harness::link::{Line, Trouble};
+use harness::link::{Line, Octets, Trouble};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::ram;
 use proptest::collection::vec;
@@ -182,7 +182,7 @@ proptest! {
         let mut sent = Vec::new();
         for bytes in pieces {
             order_by_plc(&mut line, &left);
-            line.send(0, &bytes);
+            line.send_octets(0, &bytes);
             match line.trouble() {
                 Some(Trouble::Denied(_)) => {
                     line.reset_after_denial();

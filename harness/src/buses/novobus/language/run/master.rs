@@ -2,7 +2,8 @@
 //! recorded, limited and shown is all the same.
 
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, conduct, count_drives};
-use crate::link::{Lead, Line, Trouble};
+use crate::link::{Lead, Line, Octets, Trouble};
+use crate::medium::{Heard, Medium, Out};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::PlannedCall;
 use crate::scenario::problem::Span;
@@ -10,7 +11,6 @@ use crate::scenario::run::halt::Halt;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
 use crate::scenario::syntax::Ending;
-use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Event, Job, Outcome};
@@ -28,17 +28,17 @@ struct Through<'r, 'a> {
 }
 
 impl Line for Through<'_, '_> {
-    fn byte_time(&self) -> time::Span {
-        self.runner.link.byte_time()
+    fn medium(&self, port: usize) -> Medium {
+        self.runner.link.medium(port)
     }
 
     fn now(&self) -> Instant {
         self.runner.link.now()
     }
 
-    fn send(&mut self, _ring: usize, bytes: &[u8]) -> Instant {
-        let end = self.runner.send(self.ring, bytes);
-        let start = end - self.byte_time() * bytes.len() as u64;
+    fn send(&mut self, _ring: usize, what: Out<'_>) -> Instant {
+        let end = self.runner.send(self.ring, what.octets());
+        let start = end - self.byte_time() * what.len() as u64;
         let tolerance = self.runner.link.time_tolerance();
         let late = tolerance.max(self.runner.link.lead().gap());
         if let Some(left) = self.left.replace(end)
@@ -49,8 +49,9 @@ impl Line for Through<'_, '_> {
         end
     }
 
-    fn receive(&mut self, _ring: usize) -> Option<(Instant, Received)> {
-        self.runner.take_next(self.ring)
+    fn receive(&mut self, _ring: usize) -> Option<(Instant, Heard)> {
+        let (at, octet) = self.runner.take_next(self.ring)?;
+        Some((at, Heard::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {

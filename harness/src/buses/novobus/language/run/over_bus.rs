@@ -5,7 +5,7 @@
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin::unknowable;
-use crate::link::{Line, Link, Trouble};
+use crate::link::{Line, Link, Octets, Trouble};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
 use crate::scenario::run::outcome::{Outcome, Unready};
@@ -140,12 +140,12 @@ fn exchange_all(
 ) -> Option<Vec<Vec<u8>>> {
     let bytes: Vec<u8> = exchanges.iter().flat_map(|e| e.bytes.clone()).collect();
     let expected: Vec<_> = exchanges.iter().flat_map(|e| e.expected.clone()).collect();
-    while link.receive(ring).is_some() {}
-    let sent = link.send(ring, &bytes);
+    while link.receive_octet(ring).is_some() {}
+    let sent = link.send_octets(ring, &bytes);
     let end = sent + link.byte_time() * (2 * u64::from(drives) + 4) + PATIENCE;
     let mut received: Vec<(Instant, Received)> = Vec::new();
     while received.len() < expected.len() {
-        match link.receive(ring) {
+        match link.receive_octet(ring) {
             // A busy computer may look for it late, but not take a late one for an answer.
             Some((at, _)) if at > end => return None,
             Some(byte) => received.push(byte),
@@ -347,12 +347,12 @@ fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
 
 /// Whether anything comes round for a SYNCO (9.2).
 fn passes_synco(link: &mut dyn Link, ring: usize) -> bool {
-    while link.receive(ring).is_some() {}
-    let left = link.send(ring, &[SYNCO]);
+    while link.receive_octet(ring).is_some() {}
+    let left = link.send_octets(ring, &[SYNCO]);
     let end = left + link.byte_time() * (u64::from(link.drives(ring)) + 4) + PATIENCE;
     while link.now() < end && link.trouble().is_none() {
         link.wait(end);
-        if link.receive(ring).is_some() {
+        if link.receive_octet(ring).is_some() {
             return true;
         }
     }
@@ -384,7 +384,7 @@ fn reset_one_by_one(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotRead
             let why = "it does not answer ResetH8";
             return Err(NotReady::new(*cell, Unready::NoAnswer, why));
         }
-        let left = link.send(cell.ring, &CHECK_SEQUENCE);
+        let left = link.send_octets(cell.ring, &CHECK_SEQUENCE);
         settle(link, left);
     }
     Ok(())
@@ -475,7 +475,7 @@ fn restore(link: &mut dyn Link, before: &[Before]) -> Result<(), NotReady> {
             bytes.extend(own.into_iter().flat_map(|exchange| exchange.bytes));
         }
         if bytes.len() > CHECK_SEQUENCE.len() {
-            let left = link.send(ring, &bytes);
+            let left = link.send_octets(ring, &bytes);
             settle(link, left);
         }
     }
@@ -493,7 +493,7 @@ pub(crate) fn come_home(link: &mut dyn Link) {
     let now = link.now();
     settle(link, now);
     for ring in 0..2 {
-        while link.receive(ring).is_some() {}
+        while link.receive_octet(ring).is_some() {}
     }
 }
 
