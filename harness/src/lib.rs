@@ -35,6 +35,7 @@ pub use buses::driver::State;
 pub use embed::{Drives, Error, Played, Reading, Scenario, Served};
 pub use scenario::verdict::Verdict;
 
+mod counted;
 mod embed;
 mod regular;
 mod signals;

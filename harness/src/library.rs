@@ -101,7 +101,7 @@ impl Entry {
     /// The name without folders and ending.
     #[must_use]
     pub fn short_name(&self) -> &str {
-        bare(&self.name).rsplit('/').next().unwrap_or(&self.name)
+        last(&self.name)
     }
 
     /// How many drives its rings have, as `3+1`; empty for a bus that is not built yet.
@@ -176,6 +176,19 @@ fn search(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), L
     Ok(())
 }
 
+/// The names of the built-in scenarios, in order.
+#[must_use]
+pub fn names() -> Vec<String> {
+    let mut files = Vec::new();
+    collect(&BUILT_IN, &mut files);
+    let mut names: Vec<_> = files
+        .iter()
+        .map(|(name, _)| last(name).to_owned())
+        .collect();
+    names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+    names
+}
+
 fn built_in() -> Result<Vec<Source>, LibraryError> {
     let mut files = Vec::new();
     collect(&BUILT_IN, &mut files);
@@ -185,6 +198,24 @@ fn built_in() -> Result<Vec<Source>, LibraryError> {
         .collect::<Result<Vec<_>, _>>()?;
     sources.sort_by(|a, b| natural(bare(&a.name)).cmp(&natural(bare(&b.name))));
     Ok(sources)
+}
+
+/// The remedy for a name that is part of the names of built-in scenarios, or of none.
+fn containing(wanted: &str, known: &[&str]) -> String {
+    let parts: Vec<_> = known.iter().filter(|name| name.contains(wanted)).collect();
+    match parts.as_slice() {
+        [] => "`drivebench list` shows the built-in ones".to_owned(),
+        [only] => format!("did you mean `{only}`?"),
+        [first, ..] => format!(
+            "{} built-in ones have this text in their name, such as `{first}`; `drivebench list --filter {wanted}` shows them",
+            parts.len()
+        ),
+    }
+}
+
+/// A name without folders and ending.
+fn last(name: &str) -> &str {
+    bare(name).rsplit('/').next().unwrap_or_default()
 }
 
 /// A name without the ending.
@@ -219,7 +250,6 @@ fn collect<'a>(dir: &'a Dir<'a>, files: &mut Vec<(String, &'a [u8])>) {
 
 fn built_in_named(name: &Path) -> Result<Source, LibraryError> {
     let wanted = name.display().to_string();
-    let last = |name| -> &str { bare(name).rsplit('/').next().unwrap_or_default() };
     let sources = built_in()?;
     let found = sources
         .iter()
@@ -230,10 +260,7 @@ fn built_in_named(name: &Path) -> Result<Source, LibraryError> {
     let known: Vec<_> = sources.iter().map(|source| last(&source.name)).collect();
     let remedy = match nearest(last(&wanted), &known) {
         Some(near) => format!("did you mean `{near}`?"),
-        None if known.iter().any(|name| name.contains(&wanted)) => {
-            format!("`--filter {wanted}` selects the built-in ones with this text")
-        }
-        None => "`drivebench list` shows the built-in ones".to_owned(),
+        None => containing(&wanted, &known),
     };
     Err(LibraryError::NotFound {
         name: wanted,

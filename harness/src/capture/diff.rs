@@ -1,6 +1,7 @@
 //! Two runs side by side: the first byte that differs, and how much does.
 
 use super::Capture;
+use crate::counted::counted;
 use crate::report::csv::status;
 use crate::report::meaning::Meaning;
 use crate::report::pcapng::name;
@@ -279,7 +280,9 @@ impl fmt::Display for Show<'_> {
         let other = summary.differing_links;
         writeln!(
             f,
-            "{differ} of {compared} bytes differ, on {other} of {links} links; times of equal bytes differ by up to {} ns",
+            "{differ} of {} differ, on {other} of {}; times of equal bytes differ by up to {} ns",
+            counted(compared, "byte"),
+            counted(links, "link"),
             summary.latest.as_nanos()
         )
     }

@@ -9,24 +9,23 @@ use super::shrink::ShrinkArguments;
 use crate::buses::commands::DriveCommand;
 use crate::file::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
-use clap_complete::Shell;
 use harness_proto::line::Rate;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Plays scripted conversations with serial servo drives and compares every byte with the manual.
+/// A test bench and fuzzer for serial servo drives: plays conversations and compares every byte with the manual.
 ///
-/// Without a command all built-in scenarios are played on the simulated ring.
+/// Without a command it plays all built-in scenarios on simulated rings.
 #[derive(Debug, Parser)]
 #[command(name = "drivebench", version, after_help = EXAMPLES, after_long_help = after_long_help())]
 pub struct Arguments {
-    /// What to do; `run` where nothing is said.
+    /// The command; `run` by default.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// When to use colours.
+    /// Whether to use colours.
     #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
     pub color: When,
-    /// When to show a progress bar (on standard error).
+    /// Whether to show a progress bar on standard error.
     #[arg(long, global = true, value_enum, default_value_t = Progress::Auto)]
     pub progress: Progress,
 }
@@ -34,19 +33,22 @@ pub struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   drivebench                                 play all built-in scenarios
-  drivebench run --filter 9.7                play those that pin section 9.7
-  drivebench run my-machine.scn tests/       play a file and all files of a folder
-  drivebench trace 9.7-parity-error          the 100-axis table of ND21 9.7
-  drivebench trace my.scn --format json      every byte on every link, for tools
+  drivebench run --filter 9.7                play those of section 9.7 of the manual
+  drivebench run my.scn tests/               play a file and all files of a folder
+  drivebench trace 9.7-parity-error          every byte of the 100-axis example of ND21 9.7
   drivebench trace my.scn --format svg -o my.svg
-                                             a picture of the ring; also vcd, pcapng and csv
-  drivebench check my.scn                    look for mistakes, play nothing
-  drivebench manual                          which tables of the manual are pinned
-  drivebench cells ps_                       the cells of the positioning controller
-  drivebench info --rig sim:5                the drives of a bench, here a simulated ring of five
-  drivebench read all nist Status            cells of drives by name, with units and bits
-  drivebench position 0 --to 10turns --init --move
-                                             the motor turns only with --move";
+                                             a picture of the ring
+  drivebench info --rig sim:5                the drives of a simulated ring of five
+  drivebench read all nist Status            cells of drives by name
+  drivebench fuzz run --deviates 1=writes-ignored
+                                             search for a planted fault
+
+Where to go on:
+  drivebench help run                        the options of a command
+  drivebench list                            the built-in scenarios
+  drivebench rig scan                        the serial ports of this machine
+  harness/docs/first-run.md                  ten minutes without hardware
+  harness/docs/README.md                     the guide";
 
 fn after_long_help() -> String {
     format!("{EXAMPLES}\n\n{}", Exit::HELP)
@@ -55,66 +57,80 @@ fn after_long_help() -> String {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Play scenarios and say which passed.
+    /// Play scenarios and report which passed.
     Run(RunArguments),
-    /// Show what scenarios there are and which table of the manual each pins.
+    /// List scenarios with the tables of the manual that they test.
     List(Selection),
-    /// Read a scenario and say what is wrong with it; nothing is played.
+    /// Look for mistakes in scenarios without playing them.
     Check(CheckArguments),
-    /// Play a scenario and print every byte on every link.
+    /// Play a scenario and show every byte on every link.
     Trace(TraceArguments),
-    /// Read a capture (pcapng, or the JSON of `trace`): judge it beside the model, show it, or make a scenario of it.
+    /// Compare a capture with the model, show it, or turn it into a scenario.
+    ///
+    /// The capture is pcapng, or the JSON of `trace`.
     Import(ImportArguments),
-    /// Compare two captures or scenarios byte by byte, on every link; exit code 1 where they differ.
+    /// Compare two captures or scenarios byte by byte.
+    ///
+    /// The exit code is 1 if they differ.
     Diff(DiffArguments),
-    /// Print the dissector that lets Wireshark and tshark read what `trace --format pcapng` writes.
+    /// Print the Wireshark dissector for `trace --format pcapng`.
     Dissector,
-    /// Show which tables and examples of the manual are pinned, and the errata ledger.
+    /// List the manual's tables with the scenarios that test them, and the errata.
     Manual(ManualArguments),
-    /// Show the drive's cells: address, size, access, unit, meaning and section of the manual.
+    /// List the drive's memory cells: address, access, unit, meaning, section.
     Cells(CellsArguments),
-    /// Play everything that fits a rig, settle what the manual leaves open, name deviations, and keep the evidence.
+    /// Test the drives of a rig against the whole manual and keep the evidence.
+    ///
+    /// Plays every scenario that the rig can play, finds out what the manual leaves open, names deviations, and keeps the evidence.
     Qualify(QualifyArguments),
-    /// Judge every verdict of a folder of evidence again, from its record.
+    /// Repeat every verdict of an evidence folder from its recorded bytes.
     Verify(VerifyArguments),
-    /// Make the reports of a run's folder again, from its record and captures: the same bytes as the run wrote.
+    /// Write the reports of a run again from its evidence folder.
     Report(ReportArguments),
     /// Print a JSON schema (draft 2020-12).
     Schema {
-        /// Of what.
+        /// The kind of file.
         of: SchemaName,
     },
-    /// Look for unknown faults: conversations from a seed, on simulated rings or on a rig.
+    /// Search for unknown faults with random conversations.
     Fuzz {
         /// What to do.
         #[command(subcommand)]
         command: FuzzCommand,
     },
-    /// Make a finding of `fuzz run` small: what is not needed for it is left out.
+    /// Reduce a finding of `fuzz run` to the bytes that matter.
     Shrink(ShrinkArguments),
-    /// Turn a finding into a scenario, an input of the fuzz targets and a snapshot, in a checkout of the repository.
+    /// Turn a finding into a scenario of the repository.
+    ///
+    /// Writes a scenario, an input of the fuzz targets and a snapshot into a checkout.
     Promote(PromoteArguments),
-    /// Show benches, lock them, find their ports.
+    /// List, check and lock rigs; find serial ports.
     Rig {
         /// What to do.
         #[command(subcommand)]
         command: RigCommand,
     },
-    /// Play a conversation again and again, each time with another fault, and count what comes of it.
+    /// Play a conversation once for every possible fault and count the outcomes.
     Campaign(CampaignArguments),
-    /// Show the ways in which a simulated drive can deviate from the manual.
+    /// List the faults that can be planted in a simulated drive.
     Deviations(DeviationsArguments),
     /// Commands on a bus.
     #[command(flatten)]
     Drive(Box<DriveCommand>),
     /// Print a completion script for a shell.
     Completions {
-        /// For which shell.
+        /// The shell.
         shell: Shell,
+    },
+    /// Print what can stand in place of the last word; completion scripts call it.
+    #[command(hide = true)]
+    Complete {
+        /// The words of the command line behind `drivebench`, up to the cursor.
+        words: Vec<String>,
     },
     /// Print the man page (roff), or write one for every command into a folder.
     Man {
-        /// The folder; it must be there.
+        /// An existing folder for the pages.
         folder: Option<PathBuf>,
     },
 }
@@ -122,10 +138,10 @@ pub enum Command {
 /// Which scenarios.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Selection {
-    /// Files, folders, or names of built-in scenarios; all built-in ones where none is given.
-    #[arg(value_name = "FILE|FOLDER")]
+    /// Files, folders, or names of built-in scenarios; by default all built-in ones.
+    #[arg(value_name = "SCENARIO")]
     pub paths: Vec<PathBuf>,
-    /// Only those with this text in their name, title or source.
+    /// Only scenarios with this text in their name, title or source.
     #[arg(long, value_name = "TEXT")]
     pub filter: Option<String>,
 }
@@ -136,35 +152,34 @@ pub struct RunArguments {
     /// Which scenarios.
     #[command(flatten)]
     pub selection: Selection,
-    /// Play on a ring of this many drives, where a scenario allows it.
+    /// Number of drives of the ring, for scenarios that allow it.
     #[arg(long, value_name = "DRIVES", value_parser = ring_size, conflicts_with = "rig")]
     pub ring: Option<u8>,
-    /// On which rig: sim:N, a file, or a name that `rig list` shows; a simulated ring of each scenario's own size where
-    /// nothing is said.
-    #[arg(long, value_name = "NAME")]
+    /// The rig: sim:N, a file, or a name that `rig list` shows. By default each scenario gets a simulated ring of its own size.
+    #[arg(long, value_name = "RIG")]
     pub rig: Option<String>,
-    /// Let motors turn, where the rig's file allows it too.
+    /// Let motors turn; the rig's file must allow it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that another program holds, such as 30s.
+    /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
-    /// Keep the evidence of a run on a rig in this folder, which is not there or is empty; `verify` judges it again.
+    /// Keep the evidence of a run on a rig in this folder, which must be new or empty. `verify` checks it.
     #[arg(long, value_name = "FOLDER", requires = "rig")]
     pub evidence: Option<PathBuf>,
-    /// Sign the evidence with this key of `ssh-keygen`; `verify --allowed-signers` checks the signature.
+    /// Sign the evidence with this `ssh-keygen` key; `verify --allowed-signers` checks the signature.
     #[arg(long, value_name = "KEY", requires = "evidence")]
     pub sign: Option<PathBuf>,
-    /// Write the verdicts into this file too, as JUnit's XML.
+    /// Write the verdicts into this file, as JUnit XML.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
-    /// Show what scenarios recorded, also where several are played.
+    /// Show what scenarios recorded, also if several are played.
     #[arg(long)]
     pub records: bool,
-    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    /// Write the report into this file, as one HTML page.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-    /// Count a skipped scenario as missing (exit code 5).
+    /// Let a skipped scenario make the run incomplete (exit code 5).
     #[arg(long)]
     pub require_all: bool,
 }
@@ -172,28 +187,28 @@ pub struct RunArguments {
 /// For `qualify`.
 #[derive(Clone, Debug, Args)]
 pub struct QualifyArguments {
-    /// Which scenarios; all that fit where none is given.
+    /// Which scenarios.
     #[command(flatten)]
     pub selection: Selection,
-    /// On which rig: sim:N, a file, or a name that `rig list` shows.
-    #[arg(long, value_name = "NAME")]
+    /// The rig: sim:N, a file, or a name that `rig list` shows.
+    #[arg(long, value_name = "RIG")]
     pub rig: String,
-    /// Let motors turn, where the rig's file allows it too.
+    /// Let motors turn; the rig's file must allow it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that another program holds, such as 30s.
+    /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
-    /// Where the evidence goes: a folder that is not there or is empty; evidence-RIG-DATE where nothing is said.
+    /// The folder for the evidence, which must be new or empty; by default evidence-RIG-DATE.
     #[arg(long, value_name = "FOLDER")]
     pub evidence: Option<PathBuf>,
-    /// Sign the evidence with this key of `ssh-keygen`; `verify --allowed-signers` checks the signature.
+    /// Sign the evidence with this `ssh-keygen` key; `verify --allowed-signers` checks the signature.
     #[arg(long, value_name = "KEY")]
     pub sign: Option<PathBuf>,
-    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    /// Write the report into this file, as one HTML page.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-    /// Count a skipped scenario as missing (exit code 5).
+    /// Let a skipped scenario make the run incomplete (exit code 5).
     #[arg(long)]
     pub require_all: bool,
 }
@@ -201,12 +216,12 @@ pub struct QualifyArguments {
 /// For `verify`.
 #[derive(Clone, Debug, Args)]
 pub struct VerifyArguments {
-    /// The folder.
+    /// The evidence folder.
     pub folder: PathBuf,
     /// Check the signature of the folder against this file of allowed signers (see `ssh-keygen(1)`).
     #[arg(long, value_name = "FILE", requires = "identity")]
     pub allowed_signers: Option<PathBuf>,
-    /// Whose signature it must be, as the file of allowed signers names them.
+    /// The signer, as the file of allowed signers names them.
     #[arg(long, value_name = "ID", requires = "allowed_signers")]
     pub identity: Option<String>,
 }
@@ -215,12 +230,12 @@ pub struct VerifyArguments {
 #[derive(Clone, Debug, Args)]
 #[command(group = ArgGroup::new("form").required(true).multiple(true))]
 pub struct ReportArguments {
-    /// The folder that `run --evidence`, `qualify` or `fuzz run` has written.
+    /// The folder that `run --evidence`, `qualify` or `fuzz run` wrote.
     pub folder: PathBuf,
-    /// Write one page of HTML into this file, which is there whole or not at all.
+    /// Write one HTML page into this file.
     #[arg(long, value_name = "FILE", group = "form")]
     pub html: Option<PathBuf>,
-    /// Write the verdicts as JUnit's XML into this file.
+    /// Write the verdicts into this file, as JUnit XML.
     #[arg(long, value_name = "FILE", group = "form")]
     pub junit: Option<PathBuf>,
 }
@@ -229,9 +244,9 @@ pub struct ReportArguments {
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
     /// Files, folders, or names of built-in scenarios.
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "SCENARIO", required = true)]
     pub files: Vec<PathBuf>,
-    /// For a ring of this many drives.
+    /// Number of drives of the ring.
     #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
     pub ring: Option<u8>,
 }
@@ -240,11 +255,12 @@ pub struct CheckArguments {
 #[derive(Clone, Debug, Args)]
 pub struct TraceArguments {
     /// A file, or the name of a built-in scenario.
+    #[arg(value_name = "SCENARIO")]
     pub file: PathBuf,
-    /// In which form.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = TraceFormat::Table)]
     pub format: TraceFormat,
-    /// Play on a ring of this many drives.
+    /// Number of drives of the ring.
     #[arg(long, value_name = "DRIVES", value_parser = ring_size)]
     pub ring: Option<u8>,
     /// How it is shown and where it goes.
@@ -258,13 +274,13 @@ pub struct Showing {
     /// Only these rows of the table or the picture, counted from 1.
     #[arg(long, value_name = "FIRST..LAST", value_parser = rows)]
     pub rows: Option<Rows>,
-    /// How the picture (svg) is laid out: row n the n-th byte of each link, as in the manual, or every byte at its time.
+    /// Vertical position of a byte in the picture (svg).
     #[arg(long, value_enum, default_value_t = Layout::Index)]
     pub time: Layout,
-    /// Of a value change dump (vcd) only the lines: sigrok up to 0.5.2 stops at the first vector.
+    /// Write only the lines into a value change dump (vcd); sigrok up to 0.5.2 stops at the first vector.
     #[arg(long)]
     pub lines_only: bool,
-    /// Write into this file, which is there whole or not at all, in place of standard output.
+    /// Write into this file instead of standard output.
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
 }
@@ -272,22 +288,22 @@ pub struct Showing {
 /// For `import`.
 #[derive(Clone, Debug, Args)]
 pub struct ImportArguments {
-    /// The capture: pcapng with one interface a link, named as in 98->97, or the JSON of `trace`.
+    /// The capture: pcapng with one interface per link, named as in 98->97, or the JSON of `trace`.
     pub file: PathBuf,
-    /// Show it in this form; nothing is judged then.
+    /// Show the capture in this format instead of comparing it.
     #[arg(long, value_enum, conflicts_with = "scenario")]
     pub format: Option<TraceFormat>,
-    /// Print a scenario that plays it again.
+    /// Print a scenario that replays the capture.
     #[arg(long)]
     pub scenario: bool,
-    /// A scenario whose header says how the drives are: models, cells, properties. Without one they are plain ones that hold
-    /// what they first say of their cells.
+    /// A scenario whose header describes the drives: models, cells, properties. By default the drives are plain memory that holds
+    /// the first value that they report for each cell.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     pub setup: Option<PathBuf>,
-    /// How far times may be apart, such as 2ms: real clocks are not exact; 2 ns where nothing is said.
+    /// Permitted difference of times, such as 2ms for a real clock; by default 2 ns.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub tolerance: Option<Duration>,
-    /// The rate of the line, where the capture does not say it.
+    /// Bit rate of the line, if the capture does not state it.
     #[arg(long, value_name = "RATE", value_parser = rate)]
     pub line: Option<Rate>,
     /// How it is shown and where it goes.
@@ -301,13 +317,13 @@ pub struct DiffArguments {
     /// A capture, a scenario's file, or the name of a built-in scenario.
     #[arg(value_name = "A")]
     pub left: PathBuf,
-    /// What it is compared with.
+    /// A second one.
     #[arg(value_name = "B")]
     pub right: PathBuf,
-    /// How far times may be apart, such as 2ms; 2 ns where nothing is said.
+    /// Permitted difference of times, such as 2ms; by default 2 ns.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub tolerance: Option<Duration>,
-    /// The rate of the line, where a capture does not say it.
+    /// Bit rate of the line, if a capture does not state it.
     #[arg(long, value_name = "RATE", value_parser = rate)]
     pub line: Option<Rate>,
 }
@@ -315,10 +331,10 @@ pub struct DiffArguments {
 /// For `manual`.
 #[derive(Clone, Debug, Args)]
 pub struct ManualArguments {
-    /// Only what is not pinned yet.
+    /// Only entries that no scenario tests yet.
     #[arg(long)]
     pub missing: bool,
-    /// Only entries with this text in them.
+    /// Only entries with this text.
     #[arg(long, value_name = "TEXT")]
     pub filter: Option<String>,
 }
@@ -328,7 +344,7 @@ pub struct ManualArguments {
 pub struct CellsArguments {
     /// Only cells with this text in their name, address or meaning.
     pub filter: Option<String>,
-    /// The EEPROM in place of the RAM.
+    /// List the EEPROM instead of the RAM.
     #[arg(long)]
     pub eeprom: bool,
 }
@@ -336,22 +352,22 @@ pub struct CellsArguments {
 /// For `campaign`.
 #[derive(Clone, Debug, Args)]
 pub struct CampaignArguments {
-    /// Files, or names of built-in campaigns; all built-in ones where none is given.
-    #[arg(value_name = "NAME|FILE")]
+    /// Files, or names of built-in campaigns; by default all built-in ones.
+    #[arg(value_name = "CAMPAIGN")]
     pub campaigns: Vec<PathBuf>,
-    /// In which form.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     pub format: Format,
-    /// Show the cases of this class, one line each.
+    /// Show the cases of this class, one per line.
     #[arg(long, value_name = "CLASS", value_enum)]
     pub only: Option<ClassName>,
-    /// Play nothing but this case, and print the scenario that replays it: LINK:BYTE:WHAT, such as 98->97:10:0.
+    /// Print a scenario that replays this case, LINK:BYTE:FAULT, such as 98->97:10:0.
     #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
     pub case: Option<String>,
-    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    /// Write the report into this file, as one HTML page.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-    /// On how many threads; on all cores where nothing is said. The outcome is the same.
+    /// Number of threads; by default one per core. The outcome does not depend on it.
     #[arg(long, value_name = "NUMBER", value_parser = threads)]
     pub threads: Option<usize>,
 }
@@ -359,62 +375,73 @@ pub struct CampaignArguments {
 /// For `deviations`.
 #[derive(Clone, Debug, Args)]
 pub struct DeviationsArguments {
-    /// Only those with this text in their name, section or sentence.
+    /// Only deviations with this text in their name, section or description.
     pub filter: Option<String>,
-    /// In which form.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     pub format: Format,
+}
+
+/// Shells with a completion script.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shell {
+    /// Bash 4 or later.
+    Bash,
+    /// Zsh.
+    Zsh,
+    /// Fish.
+    Fish,
 }
 
 /// What has a schema.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SchemaName {
-    /// A line of the record of a run, `run.jsonl` in a folder of evidence.
+    /// A line of `run.jsonl`, the record in an evidence folder.
     Record,
-    /// A bench's file, as `rig schema`.
+    /// A rig's file, as `rig schema`.
     Rig,
 }
 
 /// The forms of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// For people; a trace as the manual's own table, one column a drive.
+    /// A table for people.
     Table,
-    /// JSON for tools, described in the documentation.
+    /// JSON for tools; the guide describes it.
     Json,
 }
 
 /// The forms of a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TraceFormat {
-    /// For people: the manual's own table, one column a drive.
+    /// The manual's own table for people: one column per drive.
     Table,
-    /// JSON for tools, described in the documentation.
+    /// JSON for tools; the guide describes it.
     Json,
-    /// A picture: drives across, time down, colours for what each did.
+    /// A picture: drives across, time down, a colour for what each drive did.
     Svg,
-    /// The lines bit by bit, for logic analysers' programs (sigrok, GTKWave).
+    /// The lines bit by bit, for logic analyser programs (sigrok, GTKWave).
     Vcd,
-    /// A capture for Wireshark; `drivebench dissector` prints what reads it.
+    /// A capture for Wireshark; `drivebench dissector` prints the dissector.
     Pcapng,
-    /// A row a byte.
+    /// One row per byte.
     Csv,
 }
 
 /// How the rows of a picture are placed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Layout {
-    /// Row n is the n-th byte of each link.
+    /// Row n is the n-th byte of each link, as in the manual.
     #[default]
     Index,
-    /// A byte stands where its time is.
+    /// Every byte at its time.
     True,
 }
 
 /// When to do something that suits a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum When {
-    /// On a terminal (and NO_COLOR is heeded).
+    /// On a terminal, unless NO_COLOR is set or TERM is `dumb`.
     Auto,
     /// Always.
     Always,
@@ -425,7 +452,7 @@ pub enum When {
 /// When to show a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Progress {
-    /// On a terminal.
+    /// On a terminal, unless TERM is `dumb`.
     Auto,
     /// Always.
     Bar,
@@ -466,8 +493,8 @@ fn rate(text: &str) -> Result<Rate, String> {
         .ok_or_else(|| "38400, 19200 or 9600 is expected (ND21 8.3)".to_owned())
 }
 /// What `--wire-time` of the commands of `fuzz` says of itself.
-pub(crate) const WIRE_TIME_HELP: &str = "How long the line is used at most, such as 60s; on a rig with ports one minute \
-                                         where nothing is said";
+pub(crate) const WIRE_TIME_HELP: &str =
+    "Maximum time on the line, such as 60s; by default one minute on a rig with ports";
 
 /// A time such as `30s`; at most a day.
 pub(crate) fn duration(text: &str) -> Result<Duration, String> {

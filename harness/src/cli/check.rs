@@ -3,6 +3,7 @@
 use super::args::CheckArguments;
 use super::exit::Exit;
 use super::output::Output;
+use crate::counted::counted;
 use crate::library::{Entry, sources};
 
 /// Reads scenarios and plays nothing.
@@ -31,7 +32,10 @@ pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io:
                     .filter(|needs| !needs.is_empty())
                     .map(|needs| format!("; needs {needs}"))
                     .unwrap_or_default();
-                output.result(&format!("{name}: no mistakes, {steps} steps{needs}\n"))?;
+                output.result(&format!(
+                    "{name}: no mistakes, {}{needs}\n",
+                    counted(steps, "step")
+                ))?;
             }
             Err(problems) => {
                 output.mistakes(&problems);

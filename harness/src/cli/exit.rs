@@ -37,17 +37,17 @@ impl Exit {
     pub const HELP: &str = "\
 Exit codes:
   0  everything passed
-  1  a drive behaved otherwise than a scenario or a command says, or differs from a file; a campaign
-     has another figure than it pins
+  1  a drive failed a scenario or a command, or differs from a file; a figure of a campaign differs
+     from the pinned one
   2  wrong usage, a file with mistakes, a scenario that could not be played to its end (aborted), or something
      that needs --move or --yes
-  3  the bench itself failed
+  3  the rig failed
   4  nothing was selected
   5  passed but incomplete: nothing was judged (every scenario was skipped), the run ended early, a scenario
      was inconclusive or flaky, or one was skipped under --require-all
-  6  an interlock of the bench tripped; the safe state was reached
+  6  an interlock of the rig tripped; the safe state was reached
   7  the safe state could not be confirmed: look at the machine
-  75 somebody else holds the bench
+  75 another user or process holds the rig
   130 interrupted; the safe state was reached";
 
     /// The code where a file could not be used: wrong usage where its path or the rights to it are wrong, a bench that failed where the disk

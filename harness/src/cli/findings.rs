@@ -2,6 +2,7 @@
 
 use super::output::Output;
 use crate::buses::twin::{Conversation, Exactness};
+use crate::counted::counted;
 use crate::link::Octets;
 use crate::qualify::{Culprit, Meant, Named, Seen, Sighting, Trial, agreed, culprit};
 use crate::rig::{Attempt, Driven, Played, Run};
@@ -309,7 +310,8 @@ impl Findings {
         sections.sort_by_key(|(_, count, _)| std::cmp::Reverse(*count));
         let lines = sections.iter().take(MOST_SECTIONS).map(|(section, count, (name, own))| {
             format!(
-                "deviation: {culprit}: no known deviation explains it (ND21 {section}): seen in {count} attempts, one of them at {name}: {}\n",
+                "deviation: {culprit}: no known deviation explains it (ND21 {section}): seen in {}, one of them at {name}: {}\n",
+                counted(*count, "attempt"),
                 own.about
             )
         });
@@ -319,8 +321,13 @@ impl Findings {
     /// How much was compared.
     fn counts(&self) -> String {
         format!(
-            "{} of {} scenarios played are equal to their end, {} were skipped; {} bytes compared, {} more have values that only the drives know; {} probes asked",
-            self.equal, self.played, self.skipped, self.bytes, self.own, self.probes
+            "{} of {} scenarios played are equal to their end, {} were skipped; {} compared, {} more have values that only the drives know; {} asked",
+            self.equal,
+            self.played,
+            self.skipped,
+            counted(self.bytes, "byte"),
+            self.own,
+            counted(self.probes, "probe")
         )
     }
 }

@@ -8,6 +8,7 @@ use super::trace::{Shown, fits_output, show};
 use crate::capture::{
     Capture, Judged, Options, Run, diff as compare, is_capture, judge, read_file, scenario,
 };
+use crate::counted::counted;
 use crate::library::{Entry, sources};
 use crate::link::link_name;
 use crate::regular;
@@ -74,10 +75,13 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         }
     };
     let line = format!(
-        "{} {title}: {} bytes on {} links in {}\n",
+        "{} {title}: {} on {} in {}\n",
         output.verdict(judged.verdict).trim_end_matches(' '),
-        capture.bytes(),
-        capture.traces.iter().map(|t| t.links.len()).sum::<usize>(),
+        counted(capture.bytes(), "byte"),
+        counted(
+            capture.traces.iter().map(|t| t.links.len()).sum::<usize>(),
+            "link"
+        ),
         capture.end(),
     );
     output.result(&line)?;
@@ -143,15 +147,15 @@ fn details(judged: &Judged, capture: &Capture) -> String {
     if judged.adopted > 0 {
         let _infallible = writeln!(
             text,
-            "  note: {} cells were taken to hold what the drives first said of them",
-            judged.adopted
+            "  note: {} taken to hold the first value that the drives reported",
+            counted(judged.adopted, "cell")
         );
     }
     if judged.unforeseen > 0 {
         let _infallible = writeln!(
             text,
-            "  note: {} bytes are data that changed by themselves, and their checking bytes; they were not compared",
-            judged.unforeseen
+            "  note: {} not compared: data that changes by itself, and its checking bytes",
+            counted(judged.unforeseen, "byte")
         );
     }
     for remark in &judged.remarks {

@@ -6,7 +6,9 @@ use super::run::drives;
 use crate::evidence::{Case, junit};
 use crate::library::Entry;
 use crate::regular;
+use crate::report::finding::{class, explain};
 use crate::scenario::run::Outcome;
+use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -28,9 +30,10 @@ impl Cases {
     }
 
     /// Notes the outcome of a scenario.
-    pub(crate) fn note(&mut self, entry: &Entry, outcome: &Outcome) {
+    pub(crate) fn note(&mut self, entry: &Entry, outcome: &Outcome, traces: &[Trace]) {
         let found = outcome.finding.iter().map(|found| found.message.clone());
         let message: Vec<_> = found.chain(outcome.remarks.clone()).collect();
+        let found = outcome.finding.as_ref();
         self.cases.push(Case {
             name: format!(
                 "{}[rig={},drives={}]",
@@ -39,7 +42,9 @@ impl Cases {
                 drives(entry)
             ),
             verdict: outcome.verdict,
+            class: class(entry),
             message: message.join("; "),
+            details: found.map_or_else(String::new, |found| explain(entry, found, traces)),
             took: Duration::from_nanos(outcome.took.as_nanos()),
             attachments: Vec::new(),
         });

@@ -50,6 +50,6 @@ pub(crate) fn list(selection: &Selection, output: &mut Output) -> std::io::Resul
             entry.scenario.title
         );
     }
-    output.result(&text)?;
+    output.result(&output.fitted(&text))?;
     Ok(Exit::Passed)
 }

@@ -1,23 +1,13 @@
-//! `drivebench completions` and `drivebench man`.
+//! `drivebench man`.
 
-use super::args::Arguments;
 use super::exit::Exit;
+use super::help::command;
 use super::output::Output;
-use clap::CommandFactory;
-use clap_complete::Shell;
 use std::path::Path;
-
-/// Prints a completion script.
-pub(crate) fn completions(shell: Shell, output: &mut Output) -> std::io::Result<Exit> {
-    let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Arguments::command(), "drivebench", &mut script);
-    output.result(&String::from_utf8_lossy(&script))?;
-    Ok(Exit::Passed)
-}
 
 /// Prints the man page, or writes one a command into a folder.
 pub(crate) fn man(folder: Option<&Path>, output: &mut Output) -> std::io::Result<Exit> {
-    let command = Arguments::command();
+    let command = command();
     match folder {
         None => {
             let mut page = Vec::new();

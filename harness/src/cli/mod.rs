@@ -3,9 +3,11 @@
 pub(crate) mod args;
 mod campaign;
 mod check;
+mod complete;
 pub(crate) mod exit;
 mod findings;
 pub(crate) mod fuzz;
+mod help;
 mod import;
 mod junit;
 mod list;
@@ -29,7 +31,6 @@ pub use args::Arguments;
 pub use exit::Exit;
 
 use args::{Command, RunArguments};
-use clap::Parser;
 use output::Output;
 use std::process::ExitCode;
 
@@ -37,7 +38,7 @@ use std::process::ExitCode;
 #[must_use]
 pub fn main() -> ExitCode {
     crate::signals::fail_beyond_file_size_limit();
-    let arguments = match Arguments::try_parse() {
+    let arguments = match help::parse() {
         Ok(arguments) => arguments,
         Err(error) => {
             let exit = if error.use_stderr() {
@@ -84,7 +85,8 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
             crate::buses::commands::deviations::deviations(&arguments, output)
         }
         Command::Drive(command) => crate::buses::commands::drive(&command, output),
-        Command::Completions { shell } => man::completions(shell, output),
+        Command::Completions { shell } => complete::completions(shell, output),
+        Command::Complete { words } => complete::complete(&words, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),
     }
 }

@@ -15,27 +15,72 @@ pub(crate) struct Output {
     pub(crate) progress: bool,
     /// Standard output is a terminal.
     pub(crate) terminal: bool,
+    /// The terminal on standard output can move its cursor.
+    pub(crate) full_screen: bool,
+    /// The columns of the terminal on standard output.
+    width: Option<usize>,
+}
+
+/// What the streams of the process are, and what its environment says of colours.
+struct Streams {
+    out_is_terminal: bool,
+    err_is_terminal: bool,
+    /// `NO_COLOR` is set and not empty.
+    no_color: bool,
+    /// `TERM` is `dumb`: the terminal knows no escape sequences.
+    dumb: bool,
+    width: Option<usize>,
+}
+
+impl Streams {
+    fn of_process() -> Self {
+        let out = std::io::stdout();
+        let size = rustix::termios::tcgetwinsize(&out).ok();
+        let columns = size.map(|size| usize::from(size.ws_col));
+        Self {
+            out_is_terminal: out.is_terminal(),
+            err_is_terminal: std::io::stderr().is_terminal(),
+            no_color: std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty()),
+            dumb: std::env::var_os("TERM").is_some_and(|term| term == "dumb"),
+            // A serial console may report 0 columns.
+            width: columns.filter(|columns| *columns > 0),
+        }
+    }
 }
 
 impl Output {
     pub(crate) fn new(color: When, progress: Progress) -> Self {
-        let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        Self::on(&Streams::of_process(), color, progress)
+    }
+
+    fn on(streams: &Streams, color: When, progress: Progress) -> Self {
         let colour = |terminal: bool| match color {
             When::Always => true,
             When::Never => false,
-            When::Auto => terminal && !no_color,
+            When::Auto => terminal && !streams.no_color && !streams.dumb,
         };
-        let err = std::io::stderr().is_terminal();
-        let terminal = std::io::stdout().is_terminal();
         Self {
-            colour_out: colour(terminal),
-            colour_err: colour(err),
+            colour_out: colour(streams.out_is_terminal),
+            colour_err: colour(streams.err_is_terminal),
             progress: match progress {
-                Progress::Auto => err,
+                Progress::Auto => streams.err_is_terminal && !streams.dumb,
                 Progress::Bar => true,
                 Progress::None => false,
             },
-            terminal,
+            terminal: streams.out_is_terminal,
+            full_screen: streams.out_is_terminal && !streams.dumb,
+            width: streams.width.filter(|_| streams.out_is_terminal),
+        }
+    }
+
+    /// Lines that fit the terminal: the words that do not fit go on in indented lines. A pipe or a file gets the lines as they are.
+    pub(crate) fn fitted(&self, text: &str) -> String {
+        match self.width {
+            Some(width) => text
+                .split_inclusive('\n')
+                .map(|line| folded(line, width))
+                .collect(),
+            None => text.to_owned(),
         }
     }
 
@@ -118,5 +163,109 @@ fn paint(text: &str, colour: &str, on: bool) -> String {
         format!("\x1b[{colour}m{text}\x1b[0m")
     } else {
         text.to_owned()
+    }
+}
+
+/// A line with line breaks in place of the spaces at which it would pass the width. A word that is wider stays whole.
+fn folded(line: &str, width: usize) -> String {
+    const INDENT: &str = "    ";
+    let mut text = String::new();
+    let mut rest = line.to_owned();
+    let mut indent = "";
+    loop {
+        let room = width.saturating_sub(indent.len()).max(1);
+        let Some(at) = break_at(&rest, room) else {
+            return text + indent + &rest;
+        };
+        text = text + indent + rest[..at].trim_end() + "\n";
+        rest = rest[at..].trim_start().to_owned();
+        // Columns do not go on in the next line, so their padding is not needed there.
+        while rest.contains("   ") {
+            rest = rest.replace("   ", "  ");
+        }
+        indent = INDENT;
+    }
+}
+
+/// The space at which a line that is wider than `room` is broken; `None` if it fits, or has no such space.
+fn break_at(line: &str, room: usize) -> Option<usize> {
+    let line = line.trim_end();
+    let (end, past) = line.char_indices().nth(room)?;
+    let start = line.len() - line.trim_start().len();
+    // The space may stand directly behind the last column.
+    let before = line[..end + past.len_utf8()]
+        .rfind(' ')
+        .filter(|at| *at > start);
+    before.or_else(|| line[end..].find(' ').map(|at| end + at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn terminal() -> Streams {
+        Streams {
+            out_is_terminal: true,
+            err_is_terminal: true,
+            no_color: false,
+            dumb: false,
+            width: Some(20),
+        }
+    }
+
+    fn output(streams: &Streams, color: When) -> (bool, bool, bool) {
+        let output = Output::on(streams, color, Progress::Auto);
+        assert_eq!(output.colour_out, output.colour_err);
+        (output.colour_out, output.progress, output.full_screen)
+    }
+
+    #[test]
+    fn colours_need_a_terminal_that_knows_them() {
+        assert_eq!(output(&terminal(), When::Auto), (true, true, true));
+        let no_color = Streams {
+            no_color: true,
+            ..terminal()
+        };
+        assert_eq!(output(&no_color, When::Auto), (false, true, true));
+        let dumb = Streams {
+            dumb: true,
+            ..terminal()
+        };
+        assert_eq!(output(&dumb, When::Auto), (false, false, false));
+        assert_eq!(output(&dumb, When::Always), (true, false, false));
+        assert_eq!(output(&terminal(), When::Never), (false, true, true));
+    }
+
+    #[test]
+    fn lines_fit_the_terminal() {
+        let output = Output::on(&terminal(), When::Auto, Progress::Auto);
+        for (line, fitted) in [
+            ("short\n", "short\n"),
+            ("exactly twenty chars\n", "exactly twenty chars\n"),
+            (
+                "name    100 drives  a title of many words\n",
+                "name    100 drives\n    a title of many\n    words\n",
+            ),
+            (
+                "  a_word_that_is_too_wide_for_it and more\n",
+                "  a_word_that_is_too_wide_for_it\n    and more\n",
+            ),
+            (
+                "ümläute ümläute ümläute\n",
+                "ümläute ümläute\n    ümläute\n",
+            ),
+            ("1234567890123456789012345\n", "1234567890123456789012345\n"),
+        ] {
+            assert_eq!(output.fitted(line), fitted);
+        }
+        let file = Streams {
+            out_is_terminal: false,
+            ..terminal()
+        };
+        let line = "name    100 drives  a title of many words\n";
+        assert_eq!(
+            Output::on(&file, When::Auto, Progress::Auto).fitted(line),
+            line
+        );
     }
 }

@@ -11,18 +11,18 @@ use std::path::PathBuf;
 /// For `promote`.
 #[derive(Clone, Debug, Args)]
 pub struct PromoteArguments {
-    /// A finding of `fuzz run` or `shrink`: its `.json`, or the scenario beside it.
+    /// A finding of `fuzz run` or `shrink`: its `.json` or `.scn` file.
     pub finding: PathBuf,
-    /// The name of the scenario: the section that it is about and what it shows, such as 9.6-checksum-of-a-read.
+    /// Name of the scenario: section and subject, such as 9.6-checksum-of-a-read.
     #[arg(long, value_name = "NAME")]
     pub name: String,
-    /// Its title.
+    /// Title of the scenario.
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
-    /// The table of the manual that it pins, as `drivebench manual` names it.
+    /// Table of the manual that the scenario tests, as `drivebench manual` names it.
     #[arg(long, value_name = "TABLE")]
     pub source: Option<String>,
-    /// A checkout of the repository, or a folder in one; the present folder where nothing is said.
+    /// A checkout of the repository, or a folder in one; by default the current folder.
     #[arg(long, value_name = "FOLDER")]
     pub checkout: Option<PathBuf>,
 }

@@ -16,48 +16,50 @@ use std::path::{Path, PathBuf};
 /// The commands on benches.
 #[derive(Debug, Subcommand)]
 pub enum RigCommand {
-    /// Show what benches there are and whether each is free, held, reserved, quarantined or has mistakes.
+    /// List rigs and whether each is free, held, reserved, quarantined or has mistakes.
     List {
-        /// In which form.
+        /// Output format.
         #[arg(long, value_enum, default_value_t = ListFormat::Text)]
         format: ListFormat,
     },
-    /// Print a bench's file with every default filled in.
+    /// Print a rig's file with every default filled in.
     Show {
-        /// A name, a file, or sim:N.
+        /// The rig: a name, a file, or sim:N.
         rig: String,
     },
-    /// Print the JSON schema of bench files.
+    /// Print the JSON schema of rig files.
     Schema,
-    /// Open a bench, lock it, count its drives, read who they are, and measure how long a byte takes round its rings. The drives
-    /// are left as they are; exit code 3 where something is not as its file says.
+    /// Open a rig, count and read its drives, and test its line.
+    ///
+    /// Measures how long a byte takes round the ring. The drives stay as they are. The exit code is 3 if something differs from the
+    /// rig's file.
     Check(CheckRigArguments),
-    /// Propose a block of a bench's file for each serial port of this machine; no port is opened.
+    /// Print a block for a rig's file for each serial port; opens no port.
     Scan,
-    /// Keep a bench for yourself until `rig unlock`; other users get exit code 75.
+    /// Reserve a rig until `rig unlock`; other users get exit code 75.
     Lock {
-        /// A name, a file, or sim:N.
+        /// The rig: a name, a file, or sim:N.
         rig: String,
-        /// What for; others are shown it.
+        /// The purpose, which other users see.
         #[arg(long, value_name = "TEXT")]
         purpose: String,
     },
-    /// Give a bench back.
+    /// End the reservation of a rig.
     Unlock {
-        /// A name, a file, or sim:N.
+        /// The rig: a name, a file, or sim:N.
         rig: String,
-        /// Also one that is kept for another user. A running process is not disturbed.
+        /// Also end the reservation of another user. A running process is not disturbed.
         #[arg(long)]
         force: bool,
     },
-    /// Say that a bench must not be used (exit code 3 for who tries), or may be used again.
+    /// Forbid the use of a rig (exit code 3), or lift the ban.
     Quarantine {
-        /// A name, a file, or sim:N.
+        /// The rig: a name, a file, or sim:N.
         rig: String,
-        /// Why.
+        /// The reason, which other users see.
         #[arg(long, value_name = "TEXT", required_unless_present = "lift")]
         reason: Option<String>,
-        /// It may be used again.
+        /// Allow the use again.
         #[arg(long, conflicts_with = "reason")]
         lift: bool,
     },

@@ -11,14 +11,13 @@ use super::tally::Tally;
 use crate::evidence::{About, EvidenceError, Folder, too_large};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::{Link, Recording, SimulatedLink};
+use crate::report::finding::explain;
 use crate::report::html::Head;
-use crate::report::mismatch::mismatch;
 use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
-use crate::scenario::run::{AtMismatch, Mismatch, Outcome, Skip, play};
+use crate::scenario::run::{AtMismatch, Outcome, Skip, play};
 use crate::scenario::simulate::simulated;
-use crate::scenario::source::line_number;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
@@ -129,7 +128,7 @@ fn on_simulated(
         };
         let outcome = &played.outcome;
         tally.note(entry, outcome);
-        cases.note(entry, outcome);
+        cases.note(entry, outcome, &played.traces);
         let mut line = line(entry, outcome, output);
         if arguments.records || entries.len() == 1 {
             line.push_str(&records(outcome));
@@ -247,10 +246,11 @@ pub(crate) fn drives(entry: &Entry) -> String {
 pub(crate) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String {
     let drives = drives(entry);
     format!(
-        "{} {:44} {:>5} drives {:>12}  {}\n",
+        "{} {:44} {:>5} {:6} {:>12}  {}\n",
         output.verdict(outcome.verdict).trim_end_matches(' '),
         entry.short_name(),
         drives,
+        if drives == "1" { "drive" } else { "drives" },
         outcome.took.to_string(),
         entry.scenario.title
     )
@@ -259,56 +259,14 @@ pub(crate) fn line(entry: &Entry, outcome: &Outcome, output: &Output) -> String 
 /// What there is to say about a scenario beside its line, for people.
 pub(crate) fn details(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
     let mut text = String::new();
-    // Writing to a String cannot fail.
     for remark in &outcome.remarks {
         let _infallible = writeln!(text, "  note: {remark}");
     }
     if let Some(finding) = &outcome.finding {
-        text.push_str(&explain(entry, finding, traces));
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(text, "\n{}", explain(entry, finding, traces));
     }
     text
-}
-
-/// A finding: the line it is about, and the bytes that differ.
-fn explain(entry: &Entry, finding: &Mismatch, traces: &[Trace]) -> String {
-    let place = place(entry, finding);
-    let sources: Vec<_> = entry
-        .scenario
-        .sources
-        .iter()
-        .map(|s| s.text.clone())
-        .collect();
-    let mut text = format!("\n{place}: {}\n", finding.message);
-    let line = entry.source.text.get(finding.span.start..finding.span.end);
-    for line in line.unwrap_or_default().lines() {
-        let _infallible = writeln!(text, "    {line}");
-    }
-    if !finding.in_error.is_empty() {
-        let _infallible = writeln!(text, "in the error mode: {}", finding.in_error);
-    }
-    let bytes = mismatch(finding, traces, &sources);
-    if bytes.is_empty() {
-        if !sources.is_empty() {
-            let _infallible = writeln!(text, "see {}", sources.join(", "));
-        }
-    } else {
-        text.push('\n');
-        text.push_str(&bytes);
-    }
-    text.push('\n');
-    text
-}
-
-/// `file:line:column` of a finding.
-fn place(entry: &Entry, finding: &Mismatch) -> String {
-    let before = entry
-        .source
-        .text
-        .get(..finding.span.start)
-        .unwrap_or_default();
-    let line = line_number(&entry.source.text, finding.span.start);
-    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-    format!("{}:{line}:{column}", entry.name)
 }
 
 pub(crate) fn progress_bar(length: usize, shown: bool) -> ProgressBar {

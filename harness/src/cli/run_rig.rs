@@ -9,6 +9,7 @@ use super::qualify::{DEVIATIONS, ENDED, settle};
 use super::rig_failure::{alarm, exit_of, give_back};
 use super::run::{details, drives, line, progress_bar};
 use super::tally::Tally;
+use crate::counted::counted;
 use crate::evidence::{About, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
 use crate::link::{Line, Octets, Trouble};
@@ -179,21 +180,21 @@ fn all(
         bar.set_message(entry.short_name().to_owned());
         let played = match play(&mut run, entry, folder.as_mut()) {
             Err(Stop::Session(error)) => {
-                cases.note(entry, &Outcome::rig_error(error.to_string()));
+                cases.note(entry, &Outcome::rig_error(error.to_string()), &[]);
                 cases.write(Exit::RigError, output);
                 return Err(Stop::Session(error));
             }
             played => played?,
         };
         let outcome = &played.outcome;
+        let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
         tally.note(entry, outcome);
-        cases.note(entry, outcome);
+        cases.note(entry, outcome, traces);
         let mut text = line(entry, outcome, output);
         if job.records || entries.len() == 1 {
             text.extend(outcome.records.iter().map(plot));
         }
         bar.suspend(|| output.result(&text))?;
-        let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
         let told = details(entry, outcome, traces);
         bar.suspend(|| output.say(&told));
         if let (Some(page), None) = (&mut page, &folder) {
@@ -214,7 +215,7 @@ fn all(
     for entry in left {
         let outcome = Outcome::skipped(Why::RunEnded.into());
         tally.not_reached(entry, &outcome);
-        cases.note(entry, &outcome);
+        cases.note(entry, &outcome, &[]);
     }
     output.result(&tally.summary())?;
     let mut exit = cases.write(tally.exit(job.require_all), output);
@@ -315,16 +316,16 @@ fn measured(run: &mut Run<'_>) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(longest) = gaps.iter().max() {
         lines.push(format!(
-            "{} bytes were sent with a wrong parity bit; the line stood still for at most {:.1} ms around one\n",
-            gaps.len(),
+            "{} sent with a wrong parity bit; the line was idle for at most {:.1} ms around one\n",
+            counted(gaps.len(), "byte"),
             longest.as_secs_f64() * 1e3
         ));
     }
     for inner in ports.inner_links().iter().filter(|inner| inner.passes()) {
         let delay = inner.delay();
         lines.push(format!(
-            "interposer: {} bytes passed on, each a byte time later and {:.3} ms more in the mean, {:.3} ms at most\n",
-            delay.bytes,
+            "interposer: {} passed on, each delayed by a byte time and {:.3} ms (mean; {:.3} ms at most)\n",
+            counted(delay.bytes, "byte"),
             delay.mean().as_secs_f64() * 1e3,
             delay.longest.as_secs_f64() * 1e3
         ));

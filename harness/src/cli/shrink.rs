@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::fuzz::{Use, on_ports, scope, sizes, tell};
 use super::output::Output;
 use super::rig_failure::find_rig;
+use crate::counted::counted;
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::explore::{
     Case, Difference, ExploreError, Finding, OnRig, OnSim, Planted, Setup, Target,
@@ -24,18 +25,18 @@ const RUNS_ON_RIG: u32 = 40;
 /// For `shrink`.
 #[derive(Clone, Debug, Args)]
 pub struct ShrinkArguments {
-    /// A finding of `fuzz run`: its `.json`, or the scenario beside it.
+    /// A finding of `fuzz run`: its `.json` or `.scn` file.
     pub finding: PathBuf,
-    /// The rig with ports that it was found on; findings of simulated rings need none.
-    #[arg(long, value_name = "NAME")]
+    /// The rig with ports on which the finding was made; a finding of a simulated ring needs none.
+    #[arg(long, value_name = "RIG")]
     pub rig: Option<String>,
-    /// How often a ring is asked at most: 300 on simulated rings, 40 on a rig with ports where nothing is said.
+    /// Maximum number of runs; by default 300 on simulated rings, 40 on a rig with ports.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub runs: Option<u32>,
-    /// Let motors turn, where the rig's file allows it too.
+    /// Let motors turn; the rig's file must allow it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that another program holds, such as 30s.
+    /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
 }
@@ -147,8 +148,9 @@ fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
             };
             let small = make_small(subject, difference, RUNS, &mut ask).ok()?;
             output.say(&format!(
-                "drive {drive} deviates {} shows the same on the simulator: made small there first, in {} runs\n",
-                deviation.name, small.runs
+                "drive {drive} deviates {} shows the same on the simulator: made small there first, in {}\n",
+                deviation.name,
+                counted(small.runs, "run")
             ));
             return Some(Subject {
                 setup: finding.setup.clone(),
@@ -239,8 +241,9 @@ fn settle(
         false => "the runs are used up; --runs allows more",
     };
     output.say(&format!(
-        "{before} bytes became {after} in {} runs; {end}\n{}\ndrivebench promote {} --name NAME\n",
-        small.runs,
+        "{} became {after} in {}; {end}\n{}\ndrivebench promote {} --name NAME\n",
+        counted(before, "byte"),
+        counted(small.runs, "run"),
         files[1].display(),
         files[0].display()
     ));

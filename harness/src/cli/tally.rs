@@ -2,6 +2,7 @@
 //! exit code.
 
 use super::exit::Exit;
+use crate::counted::counted;
 use crate::library::Entry;
 use crate::scenario::run::{Outcome, Unlock, together};
 use crate::scenario::verdict::Verdict;
@@ -95,7 +96,7 @@ impl Tally {
             }
         }
         let (all, took) = (self.verdicts.len(), self.took);
-        let _infallible = writeln!(text, " ({all} scenarios, {took} on the line)");
+        let _infallible = writeln!(text, " ({}, {took} on the line)", counted(all, "scenario"));
         let reasons = self.skipped.iter();
         let reasons: Vec<_> = reasons
             .map(|(reason, count)| format!("{count} ({reason})"))

@@ -4,6 +4,7 @@ use super::args::VerifyArguments;
 use super::exit::Exit;
 use super::fuzz;
 use super::output::Output;
+use crate::counted::counted;
 use crate::evidence::{Signer, verify as judge_again};
 use crate::explore::read as read_run;
 
@@ -52,7 +53,9 @@ pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::i
     }
     let count = verified.attempts.len();
     output.result(&format!(
-        "{count} attempts judged again, {wrong} things wrong{}\n",
+        "{} judged again, {} wrong{}\n",
+        counted(count, "attempt"),
+        counted(wrong, "thing"),
         if verified.complete {
             ""
         } else {

@@ -10,6 +10,7 @@ use super::record::Line;
 use super::verify::{Judged, Opened, is_name, scenarios};
 use crate::capture::read;
 use crate::library::Entry;
+use crate::report::finding::{class, explain};
 use crate::report::html::{Head, Played, Shown, run, section};
 use crate::scenario::problem;
 use crate::scenario::run::{Mismatch, Outcome};
@@ -68,6 +69,8 @@ pub(super) fn derived(
         }
     }
     let mut shown = Vec::new();
+    let mut cases = Vec::new();
+    let texts = scenarios(path);
     for case in &settled {
         let attempt = attempts.get(&case.name);
         let traces = match attempt {
@@ -76,11 +79,28 @@ pub(super) fn derived(
             }
             _ => Vec::new(),
         };
-        shown.push(show(shown.len() + 1, case, attempt, &traces, opened.rate()));
+        // Of a scenario that was not played there is only its text.
+        let text = match attempt {
+            Some(attempt) => Some(attempt.text.clone()),
+            None => texts(&case.name).ok().filter(|_| is_name(&case.name)),
+        };
+        let entry = text.and_then(|text| entry(&case.name, &text));
+        let judged = attempt.and_then(|attempt| attempt.outcome.as_ref());
+        let outcome = case.outcome(judged);
+        cases.push(Case {
+            class: entry.as_ref().map_or_else(String::new, class),
+            details: match (&entry, &outcome.finding) {
+                (Some(entry), Some(found)) => explain(entry, found, &traces),
+                _ => String::new(),
+            },
+            ..case.case(path, opened.rig.id())
+        });
+        let shown_as = (shown.len() + 1, opened.rate());
+        shown.push(show(shown_as, case, attempt, (&outcome, &traces)));
     }
     Ok(Derived {
         html: run(&head(opened), shown),
-        junit: xml(path, opened.rig.id(), &settled),
+        junit: junit(&suite(opened.rig.id()), &cases),
     })
 }
 
@@ -136,7 +156,8 @@ impl Settled {
         let why = "the record ends before this scenario was settled";
         Self {
             name: name.to_owned(),
-            title: entry(name, attempt).map_or_else(String::new, |entry| entry.scenario.title),
+            title: entry(name, &attempt.text)
+                .map_or_else(String::new, |entry| entry.scenario.title),
             drives: String::new(),
             verdict: Verdict::Aborted,
             finding: None,
@@ -145,6 +166,43 @@ impl Settled {
                 .outcome
                 .as_ref()
                 .map_or(Span::ZERO, |outcome| outcome.took),
+        }
+    }
+
+    /// The case of JUnit, without class and details, with the files that the scenario left in a folder.
+    fn case(&self, path: &Path, rig: &str) -> Case {
+        let messages: Vec<_> = self.messages().map(String::as_str).collect();
+        Case {
+            name: format!("{}[rig={rig},drives={}]", self.name, self.drives),
+            class: String::new(),
+            verdict: self.verdict,
+            message: messages.join("; "),
+            details: String::new(),
+            took: Duration::from_nanos(self.took.as_nanos()),
+            attachments: attachments(path, &self.name),
+        }
+    }
+
+    /// The outcome as recorded, with the place and the bytes of the finding if `judged` has the same one.
+    fn outcome(&self, judged: Option<&Outcome>) -> Outcome {
+        let found = self.finding.as_ref().map(|message| {
+            let same = judged.and_then(|outcome| outcome.finding.clone());
+            same.filter(|own| own.message == *message)
+                .unwrap_or_else(|| Mismatch {
+                    span: problem::Span { start: 0, end: 0 },
+                    message: message.clone(),
+                    difference: None,
+                    in_error: String::new(),
+                })
+        });
+        Outcome {
+            verdict: self.verdict,
+            finding: found,
+            remarks: self.remarks.clone(),
+            took: self.took,
+            records: judged.map_or_else(Vec::new, |outcome| outcome.records.clone()),
+            unready: None,
+            skip: None,
         }
     }
 
@@ -169,22 +227,15 @@ pub(super) fn plain(rig: &str, settled: &[Settled]) -> String {
     text
 }
 
-/// The verdicts as JUnit, each with the files that it left in a folder.
-pub(super) fn xml(path: &Path, rig: &str, settled: &[Settled]) -> String {
-    let cases: Vec<_> = settled
-        .iter()
-        .map(|case| {
-            let messages: Vec<_> = case.messages().map(String::as_str).collect();
-            Case {
-                name: format!("{}[rig={rig},drives={}]", case.name, case.drives),
-                verdict: case.verdict,
-                message: messages.join("; "),
-                took: Duration::from_nanos(case.took.as_nanos()),
-                attachments: attachments(path, &case.name),
-            }
-        })
-        .collect();
-    junit(&format!("rig {rig}"), &cases)
+/// The verdicts as JUnit without details: for a folder whose record cannot be read again.
+pub(super) fn bare(path: &Path, rig: &str, settled: &[Settled]) -> String {
+    let cases: Vec<_> = settled.iter().map(|case| case.case(path, rig)).collect();
+    junit(&suite(rig), &cases)
+}
+
+/// The name of the suite of a rig.
+fn suite(rig: &str) -> String {
+    format!("rig {rig}")
 }
 
 /// The text of a scenario and the captures of its attempts.
@@ -202,10 +253,10 @@ fn attachments(path: &Path, name: &str) -> Vec<String> {
         .collect()
 }
 
-fn entry(name: &str, attempt: &Attempt) -> Option<Entry> {
+fn entry(name: &str, text: &str) -> Option<Entry> {
     let source = Source {
-        name: name.to_owned(),
-        text: attempt.text.as_str().into(),
+        name: format!("{SCENARIOS}/{name}.scn"),
+        text: text.into(),
     };
     Entry::new(source, None).ok()
 }
@@ -230,37 +281,16 @@ fn traces(
 }
 
 fn show(
-    number: usize,
+    (number, rate): (usize, Rate),
     case: &Settled,
     attempt: Option<&Attempt>,
-    traces: &[Trace],
-    rate: Rate,
+    (outcome, traces): (&Outcome, &[Trace]),
 ) -> Shown {
-    let entry = attempt.and_then(|attempt| entry(&case.name, attempt));
+    let entry = attempt.and_then(|attempt| entry(&case.name, &attempt.text));
     let sources = entry.map_or_else(Vec::new, |entry| {
         let sources = entry.scenario.sources.into_iter();
         sources.map(|source| source.text).collect()
     });
-    let judged = attempt.and_then(|attempt| attempt.outcome.as_ref());
-    let found = case.finding.as_ref().map(|message| {
-        let same = judged.and_then(|outcome| outcome.finding.clone());
-        same.filter(|own| own.message == *message)
-            .unwrap_or_else(|| Mismatch {
-                span: problem::Span { start: 0, end: 0 },
-                message: message.clone(),
-                difference: None,
-                in_error: String::new(),
-            })
-    });
-    let outcome = Outcome {
-        verdict: case.verdict,
-        finding: found,
-        remarks: case.remarks.clone(),
-        took: case.took,
-        records: judged.map_or_else(Vec::new, |outcome| outcome.records.clone()),
-        unready: None,
-        skip: None,
-    };
     let again = match attempt {
         Some(attempt) => format!(
             "drivebench import {CAPTURES}/{}.{}.json --format table",
@@ -276,7 +306,7 @@ fn show(
             sources: &sources,
             drives: &case.drives,
             text: attempt.map_or("", |attempt| &attempt.text),
-            outcome: &outcome,
+            outcome,
             traces,
             rate,
             again: &again,

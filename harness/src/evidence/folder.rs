@@ -1,6 +1,6 @@
 //! The folder of a run, written as the run goes on.
 
-use super::derive::{Settled, derive, plain, xml};
+use super::derive::{Settled, bare, derive, plain};
 use super::files::{
     CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS, sum, sums,
 };
@@ -205,10 +205,15 @@ impl Folder {
         let verdicts = verdicts.collect();
         self.writer.line(&Line::End { verdicts, safe });
         self.check()?;
-        self.write(JUNIT, &xml(&self.path, &self.rig, &self.cases))?;
         self.write(REPORT, &plain(&self.rig, &self.cases))?;
-        // The sums are written even if the page cannot be made.
-        let page = derive(&self.path).and_then(|derived| self.write(PAGE, &derived.html));
+        // The verdicts and the sums are written even if the page cannot be made.
+        let derived = derive(&self.path);
+        let junit = match &derived {
+            Ok(derived) => derived.junit.clone(),
+            Err(_) => bare(&self.path, &self.rig, &self.cases),
+        };
+        self.write(JUNIT, &junit)?;
+        let page = derived.and_then(|derived| self.write(PAGE, &derived.html));
         let sums = sums(&self.path)?;
         self.write(SUMS, &sums)?;
         if let Some(key) = &self.sign {

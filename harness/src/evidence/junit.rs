@@ -13,10 +13,14 @@ use std::time::Duration;
 pub struct Case {
     /// Its unique name: `9.7-parity-error[rig=lab-1,drives=3]`.
     pub name: String,
+    /// The group that reports show it in, as `package.class`: `nd21.chapter-9`.
+    pub class: String,
     /// Its verdict.
     pub verdict: Verdict,
     /// What differed, as a text for people.
     pub message: String,
+    /// The finding with its place, the bytes and the table: the text of a failure. May be empty.
+    pub details: String,
     /// How long it took on the line.
     pub took: Duration,
     /// The files that it left.
@@ -33,7 +37,8 @@ pub fn junit(suite: &str, cases: &[Case]) -> String {
     for case in cases {
         let time = in_millis(case.took);
         let mut test = TestCase::new(unique(&case.name, &mut names), status(case));
-        test.set_classname("drivebench").set_time(time);
+        test.set_classname(named(&case.class, "scenarios"))
+            .set_time(time);
         let output = output(case);
         if !output.is_empty() {
             test.set_system_out(output);
@@ -79,11 +84,15 @@ fn in_millis(took: Duration) -> Duration {
 
 fn status(case: &Case) -> TestCaseStatus {
     let message = printable(&case.message);
+    let details = printable(&case.details);
     let mut status = match case.verdict {
         Verdict::Passed | Verdict::Marginal => return TestCaseStatus::success(),
         Verdict::Flaky => {
             let mut before = TestRerun::new(NonSuccessKind::Failure);
             before.set_type(case.verdict.name()).set_message(message);
+            if !details.is_empty() {
+                before.set_description(details);
+            }
             let mut status = TestCaseStatus::success();
             status.add_rerun(before);
             return status;
@@ -93,6 +102,9 @@ fn status(case: &Case) -> TestCaseStatus {
         Verdict::Aborted | Verdict::RigError => TestCaseStatus::non_success(NonSuccessKind::Error),
     };
     status.set_type(case.verdict.name()).set_message(message);
+    if !details.is_empty() {
+        status.set_description(details);
+    }
     status
 }
 

@@ -77,7 +77,10 @@ pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
         return read(&place.source()?);
     }
     let known: Vec<_> = all.iter().map(|(name, _)| name.as_str()).collect();
-    let near = nearest(name, &known).map(|near| format!("did you mean `{near}`? "));
+    let near = nearest(name, &known).map(str::to_owned);
+    let near = near
+        .or_else(|| simulated_name(name))
+        .map(|near| format!("did you mean `{near}`? "));
     Err(FindError::NotFound {
         name: name.to_owned(),
         remedy: format!(
@@ -86,6 +89,16 @@ pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
             known.join(", ")
         ),
     })
+}
+
+/// The name of a simulated rig that was probably meant: `simm:3`, `sim3` and `SIM 3` mean `sim:3`.
+fn simulated_name(name: &str) -> Option<String> {
+    let digit = name.find(|c: char| c.is_ascii_digit())?;
+    let (word, sizes) = name.split_at(digit);
+    let word = word.trim_end_matches(|c: char| !c.is_alphanumeric());
+    nearest(word, &["sim"])?;
+    self::sizes(sizes).ok()?;
+    Some(format!("sim:{sizes}"))
 }
 
 /// Where a rig stands.

@@ -1,6 +1,7 @@
 //! Mistakes in a scenario, shown with their line.
 
 use super::source::line_number;
+use crate::counted::counted;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use std::fmt;
 use std::sync::Arc;
@@ -180,8 +181,7 @@ impl Problems {
 impl fmt::Display for Problems {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.problems.len();
-        let s = if count == 1 { "" } else { "s" };
-        write!(f, "{}: {count} mistake{s}", self.source.name())
+        write!(f, "{}: {}", self.source.name(), counted(count, "mistake"))
     }
 }
 

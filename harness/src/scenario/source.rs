@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The largest scenario, in bytes. The longest built-in one has a fiftieth of it.
+/// The largest text file (scenario, rig, campaign), in bytes. The longest built-in one has a fiftieth of it.
 pub const MAX_SIZE: u64 = 1 << 20;
 
 /// The longest line, in bytes: mistakes are shown with their line.
@@ -33,22 +33,20 @@ pub enum SourceError {
     },
     /// It is a folder, a device, a FIFO or the like.
     #[error(
-        "{name} is not a regular file; a scenario is a text file (*.scn) or the pipe of a shell substitution"
+        "{name} is not a regular file; a text file or the pipe of a shell substitution is expected"
     )]
     NotAFile {
         /// The file.
         name: String,
     },
     /// It is too large.
-    #[error("{name} has more than {} KiB; a scenario is a short text", MAX_SIZE >> 10)]
+    #[error("{name} has more than {} KiB; a short text is expected", MAX_SIZE >> 10)]
     TooLarge {
         /// The file.
         name: String,
     },
     /// A line is too long to be shown.
-    #[error(
-        "{name}:{line}: the line has more than {MAX_LINE} characters; bytes may go on in another `>` or `<` line"
-    )]
+    #[error("{name}:{line}: the line has more than {MAX_LINE} characters; split it")]
     LongLine {
         /// The file.
         name: String,
@@ -56,7 +54,7 @@ pub enum SourceError {
         line: usize,
     },
     /// It is not text.
-    #[error("{name} is not a text: byte {offset} is {byte:02X}; a scenario is UTF-8 text (*.scn)")]
+    #[error("{name} is not a text: byte {offset} is {byte:02X}; a text file in UTF-8 is expected")]
     NotText {
         /// The file.
         name: String,

@@ -7,6 +7,7 @@ use super::place::{ControlPlace, ServedAt};
 use super::pty::{Change, Pty};
 use super::server::Server;
 use super::tcp::{Tcp, Visitor};
+use crate::counted::counted;
 use crate::port::wake_on_time;
 use crate::signals;
 use harness_proto::time::{Instant, Span};
@@ -279,8 +280,7 @@ impl Shell<'_> {
             let name = self.server.name(seat);
             lines.push(match self.server.drives(seat) {
                 _ if seat >= self.server.rings() => format!("{name} at {place}"),
-                1 => format!("{name}: 1 drive at {place}"),
-                drives => format!("{name}: {drives} drives at {place}"),
+                drives => format!("{name}: {} at {place}", counted(drives, "drive")),
             });
         }
         if let Some(Control {
@@ -459,7 +459,7 @@ impl Shell<'_> {
         self.gone = self.here == 0;
         let lost = match self.server.lost(seat) {
             0 => String::new(),
-            lost => format!("; it has lost {lost} bytes"),
+            lost => format!("; {} lost", counted(lost, "byte")),
         };
         self.server.go(seat);
         self.say(seat, &format!("{text}{lost}"));

@@ -1,6 +1,7 @@
 //! The page: a pure function of the view's state and of the size of the terminal.
 
 use super::keys::HELP;
+use crate::counted::counted;
 use crate::top::{Entry, RingReading, Row, Top};
 use harness_proto::time::Span;
 use ratatui_core::buffer::Buffer;
@@ -174,8 +175,7 @@ fn errors(ring: &RingReading) -> (String, Look) {
 /// How many drives are in which mode.
 fn counts(top: &Top) -> String {
     let count = top.reading.drives.len();
-    let s = if count == 1 { "" } else { "s" };
-    let mut text = format!("{count} drive{s}:");
+    let mut text = format!("{}:", counted(count, "drive"));
     let modes = top.modes();
     let some = modes.iter().filter(|(_, count)| *count > 0);
     let words: Vec<_> = some.map(|(mode, n)| format!("{n} {mode}")).collect();

@@ -519,10 +519,7 @@ fn fuzz_distil() {
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let name = "9.2-sync-byte-due-no-address-byte-seen--pause.hex";
     let page = stdout(&output);
-    assert_eq!(
-        page,
-        format!("{name}\n1 inputs: 1 features more, 1 before\n")
-    );
+    assert_eq!(page, format!("{name}\n1 input: 1 feature more, 1 before\n"));
     let written = std::fs::read_to_string(kept.join(name)).expect("written");
     assert!(written.ends_with("PAUSE\n00 81\n"), "{written}");
     let again = distil("detector");

@@ -5,6 +5,7 @@ mod cli;
 mod cli_drive;
 #[path = "../common/debian.rs"]
 mod debian;
+mod help;
 mod html;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;

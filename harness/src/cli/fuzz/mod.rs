@@ -16,15 +16,17 @@ pub(crate) use verify::verify;
 /// The commands of `fuzz`.
 #[derive(Debug, Subcommand)]
 pub enum FuzzCommand {
-    /// Make conversations from a seed and look for a byte that differs from the manual; every finding is a scenario.
+    /// Play random conversations and report every byte that differs from the manual.
     Run(run::FuzzRunArguments),
-    /// Try the conversations that a run has kept, or those of a corpus, the ones that show most first.
+    /// Play the conversations that a run has kept, the most telling first.
     Replay(replay::ReplayArguments),
-    /// Show how many cases it takes to find each planned deviation of a drive.
+    /// Count the cases that it takes to find each planted deviation.
     Power(crate::buses::commands::power::PowerArguments),
-    /// Show which protocol transitions the kept inputs reach, and what those of each target reach; exit code 1 where a reachable transition is missing.
+    /// Show which protocol transitions the kept inputs reach.
+    ///
+    /// The exit code is 1 if a reachable transition is missing.
     Coverage(crate::buses::commands::coverage::CoverageArguments),
-    /// Choose from a grown corpus the few small inputs that reach what the kept ones do not, and put them beside those.
+    /// Add the inputs of a grown corpus that reach something new to the kept ones.
     Distil(crate::buses::commands::distil::DistilArguments),
 }
 

@@ -6,6 +6,7 @@ use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::find_rig;
+use crate::counted::counted;
 use crate::explore::{
     About, Act, Bounds, Campaign, Case, ExploreError, LogLine, MOST_BYTES, OnRig, OnSim, Setup,
     Target, What, by_novelty, read,
@@ -27,17 +28,17 @@ const LARGEST: u64 = 64 * 1024;
 /// For `fuzz replay`.
 #[derive(Clone, Debug, Args)]
 pub struct ReplayArguments {
-    /// A folder that `fuzz run` has written, or a corpus of `.hex` files such as corpora/fuzz/ring.
+    /// A folder of `fuzz run`, or a corpus of `.hex` files such as corpora/fuzz/ring.
     pub folder: PathBuf,
-    /// On which rig: sim:N, a file, or a name that `rig list` shows.
-    #[arg(long, value_name = "NAME")]
+    /// The rig: sim:N, a file, or a name that `rig list` shows.
+    #[arg(long, value_name = "RIG")]
     pub rig: String,
     #[arg(long, value_name = "TIME", value_parser = duration, default_value = "60s", help = WIRE_TIME_HELP)]
     pub wire_time: Duration,
-    /// Let motors turn, where the rig's file allows it too.
+    /// Let motors turn; the rig's file must allow it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that another program holds, such as 30s.
+    /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
 }
@@ -126,7 +127,8 @@ fn play(
     }
     let ordered = by_novelty(allowed);
     output.say(&format!(
-        "{count} cases, {denied} not allowed or not possible here, {} show something that the others do not\n",
+        "{}, {denied} not allowed or not possible here, {} kept to be played: those that reach something new\n",
+        counted(count, "case"),
         ordered.len()
     ));
     let bounds = Bounds {

@@ -7,13 +7,15 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::page::{writable, write};
 use crate::cli::rig_failure::find_rig;
+use crate::counted::counted;
 use crate::evidence::{can_sign, seal};
 use crate::explore::{
-    About, Bounds, Campaign, ExploreError, Kept, OnRig, OnSim, Planted, Record, Scope, Setup,
+    About, Bounds, Campaign, End, ExploreError, Kept, OnRig, OnSim, Planted, Record, Scope, Setup,
     Target, page, read,
 };
 use crate::guard::Limits;
 use crate::rig::{Rig, state};
+use crate::scenario::problem::nearest;
 use clap::Args;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation;
@@ -32,49 +34,50 @@ const EVERY: u64 = 50;
 /// For `fuzz run`.
 #[derive(Clone, Debug, Args)]
 pub struct FuzzRunArguments {
-    /// On which rig: sim:N, a file, or a name that `rig list` shows.
-    #[arg(long, value_name = "NAME", default_value = "sim:3")]
+    /// The rig: sim:N, a file, or a name that `rig list` shows.
+    #[arg(long, value_name = "RIG", default_value = "sim:3")]
     pub rig: String,
     /// The seed: the same seed gives the same run.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
-    /// How many cases; 10000 on simulated rings where nothing is said.
+    /// Number of cases; by default 10000 on simulated rings.
     #[arg(long, value_name = "NUMBER")]
     pub cases: Option<u64>,
     #[arg(long, value_name = "TIME", value_parser = duration, help = WIRE_TIME_HELP)]
     pub wire_time: Option<Duration>,
-    /// Plant a deviation in a drive of a simulated ring, as DRIVE=NAME, or 2:DRIVE=NAME in ring 2; `drivebench deviations` shows the names. May repeat.
+    /// Plant a deviation in a drive of a simulated ring: DRIVE=NAME, or 2:DRIVE=NAME in ring 2. `drivebench deviations` lists the names. May repeat.
     #[arg(long, value_name = "DRIVE=NAME", value_parser = planted)]
     pub deviates: Vec<Planted>,
-    /// Let the drives of sim:N be whole ND21s; without it they are plain, as the reference model is. Where no deviation is planted, a
-    /// witness judges each whole drive by what the manual says of the bus, the cells and the invariants of a drive.
+    /// Make the drives of sim:N complete ND21s instead of plain memory. A witness judges each of them by the rules of the manual for the
+    /// bus, the cells and the invariants of a drive.
     #[arg(long)]
     pub whole: bool,
-    /// Try a simulated rig as a ring behind a port: nothing is known of its drives but what the master receives.
+    /// Judge a simulated rig as if it were behind a port: only by the bytes that the master receives.
     #[arg(long, conflicts_with = "whole")]
     pub behind_port: bool,
-    /// A finding counts when it is seen again K of N times, as K/N.
+    /// Repetitions K of N in which a difference must be seen again to be a finding, as K/N.
     #[arg(long, value_name = "K/N", default_value = "2/3", value_parser = k_of_n)]
     pub confirm: (u8, u8),
     /// End after this number of findings.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     pub findings: usize,
-    /// Where the run is kept: a folder that is not there or is empty; fuzz-RIG-DATE where nothing is said.
+    /// The folder for the run, which must be new or empty; by default fuzz-RIG-DATE.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Go on with the run of this folder; rig, seed, deviations and confirmation are those that it began with.
+    /// Continue the run of this folder with the rig, seed, deviations and confirmation that it began with. Give --cases, --wire-time or
+    /// --findings to go beyond a finished run.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "rig", "seed", "deviates", "whole", "confirm"])]
     pub resume: Option<PathBuf>,
-    /// Write the report as one page of HTML into this file, which is there whole or not at all.
+    /// Write the report into this file, as one HTML page.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-    /// Sign the folder of the run with this key of `ssh-keygen`; `verify --allowed-signers` checks the signature.
+    /// Sign the folder of the run with this `ssh-keygen` key; `verify --allowed-signers` checks the signature.
     #[arg(long, value_name = "KEY")]
     pub sign: Option<PathBuf>,
-    /// Let motors turn, where the rig's file allows it too.
+    /// Let motors turn; the rig's file must allow it too.
     #[arg(long)]
     pub allow_motion: bool,
-    /// How long to wait for a rig that another program holds, such as 30s.
+    /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,
 }
@@ -94,7 +97,12 @@ fn planted(text: &str) -> Result<Planted, String> {
     let drive = drive.trim().parse().map_err(|_| form)?;
     let known = deviation::deviation(name.trim());
     let known = known.ok_or_else(|| {
-        format!("there is no deviation `{name}`; `drivebench deviations` shows what there is")
+        let names: Vec<_> = deviation::deviations().map(|own| own.name).collect();
+        let remedy = match nearest(name.trim(), &names) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "`drivebench deviations` lists them".to_owned(),
+        };
+        format!("there is no deviation `{name}`; {remedy}")
     })?;
     Ok(Planted {
         ring,
@@ -105,7 +113,7 @@ fn planted(text: &str) -> Result<Planted, String> {
 
 /// `2/3`.
 fn k_of_n(text: &str) -> Result<(u8, u8), String> {
-    let wrong = || "so often of so many times, such as 2/3; at most 100".to_owned();
+    let wrong = || "K/N is expected, K of N repetitions, such as 2/3; N is at most 100".to_owned();
     let (k, n) = text.split_once('/').ok_or_else(wrong)?;
     let number = |text: &str| text.trim().parse::<u8>().map_err(|_| wrong());
     let (k, n) = (number(k)?, number(n)?);
@@ -277,6 +285,7 @@ fn explore(
         told: None,
         failed: None,
     };
+    let played_before = campaign.progress().cases;
     let end = campaign.run(target, Some(&mut record), bounds, &mut telling);
     let failed = telling.failed.take();
     let end = match end {
@@ -295,6 +304,9 @@ fn explore(
         return Err(error);
     }
     output.result(&summary(&campaign, &end))?;
+    if arguments.resume.is_some() && campaign.progress().cases == played_before {
+        output.say(&beyond(&end, bounds));
+    }
     output.say(&format!("the run is in {}\n", folder.display()));
     if let Some(Err(error)) = arguments.sign.as_deref().map(|key| seal(&folder, key)) {
         output.complain(&error.to_string());
@@ -312,6 +324,23 @@ fn explore(
         (0, _) => Exit::Incomplete,
         _ => Exit::Failed,
     })
+}
+
+/// Why a run that was resumed played nothing, and how to go on.
+fn beyond(end: &End, bounds: &Bounds) -> String {
+    let remedy = match end {
+        End::Cases => format!(
+            "the run has {} cases already; give --cases with more",
+            bounds.cases
+        ),
+        End::Findings => format!(
+            "the run has {} already; give --findings with more",
+            counted(bounds.findings, "finding")
+        ),
+        End::Wire => "its time on the line is used up; give --wire-time with more".to_owned(),
+        End::Over(why) => why.clone(),
+    };
+    format!("nothing was played: {remedy}\n")
 }
 
 fn resume(

@@ -2,6 +2,7 @@
 
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::counted::counted;
 use crate::evidence::{Signer, sealed};
 use crate::explore::{ExploreError, Finding, Kept, LogLine, OnSim, Target as _};
 use std::path::Path;
@@ -65,7 +66,9 @@ pub(crate) fn verify(
         None => {}
     }
     output.result(&format!(
-        "{judged} findings played again, {wrong} things wrong\n"
+        "{} played again, {} wrong\n",
+        counted(judged, "finding"),
+        counted(wrong, "thing")
     ))?;
     Ok(match (wrong, complete) {
         (0, true) => Exit::Passed,

@@ -1,6 +1,7 @@
 //! Output of a run while it goes on.
 
 use crate::cli::output::Output;
+use crate::counted::counted;
 use crate::explore::{Campaign, End, Finding, Pool, Progress, Swarm, Watcher};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -23,7 +24,7 @@ pub(crate) struct Telling<'o> {
 
 impl Watcher for Telling<'_> {
     fn round(&mut self, round: u64, swarm: &Swarm) {
-        if self.rounds {
+        if self.rounds && self.output.progress {
             let names = swarm.names().join(" ");
             self.output.say(&format!("round {round}: {names}\n"));
         }
@@ -39,10 +40,10 @@ impl Watcher for Telling<'_> {
         }
         let word = if finding.confirmed { "found" } else { "flaky" };
         let mut text = format!(
-            "{word}: case {}, seen again {} of {} times: {}\n",
+            "{word}: case {}, seen again {} of {}: {}\n",
             finding.number,
             finding.seen_again,
-            finding.of,
+            counted(finding.of, "time"),
             finding.difference.signature()
         );
         text.push_str(&format!("  {}\n", finding.difference.about));
@@ -59,10 +60,10 @@ impl Watcher for Telling<'_> {
         if self.output.progress && self.told.is_none_or(|told| told.elapsed() >= PAUSE) {
             self.told = Some(Instant::now());
             self.output.say(&format!(
-                "{} cases, {} kept with {} features\n",
-                progress.cases,
+                "{}, {} kept with {}\n",
+                counted(progress.cases, "case"),
                 pool.cases().len(),
-                pool.shown()
+                counted(pool.shown(), "feature")
             ));
         }
     }
@@ -74,18 +75,18 @@ pub(crate) fn summary(campaign: &Campaign, end: &End) -> String {
     let (confirmed, flaky) = campaign.findings();
     let why = match end {
         End::Cases => "all cases were tried".to_owned(),
-        End::Wire => "the next case would need more of the wire's time".to_owned(),
-        End::Findings => "enough was found".to_owned(),
+        End::Wire => "the next case would exceed the time on the line".to_owned(),
+        End::Findings => "the limit of findings was reached".to_owned(),
         End::Over(why) => why.clone(),
     };
     format!(
-        "{} cases ({} not allowed or not possible here, {} repeats of findings), {:.3} s on the line, {} kept with {} \
-         features; {confirmed} found, {flaky} flaky: {why}\n",
-        progress.cases,
+        "{} ({} not allowed or not possible here, {} of findings), {:.3} s on the line, {} kept with {}; \
+         {confirmed} found, {flaky} flaky: {why}\n",
+        counted(progress.cases, "case"),
         progress.not_sent,
-        progress.repeats,
+        counted(progress.repeats, "repeat"),
         progress.wire_ns as f64 / 1e9,
         campaign.pool().cases().len(),
-        campaign.pool().shown(),
+        counted(campaign.pool().shown(), "feature"),
     )
 }

@@ -3,6 +3,7 @@
 use super::page::{Section, page};
 use super::scenario::Played;
 use super::write::Html;
+use crate::counted::counted;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 
@@ -100,15 +101,10 @@ fn counts(html: &mut Html, shown: &[Shown]) {
             }
         }
     });
-    let scenarios = if shown.len() == 1 {
-        "scenario"
-    } else {
-        "scenarios"
-    };
     html.line(
         "p",
         &[],
-        format_args!("{} {scenarios}, {took} on the line.", shown.len()),
+        format_args!("{}, {took} on the line.", counted(shown.len(), "scenario")),
     );
 }
 

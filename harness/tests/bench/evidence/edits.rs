@@ -148,7 +148,7 @@ fn a_fuzz_run_is_verified() {
     let by = ["--allowed-signers", "signers", "--identity", "bench@lab"];
     let signed = || desk.run(&[&["verify", "kept"], &by[..]].concat());
     ended(&signed(), 0, "signed by    bench@lab");
-    ended(&signed(), 0, "1 findings played again, 0 things wrong");
+    ended(&signed(), 0, "1 finding played again, 0 things wrong");
     let files = fs::read_dir(desk.path("kept")).expect("a folder");
     let mut files = files.map(|file| file.expect("a file").path());
     let finding = files

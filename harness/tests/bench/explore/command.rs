@@ -54,11 +54,29 @@ fn from_a_seed_to_a_scenario() {
         "2=and-is-or",
         "--findings",
         "1",
+        "--progress",
+        "bar",
         "--out",
     ];
     let output = drivebench(&[&arguments[..], &[name(&out)]].concat());
     ended(&output, 1, "1 found, 0 flaky");
     ended(&output, 1, "round 0:");
+    // A finished run does not end in silence.
+    let resumed = [
+        "fuzz",
+        "run",
+        "--cases",
+        "9000",
+        "--findings",
+        "1",
+        "--resume",
+    ];
+    let resumed = drivebench(&[&resumed[..], &[name(&out)]].concat());
+    ended(
+        &resumed,
+        1,
+        "nothing was played: the run has 1 finding already; give --findings with more",
+    );
     let found = findings(&out);
     let output = drivebench(&["shrink", name(&found[0])]);
     ended(&output, 0, "nothing more can be taken away");

@@ -42,20 +42,28 @@ fn every_command_on_a_ring_behind_a_port() {
     shows(
         &desk,
         "go 0 --move",
-        "error 0504 (ND21 9.8); it was confirmed",
+        "error 0504 (ND21 9.8); the error was confirmed",
     );
     shows(&desk, "go 0 --move", "drive 0 is in go");
     shows(&desk, "go 0 --move", SAFE);
-    shows(&desk, "go 0 --move --hold", "drive 0 is in go");
+    // The command says how a drive stays in go, and what that costs.
+    shows(&desk, "go 0 --move", "add --hold to leave the drives in go");
+    shows(&desk, "block 0", "drive 0 is in");
+    let blocked = desk.run(&["position", "0", "--by", "2turns", "--init", "--move"]);
+    ended(&blocked, 1, "`drivebench go 0 --move --hold`");
+    ended(&blocked, 1, "without supervision");
+    let kept = desk.run(&["go", "0", "--move", "--hold"]);
+    ended(&kept, 0, "drive 0 is in go");
+    assert!(!said(&kept).contains("add --hold"), "{}", said(&kept));
     shows(&desk, "position 0 --by 2turns --init --move", "stands at");
     shows(&desk, "write 0 nsoll=0rpm --move", "nsoll: 0000");
     // Behind a reset the guard knows no more where drives are; the next telegram passes all the same (9.8, 10.5).
     shows(&desk, "reset 0..1 --move", "drive 1 is in go");
     shows(&desk, "stop all", "drive 1 is in");
     shows(&desk, "block 0", "drive 0 is in");
-    ended(&desk.run(&["delete-error", "all"]), 2, "allow_motion");
+    ended(&desk.run(&["delete-error", "all"]), 2, "add --move");
     shows(&desk, "delete-error all --move", "drive 1 is in block");
-    shows(&desk, "recover", "2 drives answer");
+    shows(&desk, "recover", "2 drives answered");
     shows(&desk, "scope 0 nist", "recorded at once");
     shows(&desk, "watch 0 nist --for 50ms --every 10ms", "nist 0 rpm");
     let file = desk.path("drive.toml");

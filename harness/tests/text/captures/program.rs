@@ -104,7 +104,7 @@ fn captures_are_judged_compared_and_played_again() {
     assert_eq!(code(&judged), 0, "{}", stderr(&judged));
     assert!(stdout(&judged).starts_with("passed judged.pcapng: 3030 bytes on 101 links"));
     assert!(
-        stderr(&judged).contains("cells were taken to hold"),
+        stderr(&judged).contains("taken to hold the first value"),
         "{}",
         stderr(&judged)
     );

@@ -363,7 +363,7 @@ fn positions() {
     let (code, _, stderr) = drivebench_in(&folder, &line);
     assert_eq!(code, 1);
     assert!(
-        stderr.contains("drive 0 is in block; it must be in go"),
+        stderr.contains("drive 0 is in block; positioning needs a drive in go"),
         "{stderr}"
     );
 }
@@ -398,7 +398,7 @@ fn modes_of_drives() {
 fn recover_counts_the_drives() {
     assert_eq!(
         shown("recover"),
-        "ring 1: no fault reported; behind the check sequence 3 drives answer\n"
+        "ring 1: no fault reported; 3 drives answered after the check sequence\n"
     );
     assert_eq!(
         json("recover --rig sim:250,1 --format json")["rings"],

@@ -204,7 +204,7 @@ fn fuzzing_writes_a_page() {
     let parsed = parse(&text);
     sound(&parsed);
     for words in [
-        "1 findings",
+        "1 finding",
         "drive 1 deviates writes-ignored",
         "Transitions reached",
         "Expected and received around byte",

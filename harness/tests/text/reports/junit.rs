@@ -20,7 +20,9 @@ fn read(path: &Path) -> String {
 fn case(name: &str, verdict: Verdict, message: &str) -> Case {
     Case {
         name: name.to_owned(),
+        class: "nd21.chapter-9".to_owned(),
         verdict,
+        details: message.to_owned(),
         message: message.to_owned(),
         took: Duration::from_nanos(1_234_567_890),
         attachments: Vec::new(),
@@ -142,6 +144,30 @@ fn a_run_and_its_attachments() {
     ] {
         assert!(xml.contains(words), "{words}: {xml}");
     }
+    // A failure says where, what was expected and what was received, and shows the manual's table.
+    let page = roxmltree::Document::parse(&xml).expect("XML");
+    let failure = page.descendants().find(|node| node.has_tag_name("failure"));
+    let failure = failure.expect("a failure");
+    let message = "the master received 80 where 42 is expected";
+    let told = failure.attribute("message").unwrap_or_default();
+    assert!(told.starts_with(message), "{told}");
+    let text = failure.text().unwrap_or_default();
+    for words in [
+        "scenarios/fails.scn:5:1: the master received 80 where 42 is expected\n    < 80 80 42\n",
+        "\nexpected  80 80 42\nreceived  80 80 80\n",
+        "  byte  Master   1     0\n",
+        "see nd21 9.1",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let classes: std::collections::BTreeSet<_> = page
+        .descendants()
+        .filter_map(|node| node.attribute("classname"))
+        .collect();
+    assert_eq!(
+        classes.into_iter().collect::<Vec<_>>(),
+        ["nd21.chapter-10", "nd21.chapter-9"]
+    );
     let mut named = 0;
     for rest in xml.split("[[ATTACHMENT|").skip(1) {
         let (path, _) = rest.split_once("]]").expect("an end");
@@ -173,7 +199,9 @@ fn a_run_without_evidence() {
         let xml = read(&file);
         right(&xml);
         assert!(
-            xml.contains("tests=\"4\"") && xml.contains(verdicts),
+            xml.contains("tests=\"4\"")
+                && xml.contains(verdicts)
+                && xml.contains("fails.scn:5:1: "),
             "{more:?}: {xml}"
         );
     }

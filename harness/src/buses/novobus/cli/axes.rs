@@ -89,3 +89,9 @@ pub(crate) fn single(wanted: &Axes, bus: &[Axis]) -> Result<Axis, Failure> {
         _ => Err(Failure::refused("one drive expected here, not several")),
     }
 }
+/// Drives in a sentence: `drive 0`, `drives 0, 2:1`.
+pub(crate) fn named(axes: &[Axis]) -> String {
+    let names: Vec<_> = axes.iter().map(Axis::to_string).collect();
+    let s = if names.len() == 1 { "" } else { "s" };
+    format!("drive{s} {}", names.join(", "))
+}

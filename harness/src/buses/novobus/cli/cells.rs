@@ -6,6 +6,13 @@ use crate::cli::output::Output;
 use harness_proto::nd21::cells::{Access, Cell, RAM};
 use harness_proto::nd21::eeprom::EEPROM;
 
+/// The printed names of the cells that can be read, first those of the RAM.
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    let all = RAM.iter().chain(EEPROM);
+    let used = all.filter(|cell| cell.access != Access::Reserved);
+    used.map(|cell| cell.printed)
+}
+
 /// Shows the cells.
 pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
     let filter = arguments
@@ -26,7 +33,7 @@ pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io:
         output.complain("no cell has this text in it; `drivebench cells` shows all of them");
         return Ok(Exit::NothingSelected);
     }
-    output.result(&wanted)?;
+    output.result(&output.fitted(&wanted))?;
     Ok(Exit::Passed)
 }
 

@@ -21,7 +21,18 @@ type Call = fn(&Bus<'_>, Axis) -> Result<(), Error>;
 
 /// Lets drives run.
 pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
-    with_leave(arguments, output, "go", |bus, axis| bus.go(axis), CYCLES)
+    let as_what = leave_to(arguments, "go");
+    rig::on(&arguments.select.rig, as_what, output, |bench, output| {
+        let drives = axes::select(&arguments.select.drives, &bench.bus.axes())?;
+        warn(arguments, &drives, "go", output)?;
+        let exit = each(bench, &drives, output, |bus, axis| bus.go(axis), CYCLES)?;
+        if bench.has_ports() && !arguments.hold.hold {
+            output.say(
+                "this command ends in the safe state; add --hold to leave the drives in go: their motors may then turn without supervision\n",
+            );
+        }
+        Ok(exit)
+    })
 }
 
 /// Resets drives.
@@ -92,8 +103,17 @@ pub(crate) fn delete_error(
         moves: arguments.leave,
         ..Use::look("delete-error")
     };
-    quietly(&arguments.select, output, what, |bus, axis| {
-        bus.delete_error(axis)
+    let select = &arguments.select;
+    rig::on(&select.rig, what, output, |bench, output| {
+        let drives = axes::select(&select.drives, &bench.bus.axes())?;
+        if bench.has_ports() && !arguments.leave {
+            return Err(Failure::refused(format!(
+                "delete-error: a released drive runs again when its error is confirmed, so the motors of {} may turn; nothing was confirmed, add --move to allow it",
+                axes::named(&drives)
+            )));
+        }
+        let confirm: Call = |bus, axis| bus.delete_error(axis);
+        each(bench, &drives, output, confirm, CYCLES)
     })
 }
 
@@ -133,13 +153,11 @@ fn warn(
     what: &str,
     output: &mut Output,
 ) -> Result<(), Failure> {
-    let names: Vec<_> = drives.iter().map(Axis::to_string).collect();
-    let (s, their) = if drives.len() == 1 {
-        ("", "its motor")
-    } else {
-        ("s", "their motors")
+    let their = match drives.len() {
+        1 => "its motor",
+        _ => "their motors",
     };
-    let warning = format!("{what}: drive{s} {}: {their} may turn", names.join(", "));
+    let warning = format!("{what}: {}: {their} may turn", axes::named(drives));
     if !arguments.leave {
         return Err(Failure::refused(format!(
             "{warning}; nothing was done, add --move to allow it"

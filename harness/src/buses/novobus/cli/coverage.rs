@@ -12,10 +12,10 @@ use std::path::PathBuf;
 /// For `fuzz coverage`.
 #[derive(Clone, Debug, Args)]
 pub struct CoverageArguments {
-    /// In which form.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     pub format: Format,
-    /// Play the inputs of this folder, which has a folder for each target, in place of the built-in ones.
+    /// Play the inputs of this folder, which has one folder per target, instead of the built-in ones.
     #[arg(long, value_name = "FOLDER")]
     pub corpus: Option<PathBuf>,
 }

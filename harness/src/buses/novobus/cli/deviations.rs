@@ -9,6 +9,11 @@ use harness_sim::novobus::deviation::{
 use serde::Serialize;
 use std::fmt::Write as _;
 
+/// The names of the deviations of drives.
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    all().map(|deviation| deviation.name)
+}
+
 /// One deviation, for tools.
 #[derive(Serialize)]
 struct Row {

@@ -2,6 +2,7 @@
 
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::counted::counted;
 use crate::fuzz::coverage::{CoverageError, read_folder};
 use crate::fuzz::distil::{Pieces, distil as distilled};
 use crate::fuzz::input::input;
@@ -15,13 +16,13 @@ use std::path::{Path, PathBuf};
 /// For `fuzz distil`.
 #[derive(Clone, Debug, Args)]
 pub struct DistilArguments {
-    /// The target.
+    /// The fuzz target.
     #[arg(value_parser = noting().map(|target| target.name).collect::<Vec<_>>())]
     pub target: String,
-    /// The folder that the fuzzer has filled.
+    /// The folder that the fuzzer filled.
     #[arg(long, value_name = "FOLDER")]
     pub from: PathBuf,
-    /// The folder with what is kept; what reaches more is put beside it.
+    /// The folder with the kept inputs, to which new ones are added.
     #[arg(long, value_name = "FOLDER")]
     pub to: PathBuf,
 }
@@ -79,12 +80,13 @@ fn chosen(arguments: &DistilArguments) -> Result<String, CoverageError> {
     }
     let more: usize = new.iter().map(|one| one.new.len()).sum();
     Ok(format!(
-        "{}{} inputs: {more} features more, {} before\n",
+        "{}{}: {} more, {} before\n",
         names
             .iter()
             .map(|name| format!("{name}\n"))
             .collect::<String>(),
-        names.len(),
+        counted(names.len(), "input"),
+        counted(more, "feature"),
         before.len(),
     ))
 }

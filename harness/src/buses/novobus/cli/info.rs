@@ -10,6 +10,7 @@ use crate::buses::novobus::driver::{Axis, Identity, State};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::run::progress_bar;
+use crate::counted::counted;
 use crate::scenario::argument::{Location, cells};
 use crate::scenario::quantity::shown;
 use harness_proto::nd21::units::{Date, Scale, Value};
@@ -57,13 +58,12 @@ fn show(arguments: &InfoArguments, bench: &Bench, output: &mut Output) -> Result
     match arguments.format {
         Form::Text => {
             let total = bench.bus.axes().len();
-            let s = |n: u64| if n == 1 { "" } else { "s" };
-            let counted = format!(
-                "{total} drive{} on the bus, {corrected} error{} corrected\n",
-                s(total as u64),
-                s(corrected)
+            let counts = format!(
+                "{} on the bus, {} corrected\n",
+                counted(total, "drive"),
+                counted(corrected, "error")
             );
-            output.result(&(table(&drives) + &counted))?;
+            output.result(&(output.fitted(&table(&drives)) + &counts))?;
         }
         Form::Json => {
             let drives: Vec<_> = drives.iter().map(object).collect();

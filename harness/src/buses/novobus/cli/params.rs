@@ -9,6 +9,7 @@ use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{self, Found, find, hex};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::counted::counted;
 use crate::scenario::argument::{Location, Memory};
 use crate::scenario::source::Source;
 use harness_proto::nd21::cells::Access;
@@ -190,7 +191,6 @@ fn load(
         return Ok(Exit::Passed);
     }
     let count = changes.len();
-    let s = if count == 1 { "" } else { "s" };
     if !arguments.yes {
         let store = if arguments.store {
             ", and the EEPROM"
@@ -198,7 +198,8 @@ fn load(
             ""
         };
         return Err(Failure::refused(format!(
-            "drive {axis}: {count} parameter{s} would change{store}; nothing was written, add --yes to write"
+            "drive {axis}: {} would change{store}; nothing was written, add --yes to write",
+            counted(count, "parameter")
         )));
     }
     let mode = bench.bus.state(axis)?.mode();
@@ -213,7 +214,10 @@ fn load(
     verify(bench, axis, &changes, "the RAM", |entry| {
         Some(entry.location.clone())
     })?;
-    let mut words = format!("drive {axis}: {count} parameter{s} written and read back");
+    let mut words = format!(
+        "drive {axis}: {} written and read back",
+        counted(count, "parameter")
+    );
     if arguments.store {
         store(comparison)?;
         words.push_str(", all stored in the EEPROM");

@@ -140,9 +140,17 @@ impl Run {
         let state = bench.bus.state(axis)?;
         let error = state.error_in_words().map(|error| format!(": {error}"));
         if state.mode() != "go" {
+            // Without --hold a command ends in the safe state, so `go` alone would not help.
+            let remedy = match bench.has_ports() {
+                true => format!(
+                    "`drivebench go {axis} --move --hold` with the same --rig leaves it in go: its motor may then turn \
+                     without supervision until `drivebench block {axis}`"
+                ),
+                false => "see `drivebench go` and `delete-error`".to_owned(),
+            };
             return Err(Failure::drive(format!(
-                "drive {axis} is in {}{}; it must be in go: see `drivebench go`, `delete-error` and the inputs \
-                 GPIN3 and GPIN5 (ND21 5.3.3)",
+                "drive {axis} is in {}{}; positioning needs a drive in go, with the inputs GPIN3 and GPIN5 high \
+                 (ND21 5.3.3); {remedy}",
                 state.mode(),
                 error.unwrap_or_default()
             )));

@@ -4,6 +4,7 @@ use crate::buses::novobus::explore::masters;
 use crate::cli::exit::Exit;
 use crate::cli::fuzz::rig::{simulated, tell};
 use crate::cli::output::Output;
+use crate::counted::counted;
 use crate::explore::{
     About, Bounds, Campaign, ExploreError, Finding, OnSim, Planted, Pool, Progress, Setup, Swarm,
     Watcher,
@@ -28,13 +29,13 @@ const DRIVES: u8 = 3;
 pub struct PowerArguments {
     /// Only deviations with this text in their name.
     pub filter: Option<String>,
-    /// How many seeds each is looked for with.
+    /// Number of seeds per deviation.
     #[arg(long, value_name = "NUMBER", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub seeds: u64,
-    /// Let witnesses judge whole ND21s, as `fuzz run --whole` does: nothing they have knows of the deviation. Drives only.
+    /// Judge complete ND21s with witnesses, as `fuzz run --whole` does. Only for deviations of drives.
     #[arg(long)]
     pub whole: bool,
-    /// After how many cases it counts as not found.
+    /// Number of cases after which a deviation counts as not found.
     #[arg(long, value_name = "NUMBER", default_value_t = 10_000)]
     pub cases: u64,
 }
@@ -117,11 +118,11 @@ impl<'a> Table<'a> {
         self.within.sort_unstable();
         let middle = self.within.get(self.within.len() / 2).copied().unwrap_or(0);
         output.result(&format!(
-            "{} of {} found within {} cases (median of {} seeds); the median of these is {middle}\n",
+            "{} of {} found within {} (median of {}); the median of these is {middle}\n",
             self.within.len(),
             self.all,
-            self.arguments.cases,
-            self.arguments.seeds
+            counted(self.arguments.cases, "case"),
+            counted(self.arguments.seeds, "seed")
         ))
     }
 }

@@ -34,7 +34,7 @@ fn show(
         }
     }
     match arguments.format {
-        Form::Text => output.result(&table(&found))?,
+        Form::Text => output.result(&output.fitted(&table(&found)))?,
         Form::Json => {
             let cells: Vec<_> = found.iter().map(object).collect();
             output.result(&format!("{}\n", json!({"schema": 1, "cells": cells})))?;

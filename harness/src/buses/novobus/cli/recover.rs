@@ -7,6 +7,7 @@ use super::rig::{self, RigName, Use};
 use crate::buses::novobus::driver::{self, Axis, Recovery};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::counted::counted;
 use crate::link::Line;
 use serde_json::json;
 
@@ -88,9 +89,10 @@ fn text(ring: usize, recovery: &Recovery) -> String {
     };
     let behind = match (recovery.drives, recovery.after) {
         (Some(size), _) => {
-            let drives = size.drives();
-            let s = if drives == 1 { "" } else { "s" };
-            format!("behind the check sequence {drives} drive{s} answer")
+            format!(
+                "{} answered after the check sequence",
+                counted(size.drives(), "drive")
+            )
         }
         (None, Some(drive)) => format!("behind the check sequence still: {}", fault(drive)),
         (None, None) => "nothing comes back behind the check sequence: the ring is broken, or the \

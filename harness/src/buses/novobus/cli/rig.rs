@@ -2,12 +2,14 @@
 //! file or name, is taken and given back as by `run --rig`.
 
 use super::args::RigArguments;
+use super::axes;
 use super::failure::Failure;
 use crate::buses::novobus::driver::{Axis, Bus, Options};
 use crate::buses::novobus::drives;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
+use crate::counted::counted;
 use crate::link::{Line, SimulatedLink, Trouble};
 use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
@@ -97,6 +99,12 @@ impl Bench {
         }
     }
 
+    /// Whether the drives are behind ports: a rig in use that is not simulated.
+    pub(crate) fn has_ports(&self) -> bool {
+        self.with_rig(|session| !session.rig().is_simulated())
+            .unwrap_or(false)
+    }
+
     /// Runs `act` on the rig in use, if there is one. The bus carries nothing meanwhile.
     pub(crate) fn with_rig<T>(&self, act: impl FnOnce(&mut Session) -> T) -> Option<T> {
         self.rig.as_ref()?.with(act)
@@ -115,18 +123,18 @@ impl Bench {
                 self.bus.write_word(axis, ram::NSOLL, 0)?;
                 self.bus.delete_error(axis)?;
             }
-            confirmed.push(axis.to_string());
+            confirmed.push(axis);
         }
         if confirmed.is_empty() {
             return Ok(());
         }
         let end = match as_what.moves {
-            true => "; it was confirmed, and their nominal speed is 0 now",
+            true => "; the error was confirmed, and the nominal speed is 0 now",
             false => "",
         };
         output.say(&format!(
-            "the check sequence has put drive {} in error 0504 (ND21 9.8){end}\n",
-            confirmed.join(", ")
+            "the check sequence has put {} in error 0504 (ND21 9.8){end}\n",
+            axes::named(&confirmed)
         ));
         // `Status` follows in the drive's next cycles.
         self.bus.run(CYCLES);
@@ -265,8 +273,9 @@ pub(crate) fn link(
         let stated = parse_setup(&source, sizes)?.header.rings.len();
         if sizes.len() != stated {
             return Err(Failure::refused(format!(
-                "{} is for {stated} ring(s), the bench has {}",
+                "{} is for {}, the bench has {}",
                 source.name,
+                counted(stated, "ring"),
                 sizes.len()
             )));
         }

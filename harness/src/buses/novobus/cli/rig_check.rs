@@ -6,6 +6,7 @@ use crate::cli::output::Output;
 use crate::cli::rig::ListFormat;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use crate::cli::run::progress_bar;
+use crate::counted::counted;
 use crate::link::Trouble;
 use crate::rig::figures::{Figures, RingFigures, measure};
 use crate::rig::{Options, Rig, Session};
@@ -19,12 +20,12 @@ use std::time::Duration;
 /// For `rig check`.
 #[derive(Debug, Args)]
 pub struct CheckRigArguments {
-    /// A name, a file, or sim:N.
+    /// The rig: a name, a file, or sim:N.
     pub rig: String,
-    /// How long to wait for a rig that another program holds, such as 30s.
+    /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, value_name = "TIME", value_parser = crate::cli::args::duration)]
     pub wait: Option<Duration>,
-    /// In which form.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = ListFormat::Text)]
     pub format: ListFormat,
 }
@@ -104,15 +105,15 @@ fn text(rig: &Rig, figures: &Figures) -> String {
     let mut text = String::new();
     for ((number, ring), found) in rig.rings().zip(&figures.rings) {
         let drives = found.size.drives();
-        let s = if drives == 1 { "" } else { "s" };
         let port = ring.endpoint.port.as_ref();
         let port = port.map_or(String::new(), |port| format!(" {port}"));
         // Writing to a String cannot fail.
         let _infallible = writeln!(
             text,
-            "ring {number} ({}{port}, {} baud 8O1): {drives} drive{s}",
+            "ring {number} ({}{port}, {} baud 8O1): {}",
             ring.endpoint.transport.name(),
-            ring.endpoint.line.baud()
+            ring.endpoint.line.baud(),
+            counted(drives, "drive")
         );
         let _infallible = writeln!(text, "  {}", line_of(found));
         let _infallible = writeln!(

@@ -16,60 +16,60 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 pub(crate) const SIM_HELP: &str = "\
-On standard output stands a line for each ring once all are ready, `ring 1: 3 drives at 127.0.0.1:40123`, then with
---control ADDRESS a line `control at 127.0.0.1:40124`; with --control - the answers follow. What clients do is told on
-standard error.
+Once all rings are ready, standard output has one line per ring, such as `ring 1: 3 drives at 127.0.0.1:40123`, and with
+--control ADDRESS a line `control at 127.0.0.1:40124`; with --control - the answers follow. Standard error reports what
+clients do.
 
-Lines of control are lines of the scenario language that need no byte of the master's, done at once:
-  ! 1->0: flip 0                  a fault; `byte n` and times are counted from the start, and a byte that has passed
-                                  means the next one
-  drive 0 input GPIN5 low         something happens to drives from outside the bus
-  ? drive 0 nist = 0rpm +-5rpm    a check that looks at drives or at the error mode
-  state 0                         mode, outputs, error of the bus; `state 2:0 nist FF08:2`: these cells
-Each is answered by a line: `ok` (and the state), `no: ` and what was found, or `error: ` and why.
+A control line is a line of the scenario language that sends no byte of the master. It takes effect at once:
+  ! 1->0: flip 0                  a fault; `byte n` and times count from the start; if that byte has passed, the
+                                  next byte is meant
+  drive 0 input GPIN5 low         an event outside the bus
+  ? drive 0 nist = 0rpm +-5rpm    a check of drives or of the error mode
+  state 0                         mode, outputs, bus error; `state 2:0 nist FF08:2`: these cells
+The answer to each is one line: `ok` (and the state), `no: ` and what was found, or `error: ` and the reason.
 
 --tap and --cut take a link, `=`, and a place: a path (with a `/` in it) for a pseudo terminal, HOST:PORT for a socket.
-Links of the second ring are written with `2:` in front, `2:2->1`. Each has its line too, `tap 2->1 at /tmp/tap`.
+Links of the second ring begin with `2:`, as in `2:2->1`. Standard output has one line per place: `tap 2->1 at /tmp/tap`.
 
-A pseudo terminal carries no parity and no rate, and cannot turn a second program away. Without --marks in-band every
-byte of the client's is a good one, and of a damaged one that comes back only its eight bits are left.
+A pseudo terminal carries no parity and no bit rate, and cannot refuse a second program. Without --marks in-band every
+byte of the client counts as good, and a damaged byte arrives at the client as its eight bits.
 
-Ends at SIGINT, SIGTERM, SIGHUP or SIGQUIT (exit code 130), after --for, or with --once when the clients have gone.";
+Ends on SIGINT, SIGTERM, SIGHUP or SIGQUIT (exit code 130), after --for, or with --once when the clients have gone.";
 
 /// For `sim`.
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("place").required(true)))]
 pub struct SimArguments {
-    /// Serve a ring on a socket: HOST:PORT, port 0 for a free one. One client at a time; a second one is turned
-    /// away. Twice for two rings, in their order.
+    /// Serve a ring on a socket: HOST:PORT, port 0 for a free one. Only one client at a time. Give it twice for two rings, in their
+    /// order.
     #[arg(long, value_name = "ADDRESS", group = "place")]
     pub tcp: Vec<String>,
-    /// Serve a ring on a pseudo terminal, with a link to it at this path while it is served. Twice for two rings.
+    /// Serve a ring on a pseudo terminal; this path is a symbolic link to it. Give it twice for two rings.
     #[arg(long, value_name = "PATH", group = "place", conflicts_with = "tcp")]
     pub pty: Vec<PathBuf>,
-    /// Let a client listen on a link: `2->1=ADDRESS` or `2->1=PATH`. What it sends is dropped.
+    /// Let a client listen on a link: `2->1=ADDRESS` or `2->1=PATH`. Bytes from the client are dropped.
     #[arg(long, value_name = "LINK=PLACE")]
     pub tap: Vec<InnerPlace>,
-    /// Cut a link open: the client there hears the drive in front and feeds the drive behind, which hears nothing
-    /// else. With two places, `2->1=PLACE,PLACE`, the first hears and the second feeds.
+    /// Cut a link open: the client receives from the drive in front and sends to the drive behind. With two places,
+    /// `2->1=PLACE,PLACE`, the first receives and the second sends.
     #[arg(long, value_name = "LINK=PLACE")]
     pub cut: Vec<InnerPlace>,
-    /// How fast time passes.
+    /// Speed of the simulation.
     #[arg(long, value_enum, default_value_t = Speed::Line)]
     pub pace: Speed,
     /// How the stream carries line errors.
     #[arg(long, value_enum, default_value_t = MarksForm::None)]
     pub marks: MarksForm,
-    /// Take lines of control from standard input (-) or from a socket that listens (HOST:PORT).
+    /// Take control lines from standard input (-) or from a listening socket (HOST:PORT).
     #[arg(long, value_name = "-|ADDRESS")]
     pub control: Option<String>,
-    /// Let sockets listen at addresses that other machines reach.
+    /// Allow sockets that other machines can reach.
     #[arg(long)]
     pub allow_remote: bool,
-    /// End when the client has gone (with two rings, when none is left).
+    /// End when the last client has gone.
     #[arg(long)]
     pub once: bool,
-    /// How long it goes on.
+    /// Time after which it ends.
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     pub length: Option<Span>,
     /// Which bench.
@@ -82,16 +82,16 @@ pub struct SimArguments {
 pub enum Speed {
     /// As on the line: a byte takes 286 us at 38400 bit/s.
     Line,
-    /// As fast as possible while bytes of the client's are under way.
+    /// As fast as possible while bytes of the client are on the ring.
     Free,
 }
 
 /// How a stream carries line errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MarksForm {
-    /// Not at all.
+    /// Line errors are not carried.
     None,
-    /// As PARMRK does: FF 00 x is x with an error, FF FF a good FF.
+    /// As PARMRK does: FF 00 x is the byte x with an error, FF FF is a good FF.
     InBand,
 }
 

@@ -9,6 +9,7 @@ use super::rig::{self, Bench, RigName, Use};
 use crate::buses::novobus::driver::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
+use crate::counted::counted;
 use crate::link::Trouble;
 use crate::signals::interrupt_flag;
 use crate::top::screen::{Input, leave};
@@ -59,10 +60,10 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
     if arguments.every == Span::ZERO {
         return Err(Failure::refused("--every must be longer than nothing"));
     }
-    let terminal = output.terminal && std::io::stdin().is_terminal();
+    let terminal = output.full_screen && std::io::stdin().is_terminal();
     if !arguments.once && !terminal {
         return Err(Failure::refused(
-            "`top` needs a terminal; for a pipe or a file there are `top --once`, `watch` and `info --format json`",
+            "`top` needs a terminal that can move its cursor (TERM is not `dumb`); for a pipe or a file use `top --once`, `watch` or `info --format json`",
         ));
     }
     let name = match &arguments.rig.rig {
@@ -92,7 +93,6 @@ fn heading(name: &str, bench: &Bench) -> Heading {
             None => sizes.push(1),
         }
     }
-    let s = |n: usize| if n == 1 { "" } else { "s" };
     let places = bench.with_rig(|session| {
         let rings = session.rig().rings();
         let place = |ring: &crate::rig::file::Ring| match &ring.endpoint.port {
@@ -118,7 +118,7 @@ fn heading(name: &str, bench: &Bench) -> Heading {
     Heading {
         rig,
         rings: rings
-            .map(|(size, place)| format!("{size} drive{}, {place}", s(*size)))
+            .map(|(size, place)| format!("{}, {place}", counted(*size, "drive")))
             .collect(),
     }
 }

@@ -40,7 +40,7 @@ fn show(
         .into_iter()
         .map(|axis| Ok((axis, bench.units(axis)?)))
         .collect::<Result<Vec<_>, Failure>>()?;
-    let again = arguments.format == WatchForm::Text && output.terminal;
+    let again = arguments.format == WatchForm::Text && output.full_screen;
     if arguments.format == WatchForm::Csv {
         output.result(&heading(&drives, cells))?;
     }

@@ -1,5 +1,6 @@
 //! The page of a run of fuzzing: what was found, what was reached, how it went on.
 
+use crate::counted::counted;
 use crate::explore::{About, Progress};
 use crate::report::html::Curve;
 use crate::report::html::Html;
@@ -64,9 +65,9 @@ fn facts(html: &mut Html, run: &Explored<'_>) {
         html.line(
             "li",
             &[("class", &class)],
-            format_args!("{} findings", run.findings.len()),
+            counted(run.findings.len(), "finding"),
         );
-        html.line("li", &[], format_args!("{} cases", last.cases));
+        html.line("li", &[], counted(last.cases, "case"));
     });
     html.element("dl", &[], |html| {
         let mut fact = |name: &str, value: &dyn std::fmt::Display| {

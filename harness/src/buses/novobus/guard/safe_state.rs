@@ -1,6 +1,7 @@
 //! The safe state of a bench: every drive stopped, standing and blocked, and read back.
 
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Order, recover};
+use crate::counted::counted;
 use crate::link::{Lead, Line, Octets, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nd21::bits::{flags, status};
@@ -71,9 +72,11 @@ impl fmt::Display for SafeState {
         match self {
             Self::Confirmed(rings) => {
                 let drives: u32 = rings.iter().map(|size| u32::from(size.drives())).sum();
+                let are = if drives == 1 { "is" } else { "are" };
                 write!(
                     f,
-                    "safe state: {drives} drives are stopped, standing and blocked"
+                    "safe state: {} {are} stopped, standing and blocked",
+                    counted(drives, "drive")
                 )
             }
             Self::NotConfirmed(drives) => {

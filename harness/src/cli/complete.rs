@@ -1,0 +1,273 @@
+//! `drivebench completions`: scripts for shells. A script asks the program itself (`drivebench complete`) for the words that can stand
+//! at the cursor, so new rigs and commands show up without a new script.
+
+use super::args::Shell;
+use super::exit::Exit;
+use super::help::command;
+use super::output::Output;
+use crate::buses::commands::{cells, deviations};
+use crate::campaign::find as campaigns;
+use crate::library;
+use crate::rig::find;
+use clap::{Arg, Command};
+use std::fmt::Write as _;
+
+/// Prints the script for a shell.
+pub(crate) fn completions(shell: Shell, output: &mut Output) -> std::io::Result<Exit> {
+    output.result(match shell {
+        Shell::Bash => include_str!("completions/drivebench.bash"),
+        Shell::Zsh => include_str!("completions/drivebench.zsh"),
+        Shell::Fish => include_str!("completions/drivebench.fish"),
+    })?;
+    Ok(Exit::Passed)
+}
+
+/// Prints what can stand in place of the last of these words: in the first line `files` if file names can, else `words`; then a word a
+/// line.
+pub(crate) fn complete(words: &[String], output: &mut Output) -> std::io::Result<Exit> {
+    let fitting = fitting(&command(), words);
+    let mut text = match fitting.files {
+        true => "files\n".to_owned(),
+        false => "words\n".to_owned(),
+    };
+    for word in fitting.words {
+        // Writing to a String cannot fail.
+        let _infallible = writeln!(text, "{word}");
+    }
+    output.result(&text)?;
+    Ok(Exit::Passed)
+}
+
+/// What can stand at the cursor.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Fitting {
+    words: Vec<String>,
+    /// File names can.
+    files: bool,
+}
+
+/// What fits in place of the last word.
+fn fitting(command: &Command, words: &[String]) -> Fitting {
+    let Some((current, before)) = words.split_last() else {
+        return Fitting::default();
+    };
+    let mut level = command;
+    let mut positionals = 0;
+    let mut waiting = None;
+    for word in before {
+        if waiting.take().is_some() {
+            continue;
+        }
+        if let Some(option) = word.strip_prefix('-') {
+            let found = level.get_arguments().find(|own| is_named(own, option));
+            waiting = found.filter(|own| own.get_action().takes_values());
+        } else if let Some(inner) = level.find_subcommand(word) {
+            (level, positionals) = (inner, 0);
+        } else {
+            positionals += 1;
+        }
+    }
+    let mut fitting = if let Some(option) = waiting {
+        values(option, current)
+    } else if current.starts_with('-') {
+        let options = level.get_arguments().filter(|own| !own.is_hide_set());
+        Fitting {
+            words: options
+                .filter_map(|own| own.get_long())
+                .map(|own| format!("--{own}"))
+                .collect(),
+            files: false,
+        }
+    } else if level.has_subcommands() {
+        let inner = level.get_subcommands().filter(|own| !own.is_hide_set());
+        Fitting {
+            words: inner.map(|own| own.get_name().to_owned()).collect(),
+            files: false,
+        }
+    } else {
+        // The last positional may repeat.
+        let positional = level.get_positionals().take(positionals + 1).last();
+        positional.map_or_else(Fitting::default, |own| values(own, current))
+    };
+    fitting
+        .words
+        .retain(|word| word.starts_with(current.as_str()));
+    fitting
+}
+
+/// Whether an argument is the option `-x` or `--name`, given what stands behind the first hyphen.
+fn is_named(argument: &Arg, option: &str) -> bool {
+    match option.strip_prefix('-') {
+        Some(long) => {
+            let names = argument.get_long_and_visible_aliases();
+            names.is_some_and(|names| names.contains(&long))
+        }
+        None => {
+            let mut letters = option.chars();
+            argument.get_short().is_some() && letters.next() == argument.get_short()
+        }
+    }
+}
+
+/// What an argument takes: its fixed values, or by the name of its value the names that the program knows.
+fn values(argument: &Arg, current: &str) -> Fitting {
+    let fixed = argument.get_possible_values();
+    if !fixed.is_empty() {
+        return Fitting {
+            words: fixed.iter().map(|own| own.get_name().to_owned()).collect(),
+            files: false,
+        };
+    }
+    let name = argument.get_value_names().and_then(<[_]>::first);
+    let name = name.map_or("", |name| name.as_str());
+    Fitting {
+        words: match name {
+            "SCENARIO" => library::names(),
+            "CAMPAIGN" => campaigns::names().into_iter().map(str::to_owned).collect(),
+            "RIG" => {
+                let rigs = find::all(&find::folder()).into_iter();
+                let rigs = rigs.map(|(name, _)| name);
+                rigs.chain(["sim:1", "sim:3", "sim:2,3"].map(str::to_owned))
+                    .collect()
+            }
+            "DRIVE" => vec!["all".to_owned()],
+            "CELL" | "SIGNAL" => cells::names().map(str::to_owned).collect(),
+            "CELL=VALUE" => cells::names().map(|name| format!("{name}=")).collect(),
+            "DRIVE=NAME" => {
+                let drive = current.split_once('=').map_or("0", |(drive, _)| drive);
+                deviations::names()
+                    .map(|name| format!("{drive}={name}"))
+                    .collect()
+            }
+            _ => Vec::new(),
+        },
+        files: matches!(
+            name,
+            "SCENARIO" | "CAMPAIGN" | "RIG" | "FILE" | "FOLDER" | "FINDING" | "KEY" | "A" | "B"
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(line: &str) -> Fitting {
+        let words: Vec<_> = line.split(' ').map(str::to_owned).collect();
+        fitting(&command(), &words)
+    }
+
+    #[track_caller]
+    fn offers(line: &str, word: &str) {
+        let fitting = of(line);
+        let has = fitting.words.iter().any(|own| own == word);
+        assert!(has, "{line}: {fitting:?}");
+    }
+
+    #[test]
+    fn commands_options_and_values() {
+        assert_eq!(of("pos").words, ["position"]);
+        assert_eq!(of("fuzz r").words, ["run", "replay"]);
+        assert_eq!(of("run --juni").words, ["--junit"]);
+        assert_eq!(of("run --color a").words, ["auto", "always"]);
+        assert_eq!(of("trace x.scn --format p").words, ["pcapng"]);
+        assert_eq!(of("completions ").words, ["bash", "zsh", "fish"]);
+        assert!(of("run --filter 9").words.is_empty());
+        assert!(!of("run --filter 9").files);
+        // A value is not a command, and a global option may stand in front of one.
+        assert_eq!(of("--color never ver").words, ["verify"]);
+        assert_eq!(of("run --filter list --evid").words, ["--evidence"]);
+        assert_eq!(
+            of(""),
+            Fitting {
+                words: command()
+                    .get_subcommands()
+                    .filter(|own| !own.is_hide_set())
+                    .map(|own| own.get_name().to_owned())
+                    .collect(),
+                files: false,
+            }
+        );
+    }
+
+    #[test]
+    fn names_of_scenarios_rigs_cells_and_deviations() {
+        for line in [
+            "run 9.7-pa",
+            "run my.scn 9.7-pa",
+            "trace --rows 1..3 9.7-pa",
+            "check 9.7-pa",
+        ] {
+            offers(line, "9.7-parity-error");
+            assert!(of(line).files, "{line}");
+        }
+        offers("campaign 9.7-s", "9.7-single-bits");
+        for line in [
+            "run --rig sim",
+            "info --rig sim",
+            "rig show sim",
+            "qualify --rig sim",
+        ] {
+            offers(line, "sim-two-rings");
+            offers(line, "sim:3");
+        }
+        offers("read a", "all");
+        for line in [
+            "read 0 nis",
+            "read 0 nsoll nis",
+            "scope 0 nis",
+            "watch all nis",
+        ] {
+            offers(line, "nist");
+        }
+        offers("read 0 EE_p", "EE_pole");
+        offers("write 0 nsol", "nsoll=");
+        offers("fuzz run --deviates 2=wri", "2=writes-ignored");
+    }
+
+    /// Every kind of name that an argument takes is offered, or is known to be free text.
+    #[test]
+    fn every_value_is_of_a_known_kind() {
+        const FREE: [&str; 21] = [
+            "TEXT",
+            "TIME",
+            "NUMBER",
+            "DRIVES",
+            "RATE",
+            "ID",
+            "NAME",
+            "TABLE",
+            "CASE",
+            "FIRST..LAST",
+            "VALUE",
+            "POSITION",
+            "PATH",
+            "SPEED",
+            "ADDRESS",
+            "-|ADDRESS",
+            "LINK=PLACE",
+            "K/N",
+            "FILTER",
+            "WORDS",
+            "COMMAND",
+        ];
+        let mut open = vec![command()];
+        while let Some(level) = open.pop() {
+            open.extend(level.get_subcommands().cloned());
+            for own in level
+                .get_arguments()
+                .filter(|own| own.get_action().takes_values())
+            {
+                let known = values(own, "") != Fitting::default();
+                let name = own.get_value_names().and_then(<[_]>::first);
+                let name = name.map_or("", |name| name.as_str());
+                assert!(
+                    known || FREE.contains(&name),
+                    "{} {}: {name}",
+                    level.get_name(),
+                    own.get_id()
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! What helps a user who starts: `--help`, suggestions, completions, counts, and terminals without colours.
+
+use std::process::{Command, Output, Stdio};
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    command
+        .args(arguments)
+        .current_dir(std::env::temp_dir())
+        .stdin(Stdio::null());
+    command
+}
+
+fn drivebench(arguments: &[&str]) -> Output {
+    command(arguments).output().expect("the program starts")
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn commands_stand_in_groups() {
+    for arguments in [&["--help"][..], &["-h"], &["help"]] {
+        let output = drivebench(arguments);
+        assert_eq!(output.status.code(), Some(0));
+        let page = stdout(&output);
+        let places: Vec<_> = [
+            "\nPlay:\n  run ",
+            "\nLook:\n  list ",
+            "\nDrives:\n  info ",
+            "\nBenches:\n  rig ",
+            "\nFind:\n  fuzz ",
+            "\nExchange:\n  import ",
+            "\nMore:\n  completions ",
+            "\nOptions:\n",
+            "\nWhere to go on:\n",
+        ]
+        .iter()
+        .map(|words| {
+            page.find(words)
+                .unwrap_or_else(|| panic!("{words}: {page}"))
+        })
+        .collect();
+        assert!(places.is_sorted(), "{page}");
+        assert!(!page.contains("\n  complete "), "{page}");
+    }
+}
+
+#[test]
+fn there_is_a_help_command() {
+    for arguments in [&["help", "run"][..], &["help", "fuzz", "replay"]] {
+        let output = drivebench(arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let usage = format!("Usage: drivebench {}", arguments[1..].join(" "));
+        assert!(stdout(&output).contains(&usage), "{}", stdout(&output));
+    }
+    assert_eq!(drivebench(&["help", "nonesuch"]).status.code(), Some(2));
+}
+
+#[test]
+fn a_misspelt_word_gets_a_suggestion() {
+    for (arguments, words) in [
+        (&["rnu"][..], "a similar subcommand exists: 'run'"),
+        (
+            &["--color", "never", "rnu"],
+            "a similar subcommand exists: 'run'",
+        ),
+        (&["fuzz", "rnu"], "a similar subcommand exists: 'run'"),
+        (&["9.7-parity-error"], "`drivebench run 9.7-parity-error`"),
+        (
+            &["run", "9.7-parity-eror"],
+            "did you mean `9.7-parity-error`?",
+        ),
+        (
+            &["run", "9.2-synco", "--rig", "simm:3"],
+            "did you mean `sim:3`?",
+        ),
+        (&["info", "--rig", "sim3"], "did you mean `sim:3`?"),
+        (&["info", "--rig", "SIM:2,3"], "did you mean `sim:2,3`?"),
+        (
+            &["fuzz", "run", "--deviates", "1=write-ignored"],
+            "did you mean `writes-ignored`?",
+        ),
+        (&["read", "0", "nsit"], "did you mean `nist`?"),
+        (&["write", "0", "nsol=0rpm"], "did you mean `nsoll`?"),
+        (
+            &["campaign", "9.7-singel-bits"],
+            "did you mean `9.7-single-bits`?",
+        ),
+    ] {
+        let output = drivebench(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            stderr(&output).contains(words),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+    }
+    let nothing_near = stderr(&drivebench(&["zzzz"]));
+    assert!(!nothing_near.contains("tip:"), "{nothing_near}");
+}
+
+/// A remedy can be used as it stands, in every command that takes a scenario.
+#[test]
+fn a_part_of_names_leads_to_the_scenarios_that_have_it() {
+    let remedy = "`drivebench list --filter 9.7` shows them";
+    for name in ["trace", "run", "check", "list"] {
+        let said = stderr(&drivebench(&[name, "9.7"]));
+        assert!(said.contains(remedy), "{name}: {said}");
+    }
+    let listed = stdout(&drivebench(&["list", "--filter", "9.7"]));
+    assert!(listed.contains("9.7-parity-error"), "{listed}");
+    let only = stderr(&drivebench(&["trace", "every-bad-sync"]));
+    assert!(
+        only.contains("did you mean `9.2-every-bad-sync-byte`?"),
+        "{only}"
+    );
+}
+
+#[test]
+fn one_thing_is_singular() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("one.scn");
+    std::fs::write(&path, "title one\nring 1\n> 80\n").expect("room");
+    let path = path.to_str().expect("a name");
+    let run = stdout(&drivebench(&["run", path]));
+    assert!(
+        run.contains(" 1 drive  ") && run.contains("(1 scenario, "),
+        "{run}"
+    );
+    let checked = stdout(&drivebench(&["check", path]));
+    assert!(checked.ends_with("no mistakes, 1 step\n"), "{checked}");
+    let evidence = folder.path().join("evidence");
+    let evidence = evidence.to_str().expect("a name");
+    drivebench(&["run", path, "--rig", "sim:1", "--evidence", evidence]);
+    let verified = stdout(&drivebench(&["verify", evidence]));
+    assert!(
+        verified.contains("1 attempt judged again, 0 things wrong"),
+        "{verified}"
+    );
+}
+
+/// Files that are no scenarios share the reader; its messages fit them all.
+#[test]
+fn a_rig_file_that_is_no_text_is_not_called_a_scenario() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("rig.toml");
+    std::fs::write(&path, [b's', 0, b'=']).expect("room");
+    let path = path.to_str().expect("a name");
+    for arguments in [&["rig", "show", path][..], &["campaign", path]] {
+        let said = stderr(&drivebench(arguments));
+        assert!(
+            said.contains("byte 1 is 00; a text file in UTF-8 is expected"),
+            "{said}"
+        );
+        assert!(!said.contains("scenario"), "{said}");
+    }
+}
+
+/// The bash script itself, at the end of a command line.
+#[test]
+fn bash_completes_names() {
+    let script = stdout(&drivebench(&["completions", "bash"]));
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("9.7-own.scn"), "").expect("room");
+    let completed = |line: &str| {
+        let program = env!("CARGO_BIN_EXE_drivebench");
+        let tail = "COMP_POINT=${#COMP_LINE}; _drivebench; printf '%s\\n' \"${COMPREPLY[@]}\"";
+        let mut bash = Command::new("bash");
+        bash.args(["--norc", "-c", &format!("{script}\n{tail}")])
+            .env("COMP_LINE", format!("{program} {line}"))
+            .current_dir(folder.path());
+        let output = bash.output().expect("bash");
+        assert_eq!(stderr(&output), "");
+        stdout(&output)
+    };
+    let names = completed("run --ring 100 9.7-");
+    assert!(names.contains("9.7-parity-error\n"), "{names}");
+    assert!(names.contains("9.7-own.scn\n"), "{names}");
+    assert_eq!(completed("read 0 nsollr"), "nsollrampe\n");
+    assert_eq!(completed("deviat"), "deviations\n");
+    // bash replaces what stands behind the last colon or equal sign.
+    assert_eq!(completed("run --rig sim:1"), "1\n");
+    assert_eq!(
+        completed("fuzz run --deviates 1=writes-ig"),
+        "writes-ignored\n"
+    );
+    assert!(completed("--color ").starts_with("auto\n"));
+}
+
+#[test]
+fn there_are_scripts_for_three_shells() {
+    for (shell, words) in [
+        ("bash", "complete -o filenames -F _drivebench drivebench"),
+        ("zsh", "#compdef drivebench"),
+        ("fish", "complete -c drivebench"),
+    ] {
+        let script = stdout(&drivebench(&["completions", shell]));
+        assert!(script.contains(words), "{script}");
+        assert!(script.contains(" complete -- "), "{script}");
+    }
+}
