@@ -59,11 +59,11 @@ fn every_case_for_tools_and_one_class_for_people() {
     let silent = |case: &&Value| case["class"] == "silent-corruption";
     let first = cases.iter().find(silent).expect("a silent case");
     assert_eq!(first["case"], "master->2:35:0+master->2:35:1");
-    assert_eq!(first["wrong"][0]["address"], 0xFF6A);
+    assert_eq!(first["wrong"][0]["address"], 0xFF3E);
     assert_eq!(first["wrong"][0]["value"], 0x11);
     let output = drivebench(&["campaign", path, "--only", "silent-corruption"]);
     assert_eq!(stdout(&output).lines().count(), 36);
-    let line = "silent-corruption  master->2:35:0+master->2:35:1 drive 2: FF6A";
+    let line = "silent-corruption  master->2:35:0+master->2:35:1 drive 2: FF3E";
     assert!(stdout(&output).starts_with(line), "{}", stdout(&output));
 }
 

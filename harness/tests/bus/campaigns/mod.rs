@@ -229,8 +229,8 @@ fn names_that_are_not_there() {
 fn cases_by_link_and_byte() {
     let finished = run(&built_in("9.9-silence"));
     let map = finished.by_place();
-    // Four links, 21 bytes, and eleven faults at each.
-    assert_eq!(map.len(), 4 * 21);
+    // Four links, 57 bytes, and eleven faults at each.
+    assert_eq!(map.len(), 4 * 57);
     assert!(
         map.values()
             .all(|classes| classes.values().sum::<u64>() == 11)

@@ -336,6 +336,9 @@ fn held_condition(held: Held, scanner: &mut Scanner<'_>) -> Result<Condition, Pr
     let showing = match held {
         Held::Memory => {
             let place = place(scanner)?;
+            if scanner.clone().eat("&") {
+                return Ok(Condition::Cell(cell_check(scanner, place)?));
+            }
             equals(scanner)?;
             return Ok(Condition::Memory(place, bytes(scanner)?));
         }

@@ -15,6 +15,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
+use harness_proto::nd21::own::is_of_the_scope;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
@@ -257,11 +258,10 @@ impl NotReady {
     }
 }
 
-/// Whether the manual lets a drive change a cell by itself, or leaves open whether it does (14.2). The recording of the oscilloscope is
-/// plain memory as long as no measurement is started (14.10.6.5).
+/// Whether the manual lets a drive change a cell by itself, or leaves open whether it does (14.2). The settings and the recording of the
+/// oscilloscope are plain memory as long as no measurement is started (14.10.6.5).
 fn is_own(address: u16) -> bool {
-    const RECORDING: std::ops::Range<u16> = nd21::ram::SCOPE_PUFFER..nd21::ram::STACK;
-    !RECORDING.contains(&address) && (cell_at(address).is_none() || unknowable(address))
+    !is_of_the_scope(address) && (cell_at(address).is_none() || unknowable(address))
 }
 
 /// How long drives may test themselves after a reset.
