@@ -373,7 +373,18 @@ fn a_failed_scenario_leaves_deviations_unsettled() {
 #[test]
 fn a_whole_drive_passes_the_scenarios_of_the_bus() {
     let folder = tempfile::tempdir().expect("a folder");
-    for (drives, name) in [(2, "9.1-seven-forms"), (3, "9.2-address-follows")] {
+    for (drives, name) in [
+        (1, "14.2.1-read-only-cells"),
+        (2, "9.1-seven-forms"),
+        (3, "9.2-address-follows"),
+        (3, "9.2-empty-short-telegram"),
+        (3, "9.6-every-write"),
+        (3, "9.9-monitored-writes"),
+        (3, "10.5-reset-forgets"),
+        (3, "12.5-driver-eeprom"),
+        (3, "14.10.3-nominal-and-actual-value"),
+        (5, "9.3-address-byte"),
+    ] {
         let text = rig(drives, true, "", ", \"drive 0..last model nd21\"");
         let output = run(folder.path(), &text, &[name]);
         ended(&output, 0, "1 passed, 0 failed");

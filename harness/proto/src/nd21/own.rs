@@ -3,7 +3,9 @@
 //! A bench compares a cell that it has written only where no row of [`OWN`] names it. What any other cell holds before the first
 //! write is the drive's choice too, ROM and EEPROM included, but it must not change from one read to the next.
 
+use super::bits::{hw_version, hw_version2};
 use super::cells::{Access, cell_at, changes_by_itself};
+use super::io::{GPO1, GPO2, OUTPUTS};
 use super::{PARAMETERS, ram};
 use core::ops::RangeInclusive;
 
@@ -105,10 +107,32 @@ pub fn kept(address: u16, value: u8) -> Kept {
         ram::PS_POSITION_H..=ram::PS_DELTA => kept(0xFF, positioning),
         ram::EEPROM_BUFFER..ram::EEPROM_CONTROL => kept(0xFF, Some(Worker::Eeprom)),
         ram::SCOPE_STATUS => kept(0, None),
+        // 10.4, 13.1.7.2: GPO1 and GPO2; they are the drive's where its configuration gives them another use ([`outputs_of_the_bus`]).
+        OUTPUTS => kept(GPO1 | GPO2, positioning),
         _ if is_of_the_scope(address) => kept(0xFF, Some(Worker::Scope)),
         _ if is_own(address) || changes_by_itself(address) => kept(0, None),
         _ => kept(0xFF, None),
     }
+}
+
+/// The bits of [`OUTPUTS`] that only `WriteIO` sets (ND21 10.4), by what `HwVersion` and `HwVersion2` held after the last reset, which
+/// activates them. The analogue output, the cycle control and the report of a completed positioning take GPO1 (14.7.4, 13.1.7.2,
+/// 14.3.3), and the messages of 14.7.5 take GPO2. The layouts of `HwVersion` before and after 7/93 are both respected.
+#[must_use]
+pub const fn outputs_of_the_bus(hardware: u8, hardware2: u8) -> u8 {
+    const OTHER_USE_OF_GPO1: u8 = 1 << 3 | 1 << 2;
+    let analogue = hardware2 & hw_version2::NO_ANALOGUE_OUTPUT == 0;
+    let gpo1 = if analogue || hardware & OTHER_USE_OF_GPO1 != 0 {
+        0
+    } else {
+        GPO1
+    };
+    let gpo2 = if hardware & hw_version::GPO2 == hw_version::GPO2_BUS {
+        GPO2
+    } else {
+        0
+    };
+    gpo1 | gpo2
 }
 
 /// Whether the drive's program may write a cell at any time, so that no model can say what it holds. ROM is not: the drive chooses what

@@ -11,8 +11,8 @@ use crate::scenario::run::{Outcome, lacks};
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict::{self, Failed, Inconclusive, Passed};
-use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
+use std::collections::BTreeSet;
 
 /// The verdict of a scenario on a ring of three with these header lines, on a rig whose file has this text behind it.
 fn judged(ring: &str, rig: &str, scenario: &str) -> Outcome {
@@ -49,8 +49,13 @@ fn plan(text: String) -> Plan {
 
 /// A ring of three with these header lines.
 fn link(ring: &str) -> SimulatedLink {
+    link_of(3, ring)
+}
+
+/// The same of another size.
+fn link_of(drives: u8, ring: &str) -> SimulatedLink {
     bench(&plan(format!(
-        "title x\nring 3\ndrive 0..last model nd21\n{ring}\n> 80\n"
+        "title x\nring {drives}\ndrive 0..last model nd21\n{ring}\n> 80\n"
     )))
 }
 
@@ -61,8 +66,9 @@ fn judged_on(
     (plan, way): (&Plan, &Way),
     change: &dyn Fn(&mut [Comparison]),
 ) -> Outcome {
+    let drives = way.rings[0].drives();
     let rig = format!(
-        "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"in-band\"\n{rig}"
+        "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = {drives}\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\nmarks = \"in-band\"\n{rig}"
     );
     let rig = parse(&source(rig)).expect("a rig");
     let byte_time = link.byte_time();
@@ -347,63 +353,202 @@ fn silent_self_tests_accuse_no_drive() {
     assert!(remarks.contains("self-test-bus = silent"), "{remarks}");
 }
 
-/// Every built-in scenario on drives that are right and not as the model: other contents, other clocks, other choices. None fails.
+/// Drives that are right and not as the model: other contents, other clocks, other choices; `{k}` is each drive's number.
+const RIGHT: [&str; 3] = [
+    "\
+eeprom 5C = A1 B2 C3 D4
+property time-out = 10.2ms
+property bus-errors = time-out-only
+property self-test-time = 140ms
+property eeprom-write-time = 4ms
+memory FD8C = 3C*12
+memory FDA0 = A5*256
+memory FF08 = 01 02
+memory FF28 = 33 44
+memory FF32 = 74 00 72
+memory FF39 = 91 82 73 64 55 46 37 28 19
+memory FF44 = 5A*17
+memory FF72 = 12 34 56 78
+memory FFB7 = 13
+",
+    // Blocked after a reset, the analogue input sets the speed, the outputs show other things (14.3.1, 14.3.3, 14.3.4).
+    "\
+eeprom SwVersion = E0
+eeprom HwVersion = E8
+eeprom HwVersion2 = BF
+eeprom EE_pole = 04
+property time-out-wait = 10.3ms
+property eeprom-read-time = 5ms
+memory FE00 = C3*160
+memory FF4C = 00 77 00 77
+memory FF60 = 00
+",
+    // Nothing is connected, hot, turned, and errors block.
+    "\
+property self-test-time = 81ms
+eeprom nMax = 2000rpm
+eeprom ReversTakt = 77
+memory umdrist = 00 05 80 00
+memory FE00 = 7E*160
+memory FF39 = FF*9
+",
+];
+
+/// Built-in scenarios that a right drive need not pass, and the sentences of the manual that leave it open.
+const OPEN: [(&str, &str); 4] = [
+    ("9.1-seven-forms", "14.7.4: GPO1 can be the analogue output"),
+    (
+        "9.2-address-follows",
+        "14.7.4: GPO1 can be the analogue output",
+    ),
+    ("10.2-read-back", "14.7.4: GPO1 can be the analogue output"),
+    (
+        "14.10.1-error-mode",
+        "11.8: which errors of the bus set bit 5 of Status",
+    ),
+];
+
+/// Every built-in scenario that a rig of ports can play, on drives that are right and not as the model. It passes, unless the manual leaves
+/// open what it asks for, and none fails.
 #[test]
 fn no_right_drive_is_accused() {
-    let ring = "\
-drive 0..last eeprom 5C = A1 B2 C3 D4
-drive 0 property time-out = 10.2ms
-drive 1 property time-out = 10.1ms
-drive 2 property time-out-wait = 10.3ms
-drive 0..last property bus-errors = time-out-only
-drive 0..last property self-test-time = 140ms
-drive 0..last property eeprom-write-time = 4ms
-drive 0..last memory FE10 = 5A 3C 11 EE 77*100
-drive 0..last memory FDA0 = A5*100
-drive 0..last memory FF32 = 74 00 72
-drive 0..last memory FF72 = 12 34 56 78
-";
-    let right = link(ring);
-    let mut judged = Vec::new();
+    let mut other = Vec::new();
+    let (mut played, mut open) = (0, BTreeSet::new());
     for source in sources(&[]).expect("built-in scenarios") {
         let name = source.name.clone();
-        let Some(plan) = Entry::new(source, Some(3))
-            .ok()
-            .and_then(|entry| entry.plan)
-        else {
+        let Some(plan) = Entry::new(source, None).ok().and_then(|entry| entry.plan) else {
             continue;
         };
+        let [size] = plan.rings[..] else { continue };
         let way = Way {
-            rings: vec![RingSize::new(3).expect("a size")],
+            rings: plan.rings.clone(),
             attempts: None,
             anew: true,
         };
-        let mut link = right.clone();
-        let mut events: Vec<Event> = Vec::new();
-        let seen = Recording::new(&mut link, &mut events);
-        let fits = plan.rings == way.rings && !plan.needs.contains(&Capability::Interposer);
-        if !fits || lacks(&plan, &seen).is_some() {
-            continue;
+        for (number, drives) in RIGHT.iter().enumerate() {
+            let lines = drives.lines().map(|line| format!("drive 0..last {line}\n"));
+            let mut link = link_of(size.drives(), &lines.collect::<String>());
+            let mut events: Vec<Event> = Vec::new();
+            let seen = Recording::new(&mut link, &mut events);
+            if plan.needs.contains(&Capability::Interposer) || lacks(&plan, &seen).is_some() {
+                break;
+            }
+            played += 1;
+            let outcome = judged_on(&mut link, "", (&plan, &way), &|_| {});
+            let row = OPEN
+                .iter()
+                .find(|(own, _)| name.ends_with(&format!("/{own}.scn")));
+            let is_open = row.is_some() && outcome.verdict == Inconclusive;
+            open.extend(row.filter(|_| is_open).map(|(own, _)| *own));
+            let right = outcome.verdict == Passed || is_open;
+            if !right {
+                let message = outcome.finding.map(|found| found.message);
+                other.push((
+                    name.clone(),
+                    number,
+                    outcome.verdict,
+                    outcome.remarks,
+                    message,
+                ));
+            }
         }
-        let outcome = judged_on(&mut link, "", (&plan, &way), &|_| {});
-        judged.push((name, outcome));
     }
-    let failed: Vec<_> = judged
-        .iter()
-        .filter(|(_, own)| own.verdict >= Failed)
-        .map(|(name, own)| {
-            (
-                name,
-                own.verdict,
-                &own.remarks,
-                own.finding.as_ref().map(|f| &f.message),
-            )
-        })
-        .collect();
-    assert!(failed.is_empty(), "{failed:#?}");
-    let passed = judged
-        .iter()
-        .filter(|(_, own)| own.verdict == Passed)
-        .count();
-    assert!(passed >= 36, "{passed} of {}", judged.len());
+    assert!(other.is_empty(), "{} of {played}: {other:#?}", other.len());
+    assert!(played >= 3 * 60, "{played}");
+    assert_eq!(
+        open.len(),
+        OPEN.len(),
+        "a row that no drive needs: {open:?}"
+    );
+}
+
+/// The verdict of a scenario on a simulated rig of three with these lines in its `[sim] setup`, behind these lines played before.
+fn judged_simulated(setup: &[&str], before: &str, scenario: &str) -> Outcome {
+    let text = format!(
+        "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\nsetup = {setup:?}\n"
+    );
+    let rig = parse(&source(text)).expect("a rig");
+    let ring = plan(format!("title x\nring 3\n{}\n> 80\n", setup.join("\n")));
+    let mut link = bench(&ring);
+    let way = Way {
+        rings: ring.rings.clone(),
+        attempts: None,
+        anew: false,
+    };
+    let exactness = Exactness {
+        tolerance: Span::ZERO,
+        line_errors: true,
+        knows_cells: true,
+        looks: None,
+    };
+    let mut twin = twin(&rig, &known(&rig)).expect("a twin");
+    link.run_until(Instant::START);
+    let mut last = None;
+    for steps in [before, scenario] {
+        let plan = plan(format!("title x\nring 3\n{steps}"));
+        let mut events: Vec<Event> = Vec::new();
+        let byte_time = link.byte_time();
+        let mut recording = Recording::new(&mut link, &mut events);
+        let mut outcome = play_one(&mut recording, &plan, &way).expect("it is not examined");
+        let all = Conversation::all(&events, byte_time, true);
+        let (conversations, _) = way.compared(all, exactness);
+        let (comparisons, _) = twin.follow_all(&conversations, exactness);
+        let heard = Heard {
+            rig: &rig,
+            plan: &plan,
+            way: &way,
+            exactness,
+            conversations: &conversations,
+            comparisons: &comparisons,
+            unplaced: 0,
+            alive: &|| {},
+        };
+        judge(&mut outcome, &heard);
+        last = Some(outcome);
+    }
+    last.expect("two were played")
+}
+
+/// On a simulated rig the state of the drives is known: it excuses nothing. A choice that the manual leaves open excuses what it explains.
+#[test]
+fn nothing_of_a_simulated_drive_is_excused() {
+    let check = |setup: &[&str], before: &str, scenario: &str, expected: Verdict| {
+        let outcome = judged_simulated(setup, before, scenario);
+        assert_eq!(outcome.verdict, expected, "{scenario}: {outcome:#?}");
+        outcome.remarks.join("\n")
+    };
+    let reads = "read-byte 1 FE13 = 00\n";
+    let writes = "write-byte 1 FE13 = 55\n";
+    check(&[], "> 80\n", reads, Passed);
+    let remarks = check(&[], writes, reads, Failed);
+    assert!(remarks.contains("what was played before"), "{remarks}");
+    // Cells of the drive's own.
+    check(
+        &["drive 1 model nd21"],
+        "> 80\n",
+        "read-byte 1 TempKK = 01\n",
+        Failed,
+    );
+    // 10.1: the answer of ReadLong is open.
+    let set = "drive 1 memory FE12 = 12 34 56 78\n";
+    let long = format!("{set}> 8C FE C7 12 FE 31 32 3A\n< 8C 01 C7 12 12 34 56 78\n");
+    let printed = "drive 0..last property read-long = as-printed";
+    let remarks = check(&[printed], "> 80\n", &long, Inconclusive);
+    assert!(remarks.contains("the model's defaults"), "{remarks}");
+    // The choice explains nothing else, and a wrong drive with it is wrong.
+    check(
+        &[printed],
+        "> 80\n",
+        &format!("{set}read-byte 1 FE13 = 35\n"),
+        Failed,
+    );
+    check(&[printed], writes, reads, Failed);
+    let wrong = "drive 1 deviates checksum-wrong";
+    check(&[printed, wrong], "> 80\n", &long, Failed);
+    check(
+        &[printed, wrong],
+        "> 80\n",
+        &format!("{set}read-byte 1 FE13 = 34\n"),
+        Failed,
+    );
 }

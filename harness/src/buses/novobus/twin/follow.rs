@@ -218,6 +218,8 @@ impl Twin {
             self.add_later(conversation, exactness.tolerance, &mut received);
         }
         recording.extend(self.recording());
+        let fault = |(_, done): &(usize, Done)| matches!(done, Done::Fault(..));
+        self.knowledge.converse(conversation.done.iter().any(fault));
         let mut comparer = Comparer {
             exactness,
             byte_time: self.link.byte_time(),

@@ -4,10 +4,12 @@
 //! ([`own::kept`]). A value that was read is learned where the master has not written, and never replaces what the master wrote.
 
 use super::program::Program;
-use harness_proto::nd21::bits::{flags2, ps_status};
+use harness_proto::nd21::bits::{flags2, ps_status, status};
+use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::command::{Command, PAGE};
+use harness_proto::novobus::output::Output;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A byte of a drive: its ring, counted from 0, the drive, and the address.
@@ -52,7 +54,7 @@ impl Write {
     }
 }
 
-/// The bytes that a command writes (ND21 10.2, 10.3).
+/// The bytes that a command writes (ND21 10.2 to 10.4).
 pub(crate) fn writes(command: &Command) -> Vec<(u16, Write)> {
     match *command {
         Command::WriteByte { address, data } => vec![(address, Write::Set(data))],
@@ -68,6 +70,18 @@ pub(crate) fn writes(command: &Command) -> Vec<(u16, Write)> {
         }
         Command::Or { address_low, data } => {
             vec![(PAGE | u16::from(address_low), Write::Or(data))]
+        }
+        Command::WriteIo(change) => {
+            let bit = match change.output {
+                Output::Gpo1 => GPO1,
+                Output::Gpo2 => GPO2,
+            };
+            let write = if change.set {
+                Write::Or(bit)
+            } else {
+                Write::And(!bit)
+            };
+            vec![(OUTPUTS, write)]
         }
         _ => Vec::new(),
     }
@@ -107,6 +121,10 @@ pub(crate) struct Knowledge {
     started: BTreeSet<(usize, u8, Worker)>,
     /// What the manual decides of the cells of each drive's program.
     programs: BTreeMap<(usize, u8), Program>,
+    /// Drives that have shown since the attempt began that their reset is over.
+    working: BTreeSet<(usize, u8)>,
+    /// The present conversation has faults: a drive may have been switched off and on.
+    disturbed: bool,
 }
 
 impl Knowledge {
@@ -114,6 +132,15 @@ impl Knowledge {
     pub(crate) fn begin(&mut self) {
         self.cells.values_mut().for_each(|own| own.now = 0);
         self.programs.values_mut().for_each(Program::begin);
+        self.working.clear();
+    }
+
+    /// A conversation begins, with or without faults.
+    pub(crate) fn converse(&mut self, faults: bool) {
+        if faults || self.disturbed {
+            self.working.clear();
+        }
+        self.disturbed = faults;
     }
 
     /// A drive was reset (ND21 10.5): its cells are loaded from its EEPROM, and how long the drive took to write that is its choice
@@ -123,6 +150,7 @@ impl Knowledge {
             .retain(|cell, _| (cell.0, cell.1) != (ring, drive));
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
         self.programs.entry((ring, drive)).or_default().begin();
+        self.working.remove(&(ring, drive));
     }
 
     /// The master has written to a byte.
@@ -192,8 +220,31 @@ impl Knowledge {
         let kept = own::kept(address, value);
         match kept.unless {
             Some(worker) if self.started.contains(&(ring, drive, worker)) => 0,
+            _ if address == OUTPUTS => kept.bits & self.outputs_of_the_bus(ring, drive),
             _ => kept.bits,
         }
+    }
+
+    /// The outputs that only `WriteIO` sets; none where the master has not read since the last reset what they are configured for.
+    fn outputs_of_the_bus(&self, ring: usize, drive: u8) -> u8 {
+        let read = |address| {
+            let own = self.cells.get(&(ring, drive, address))?;
+            (own.learned && own.written == 0).then_some(own.value)
+        };
+        match (read(ram::HW_VERSION), read(ram::HW_VERSION2)) {
+            (Some(hardware), Some(hardware2)) => own::outputs_of_the_bus(hardware, hardware2),
+            _ => 0,
+        }
+    }
+
+    /// Whether a `Status` that was read says that a drive is in its reset although the master has not reset it since its last reset was
+    /// over (ND21 10.5, 11.8, 14.4.1).
+    fn is_in_reset_by_itself(&mut self, drive: (usize, u8), wanted: u8, value: u8) -> bool {
+        if value & status::RESET == 0 {
+            self.working.insert(drive);
+            return false;
+        }
+        wanted & status::RESET == 0 && !self.disturbed && self.working.contains(&drive)
     }
 
     /// The bits of a byte that hold what the master has written in the present attempt.
@@ -209,6 +260,9 @@ impl Knowledge {
             Some(true) => return Reading::Right,
             Some(false) => return Reading::Wrong,
             None => {}
+        }
+        if place.2 == ram::STATUS && self.is_in_reset_by_itself((place.0, place.1), wanted, value) {
+            return Reading::Wrong;
         }
         let kept = self.kept(place, value);
         let own = self.cells.entry(place).or_default();
@@ -266,6 +320,67 @@ mod tests {
         known.reset(0, 1);
         assert_eq!(known.read(CELL, 0x00, 0x00), Reading::Right);
         assert_eq!(known.read(CELL, 0x00, 0x77), Reading::Learned);
+    }
+
+    /// ND21 10.4: `WriteIO` decides the outputs that the drive's configuration leaves to the bus, once the master has read it.
+    #[test]
+    fn outputs_hold_what_was_written_where_nothing_else_uses_them() {
+        let outputs = (0, 1, OUTPUTS);
+        let configured = |hardware: u8, hardware2: u8| {
+            let mut known = Knowledge::default();
+            known.read((0, 1, ram::HW_VERSION), 0x84, hardware);
+            known.read((0, 1, ram::HW_VERSION2), 0x84, hardware2);
+            let set = Command::WriteIo(harness_proto::novobus::output::OutputChange {
+                output: Output::Gpo1,
+                set: true,
+            });
+            for (address, write) in writes(&set) {
+                known.write((0, 1, address), write);
+            }
+            known
+        };
+        let mut known = configured(0x80, 0xFF);
+        // The other bits of the port are the drive's.
+        assert_eq!(known.read(outputs, 0x80, 0x9F), Reading::Own);
+        assert_eq!(known.read(outputs, 0x80, 0x00), Reading::Wrong);
+        assert_eq!(known.read(outputs, 0x80, 0x20), Reading::Wrong);
+        known.write(outputs, Write::Or(GPO2));
+        assert_eq!(known.read(outputs, 0xA0, 0xA0), Reading::Own);
+        assert_eq!(known.read(outputs, 0xA0, 0x80), Reading::Wrong);
+        // GPO2 shows a message, GPO1 the analogue output, the cycle control or a completed positioning.
+        for (hardware, hardware2) in [(0x80, 0xBF), (0x88, 0xFF), (0x84, 0xFF)] {
+            assert_eq!(
+                configured(hardware, hardware2).read(outputs, 0x80, 0x00),
+                Reading::Own
+            );
+        }
+        let mut shows = configured(0xC0, 0xFF);
+        shows.write(outputs, Write::Or(GPO2));
+        assert_eq!(shows.read(outputs, 0xA0, 0x80), Reading::Own);
+        // Nothing is known of the configuration, or a reset may have activated another one.
+        known.reset(0, 1);
+        known.write(outputs, Write::Or(GPO1));
+        assert_eq!(known.read(outputs, 0x80, 0x00), Reading::Own);
+    }
+
+    /// ND21 14.4.1: bit 6 of `Status` comes back only with another reset.
+    #[test]
+    fn no_drive_resets_itself() {
+        let status = (0, 1, ram::STATUS);
+        let mut known = Knowledge::default();
+        // The drive's self-test is longer than the model's.
+        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
+        assert_eq!(known.read(status, 0x00, 0x01), Reading::Own);
+        assert_eq!(known.read(status, 0x00, 0x40), Reading::Wrong);
+        known.reset(0, 1);
+        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
+        // Its power may have been switched.
+        assert_eq!(known.read(status, 0x00, 0x00), Reading::Own);
+        known.converse(true);
+        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
+        assert_eq!(known.read(status, 0x00, 0x00), Reading::Own);
+        known.converse(false);
+        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
     }
 
     /// ND21 14.10.3: where process data go is known from a write by any command, and from a read.
