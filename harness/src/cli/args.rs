@@ -196,6 +196,9 @@ pub struct QualifyArguments {
     /// Let motors turn; the rig's file must allow it too.
     #[arg(long)]
     pub allow_motion: bool,
+    /// Also play long soaks of every command, every silence, and every EEPROM cell that `[limits]` permit: several minutes more.
+    #[arg(long)]
+    pub thorough: bool,
     /// How long to wait if another program holds the rig, such as 30s.
     #[arg(long, visible_alias = "wait-for-rig", value_name = "TIME", value_parser = duration)]
     pub wait: Option<Duration>,

@@ -4,7 +4,7 @@ use super::output::Output;
 use crate::buses::twin::{Conversation, Exactness};
 use crate::counted::counted;
 use crate::link::Octets;
-use crate::qualify::{Culprit, Meant, Named, Seen, Sighting, Trial, agreed, culprit};
+use crate::qualify::{Culprit, Meant, Named, Pinned, Seen, Sighting, Trial, agreed, culprit};
 use crate::rig::{Attempt, Driven, Played, Run};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -30,6 +30,8 @@ pub(crate) struct Findings {
     sightings: Vec<(String, Sighting)>,
     /// The outcomes of those that were tried with the drives' roles exchanged.
     trials: Vec<Trial>,
+    /// What questions to the ring have shown.
+    pinned: Vec<Pinned>,
     /// The conversations of each attempt that differed.
     differing: Vec<Vec<Conversation>>,
     /// Those in which the driver had a part: it waits and tries again, which takes long to be explained and says no more.
@@ -172,11 +174,17 @@ impl Findings {
         self.trials.extend(trials);
     }
 
+    /// Notes what a question to the ring has shown.
+    pub(crate) fn note_pinned(&mut self, pinned: Pinned) {
+        self.pinned.push(pinned);
+    }
+
     /// The drive that alone explains where attempts differed, as far as the bytes and the trials say.
     fn culprit(&self) -> Option<Culprit> {
         // What was seen only once may be a byte that was damaged on its way.
         let seen: Vec<_> = self.sightings.iter().map(|(_, own)| own.meant).collect();
-        culprit(self.drives, &seen, &self.trials).filter(|_| seen.len() > 1)
+        let found = culprit(self.drives, &seen, &self.trials, &self.pinned);
+        found.filter(|_| seen.len() > 1)
     }
 
     /// Notes a probe that was asked.
@@ -297,6 +305,19 @@ impl Findings {
         let Some(culprit) = culprit else {
             return "deviations: the drives differ from the model, and no single known deviation explains every byte; not known which drive\n".to_owned();
         };
+        let shown = self.pinned.iter().filter(|own| own.drive == culprit.drive);
+        let mut shown: Vec<String> = shown
+            .map(|own| {
+                format!(
+                    "deviation: {culprit}: no known deviation explains it (ND21 {}): {own}\n",
+                    own.section
+                )
+            })
+            .collect();
+        shown.dedup();
+        if !shown.is_empty() {
+            return shown.concat();
+        }
         let mut sections: Vec<(&str, usize, &(String, Sighting))> = Vec::new();
         for own in &self.sightings {
             match sections

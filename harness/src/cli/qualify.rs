@@ -13,9 +13,11 @@ use crate::evidence::Folder;
 use crate::library::Entry;
 use crate::link::Link as _;
 use crate::qualify::{
-    Answer, Asked, Probe, Profile, answer, conversations, deviating_masters, exchange, name, probes,
+    Answer, Asked, Probe, Profile, answer, conversations, deviating_masters, dumps, exchange,
+    marches, name, probes, questions, thorough,
 };
-use crate::rig::{Run, state};
+use crate::rig::{Played, Run, state};
+use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -63,6 +65,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         require_all: arguments.require_all,
         junit: None,
         qualify: true,
+        thorough: arguments.thorough,
         sign: arguments.sign.clone(),
     };
     work(&rig, &entries, &job, page, output)
@@ -72,7 +75,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
 pub(crate) fn settle(
     run: &mut Run<'_>,
     findings: &mut Findings,
-    ill: bool,
+    (ill, long): (bool, bool),
     mut folder: Option<&mut Folder>,
     output: &mut Output,
 ) -> Result<Exit, Stop> {
@@ -85,16 +88,26 @@ pub(crate) fn settle(
             .map(|place| place == 0 || run.session().link().reaches(0, place))
             .collect();
         let reaches = |place: usize| reached.get(place) == Some(&true);
-        for entry in conversations(drives, &reaches).unwrap_or_default() {
-            let played = play(run, &entry, folder.as_deref_mut())?;
-            let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
-            output.result(&line(&entry, &played.outcome, output))?;
-            output.say(&details(&entry, &played.outcome, traces));
-            findings.note(entry.short_name(), &played);
-            if over(run, output) {
-                ended = true;
+        let mut entries = conversations(drives, &reaches).unwrap_or_default();
+        if long {
+            entries.extend(thorough(drives).unwrap_or_default());
+        }
+        for entry in entries {
+            ended =
+                ended || compare(run, findings, &entry, folder.as_deref_mut(), output)?.is_none();
+        }
+        let read = if long { dumps(drives) } else { Vec::new() };
+        for (drive, entry) in read {
+            if ended {
                 break;
             }
+            ended = march(
+                run,
+                findings,
+                (drive, &entry),
+                folder.as_deref_mut(),
+                output,
+            )?;
         }
     }
     let (profile, settled) = match ill {
@@ -105,6 +118,7 @@ pub(crate) fn settle(
         }
     };
     if !ill && !ended {
+        ask_ring(run, findings, folder.as_deref_mut(), output)?;
         exchange_roles(run, findings, folder.as_deref_mut(), output)?;
     }
     if ended || over(run, output) {
@@ -132,6 +146,46 @@ pub(crate) fn settle(
     Ok(exit)
 }
 
+/// Plays a conversation that is judged by the model; `None` where nothing more can or may be played.
+fn compare(
+    run: &mut Run<'_>,
+    findings: &mut Findings,
+    entry: &Entry,
+    folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<Option<Played>, Stop> {
+    let played = play(run, entry, folder)?;
+    let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
+    output.result(&line(entry, &played.outcome, output))?;
+    output.say(&details(entry, &played.outcome, traces));
+    findings.note(entry.short_name(), &played);
+    Ok((!over(run, output)).then_some(played))
+}
+
+/// Reads the EEPROM of a drive, and writes and restores its cells one by one. Whether nothing more can or may be played.
+fn march(
+    run: &mut Run<'_>,
+    findings: &mut Findings,
+    (drive, read): (u8, &Entry),
+    mut folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<bool, Stop> {
+    let drives = run.session().rig().file.ring.first.drives;
+    let Some(played) = compare(run, findings, read, folder.as_deref_mut(), output)? else {
+        return Ok(true);
+    };
+    let right = played.outcome.verdict == Verdict::Passed;
+    let Some(last) = played.last_played().filter(|_| right) else {
+        return Ok(false);
+    };
+    for entry in marches(drives, drive, &last.conversations) {
+        if compare(run, findings, &entry, folder.as_deref_mut(), output)?.is_none() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
 /// Names the deviation of the bench's own master, if it is wrong.
 fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<String> {
     if !findings.master_is_wrong {
@@ -152,6 +206,30 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
     );
     output.result(&text)?;
     Ok(text)
+}
+
+/// Asks the ring about what differed, so that it shows which drive it was.
+fn ask_ring(
+    run: &mut Run<'_>,
+    findings: &mut Findings,
+    mut folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<(), Stop> {
+    if !run.way().anew {
+        return Ok(());
+    }
+    let drives = run.session().rig().file.ring.first.drives;
+    let sightings = findings.sightings().to_vec();
+    for question in questions(drives, &sightings) {
+        if over(run, output) {
+            break;
+        }
+        let played = play(run, &question.entry, folder.as_deref_mut())?;
+        let last = played.last_played().filter(|own| own.was_played());
+        let shown = last.and_then(|own| question.answer(&own.conversations));
+        shown.into_iter().for_each(|own| findings.note_pinned(own));
+    }
+    Ok(())
 }
 
 /// Plays again what differed, with the drives' roles exchanged, so that it shows which drive it was. Only where every drive is reset before:

@@ -82,6 +82,7 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             require_all: arguments.require_all,
             junit: arguments.junit.clone(),
             qualify: false,
+            thorough: false,
             sign: arguments.sign.clone(),
         };
         return work(rig, &entries, &job, page, output);

@@ -35,6 +35,8 @@ pub(crate) struct Job {
     pub(crate) junit: Option<PathBuf>,
     /// Also settle what the manual leaves open, and name the deviations.
     pub(crate) qualify: bool,
+    /// Play the long conversations of a qualification, too.
+    pub(crate) thorough: bool,
     /// The key to sign the evidence with.
     pub(crate) sign: Option<PathBuf>,
 }
@@ -226,7 +228,13 @@ fn all(
             folder.add(DEVIATIONS, &told)?;
         }
     } else if job.qualify {
-        match settle(&mut run, &mut findings, ill, folder.as_mut(), output)? {
+        match settle(
+            &mut run,
+            &mut findings,
+            (ill, job.thorough),
+            folder.as_mut(),
+            output,
+        )? {
             // What a drive does wrong is the drive's fault, whatever the outcome.
             Exit::Failed => exit = Exit::Failed,
             // What is not settled takes no failure back.

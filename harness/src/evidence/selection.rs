@@ -4,7 +4,7 @@ use super::attempt::reached;
 use super::files::sum;
 use super::record::Line;
 use super::verify::Opened;
-use crate::buses::qualify::{conversations, probes};
+use crate::buses::qualify::{TRIALS, conversations, probes, thorough};
 use crate::library::Entry;
 
 /// How the scenarios of a record compare with those that were to be played.
@@ -49,7 +49,11 @@ pub(super) fn compare(opened: &Opened) -> Selection {
         false => Vec::new(),
     };
     let known = |sum: &String| qualifying.iter().any(|own| own.sum == *sum);
-    for (name, _) in more.iter().filter(|(_, sum)| !known(sum)) {
+    let trial = |name: &str| header.qualified && TRIALS.iter().any(|own| name.starts_with(own));
+    let unknown = more
+        .iter()
+        .filter(|(name, sum)| !known(sum) && !trial(name));
+    for (name, _) in unknown {
         selection
             .wrong
             .push(format!("case {name}: it was not selected"));
@@ -102,6 +106,8 @@ fn qualifying(opened: &Opened) -> Vec<Qualifying> {
     };
     let own = conversations(drives, &reaches).unwrap_or_default();
     let mut list: Vec<_> = own.iter().map(|entry| listed(entry, true)).collect();
+    let long = thorough(drives).unwrap_or_default();
+    list.extend(long.iter().map(|entry| listed(entry, false)));
     for probe in probes(drives).unwrap_or_default() {
         let entries = probe.entries.iter().enumerate();
         list.extend(entries.map(|(place, entry)| listed(entry, place == 0)));

@@ -4,8 +4,8 @@
 //! that the real ring gave.
 
 pub use crate::buses::novobus::qualify::{
-    Answer, Asked, Culprit, Evidence, Hypothesis, Meant, Named, Probe, Seen, Sighting, Trial,
-    Whose, agreed, answer, conversations, culprit, deviating_masters, exchange, explaining,
-    hypotheses, name, probes,
+    Answer, Asked, Culprit, Evidence, Hypothesis, Meant, Named, Pinned, Probe, Question, Seen,
+    Sighting, Trial, Whose, agreed, answer, conversations, culprit, deviating_masters, dumps,
+    exchange, explaining, hypotheses, marches, name, probes, questions, thorough,
 };
 pub use crate::rig::{Profile, ProfileError, Settled};

@@ -6,8 +6,8 @@ use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Event, Octets, Recording, SimulatedLink};
 use harness::qualify::{
-    Answer, Culprit, Meant, Named, Seen, Sighting, Whose, agreed, answer, conversations, culprit,
-    exchange, hypotheses, name, probes,
+    Answer, Culprit, Meant, Named, Pinned, Seen, Sighting, Whose, agreed, answer, conversations,
+    culprit, exchange, hypotheses, name, probes, questions,
 };
 use harness::rig::{Way, play_one};
 use harness::scenario::plan::Plan;
@@ -85,6 +85,7 @@ fn plans() -> &'static [Plan] {
         };
         let built_in = built_in.filter(fits);
         let own = own.into_iter().filter_map(|entry| entry.plan);
+        let own = own.filter(|plan| !plan.asks_the_driver());
         own.chain(built_in).collect()
     })
 }
@@ -105,16 +106,21 @@ fn slow(conversation: &mut Conversation) {
     }
 }
 
-/// What comes of playing a scenario on a link.
+/// What comes of playing a scenario on a link, as a bench with another clock sees it.
 fn played(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
+    let mut all = played_in_time(plan, link);
+    all.iter_mut().for_each(slow);
+    all
+}
+
+/// What comes of playing a scenario on a link.
+fn played_in_time(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
     let mut link = link.clone();
     let byte_time = link.byte_time();
     let mut events: Vec<Event> = Vec::new();
     let mut recording = Recording::new(&mut link, &mut events);
     let _verdict = play_one(&mut recording, plan, &as_they_are());
-    let mut all = Conversation::all(&events, byte_time, true);
-    all.iter_mut().for_each(slow);
-    all
+    Conversation::all(&events, byte_time, true)
 }
 
 /// What a qualification makes of a ring.
@@ -125,6 +131,8 @@ struct Verdict {
     named: Vec<Named>,
     /// The drive that is to blame, whatever it does.
     culprit: Option<Culprit>,
+    /// What the ring has shown when it was asked.
+    pinned: Vec<Pinned>,
 }
 
 /// What a ring was seen to do.
@@ -137,9 +145,18 @@ struct Play {
 impl Play {
     /// Plays a scenario on such a ring, and gives where it differed from the model.
     fn play(&mut self, link: &SimulatedLink, plan: &Plan) -> (bool, Option<Sighting>) {
-        let (way, byte_time) = (as_they_are(), link.byte_time());
-        let (conversations, _) = way.compared(played(plan, link), THROUGH_A_PORT);
-        let mut right = twin(&[]).expect("a ring");
+        let right = twin(&[]).expect("a ring");
+        self.judge(played(plan, link), link.byte_time(), right)
+    }
+
+    /// Where conversations differed from the model.
+    fn judge(
+        &mut self,
+        played: Vec<Conversation>,
+        byte_time: Span,
+        mut right: Twin,
+    ) -> (bool, Option<Sighting>) {
+        let (conversations, _) = as_they_are().compared(played, THROUGH_A_PORT);
         let (comparisons, _) = right.follow_all(&conversations, THROUGH_A_PORT);
         let mut found = comparisons.iter().enumerate();
         let found = found.find_map(|(at, own)| Some((at, own.divergence.as_ref()?)));
@@ -164,6 +181,12 @@ fn verdict(lines: &[String]) -> Verdict {
         sightings.extend(sighting.map(|own| (number.to_string(), own)));
     }
     let seen: Vec<_> = sightings.iter().map(|(_, own)| own.meant).collect();
+    let asked = questions(DRIVES, &sightings);
+    let pinned = asked.iter().filter_map(|question| {
+        let plan = question.entry.plan.as_ref().expect("novobus");
+        question.answer(&played(plan, &link))
+    });
+    let pinned: Vec<_> = pinned.collect();
     let trials = exchange(DRIVES, sightings, &mut |entry: &Entry| {
         let plan = entry.plan.as_ref().expect("novobus");
         let (differs, sighting) = play.play(&link, plan);
@@ -177,12 +200,13 @@ fn verdict(lines: &[String]) -> Verdict {
         alike: &play.alike,
         exactness: THROUGH_A_PORT,
     };
-    let culprit = culprit(DRIVES, &seen, &trials.expect("no errors"));
+    let culprit = culprit(DRIVES, &seen, &trials.expect("no errors"), &pinned);
     let (_, named) = agreed(culprit, &name(&seen_all, &twin));
     Verdict {
         differs: !play.differing.is_empty(),
         named,
         culprit,
+        pinned,
     }
 }
 
@@ -207,7 +231,10 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
         differs,
         named,
         culprit,
+        pinned,
     } = verdict(&lines);
+    let others = pinned.iter().find(|own| Some(own.drive) != whose);
+    assert!(others.is_none(), "{lines:?}: {others:?}");
     if let Some(culprit) = culprit {
         assert_eq!(
             Some(culprit.drive),
@@ -267,6 +294,98 @@ fn planted_in_turn(step: usize, named: usize, culprits: usize) {
         "{ends:?}"
     );
     assert!(blamed >= culprits, "{blamed}");
+}
+
+/// An oscilloscope that stands, as it does behind a reset (14.10.6.5): it records nothing in the cells that are tested.
+const STANDS: &str = "drive 0..last memory scope_status = 80";
+
+/// A scenario or a conversation of a qualification by its name.
+fn named_plan(name: &str) -> Plan {
+    let own = conversations(DRIVES, &|_| false).expect("no mistakes");
+    let built_in = sources(&[]).expect("built-in scenarios").into_iter();
+    let built_in = built_in.filter_map(|source| Entry::new(source, Some(DRIVES)).ok());
+    let mut all = built_in.chain(own);
+    let entry = all.find(|entry| entry.short_name() == name).expect(name);
+    entry.plan.expect("novobus")
+}
+
+/// What a ring with these lines shows when it is asked, where this scenario or conversation differed.
+fn shown(lines: &str, name: &str) -> Vec<(u8, &'static str)> {
+    let wrong = [STANDS.to_owned(), lines.to_owned()];
+    let link = twin(&wrong).expect("a ring").into_link();
+    let right = twin(&wrong[..1]).expect("a ring");
+    let all = played_in_time(&named_plan(name), &link);
+    let (_, sighting) = Play::default().judge(all, link.byte_time(), right);
+    let sighting = sighting.unwrap_or_else(|| panic!("{lines}: {name} shows nothing"));
+    let sightings = [(name.to_owned(), sighting)];
+    let asked = questions(DRIVES, &sightings);
+    let pinned = asked.iter().filter_map(|question| {
+        let plan = question.entry.plan.as_ref().expect("novobus");
+        question.answer(&played_in_time(plan, &link))
+    });
+    pinned.map(|own| (own.drive, own.section)).collect()
+}
+
+/// A bit that is stuck at 0 is as in a drive that writes nothing, where nothing else is looked at; other cells that are right refute it.
+#[test]
+fn what_is_right_refutes_a_name() {
+    let wrong = [
+        STANDS.to_owned(),
+        "drive 1 deviates ram-bit-stuck-at-0".to_owned(),
+    ];
+    let link = twin(&wrong).expect("a ring").into_link();
+    let mut play = Play::default();
+    for name in ["10.2-march", "qualify-cells"] {
+        let all = played_in_time(&named_plan(name), &link);
+        let _sighting = play.judge(all, link.byte_time(), twin(&wrong[..1]).expect("a ring"));
+    }
+    assert_eq!((play.differing.len(), play.alike.len()), (1, 1));
+    let seen = Seen {
+        drives: DRIVES,
+        suspects: &[],
+        differing: &play.differing,
+        alike: &play.alike,
+        exactness: THROUGH_A_PORT,
+    };
+    let twin = |lines: &[String]| twin(&[&wrong[..1], lines].concat());
+    let named = name(&seen, &twin);
+    let names: Vec<_> = named.iter().map(|own| own.deviation.name).collect();
+    assert!(!names.contains(&"writes-ignored"), "{names:?}");
+    assert!(names.contains(&"ram-bit-stuck-at-0"), "{names:?}");
+}
+
+/// ND21 14.2.1, 9.3, 9.7: a ring that is asked shows which drive is wrong, or which cell, and keeps to what the bytes say.
+#[test]
+fn a_ring_that_is_asked_shows_what_is_wrong() {
+    for drive in 0..DRIVES {
+        let is = |deviation: &str, name: &str, section: &'static str| {
+            let lines = format!("drive {drive} deviates {deviation}");
+            assert_eq!(shown(&lines, name), [(drive, section)], "{lines}");
+        };
+        let nothing = |deviation: &str, name: &str| {
+            let lines = format!("drive {drive} deviates {deviation}");
+            assert_eq!(shown(&lines, name), [], "{lines}");
+        };
+        for cell in ["ram-bit-stuck-at-0", "ram-cells-aliased"] {
+            is(cell, "10.2-march", "14.2.1");
+        }
+        is("read-word-stays-in-its-page", "10.1-ends-of-pages", "10.1");
+        is("increments-seven-bits", "qualify-addresses", "9.3");
+        // No drive can be told from another one by its address.
+        nothing("does-not-increment", "qualify-addresses");
+        // The first drive of the conversation has an address byte of its own.
+        if drive > 0 {
+            is("next-drive-is-same-drive", "qualify-next-drives", "9.2");
+        }
+        // No cell is wrong: one value, or a write now and then.
+        nothing("byte-a7-written-as-a6", "10.2-march");
+        nothing("every-64th-write-lost", "10.2-march");
+        // Only the first drive of the ring has certainly been sent what the master sent.
+        match drive + 1 == DRIVES {
+            true => is("last-word-refused", "10.1-ends-of-pages", "10.1"),
+            false => nothing("last-word-refused", "10.1-ends-of-pages"),
+        }
+    }
 }
 
 #[test]

@@ -243,25 +243,25 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
     // Cells.
     wrong(
         "ram-bit-stuck-at-1",
-        "10.2",
+        "14.2.1",
         "bit 3 of the RAM cell FE5A is always 1",
         How::Reads(|peek, a| peek(a) | if a == 0xFE5A { 1 << 3 } else { 0 }),
     ),
     wrong(
         "ram-bit-stuck-at-0",
-        "10.2",
+        "14.2.1",
         "bit 6 of the RAM cell FE33 is always 0",
         How::Reads(|peek, a| peek(a) & if a == 0xFE33 { !(1 << 6) } else { 0xFF }),
     ),
     wrong(
         "ram-cells-aliased",
-        "10.2",
+        "14.2.1",
         "the RAM cells FE20 and FE60 are one",
         How::Reads(|peek, a| peek(if a == 0xFE60 { 0xFE20 } else { a })),
     ),
     wrong(
         "ram-bits-coupled",
-        "10.2",
+        "14.2.1",
         "bit 0 of the RAM cell FE44 shows bit 0 of FE45",
         How::Reads(|peek, a| match a {
             0xFE44 => peek(a) & 0xFE | peek(0xFE45) & 1,

@@ -6,6 +6,7 @@
 
 use super::diagnose::{Named, Whose};
 use super::exchange::{EEPROM, Sent, begin};
+use super::pinned::Pinned;
 use crate::buses::novobus::twin::{Conversation, Divergence};
 use crate::library::Entry;
 use crate::scenario::source::Source;
@@ -16,6 +17,10 @@ use harness_proto::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte};
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
 use std::fmt;
+
+/// The command bytes that read several cells (10.1).
+const READ_WORD: u8 = 0xC1;
+const READ_LONG: u8 = 0xC7;
 
 /// How the byte at which an attempt differed belongs to a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,6 +43,20 @@ pub struct Sighting {
     pub section: &'static str,
     /// What was seen, as a sentence.
     pub about: String,
+    /// The byte that the model expects, and the one that came.
+    pub(super) values: (u8, u8),
+    /// What the byte is for.
+    pub(super) role: Role,
+    /// The byte that the master sent.
+    pub(super) byte: u8,
+    /// The drives, if any, whose telegrams the byte and the zeros directly in front of it belong to, apart from sync and address bytes.
+    pub(super) addressed: Vec<Option<u8>>,
+    /// Whether ReadWord or ReadLong reads it, of a cell that WriteByte has written.
+    pub(super) word_of_bytes: bool,
+    /// Whether zeros have come from it on, and not only in its place.
+    pub(super) is_refused: bool,
+    /// Whether it stands in a telegram with a short address.
+    pub(super) is_short: bool,
     sent: Sent,
     /// How many bytes are sent until the difference is seen and the telegram is complete.
     count: usize,
@@ -72,20 +91,20 @@ impl Sighting {
         let mut answered =
             all.filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE));
         let (index, _) = answered.nth(found.byte.checked_sub(1)?)?;
-        let (meant, end) = sent.meant(index);
-        // Answers of the first drive of the ring pass the second one before all others: a 00 may be that drive's, which takes them for
-        // an error.
-        let refuses = values.is_some_and(|(_, (_, came))| came.byte == 0);
-        let meant = match meant {
-            Meant::Own(drive) if refuses && drives > 1 && drive + 1 == drives => Meant::Nobody,
-            meant => meant,
+        let received = &attempt[place].received;
+        let came = |at: usize| {
+            let place = (found.byte - 1 + at).checked_sub(index)?;
+            received.get(place).map(|own| own.2.byte)
         };
-        let refused = found.received.is_some_and(|(_, came)| came.byte == 0)
-            && found.byte.checked_sub(2).is_some_and(|before| {
-                let came = attempt[place].received.get(before);
-                came.is_some_and(|(_, _, came)| came.byte == 0)
-            });
-        let section = sent.section(index, refused);
+        let (meant, section, end) = sent.blame(index, drives, found, &came);
+        let word_of_bytes = sent.is_word_of_bytes(index);
+        let is_short = sent.is_short(index);
+        let (role, byte) = (sent.roles[index], sent.bytes[index].0);
+        let is_refused = (index..index + 2).all(|at| came(at).is_none_or(|byte| byte == 0));
+        let zeros = (before..index).rev().take_while(|at| came(*at) == Some(0));
+        let first = zeros.last().unwrap_or(index);
+        let addressed = (first..=index).filter_map(|at| sent.addressed(at));
+        let addressed = addressed.collect();
         let count = end.max(index + 1).min(sent.bytes.len());
         let (sent, count) = match meant {
             Meant::Own(drive) => sent.shortened(count, drive),
@@ -95,9 +114,26 @@ impl Sighting {
             meant,
             section,
             about: found.to_string(),
+            values: values.map(|((_, due), (_, came))| (due.byte, came.byte))?,
+            role,
+            byte,
+            addressed,
+            word_of_bytes,
+            is_refused,
+            is_short,
             count,
             sent,
         })
+    }
+
+    /// How many bytes are sent until the difference is seen.
+    pub(super) const fn length(&self) -> usize {
+        self.count
+    }
+
+    /// The text of a scenario that sends the same bytes again.
+    pub(super) fn again(&self, drives: u8) -> Option<String> {
+        self.sent.exchanged(self.count, drives, 0)
     }
 }
 
@@ -142,7 +178,7 @@ pub fn exchange<E>(
             let text = sighting.sent.exchanged(sighting.count, drives, step);
             let Some(text) = text else { break };
             let source = Source {
-                name: format!("exchanged-{name}-by-{step}"),
+                name: format!("{}{name}-by-{step}", super::EXCHANGED),
                 text: text.into(),
             };
             let Ok(entry) = Entry::new(source, Some(drives)) else {
@@ -178,9 +214,18 @@ impl fmt::Display for Culprit {
     }
 }
 
-/// The drive that explains where attempts differed: `seen` are all of them, and some were tried again with the roles exchanged.
+/// The drive that explains where attempts differed: `seen` are all of them, some were tried again with the roles exchanged, and `pinned` is
+/// what the ring has shown when it was asked.
 #[must_use]
-pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial]) -> Option<Culprit> {
+pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial], pinned: &[Pinned]) -> Option<Culprit> {
+    let mut shown = pinned.iter().filter(|own| own.names_the_drive);
+    if let Some(first) = shown.next() {
+        let same = shown.all(|own| own.drive == first.drive);
+        return same.then_some(Culprit {
+            drive: first.drive,
+            perhaps_of_all: false,
+        });
+    }
     if drives == 1 && !seen.is_empty() {
         return Some(Culprit {
             drive: 0,
@@ -268,6 +313,39 @@ fn may_be(drives: u8, drive: u8, wrong: &BTreeSet<u8>) -> bool {
 }
 
 impl Sent {
+    /// The drive that a differing byte belongs to, the section of the broken rule, and where the telegram ends. `came` is what was received
+    /// in the place of a byte.
+    fn blame(
+        &self,
+        index: usize,
+        drives: u8,
+        found: &Divergence,
+        came: &dyn Fn(usize) -> Option<u8>,
+    ) -> (Meant, &'static str, usize) {
+        let (meant, end) = self.meant(index);
+        let refused = came(index) == Some(0);
+        let expected = found.expected.map(|(_, due)| due.byte);
+        // Behind an error the byte of the master has come: the drive with the error has passed it on.
+        let passed = expected == Some(0) && !refused && came(index) == Some(self.bytes[index].0);
+        match meant {
+            Meant::Behind(drive) if passed => {
+                return (Meant::Own(drive), self.of_error(index), end);
+            }
+            _ => {}
+        }
+        // Answers of the first drive of the ring pass the second one before all others: a 00 may be that drive's, which takes them for
+        // an error. A question to the ring tells them apart.
+        let meant = match meant {
+            Meant::Own(drive) if refused && drives > 1 && drive + 1 == drives => Meant::Nobody,
+            meant => meant,
+        };
+        let before = index.checked_sub(1).and_then(came);
+        let section = self
+            .comes_back(index, came)
+            .unwrap_or_else(|| self.section(index, refused && before == Some(0)));
+        (meant, section, end)
+    }
+
     /// The drive that a byte belongs to, and where its telegram ends.
     fn meant(&self, index: usize) -> (Meant, usize) {
         let is_sync = |at: &usize| self.roles[*at] == Role::Sync;
@@ -297,6 +375,19 @@ impl Sent {
         (meant, end)
     }
 
+    /// The drive that the telegram of a byte behind an address byte is addressed to, if any; `None` for every other byte.
+    fn addressed(&self, index: usize) -> Option<Option<u8>> {
+        let start = (0..index).rev().find(|at| self.roles[*at] == Role::Sync)?;
+        let Ok(SyncByte::Telegram(header)) = SyncByte::decode(self.bytes[start].0) else {
+            return None;
+        };
+        let within = (start + 2..start + header.telegram_length()).contains(&index);
+        match (header.addressing(), self.roles[start + 1]) {
+            (Addressing::AddressFollows, Role::Address { drive }) if within => Some(drive),
+            _ => None,
+        }
+    }
+
     /// The section of the rule that a byte obeys: for what a cell holds, that of the command by which it was written; for the checking byte of
     /// an answer that was refused before, that of the command.
     fn section(&self, index: usize, refused: bool) -> &'static str {
@@ -319,6 +410,69 @@ impl Sent {
             }
             _ => role.rule().0,
         }
+    }
+
+    /// The section of the addressing that the telegram of a byte has, if the rest of its command comes back as it was sent: then the drive has
+    /// not taken the command for its own. `came` is what was received in the place of a byte.
+    fn comes_back(&self, index: usize, came: &dyn Fn(usize) -> Option<u8>) -> Option<&'static str> {
+        let is_check = |at: &usize| matches!(self.roles[*at], Role::Check { .. });
+        let end = (index..self.roles.len().min(index + 4)).find(is_check)?;
+        let unchanged = (index..=end).all(|at| came(at) == Some(self.bytes[at].0));
+        let section = if self.is_short(index) { "9.2" } else { "9.3" };
+        unchanged.then_some(section)
+    }
+
+    /// Whether a byte stands behind the sync byte of a telegram with a short address (9.2).
+    fn is_short(&self, index: usize) -> bool {
+        let start = (0..index).rev().find(|at| self.roles[*at] == Role::Sync);
+        let header = start.map(|start| (start, SyncByte::decode(self.bytes[start].0)));
+        match header {
+            Some((start, Ok(SyncByte::Telegram(header)))) => {
+                header.addressing() != Addressing::AddressFollows
+                    && index < start + header.telegram_length()
+            }
+            _ => false,
+        }
+    }
+
+    /// The section of the rule by which the byte of an error in front of `index` is one: the last byte that is a part of a telegram, or the
+    /// one behind it.
+    fn of_error(&self, index: usize) -> &'static str {
+        let part = |role: &&Role| !matches!(role, Role::Foreign | Role::Idle);
+        match self.roles[..index].iter().rev().find(part) {
+            Some(Role::Address { .. } | Role::ProcessData { .. }) => "9.5",
+            Some(Role::Data { .. }) | None => "10.1",
+            Some(role) => role.rule().0,
+        }
+    }
+
+    /// Whether ReadWord or ReadLong reads the byte at `index`, of a cell that WriteByte was the last to write.
+    fn is_word_of_bytes(&self, index: usize) -> bool {
+        let Role::Data {
+            drive: Some(drive),
+            address,
+        } = self.roles[index]
+        else {
+            return false;
+        };
+        let of_it = |at: &usize| self.roles[*at].drive() == Some(drive);
+        let places = (0..index).rev().filter(of_it);
+        let is_part =
+            |at: &usize| matches!(self.roles[*at], Role::Command { .. } | Role::Data { .. });
+        let Some(command) = places.clone().take_while(is_part).last() else {
+            return false;
+        };
+        let writes = |at: usize| match self.roles[at] {
+            Role::Check {
+                writes: Some((first, width)),
+                ..
+            } => (first..first.saturating_add(u16::from(width)))
+                .contains(&address)
+                .then_some(width),
+            _ => None,
+        };
+        let is_wide = [READ_WORD, READ_LONG].contains(&self.bytes[command].0);
+        is_wide && places.into_iter().find_map(writes) == Some(1)
     }
 
     /// The section of what a cell holds that is read at `index`.
@@ -411,7 +565,7 @@ mod tests {
     }
 
     fn blamed(seen: &[Meant], trials: &[Trial]) -> Option<u8> {
-        culprit(3, seen, trials).map(|own| own.drive)
+        culprit(3, seen, trials, &[]).map(|own| own.drive)
     }
 
     #[test]
@@ -435,7 +589,8 @@ mod tests {
         let found = |at: &[u8]| {
             let step = |step: u8| (step, at.contains(&step).then_some(Meant::Behind(step)));
             let tried = trial(Meant::Behind(0), &[step(1), step(2)]);
-            culprit(3, &[Meant::Behind(0)], &[tried]).map(|own| (own.drive, own.perhaps_of_all))
+            culprit(3, &[Meant::Behind(0)], &[tried], &[])
+                .map(|own| (own.drive, own.perhaps_of_all))
         };
         // Drive 0 alone is in the error mode where the error is in drive 0.
         assert_eq!(found(&[]), Some((0, false)));

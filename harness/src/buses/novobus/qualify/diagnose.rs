@@ -18,6 +18,9 @@ const MOST_SIMULATED: usize = 12;
 /// Number of attempts for which every candidate is tried on simulated drives, even if it has explained none.
 const ASKED_OF_ALL: usize = 3;
 
+/// How many cells may hold what the master wrote although a wrong drive's would not: a cell may have held that byte before.
+const MOST_AGAINST: u64 = 2;
+
 /// A deviation that explains every byte.
 #[derive(Clone, Debug)]
 pub struct Named {
@@ -151,10 +154,12 @@ fn name_among<E>(
     let most = candidates.iter().map(|own| own.explained).max();
     candidates.retain(|own| own.explained > 0 && Some(own.explained) == most);
     for attempt in seen.alike {
-        if simulated || candidates.is_empty() || explains(&[], attempt).is_none() {
-            continue;
-        }
-        candidates.retain(|candidate| explains(&candidate.lines(), attempt).is_some());
+        let right = explains(&[], attempt).filter(|_| !simulated && !candidates.is_empty());
+        let Some(right) = right else { continue };
+        candidates.retain(|candidate| {
+            let own = explains(&candidate.lines(), attempt);
+            own.is_some_and(|own| own.against <= right.against + MOST_AGAINST)
+        });
     }
     simplest(candidates)
 }

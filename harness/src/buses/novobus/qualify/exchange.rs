@@ -13,6 +13,7 @@ use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::{Addressing, SyncByte};
 use harness_proto::time::{Instant, Span};
 use harness_sim::fault::LinkFault;
+use std::collections::BTreeMap;
 
 /// Bytes on a line at most.
 const BYTES_A_LINE: usize = 24;
@@ -25,6 +26,14 @@ const LONG: usize = 8_000;
 
 /// The ports of the EEPROM (ND21 14.10.5): values written there persist over a reset.
 pub(super) const EEPROM: std::ops::RangeInclusive<u16> = ram::EEPROM_BUFFER..=ram::EEPROM_CONTROL;
+
+/// Orders to the controller of the EEPROM (14.10.5.1), and the cells that no function of the drive uses (14.10.5.3).
+const READ_BYTE: u8 = 0x81;
+const WRITE_BYTE: u8 = 0x82;
+const CUSTOMERS: std::ops::RangeInclusive<u8> = 0x5C..=0x5F;
+
+/// How long the controller of an EEPROM may take for a byte: twice the time of the model.
+const EEPROM_TIME: Span = Span::from_millis(20);
 
 /// What the master did in an attempt, in order.
 #[derive(Clone, Debug)]
@@ -156,22 +165,14 @@ impl Sent {
 
     /// The text of a scenario that sends the first `count` bytes again, each telegram `step` addresses on in a ring of `drives`. `None` where it
     /// would be another conversation: a short address does not go on from the last drive to the first, and what an EEPROM holds is not
-    /// exchanged.
+    /// exchanged, apart from the cells of the customer.
     pub(super) fn exchanged(&self, count: usize, drives: u8, step: u8) -> Option<String> {
         let on = |drive: u8| {
             let drive = (u16::from(drive) + u16::from(step)) % u16::from(drives);
             u8::try_from(drive).ok()
         };
-        let writes_eeprom = |role: &Role| match role {
-            Role::Check {
-                writes: Some((address, width)),
-                ..
-            } => (*address..address.saturating_add(u16::from(*width)))
-                .any(|cell| EEPROM.contains(&cell)),
-            _ => false,
-        };
         let roles = self.roles.get(..count)?;
-        if count > MOST_BYTES || roles.iter().any(writes_eeprom) {
+        if count > MOST_BYTES || self.changes_eeprom(count) {
             return None;
         }
         let mut new: Vec<(u8, bool)> = self.bytes[..count].to_vec();
@@ -193,6 +194,50 @@ impl Sent {
         Some(self.text(&new, drives, step))
     }
 
+    /// Whether the first `count` bytes may write another cell of an EEPROM than those of the customer (ND21 14.10.5.3).
+    fn changes_eeprom(&self, count: usize) -> bool {
+        let mut buffers = BTreeMap::new();
+        let mut checks = self.roles[..count].iter().enumerate();
+        checks.any(|(at, role)| {
+            let Role::Check {
+                drive: Some(drive),
+                writes: Some((address, width)),
+                ..
+            } = *role
+            else {
+                return false;
+            };
+            let cells = address..address.saturating_add(u16::from(width));
+            if !cells.clone().any(|cell| EEPROM.contains(&cell)) {
+                return false;
+            }
+            // WriteByte and WriteWord end with the address; in front of it stands the byte for the highest cell first.
+            let whole = |place: &usize| self.roles[*place].drive() == Some(drive);
+            let data = |cell: u16| {
+                let last = at.checked_sub(3)?;
+                let place = last.checked_sub(usize::from(cell - address))?;
+                (place..at)
+                    .all(|own| whole(&own))
+                    .then(|| self.bytes[place].0)
+            };
+            for cell in cells.filter(|cell| EEPROM.contains(cell)) {
+                let Some(data) = data(cell) else { return true };
+                let customers = |own: &u8| CUSTOMERS.contains(own);
+                match (cell, data) {
+                    (ram::EEPROM_BUFFER, _) => {
+                        buffers.insert(drive, data);
+                    }
+                    (ram::EEPROM_CONTROL, READ_BYTE | 0..=0x80) => {}
+                    (ram::EEPROM_CONTROL, WRITE_BYTE)
+                        if buffers.get(&drive).is_some_and(customers) => {}
+                    (ram::EEPROM_CONTROL, _) => return true,
+                    _ => {}
+                }
+            }
+            false
+        })
+    }
+
     fn text(&self, bytes: &[(u8, bool)], drives: u8, step: u8) -> String {
         let title = format!("The same conversation, each telegram {step} addresses on");
         let mut text = Text::default();
@@ -200,10 +245,8 @@ impl Sent {
         text.empty_line();
         let mut left = bytes.iter().map(|(byte, _)| Expected::Byte(*byte));
         // Bytes stand together up to a gap or a fault.
-        for run in self
-            .pieces
-            .chunk_by(|one, other| one.is_byte() && other.is_byte())
-        {
+        let pieces = self.patient();
+        for run in pieces.chunk_by(|one, other| one.is_byte() && other.is_byte()) {
             let actions = match run {
                 [Piece::Gap(gap)] => vec![Action::Wait(Duration::micros(gap.as_nanos() / 1_000))],
                 [Piece::Fault(byte, fault)] => {
@@ -233,6 +276,35 @@ impl Sent {
 impl Piece {
     const fn is_byte(&self) -> bool {
         matches!(self, Self::Byte)
+    }
+}
+
+impl Sent {
+    /// The pieces, with a gap behind each order to an EEPROM: other drives may be slower than the one that was asked first.
+    fn patient(&self) -> Vec<Piece> {
+        let mut pieces = Vec::with_capacity(self.pieces.len());
+        let mut index = 0;
+        for piece in &self.pieces {
+            pieces.push(piece.clone());
+            if piece.is_byte() {
+                if self.starts_eeprom(index) {
+                    pieces.push(Piece::Gap(EEPROM_TIME));
+                }
+                index += 1;
+            }
+        }
+        pieces
+    }
+
+    /// Whether a byte gives an order to the controller of an EEPROM.
+    fn starts_eeprom(&self, index: usize) -> bool {
+        let writes = match self.roles[index] {
+            Role::Check { writes, .. } => writes,
+            _ => None,
+        };
+        writes.is_some_and(|(address, width)| {
+            (address..address.saturating_add(u16::from(width))).contains(&ram::EEPROM_CONTROL)
+        })
     }
 }
 
@@ -267,4 +339,35 @@ fn is_written_as_read(fault: &LinkFault) -> bool {
             | LinkFault::Duplicate
             | LinkFault::Insert(_)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::plan::Exchange;
+    use harness_proto::novobus::command::Command;
+
+    /// ND21 14.10.5: only the customer's cells of another drive are written when roles are exchanged.
+    #[test]
+    fn no_other_cell_of_an_eeprom_is_written() {
+        let orders = |cell: u8, order: u8| {
+            let writes = [(ram::EEPROM_BUFFER, cell), (ram::EEPROM_CONTROL, order)];
+            let bytes = writes.into_iter().flat_map(|(address, data)| {
+                let command = Command::WriteByte { address, data };
+                Exchange::new(3, 1, command).expect("a drive").bytes
+            });
+            let bytes: Vec<_> = bytes.map(|byte| (byte, true)).collect();
+            let sent = Sent {
+                pieces: vec![Piece::Byte; bytes.len()],
+                roles: roles(RingSize::new(3).expect("a ring"), &bytes),
+                bytes,
+            };
+            sent.exchanged(sent.bytes.len(), 3, 1)
+        };
+        assert!(orders(0x60, READ_BYTE).is_some());
+        let text = orders(0x5C, WRITE_BYTE).expect("a customer's cell");
+        assert!(text.trim_end().ends_with("\nwait 20000us"), "{text}");
+        assert_eq!(orders(0x60, WRITE_BYTE), None);
+        assert_eq!(orders(0x5C, 0x84), None);
+    }
 }

@@ -19,6 +19,8 @@ pub struct Evidence {
     pub apart: Span,
     /// Whether every byte also came at the predicted time.
     pub timely: bool,
+    /// How many cells hold what the master wrote, where the hypothesis says that they hold something else.
+    pub against: u64,
 }
 
 /// The hypotheses that explain every byte of all conversations, with their evidence, in the order given. If one of them also explains the
@@ -61,6 +63,7 @@ pub(crate) fn judge(
         }
         evidence.apart = evidence.apart + comparison.apart;
         evidence.timely &= comparison.untimely.is_none();
+        evidence.against += comparison.against;
     }
     Some(evidence)
 }

@@ -2,13 +2,24 @@
 
 mod blame;
 mod diagnose;
+mod eeprom;
 mod exchange;
 mod hypothesis;
+mod pinned;
 mod probes;
 mod settle;
 
 pub use blame::{Culprit, Meant, Sighting, Trial, agreed, culprit, exchange};
 pub use diagnose::{Named, Seen, Whose, deviating_masters, name};
+pub use eeprom::{dumps, marches};
 pub use hypothesis::{Evidence, Hypothesis, explaining};
-pub use probes::{Asked, Probe, conversations, hypotheses, probes};
+pub use pinned::{Pinned, Question, questions};
+pub use probes::{Asked, Probe, conversations, hypotheses, probes, thorough};
 pub use settle::{Answer, answer};
+
+/// What the names of scenarios begin with that a qualification makes from what it has heard: the roles of drives exchanged, questions to the
+/// ring, and marches over the EEPROM.
+pub(crate) const TRIALS: [&str; 3] = [EXCHANGED, ASKED, EEPROM_TRIAL];
+const EXCHANGED: &str = "exchanged-";
+const ASKED: &str = "asked-";
+const EEPROM_TRIAL: &str = "thorough-eeprom-";

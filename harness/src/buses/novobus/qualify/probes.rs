@@ -21,6 +21,8 @@ static OF_DRIVES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/probes/nd2
 
 static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/novobus");
 
+static THOROUGH: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/novobus-thorough");
+
 /// Placeholder for a drive's number in a conversation that is played for several drives: the first ones, the middle one and the last
 /// one.
 const EACH: &str = "{drive}";
@@ -224,7 +226,7 @@ pub fn conversations(
                         .replace(RECEIVER, &receiver)
                         .into(),
                 };
-                entries.push(Entry::new(source, Some(drives))?);
+                entries.extend(entry_for(source, drives)?);
             }
             continue;
         }
@@ -241,10 +243,39 @@ pub fn conversations(
                 },
                 text: text.replace(EACH, &drive.to_string()).into(),
             };
-            entries.push(Entry::new(source, Some(drives))?);
+            entries.extend(entry_for(source, drives)?);
         }
     }
     Ok(entries)
+}
+
+/// A scenario on a ring of `drives`; `None` where it is for smaller rings.
+fn entry_for(source: Source, drives: u8) -> Result<Option<Entry>, Box<Problems>> {
+    match Entry::new(source.clone(), Some(drives)) {
+        Ok(entry) => Ok(Some(entry)),
+        // Without a size it is planned for its default.
+        Err(problems) => match Entry::new(source, None) {
+            Ok(_) => Ok(None),
+            Err(_) => Err(problems),
+        },
+    }
+}
+
+/// The long conversations of a thorough qualification, for a ring of `drives`.
+///
+/// # Errors
+/// One of them has mistakes.
+pub fn thorough(drives: u8) -> Result<Vec<Entry>, Box<Problems>> {
+    let mut files: Vec<_> = THOROUGH.files().collect();
+    files.sort_by_key(|file| file.path().to_owned());
+    let entries = files.into_iter().filter_map(|file| {
+        let source = Source {
+            name: format!("thorough-{}", file.path().file_stem()?.to_str()?),
+            text: file.contents_utf8()?.into(),
+        };
+        entry_for(source, drives).transpose()
+    });
+    entries.collect()
 }
 
 /// The possible values of a property of the bus: first all drives alike, then one drive different from the others.
@@ -327,6 +358,15 @@ mod tests {
             ["qualify-location-master-to-2", "qualify-location-2-to-1"]
         );
         assert_eq!(names(250, &|_| true).len(), 250);
+    }
+
+    #[test]
+    fn conversations_have_no_mistakes_on_rings_of_any_size() {
+        for drives in [1, 2, 3, 16, 60, 250] {
+            let all = conversations(drives, &|_| false).expect("no mistakes");
+            assert!(all.len() >= 10, "{drives}");
+            assert!(!thorough(drives).expect("no mistakes").is_empty());
+        }
     }
 
     #[test]

@@ -303,7 +303,10 @@ impl Comparer<'_> {
             _ if self.is_recorded(place) => self.comparison.measured += 1,
             Reading::Wrong => return Some(false),
             Reading::Own => self.comparison.measured += 1,
-            Reading::Right => {}
+            Reading::Right => {
+                let written = self.knowledge.written_now(place, value);
+                self.comparison.against += u64::from(value != wanted && written == 0xFF);
+            }
             Reading::Learned if value == wanted => {}
             Reading::Learned => self.comparison.adopted.push(Adopted {
                 ring,

@@ -174,6 +174,8 @@ pub struct Comparison {
     pub compared: u64,
     /// How many were not compared, because the drive measures their data itself.
     pub measured: u64,
+    /// How many hold what the master wrote, although the model is a wrong drive's and holds something else.
+    pub against: u64,
     /// The contents of cells that the model took over.
     pub adopted: Vec<Adopted>,
     /// The bytes whose values are the drives' choice, in order; empty if the twin knows the content of every cell.

@@ -12,6 +12,10 @@ use harness_proto::novobus::command::{Command, PAGE};
 use harness_proto::novobus::output::Output;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// How many different values must come out of as many resets before a cell counts as one that a reset does not clear: one value may
+/// be what the drive loads or sets.
+const SURVIVALS: usize = 3;
+
 /// A byte of a drive: its ring, counted from 0, the drive, and the address.
 pub(crate) type Place = (usize, u8, u16);
 
@@ -113,6 +117,14 @@ pub(crate) enum Reading {
     Own,
 }
 
+/// Whether a reset must replace what a master wrote to a cell: all data "which has not been saved on the EEPROM will be lost" (ND21
+/// 10.5). The recording of the oscilloscope has no value that a drive must set.
+fn is_lost(address: u16) -> bool {
+    let kept = own::kept(address, 0).bits == 0xFF;
+    kept && (ram::POLE_JUMP..=ram::VCO_LIN_L).contains(&address)
+        && !own::SCOPE_BUFFER.contains(&address)
+}
+
 /// What is known of all drives.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Knowledge {
@@ -125,6 +137,12 @@ pub(crate) struct Knowledge {
     working: BTreeSet<(usize, u8)>,
     /// The present conversation has faults: a drive may have been switched off and on.
     disturbed: bool,
+    /// What cells held before the last reset, if the master wrote all of it in the present attempt.
+    before_reset: BTreeMap<Place, u8>,
+    /// The values with which cells came out of resets, as long as they came out of each with the value that was written before it.
+    survived: BTreeMap<Place, BTreeSet<u8>>,
+    /// Drives whose EEPROM may have been written in the present attempt.
+    saved: BTreeSet<(usize, u8)>,
 }
 
 impl Knowledge {
@@ -132,6 +150,9 @@ impl Knowledge {
     pub(crate) fn begin(&mut self) {
         self.cells.values_mut().for_each(|own| own.now = 0);
         self.programs.values_mut().for_each(Program::begin);
+        self.before_reset.clear();
+        self.survived.clear();
+        self.saved.clear();
         self.working.clear();
     }
 
@@ -146,6 +167,17 @@ impl Knowledge {
     /// A drive was reset (ND21 10.5): its cells are loaded from its EEPROM, and how long the drive took to write that is its choice
     /// (14.10.5).
     pub(crate) fn reset(&mut self, ring: usize, drive: u8) {
+        let of_it = |place: &Place| (place.0, place.1) == (ring, drive);
+        let lost = |place: &Place, own: &Known| {
+            own.now == 0xFF && !self.saved.contains(&(ring, drive)) && is_lost(place.2)
+        };
+        let cells = self.cells.iter();
+        let lost: Vec<_> = cells
+            .filter(|(place, own)| of_it(place) && lost(place, own))
+            .map(|(place, own)| (*place, own.value))
+            .collect();
+        self.before_reset.retain(|place, _| !of_it(place));
+        self.before_reset.extend(lost);
         self.cells
             .retain(|cell, _| (cell.0, cell.1) != (ring, drive));
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
@@ -171,8 +203,12 @@ impl Knowledge {
         let workers = workers.into_iter().filter(|(starts, _)| *starts);
         self.started
             .extend(workers.map(|(_, worker)| (ring, drive, worker)));
-        if ordered {
+        // A teach-in writes positions into the EEPROM (13.1.7.3), and so may the cycle control.
+        if started || ordered {
             self.programs.remove(&(ring, drive));
+        }
+        if started || ordered || address == ram::EEPROM_CONTROL {
+            self.saved.insert((ring, drive));
         }
         let program = self.programs.entry((ring, drive)).or_default();
         program.write(address, write);
@@ -275,6 +311,19 @@ impl Knowledge {
                 (0, _) => Reading::Own,
                 _ => Reading::Wrong,
             };
+        }
+        if own.written == 0 && !own.learned {
+            let before = self.before_reset.remove(&place);
+            let survived = self.survived.entry(place).or_default();
+            match before {
+                Some(before) if before == value => {
+                    survived.insert(value);
+                }
+                _ => survived.clear(),
+            }
+            if survived.len() >= SURVIVALS {
+                return Reading::Wrong;
+            }
         }
         if own.learned {
             differ |= (value ^ own.value) & !written;
@@ -381,6 +430,28 @@ mod tests {
         assert_eq!(known.read(status, 0x00, 0x00), Reading::Own);
         known.converse(false);
         assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
+    }
+
+    /// ND21 10.5: what was not saved in the EEPROM is lost with a reset. One value may be what the drive loads; three are not.
+    #[test]
+    fn a_cell_that_outlives_three_resets_was_not_reset() {
+        let outlives = |values: [u8; 3], read: &dyn Fn(u8) -> u8, save: bool| {
+            let mut known = Knowledge::default();
+            known.begin();
+            let readings = values.map(|value| {
+                known.write(CELL, Write::Set(value));
+                if save {
+                    known.write((0, 1, ram::EEPROM_CONTROL), Write::Set(0x84));
+                }
+                known.reset(0, 1);
+                known.read(CELL, 0, read(value))
+            });
+            readings[2]
+        };
+        assert_eq!(outlives([1, 2, 3], &|own| own, false), Reading::Wrong);
+        assert_eq!(outlives([1, 2, 3], &|_| 2, false), Reading::Learned);
+        assert_eq!(outlives([2, 2, 2], &|own| own, false), Reading::Learned);
+        assert_eq!(outlives([1, 2, 3], &|own| own, true), Reading::Learned);
     }
 
     /// ND21 14.10.3: where process data go is known from a write by any command, and from a read.

@@ -17,8 +17,9 @@ const READ_BYTE: u8 = 0x81;
 const WRITE_BYTE: u8 = 0x82;
 const READ: u8 = 1 << 5;
 
-/// The cells of the EEPROM that no function of the drive uses (14.10.5.3).
-const CUSTOMERS: RangeInclusive<u8> = 0x5C..=0x5F;
+/// The cells of the EEPROM that only a master changes (14.2.2): the parameters and settings, the customer's cells, and the positions of
+/// the cycle control. The drive itself counts its hours, notes errors and dates, and may note its reference point.
+const STEADY: [RangeInclusive<u8>; 4] = [0x20..=0x4B, 0x50..=0x57, 0x5A..=0x5F, 0x60..=0xFF];
 
 /// A byte of `errorcode`: bits of [`Program::zeros`].
 const HIGH: u8 = 1;
@@ -36,7 +37,7 @@ pub(super) struct Program {
     /// What the master has written to the ports of the EEPROM, while it stands there.
     address: Option<u8>,
     data: Option<u8>,
-    /// What the master has written to cells of the EEPROM.
+    /// What the master has written to cells of the EEPROM, or read from them.
     eeprom: BTreeMap<u8, u8>,
     /// The cell that is read, and whether the drive has said that it is done.
     reading: Option<(u8, bool)>,
@@ -76,9 +77,13 @@ impl Program {
         self.reading = None;
         match (command, address, data) {
             (READ_BYTE, Some(address), _) => self.reading = Some((address, false)),
-            (WRITE_BYTE, Some(address), Some(data)) if CUSTOMERS.contains(&address) => {
-                self.eeprom.insert(address, data);
+            (WRITE_BYTE, Some(address), Some(data)) => {
+                if is_steady(address) {
+                    self.eeprom.insert(address, data);
+                }
             }
+            // The master confirms that it has seen the end of the last order.
+            (0..READ_BYTE, ..) => {}
             // It is unknown which cell such a command writes.
             _ => self.eeprom.clear(),
         }
@@ -115,16 +120,54 @@ impl Program {
             }
             ram::EEPROM_BUFFER => {
                 let (address, _) = self.reading.filter(|(_, done)| *done)?;
-                self.eeprom.get(&address).map(|held| *held == value)
+                match self.eeprom.get(&address) {
+                    Some(held) => Some(*held == value),
+                    None => {
+                        // A drive that refuses the rest of the command sends 00, too (9.7).
+                        if is_steady(address) && value != 0 {
+                            self.eeprom.insert(address, value);
+                        }
+                        None
+                    }
+                }
             }
             _ => None,
         }
     }
 }
 
+fn is_steady(address: u8) -> bool {
+    STEADY.iter().any(|cells| cells.contains(&address))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// ND21 14.2.2, 14.10.5: a cell that only a master changes holds what was read before, whatever was written to other cells.
+    #[test]
+    fn the_eeprom_holds_what_was_read() {
+        let mut drive = Program::default();
+        let read = |drive: &mut Program, address, value| {
+            drive.write(ram::EEPROM_BUFFER, Write::Set(address));
+            drive.write(ram::EEPROM_CONTROL, Write::Set(READ_BYTE));
+            drive.read(ram::EEPROM_CONTROL, 0x01, READ);
+            drive.read(ram::EEPROM_BUFFER, address, value)
+        };
+        assert_eq!(read(&mut drive, 0xDC, 0x77), None);
+        drive.write(ram::EEPROM_CONTROL, Write::Set(0x10));
+        assert_eq!(read(&mut drive, 0x05, 0x01), None);
+        drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C));
+        drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5));
+        drive.write(ram::EEPROM_CONTROL, Write::Set(WRITE_BYTE));
+        assert_eq!(read(&mut drive, 0xDC, 0xA5), Some(false));
+        assert_eq!(read(&mut drive, 0xDC, 0x77), Some(true));
+        // The operating hours, which the drive counts.
+        assert_eq!(read(&mut drive, 0x05, 0x02), None);
+        // The parameters are copied into it.
+        drive.write(ram::EEPROM_CONTROL, Write::Set(0x84));
+        assert_eq!(read(&mut drive, 0xDC, 0x78), None);
+    }
 
     /// ND21 14.10.1, 14.11.14: behind a confirmed error the code of the bus's next one is decided, and no other code.
     #[test]
