@@ -339,7 +339,7 @@ impl Read<'_> {
         }
         for (index, text) in file.inserted.iter().flatten().enumerate() {
             if hex(text).is_none() {
-                let message = format!("`{text}` is no byte");
+                let message = format!("`{text}` is not a byte");
                 found.push(self.at(
                     "inserted",
                     index,
@@ -363,7 +363,7 @@ impl Read<'_> {
         {
             found.push(self.wrong(
                 &["bytes"],
-                "this is no range of bytes",
+                "this is not a range of bytes",
                 "FIRST..LAST, counted from 1, such as \"1..18\" expected here",
             ));
         }

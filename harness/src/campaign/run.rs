@@ -160,7 +160,7 @@ impl Campaign {
             Talk::Bytes(bytes) => {
                 let Some(by_manual) = ByManual::new(start, bytes) else {
                     let message =
-                        "said twice, the conversation leaves something else than said once";
+                        "played twice, the conversation leaves other cells than played once";
                     let expected =
                         "a conversation whose telegrams can be repeated is expected there";
                     return Err(mistake(read.wrong(&["scenario"], message, expected)));

@@ -268,7 +268,7 @@ impl Reader<'_> {
             return self.wrong(
                 from,
                 format!(
-                    "{text:?} is no link of a ring: master->K, K->K-1 or 0->master is expected"
+                    "{text:?} is not a link of a ring: master->K, K->K-1 or 0->master is expected"
                 ),
             );
         };

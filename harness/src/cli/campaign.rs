@@ -101,7 +101,7 @@ fn complain(error: &FindError, output: &mut Output) {
 /// Prints the scenario of one case.
 fn replay(name: &str, campaigns: &[Campaign], output: &mut Output) -> std::io::Result<Exit> {
     let [campaign] = campaigns else {
-        output.complain("--case needs the one campaign that it belongs to");
+        output.complain("--case needs exactly one campaign; name the one that the case belongs to");
         return Ok(Exit::Usage);
     };
     let case = match Case::from_name(name, campaign.shape.drives) {

@@ -16,7 +16,7 @@ pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io:
         }
     };
     if sources.is_empty() {
-        output.complain("no scenario (*.scn) was found there");
+        output.complain("no scenario (*.scn) was found in the folders given");
         return Ok(Exit::NothingSelected);
     }
     let mut exit = Exit::Passed;

@@ -97,7 +97,7 @@ impl Findings {
             Verdict::Aborted => "it was aborted",
             Verdict::RigError => "the rig failed",
             Verdict::Passed | Verdict::Marginal if !whole => {
-                "drives sent bytes unasked, and what comes behind is a race (ND21 9.9)"
+                "drives sent bytes by themselves, so the order of the bytes behind them is open (ND21 9.9)"
             }
             Verdict::Passed | Verdict::Marginal => {
                 self.equal += 1;

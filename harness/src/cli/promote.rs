@@ -41,8 +41,10 @@ pub(crate) fn promote(arguments: &PromoteArguments, output: &mut Output) -> std:
     output.result(&names.collect::<String>())?;
     output.say("the model passes it");
     output.say(match promoted.fails_on_deviating {
-        Some(true) => ", the ring that it was found on fails it\n",
-        Some(false) => ", and so does the ring that it was found on: what is otherwise does not show at the master\n",
+        Some(true) => ", and the ring with the finding fails it\n",
+        Some(false) => {
+            ", and so does the ring with the finding: the difference does not reach the master\n"
+        }
         None => "\n",
     });
     output.say("compare the table with the print, cell by cell, before you keep it\n");

@@ -199,10 +199,10 @@ fn name_master(findings: &Findings, output: &mut Output) -> std::io::Result<Stri
         ));
     }
     if text.is_empty() {
-        text.push_str("the master: it is otherwise than the master of the manual, and no single known deviation explains it\n");
+        text.push_str("the bench's master differs from the master of the manual, and no single known deviation explains it\n");
     }
     text.push_str(
-        "the bench is wrong, not a drive: what its master did says nothing of the drives\n",
+        "the bench is wrong, not a drive: its own master deviates, so nothing follows for the drives\n",
     );
     output.result(&text)?;
     Ok(text)
@@ -325,7 +325,7 @@ fn profile(
             }
             Asking::Answer(Answer::NotDone(time)) => {
                 findings.note_probe();
-                format!("longer than {time}: it was not done when it was asked for the last time")
+                format!("longer than {time}: not finished when asked for the last time")
             }
             Asking::Answer(Answer::Unexplained) => {
                 let why = "no value of it gives the bytes that came";

@@ -86,7 +86,7 @@ impl Failure {
     fn state(error: &std::io::Error) -> Self {
         Self::Said(
             Exit::RigError,
-            format!("failed to use the folder of locks: {error}; DRIVEBENCH_STATE names another"),
+            format!("failed to use the folder of locks: {error}; set DRIVEBENCH_STATE to another"),
         )
     }
 }
@@ -131,7 +131,7 @@ fn command_on(command: &RigCommand, output: &mut Output) -> Result<Exit, Failure
         RigCommand::Scan => {
             let ports = scan::scan(Path::new("/"));
             if ports.is_empty() {
-                let message = "this machine has no serial port; is the adapter plugged in?";
+                let message = "this machine has no serial port; plug the adapter in and try again";
                 return Err(Failure::Said(Exit::NothingSelected, message.to_owned()));
             }
             scan::propose(&ports)
@@ -257,7 +257,7 @@ fn row(name: &str, place: &RigPlace, folder: &Path) -> Value {
         Ok((None, Standing::Held(holder))) => {
             let who = holder
                 .as_ref()
-                .map_or("somebody".to_owned(), Holder::to_string);
+                .map_or("another user".to_owned(), Holder::to_string);
             ("held", format!("by {who}"), holder)
         }
     };

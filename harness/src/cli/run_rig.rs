@@ -282,7 +282,7 @@ pub(crate) fn play(
 pub(crate) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
     let session = run.session();
     if session.overdue() {
-        output.complain("the rig's file allows no longer run (max_run)");
+        output.complain("the run reached `max_run` of the rig's file");
         return true;
     }
     matches!(

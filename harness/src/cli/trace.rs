@@ -75,7 +75,7 @@ pub(crate) struct Shown<'s> {
 pub(crate) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut Output) -> bool {
     if format == TraceFormat::Pcapng && showing.output.is_none() && output.terminal {
         output.complain(
-            "pcapng is no text, and standard output is a terminal; add `--output FILE`, or send it on with `|` or `>`",
+            "pcapng is not a text, and standard output is a terminal; add `--output FILE`, or send it on with `|` or `>`",
         );
         return false;
     }

@@ -24,7 +24,7 @@ use std::time::SystemTime;
 #[derive(Debug, thiserror::Error)]
 pub enum EvidenceError {
     /// There is something in it.
-    #[error("{0} is there already and not empty: evidence goes into a folder of its own")]
+    #[error("{0} is not empty; name a new or empty folder for the evidence")]
     NotEmpty(String),
     /// A file.
     #[error("failed to use {path}: {error}")]
@@ -41,7 +41,7 @@ pub enum EvidenceError {
     #[error("failed to use a signature: {0}")]
     Signature(String),
     /// It is no folder of a run.
-    #[error("{0} is no folder of evidence: {1}")]
+    #[error("{0} is not an evidence folder: {1}")]
     Foreign(String, String),
 }
 

@@ -70,7 +70,7 @@ fn parse(bytes: &[u8]) -> Result<Line, (usize, String)> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let at = error.valid_up_to();
         let byte = bytes.get(at).copied().unwrap_or(0);
-        (at + 1, format!("this is no UTF-8: {byte:02X} stands here"))
+        (at + 1, format!("this is not UTF-8: {byte:02X} stands here"))
     })?;
     serde_json::from_str::<Line>(text.trim_end_matches('\n')).map_err(|error| {
         let message = error.to_string();
@@ -215,6 +215,6 @@ fn verdict(name: &str) -> Result<(), String> {
     let known = Verdict::ALL.iter().any(|verdict| verdict.name() == name);
     match known {
         true => Ok(()),
-        false => Err(format!("`{name}` is no verdict")),
+        false => Err(format!("`{name}` is not a verdict")),
     }
 }

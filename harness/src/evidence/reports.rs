@@ -116,7 +116,7 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged) -> Option<String> {
     };
     if capture(&capture_read.traces, &again.outcome) != text {
         return Some(format!(
-            "{name} is not as this program writes what it holds"
+            "{name} is not in the form in which this program writes it"
         ));
     }
     if opened.header.simulated || !opened.rig.file.interlock.is_empty() {
@@ -254,6 +254,6 @@ fn foreign(path: &Path, opened: &Opened, judged: &[Judged]) -> Vec<String> {
     let there = files::names(path);
     let foreign = there.iter().filter(|file| !known.contains(*file));
     foreign
-        .map(|file| format!("{file} is no file of this run"))
+        .map(|file| format!("{file} is not a file of this run"))
         .collect()
 }

@@ -114,9 +114,7 @@ fn scenario(
     for (number, made) in (1..).zip(&tape.captures) {
         let file = format!("{CAPTURES}/{name}.{number}.json");
         if read_text(path, &file)? != *made {
-            wrong.push(format!(
-                "{file} is not what comes of the scenario played again"
-            ));
+            wrong.push(format!("{file} differs from the scenario played again"));
         }
     }
     Ok(wrong)

@@ -29,7 +29,7 @@ pub(super) fn ready(key: &Path) -> Result<(), EvidenceError> {
     if !key.is_file() {
         let key = key.display();
         return Err(EvidenceError::Signature(format!(
-            "{key} is no file of a key; `ssh-keygen -t ed25519 -f FILE` makes one"
+            "{key} is not a file of a key; `ssh-keygen -t ed25519 -f FILE` makes one"
         )));
     }
     let mut command = Command::new(TOOL);
@@ -88,7 +88,7 @@ pub(super) fn check(path: &Path, signer: Signer<'_>) -> Result<Option<String>, E
         let said = [&output.stdout[..], &output.stderr[..]].concat();
         let said = String::from_utf8_lossy(&said).trim().replace('\n', "; ");
         format!(
-            "{SIGNATURE} is no signature of {} by {}: {said}",
+            "{SIGNATURE} is not a signature of {} by {}: {said}",
             signer.identity,
             signer.allowed.display()
         )

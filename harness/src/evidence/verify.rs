@@ -274,7 +274,7 @@ pub(super) fn text_of(
     scenario: &dyn Fn(&str) -> Result<String, String>,
 ) -> Result<String, String> {
     if !is_name(name) {
-        return Err("this is no name of a scenario".to_owned());
+        return Err("this is not a name of a scenario".to_owned());
     }
     let text = scenario(name)?;
     match sum(text.as_bytes()) == sha256 {

@@ -141,7 +141,7 @@ impl<'a> Walk<'a> {
                 None => self.problems.push(
                     Problem::new(
                         span_of(key),
-                        format!("`{name}` is no key of {what}"),
+                        format!("`{name}` is not a key of {what}"),
                         format!("one of {} expected here", known.join(", ")),
                     )
                     .did_you_mean(name, &known),
@@ -230,7 +230,7 @@ impl<'a> Walk<'a> {
                 if !words.contains(&text.as_ref()) {
                     let problem = Problem::new(
                         place,
-                        format!("`{text}` is no value of `{name}`"),
+                        format!("`{text}` is not a value of `{name}`"),
                         format!("one of \"{}\" expected here", words.join("\", \"")),
                     );
                     self.problems.push(problem.did_you_mean(text, &words));

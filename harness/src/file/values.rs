@@ -48,13 +48,14 @@ impl FromStr for Time {
 
     fn from_str(text: &str) -> Result<Self, ValueError> {
         let expected = "a time such as \"100ms\", \"5s\" or \"1h\" expected here";
-        let quantity = parse(text).map_err(|_| wrong(format!("`{text}` is no time"), expected))?;
+        let quantity =
+            parse(text).map_err(|_| wrong(format!("`{text}` is not a time"), expected))?;
         let micros = match quantity.unit.dimension() {
             Dimension::Time => quantity.value.to_f64(),
             Dimension::Hours => quantity.value.to_f64() * 3.6e9,
             _ => {
                 return Err(wrong(
-                    format!("`{}` is no unit of time", quantity.unit.name),
+                    format!("`{}` is not a unit of time", quantity.unit.name),
                     expected,
                 ));
             }
@@ -94,10 +95,11 @@ impl FromStr for Speed {
 
     fn from_str(text: &str) -> Result<Self, ValueError> {
         let expected = "a speed such as \"300rpm\" expected here";
-        let quantity = parse(text).map_err(|_| wrong(format!("`{text}` is no speed"), expected))?;
+        let quantity =
+            parse(text).map_err(|_| wrong(format!("`{text}` is not a speed"), expected))?;
         let rpm = quantity.value.to_f64();
         if quantity.unit.dimension() != Dimension::Speed {
-            let message = format!("`{}` is no unit of speed", quantity.unit.name);
+            let message = format!("`{}` is not a unit of speed", quantity.unit.name);
             return Err(wrong(message, expected));
         }
         if rpm <= 0.0 || rpm > MAX_SPEED {
@@ -158,7 +160,7 @@ impl FromStr for Wire {
             })
             .ok_or_else(|| {
                 wrong(
-                    format!("`{text}` is no link"),
+                    format!("`{text}` is not a link"),
                     "a link such as \"98->97\", \"master->99\" or \"0->master\" expected here",
                 )
             })

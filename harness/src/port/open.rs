@@ -54,23 +54,27 @@ pub struct PortSettings {
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// There is no such port.
-    #[error("there is no port {0}: is the adapter plugged in?")]
+    #[error(
+        "there is no port {0}: check that the adapter is plugged in; `drivebench rig scan` lists the ports"
+    )]
     Missing(String),
     /// The user has no right to open it.
-    #[error("no right to open {0}: on most systems its group is `dialout` (ls -l {0})")]
+    #[error(
+        "no permission to open {0}: on most systems users of the group `dialout` have it (ls -l {0})"
+    )]
     Denied(String),
     /// Another program has it.
     #[error("{0} is in use by another program")]
     InUse(String),
     /// The path is something else than a port.
-    #[error("{0} is no {1}")]
+    #[error("{0} is not a {1}")]
     NotA(String, &'static str),
     /// A pty where a serial port should be.
     #[error("{0} is a pseudo terminal, which has no parity: say transport = \"pty\"")]
     PseudoTerminal(String),
     /// The port does not take the settings.
     #[error(
-        "{port}: {what} was not taken; the line needs 8 data bits, odd parity and 1 stop bit: use another adapter"
+        "{port}: the adapter refused {what}; the line needs 8 data bits, odd parity and 1 stop bit: use another adapter"
     )]
     Setting {
         /// The port.

@@ -140,8 +140,8 @@ fn what_is_no_serial_port() {
     let missing = folder.path().join("none");
     for (path, part) in [
         (pty, "transport = \"pty\""),
-        (file, "is no serial port"),
-        (null, "is no serial port"),
+        (file, "is not a serial port"),
+        (null, "is not a serial port"),
         (missing, "there is no port"),
     ] {
         let error = open(&path, Rate::default(), false).expect_err("no serial port");

@@ -119,7 +119,7 @@ pub(crate) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     let Some(dimension) = cell.scale.and_then(Dimension::of) else {
         return text.trim().parse::<i32>().map(f64::from).map_err(|_| {
             wrong(
-                format!("`{text}` is no whole number"),
+                format!("`{text}` is not a whole number"),
                 "the cell has no unit: a whole number in quotes expected here",
             )
         });
@@ -130,7 +130,7 @@ pub(crate) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     if value.unit.dimension() == dimension {
         Ok(value.value.to_f64())
     } else {
-        let message = format!("`{}` is no unit of {}", value.unit.name, cell.printed);
+        let message = format!("`{}` is not a unit of {}", value.unit.name, cell.printed);
         Err(wrong(message, &expected))
     }
 }
@@ -208,7 +208,7 @@ impl Check<'_> {
                 "1 to 64 letters, digits, `.`, `_` or `-`, a letter or digit first, expected here";
             self.wrong(
                 &["rig".into(), "id".into()],
-                format!("`{id}` is no id"),
+                format!("`{id}` is not an id"),
                 expected,
             );
         }
@@ -284,7 +284,7 @@ impl Check<'_> {
                     !host.is_empty() && number.parse::<u16>().is_ok_and(|number| number > 0)
                 });
                 if !fits {
-                    let message = format!("`{port}` is no address");
+                    let message = format!("`{port}` is not an address");
                     self.wrong(
                         &at("port"),
                         message,
@@ -345,7 +345,7 @@ impl Check<'_> {
         if !first && self.file.sim.is_some() {
             self.wrong(
                 &["sim".into()],
-                "[sim] is for simulated rings; the drives of this one are what they are",
+                "[sim] is only for simulated rings; this rig has ports",
                 "no [sim] expected here",
             );
         }
@@ -578,7 +578,7 @@ impl Check<'_> {
             {
                 self.wrong(
                     &path,
-                    "this is no program",
+                    "this is not a program",
                     "[\"program\", \"argument\"] expected here",
                 );
             }
@@ -591,7 +591,7 @@ impl Check<'_> {
         };
         let date = quarantine.since.parse::<toml::value::Datetime>();
         if !date.is_ok_and(|date| date.date.is_some()) {
-            let message = format!("`{}` is no date", quarantine.since);
+            let message = format!("`{}` is not a date", quarantine.since);
             self.wrong(
                 &["quarantine".into(), "since".into()],
                 message,

@@ -20,7 +20,7 @@ const MAX_RIGS: usize = 1000;
 #[derive(Debug, thiserror::Error)]
 pub enum FindError {
     /// Nothing has this name.
-    #[error("failed to find the rig {name}: no file, and no rig of that name; {remedy}")]
+    #[error("failed to find the rig {name}: neither a file nor a rig of that name; {remedy}")]
     NotFound {
         /// The name as given.
         name: String,
@@ -84,7 +84,7 @@ pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
     Err(FindError::NotFound {
         name: name.to_owned(),
         remedy: format!(
-            "{}there are {}, and sim:N",
+            "{}the rigs are {}, and sim:N",
             near.unwrap_or_default(),
             known.join(", ")
         ),
@@ -172,7 +172,7 @@ fn rig_name(path: &Path) -> Option<String> {
 pub fn sizes(text: &str) -> Result<Vec<u8>, String> {
     let size = |text: &str| {
         let number: u64 = text.parse().map_err(|_| {
-            format!("`{text}` is no number of drives: 1 to 250 expected (ND21 8.4)")
+            format!("`{text}` is not a number of drives: 1 to 250 expected (ND21 8.4)")
         })?;
         RingSize::new(number)
             .map(RingSize::drives)

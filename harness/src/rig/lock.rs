@@ -38,7 +38,7 @@ pub enum LockError {
     },
     /// The lock file cannot be used.
     #[error(
-        "failed to lock the rig {rig} by its file in {folder}: {error}; DRIVEBENCH_STATE names another folder"
+        "failed to lock the rig {rig} by its file in {folder}: {error}; set DRIVEBENCH_STATE to another folder"
     )]
     Io {
         /// The rig's id.
@@ -51,7 +51,7 @@ pub enum LockError {
 }
 
 fn holder_text(holder: Option<&Holder>) -> String {
-    holder.map_or_else(|| "somebody who left no name".to_owned(), Holder::to_string)
+    holder.map_or_else(|| "an unnamed user".to_owned(), Holder::to_string)
 }
 
 /// The content of a lock file.

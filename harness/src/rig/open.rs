@@ -40,7 +40,7 @@ pub enum OpenRigError {
     Setup(#[from] Problems),
     /// Several transports that have no line in common.
     #[error(
-        "ring 2 runs at {second} bit/s, ring 1 at {first}: both rings of a bench share their rate"
+        "ring 2 runs at {second} bit/s, ring 1 at {first}: both rings of a rig must have the same rate"
     )]
     Rates {
         /// Ring 1.

@@ -26,7 +26,7 @@ pub enum SessionError {
         reason: String,
     },
     /// The folder of locks.
-    #[error("failed to use the folder of locks: {0}; DRIVEBENCH_STATE names another")]
+    #[error("failed to use the folder of locks: {0}; set DRIVEBENCH_STATE to another")]
     State(std::io::Error),
     /// The watchdog cannot be started.
     #[error("failed to start the watchdog: {0}")]

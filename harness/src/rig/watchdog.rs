@@ -84,7 +84,7 @@ impl Watchdog {
                 while left.recv_timeout(EVERY.min(limit)) == Err(RecvTimeoutError::Timeout) {
                     if last.age(beats.load(Ordering::Relaxed), Instant::now()) >= limit {
                         let mut why = vec![format!(
-                            "the program has shown no sign of life for {} s; the drives were told to stop, and nobody knows whether they \
+                            "the program has shown no sign of life for {} s; the drives were told to stop, and it is not known whether they \
                              did: use the emergency stop",
                             limit.as_secs_f64()
                         )];

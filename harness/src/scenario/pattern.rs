@@ -206,7 +206,7 @@ fn low_byte(number: &Located, scope: Scope) -> Result<u8, Problem> {
     if !(-255..=255).contains(&value) {
         return Err(Problem::new(
             number.span,
-            format!("{value} is no byte"),
+            format!("{value} is not a byte"),
             "a number between -255 and 255 expected here",
         ));
     }

@@ -375,7 +375,7 @@ pub(crate) fn quantity(
             None => scanner.unexpected(&expected),
             Some(word) => Problem::new(
                 word.span,
-                format!("`{}` is no unit", word.value),
+                format!("`{}` is not a unit", word.value),
                 format!("{expected} expected here"),
             )
             .did_you_mean(word.value, &names),

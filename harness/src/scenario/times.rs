@@ -233,7 +233,7 @@ fn finish(
         let names: Vec<_> = UNITS.iter().map(|(name, _)| *name).collect();
         return Err(Problem::new(
             span,
-            format!("`{value}` is no unit of time"),
+            format!("`{value}` is not a unit of time"),
             "us, ms, s or bytes expected here",
         )
         .did_you_mean(value, &names));

@@ -56,9 +56,7 @@ pub enum End {
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// As many places as rings are needed.
-    #[error(
-        "{given} place(s) given for {rings} ring(s): one --tcp or --pty for each ring expected, in their order"
-    )]
+    #[error("--tcp or --pty is expected once for each ring: {given} given, {rings} needed")]
     Places {
         /// How many there are.
         given: usize,
@@ -83,7 +81,7 @@ pub enum ServeError {
         error: io::Error,
     },
     /// The path exists already.
-    #[error("{} is there already: name another path, or remove it if no program serves there", path.display())]
+    #[error("{} exists already; name another path, or remove it if no program serves there", path.display())]
     Exists {
         /// The path.
         path: PathBuf,

@@ -384,13 +384,16 @@ fn what_is_refused() {
         (&["--tap", "3:2->1=127.0.0.1:0"], "there is no ring 3"),
         (&["--tap", "2->1"], "a link and a place expected"),
         (&["--tap", "2->1="], "a link and a place expected"),
-        (&["--tap", "21=x:0"], "is no link"),
+        (&["--tap", "21=x:0"], "is not a link"),
         (&["--tap", "2->1=a:0,b:0"], "one place expected for a tap"),
         (
             &["--cut", "2->1=a:0,b:0,c:0"],
             "one place expected for a tap",
         ),
-        (&["--tap", "2->1=a:0", "--cut", "2->1=b:0"], "somebody sits"),
+        (
+            &["--tap", "2->1=a:0", "--cut", "2->1=b:0"],
+            "uses this link already",
+        ),
         (&["--cut", "2->1=0.0.0.0:0"], "--allow-remote"),
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_drivebench"))

@@ -186,7 +186,7 @@ fn a_terminal_is_raw_and_its_link_goes_with_the_program() {
 
     let (code, text) = refused(&["--pty", place]);
     assert_eq!(code, Some(2));
-    assert!(text.contains("is there already"), "{text}");
+    assert!(text.contains("exists already"), "{text}");
     assert!(link.is_symlink(), "the first one's link stays");
 
     sim.signal("-TERM");
@@ -242,7 +242,10 @@ fn what_is_refused() {
     assert!(text.contains("--allow-remote"), "{text}");
     let (code, text) = refused(&["--rig", "sim:3,2", "--tcp", "127.0.0.1:0"]);
     assert_eq!(code, Some(2));
-    assert!(text.contains("1 place(s) given for 2 ring(s)"), "{text}");
+    assert!(
+        text.contains("--tcp or --pty is expected once for each ring: 1 given, 2 needed"),
+        "{text}"
+    );
     let (code, text) = refused(&["--tcp", "nowhere"]);
     assert_eq!(code, Some(2));
     assert!(text.contains("failed to listen at nowhere"), "{text}");

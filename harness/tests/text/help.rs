@@ -1,5 +1,8 @@
 //! What helps a user who starts: `--help`, suggestions, completions, counts, and terminals without colours.
 
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{Winsize, tcsetwinsize};
+use std::io::Read as _;
 use std::process::{Command, Output, Stdio};
 
 fn command(arguments: &[&str]) -> Command {
@@ -204,4 +207,75 @@ fn there_are_scripts_for_three_shells() {
         assert!(script.contains(words), "{script}");
         assert!(script.contains(" complete -- "), "{script}");
     }
+}
+
+/// What the program writes to a terminal of 60 columns.
+fn on_a_terminal(arguments: &[&str], term: &str) -> String {
+    let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+    let master = openpt(flags).expect("a pty");
+    grantpt(&master)
+        .and_then(|()| unlockpt(&master))
+        .expect("a pty");
+    let size = Winsize {
+        ws_row: 24,
+        ws_col: 60,
+        ws_xpixel: 0,
+        ws_ypixel: 0,
+    };
+    tcsetwinsize(&master, size).expect("a size");
+    let name = ptsname(&master, Vec::new()).expect("a name");
+    let slave = std::fs::File::options()
+        .read(true)
+        .write(true)
+        .open(name.to_str().expect("text"))
+        .expect("its other end");
+    let mut command = command(arguments);
+    command
+        .stdout(slave.try_clone().expect("another"))
+        .stderr(slave.try_clone().expect("another"))
+        .env("TERM", term)
+        .env_remove("NO_COLOR");
+    let mut child = command.spawn().expect("the program starts");
+    drop(command);
+    let reader = std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        // Reading fails when the last program has closed the other end.
+        let _closed = std::fs::File::from(master).read_to_end(&mut bytes);
+        String::from_utf8_lossy(&bytes).into_owned()
+    });
+    child.wait().expect("it ends");
+    drop(slave);
+    reader.join().expect("no panic")
+}
+
+#[test]
+fn a_list_fits_the_terminal() {
+    for arguments in [
+        &["list", "--filter", "9.7"][..],
+        &["info", "--progress", "none"],
+        &["read", "0", "nist", "Status"],
+    ] {
+        let shown = on_a_terminal(arguments, "xterm");
+        let longest = shown.lines().map(|line| line.chars().count()).max();
+        assert!(longest.is_some_and(|longest| longest <= 60), "{shown}");
+    }
+    let piped = stdout(&drivebench(&["list", "--filter", "9.7-parity-error"]));
+    assert!(piped.lines().any(|line| line.len() > 100), "{piped}");
+}
+
+#[test]
+fn a_dumb_terminal_gets_no_escape_sequences() {
+    let arguments = ["run", "9.2-synco", "9.2-pause"];
+    let coloured = on_a_terminal(&arguments, "xterm");
+    assert!(coloured.contains("\x1b[32mpassed"), "{coloured}");
+    let plain = on_a_terminal(&arguments, "dumb");
+    assert!(
+        plain.contains("passed 9.2-synco") && !plain.contains('\x1b'),
+        "{plain}"
+    );
+    let usage = on_a_terminal(&["rnu"], "dumb");
+    assert!(
+        usage.contains("'run'") && !usage.contains('\x1b'),
+        "{usage}"
+    );
 }

@@ -79,7 +79,7 @@ fn leave_clean(session: &mut Session, output: &mut Output) {
         Err(error) => Err(error.to_string()),
     };
     if let Err(why) = done {
-        output.complain(&format!("the drives were not reset behind the run: {why}"));
+        output.complain(&format!("the drives were not reset after the run: {why}"));
     }
 }
 

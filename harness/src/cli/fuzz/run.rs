@@ -152,7 +152,7 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
         sim.setup
             .extend(arguments.deviates.iter().map(Planted::line));
     } else if !arguments.deviates.is_empty() || arguments.whole {
-        output.complain("--deviates and --whole are for simulated rings: the drives of this rig are what they are");
+        output.complain("--deviates and --whole are only for simulated rings; this rig has ports");
         return Ok(Exit::Usage);
     }
     let how = Use {

@@ -33,7 +33,7 @@ impl Watcher for Telling<'_> {
     fn found(&mut self, finding: &Finding, file: &str) {
         if finding.seen_again == 0 {
             self.output.say(&format!(
-                "case {} differed once and not again in {} tries; the computer or the line may have been disturbed, so this is no finding: {}\n",
+                "case {} differed once and not again in {} tries; the computer or the line may have been disturbed, so this is not a finding: {}\n",
                 finding.number, finding.of, finding.difference.about
             ));
             return;

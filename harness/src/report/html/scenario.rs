@@ -225,7 +225,7 @@ fn came(outcome: &Outcome, start: usize, end: usize) -> (&'static str, &'static 
     let known = outcome.finding.as_ref().map(|found| &found.span);
     match (outcome.verdict, known) {
         (_, Some(span)) if span.end > 0 && (start..end).contains(&span.start) => {
-            ("bad", "otherwise, see above")
+            ("bad", "differs, see above")
         }
         (_, Some(span)) if span.end > 0 && end <= span.start => ("good", "as expected"),
         (Verdict::Passed | Verdict::Marginal | Verdict::Flaky, None) => ("good", "as expected"),

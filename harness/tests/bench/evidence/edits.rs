@@ -96,7 +96,7 @@ fn signatures() {
     ended(
         &signed("someone@else"),
         1,
-        "SHA256SUMS.sig is no signature of someone@else",
+        "SHA256SUMS.sig is not a signature of someone@else",
     );
     ended(
         &desk.run(&["verify", "kept"]),
@@ -110,7 +110,7 @@ fn signatures() {
     ended(
         &signed("bench@lab"),
         1,
-        "SHA256SUMS.sig is no signature of bench@lab",
+        "SHA256SUMS.sig is not a signature of bench@lab",
     );
     fs::remove_file(desk.path("kept/SHA256SUMS.sig")).expect("a file");
     ended(&signed("bench@lab"), 1, "SHA256SUMS.sig: it is missing");
@@ -159,5 +159,9 @@ fn a_fuzz_run_is_verified() {
     ended(&desk.run(&["verify", "kept"]), 1, "was changed");
     fit(&desk.path("kept"));
     ended(&desk.run(&["verify", "kept"]), 1, "differs      case");
-    ended(&signed(), 1, "SHA256SUMS.sig is no signature of bench@lab");
+    ended(
+        &signed(),
+        1,
+        "SHA256SUMS.sig is not a signature of bench@lab",
+    );
 }

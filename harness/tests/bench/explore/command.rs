@@ -100,7 +100,7 @@ fn from_a_seed_to_a_scenario() {
     ended(
         &drivebench(&promote),
         0,
-        "the ring that it was found on fails it",
+        "the ring with the finding fails it",
     );
     ended(&drivebench(&promote), 2, "is there already");
     let scenario = top.join("corpora/scenarios/novobus/10.3-and.scn");
@@ -335,11 +335,15 @@ fn what_is_damaged() {
         "there is no finding",
     );
     std::fs::write(&nothing, "{}").expect("room");
-    ended(&drivebench(&["shrink", name(&nothing)]), 2, "is no finding");
+    ended(
+        &drivebench(&["shrink", name(&nothing)]),
+        2,
+        "is not a finding",
+    );
     ended(
         &drivebench(&["promote", name(&nothing), "--name", "x"]),
         2,
-        "is no finding",
+        "is not a finding",
     );
     ended(
         &drivebench(&["fuzz", "replay", name(&file), "--rig", "sim:3"]),

@@ -220,7 +220,7 @@ fn a_finding_is_kept() {
     let again = promote(&finding, &naming, &found).expect_err("it is there");
     assert!(again.to_string().contains("is there already"), "{again}");
     for (name, source, word) in [
-        ("../x", None, "is no name"),
+        ("../x", None, "is not a name"),
         ("new", Some("nd21 99".to_owned()), "the catalogue has no"),
     ] {
         let naming = Naming {

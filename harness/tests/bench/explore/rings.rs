@@ -205,7 +205,7 @@ fn the_commands_on_two_rings() {
         ended(
             &drivebench(&promote),
             0,
-            "the ring that it was found on fails it",
+            "the ring with the finding fails it",
         );
         let kept = top.join(format!("corpora/scenarios/novobus/{own}.scn"));
         ended(&drivebench(&["run", name(&kept)]), 0, "1 passed");

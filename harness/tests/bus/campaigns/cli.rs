@@ -99,7 +99,7 @@ fn wrong_usage_says_what_to_do() {
         ),
         (
             &["campaign", "--case", "98->97:10:0"],
-            "--case needs the one campaign",
+            "--case needs exactly one campaign",
         ),
         (
             &["campaign", "9.7-single-bits", "--case", "98->96:10:0"],

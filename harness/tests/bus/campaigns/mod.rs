@@ -262,6 +262,6 @@ fn a_conversation_that_cannot_be_repeated_is_refused() {
     let message = &problems.all()[0].message;
     assert_eq!(
         message,
-        "said twice, the conversation leaves something else than said once"
+        "played twice, the conversation leaves other cells than played once"
     );
 }

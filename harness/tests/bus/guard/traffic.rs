@@ -229,7 +229,7 @@ fn caps() {
                 most_bytes: 60,
                 ..Limits::default()
             },
-            "have been sent, which is the most",
+            "have been sent; the rig",
         ),
     ] {
         let mut line = guarded(1, limits);

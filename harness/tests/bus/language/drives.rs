@@ -99,7 +99,7 @@ fn stimuli_that_cannot_be_are_refused() {
     refused(
         &lines("drive 0 frequency 20kHzz"),
         "kHzz",
-        "no unit",
+        "not a unit",
         Some("`kHz`"),
     );
     refused(&lines("drive 0 cooler 201C"), "201C", "not possible", None);
@@ -313,7 +313,7 @@ fn cells_that_cannot_be_are_refused() {
     refused(
         &check("nist = 1500rpn"),
         "rpn",
-        "`rpn` is no unit",
+        "`rpn` is not a unit",
         Some("`rpm`"),
     );
     refused(
@@ -356,8 +356,13 @@ fn cells_that_cannot_be_are_refused() {
     );
     refused(&check("Flags2 & E0 > 00"), ">", "bits are compared", None);
     refused(&check("uP = 5rpm"), "5rpm", "no unit for `uP`", None);
-    refused(&check("stack < 00"), "stack", "is no number", None);
-    refused(&check("nRampe+ < off"), "off", "`off` is no number", None);
+    refused(&check("stack < 00"), "stack", "is not a number", None);
+    refused(
+        &check("nRampe+ < off"),
+        "off",
+        "`off` is not a number",
+        None,
+    );
     refused(
         &check("imax = 5A"),
         "5A",

@@ -153,7 +153,10 @@ fn loops_are_played_for_each_number() {
             "for i in 0..9\nread-byte i FE13\nend",
             "there is no drive 3 in a ring of 3",
         ),
-        ("for i in 0..1\nread-byte 0 FFFF+i\nend", "is no address"),
+        (
+            "for i in 0..1\nread-byte 0 FFFF+i\nend",
+            "is not an address",
+        ),
     ];
     for (text, message) in wrong {
         let problems = entry(&steps(text)).expect_err(text);
@@ -215,7 +218,7 @@ fn near_misses_get_a_suggestion() {
         "no link 2->0",
         Some("`2->1`"),
     );
-    refused(&steps("+5mss > 80"), "mss", "no unit", Some("`ms`"));
+    refused(&steps("+5mss > 80"), "mss", "not a unit", Some("`ms`"));
 }
 
 #[test]
@@ -244,7 +247,7 @@ fn what_cannot_be_is_refused_with_its_range() {
         "WriteByte does not reach FF80",
         None,
     );
-    refused(&steps("write-io 1 = 04"), "04", "no output code", None);
+    refused(&steps("write-io 1 = 04"), "04", "not an output code", None);
     refused(
         &steps("write-word 1 FF08 = 12"),
         "12",
@@ -252,7 +255,7 @@ fn what_cannot_be_is_refused_with_its_range() {
         None,
     );
     refused(&steps("> xx"), "xx", "must be known", None);
-    refused(&steps("> (300)"), "300", "300 is no byte", None);
+    refused(&steps("> (300)"), "300", "300 is not a byte", None);
     refused(&steps("> (1/0)"), "1/0", "no value", None);
     refused(
         &steps("> 80*2000000"),

@@ -166,7 +166,7 @@ fn records_that_cannot_be_are_refused_and_bounded() {
     refused(
         &nd21("record drive 0 scope_puffer changes"),
         "scope_puffer",
-        "no number",
+        "not a number",
         None,
     );
     refused(

@@ -176,7 +176,7 @@ fn the_rigs_limits_hold_for_commands() {
     let missing = ["read", "0", "nist", "--rig", "no-such-rig"];
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_drivebench"));
     let output = command.args(missing).output().expect("the program");
-    ended(&output, 2, "no rig of that name");
+    ended(&output, 2, "nor a rig of that name");
 }
 
 /// Power goes on before the ports are opened and off behind the last telegram; hooks run around, also where nothing answers.
@@ -254,7 +254,7 @@ fn an_interlock_trips() {
     let fast = run("075F");
     let words = "interlock on nist of drive 0 (the belt comes off):";
     ended(&fast, 6, words);
-    ended(&fast, 6, "at least -300 and at most 300 must it be");
+    ended(&fast, 6, "at least -300 and at most 300 is required");
     ended(&fast, 6, SAFE);
     // The driver's own commands are watched as well.
     shows(&desk, "go 0 --move --hold", "drive 0 is in go");
@@ -270,7 +270,7 @@ fn an_interlock_trips() {
         ended(
             &output,
             6,
-            "interlock on GPIN4 of drive 1: it is low, high must it be",
+            "interlock on GPIN4 of drive 1: it is low, high is required",
         );
         ended(&output, 6, SAFE);
     }
@@ -376,7 +376,7 @@ fn a_port_without_rights() {
     command.args(["rig", "check"]).arg(desk.path("desk.toml"));
     command.env("DRIVEBENCH_STATE", &state);
     let output = command.output().expect("the program");
-    ended(&output, 3, "no right to open ");
+    ended(&output, 3, "no permission to open ");
     let held = std::fs::read_dir(&state).expect("a folder");
     let held: Vec<_> = held.map(|entry| entry.expect("a file").path()).collect();
     let free =

@@ -175,7 +175,7 @@ fn what_is_no_ring_says_so() {
     ended(&desk.run(&["run"]), 3, "failed to connect to 127.0.0.1:1");
     // A port that is no tty, a pty where a serial port should be, nothing at all.
     let desk = Desk::new(2, "serial", "/dev/null");
-    ended(&desk.run(&["run"]), 3, "is no serial port");
+    ended(&desk.run(&["run"]), 3, "is not a serial port");
     let desk = Desk::new(2, "serial", "/dev/there-is-none");
     ended(&desk.run(&["run"]), 3, "there is no port");
     let served = Served::start("plain", &[2], "pty", true, &[]);

@@ -159,7 +159,7 @@ fn a_terminal_gets_no_pcapng() {
         .expect("it is there");
     assert_eq!(code(&output), 2, "{}", stdout(&output));
     assert!(
-        stdout(&output).contains("pcapng is no text"),
+        stdout(&output).contains("pcapng is not a text"),
         "{}",
         stdout(&output)
     );

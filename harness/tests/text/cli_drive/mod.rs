@@ -125,9 +125,9 @@ fn all_mistakes_in_cells_are_shown_at_once() {
 #[test]
 fn benches_and_drives_that_are_not_there_are_refused() {
     for (line, part) in [
-        ("read 0 nist --rig cabinet", "no rig of that name"),
+        ("read 0 nist --rig cabinet", "nor a rig of that name"),
         ("read 0 nist --rig cabinet", "and sim:N"),
-        ("read 0 nist --rig sim:", "no number of drives"),
+        ("read 0 nist --rig sim:", "not a number of drives"),
         ("read 0 nist --rig sim:251", "1 to 250 (ND21 8.4)"),
         ("read 0 nist --rig sim:1,2,3", "one ring or two (ND21 12.2)"),
         (
@@ -137,8 +137,8 @@ fn benches_and_drives_that_are_not_there_are_refused() {
         ("read 2:0 nist", "the bus has no ring 2"),
         ("read 2..1 nist", "ends before it begins"),
         ("read -1 nist", "unexpected argument"),
-        ("read 1..x nist", "`1..x` is no drive"),
-        ("read 3:0 nist", "`3:0` is no drive"),
+        ("read 1..x nist", "`1..x` is not a drive"),
+        ("read 3:0 nist", "`3:0` is not a drive"),
         ("position 0..1 --by 1turn", "one drive expected"),
         (
             "info --setup no-such-file.scn",
@@ -314,7 +314,7 @@ fn watch_shows_values_again_and_again() {
     refused(
         "watch 0 nist --every 1rpm",
         2,
-        &["`rpm` is no unit of time"],
+        &["`rpm` is not a unit of time"],
     );
 }
 

@@ -105,7 +105,7 @@ fn all_mistakes_of_a_file_of_parameters_are_shown_at_once() {
         "at most 19.952 expected (ND21 14.5.1.2)",
         "`5` has an odd number of digits",
         "2 bytes where `nKi` has 1",
-        "`nist` is no parameter",
+        "`nist` is not a parameter",
         "`5A` can be bytes or a number with a unit",
         "`other` is not the table of the parameters",
         "bad.toml: 8 mistakes",

@@ -60,10 +60,13 @@ fn scope_without_a_trigger_and_its_mistakes() {
         "{flat}"
     );
     for (line, part) in [
-        ("scope 0 RefV1", "`RefV1` is no signal of the oscilloscope"),
+        (
+            "scope 0 RefV1",
+            "`RefV1` is not a signal of the oscilloscope",
+        ),
         (
             "scope 0 EE_pole",
-            "`EE_pole` is no signal of the oscilloscope",
+            "`EE_pole` is not a signal of the oscilloscope",
         ),
         ("scope 0 nist --level 3rpm", "--trigger"),
         (

@@ -173,7 +173,7 @@ fn a_folder_that_is_cut_off_gives_what_there_is() {
     std::fs::write(&record, judged).expect("a file");
     let output = drivebench(&["report", path(&evidence), "--html", path(&html)]);
     assert_eq!(output.status.code(), Some(2), "{output:?}");
-    assert!(String::from_utf8_lossy(&output.stderr).contains("`splendid` is no verdict"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("`splendid` is not a verdict"));
     std::fs::write(&record, "{\"kind\":\"other\"}\n").expect("a file");
     std::fs::remove_file(&html).expect("a file");
     for folder in [path(&evidence), path(&own), "/dev/null"] {

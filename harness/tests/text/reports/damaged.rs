@@ -49,7 +49,7 @@ fn every_mistake_has_its_place() {
     // No UTF-8, in the second line.
     let mut bytes = text.clone().into_bytes();
     bytes[first + 9] = 0xFF;
-    at(&bytes, 2, 10, first + 9, "no UTF-8: FF");
+    at(&bytes, 2, 10, first + 9, "not UTF-8: FF");
     // Behind the first line.
     let head = &text[..first];
     for (line, words) in [
@@ -61,7 +61,7 @@ fn every_mistake_has_its_place() {
         ),
         (
             "{\"kind\":\"end\",\"verdicts\":[\"great\"]}",
-            "is no verdict",
+            "is not a verdict",
         ),
     ] {
         at(format!("{head}{line}\n").as_bytes(), 2, 1, first, words);
@@ -95,7 +95,7 @@ fn every_mistake_has_its_place() {
         ),
         (
             "{\"kind\":\"verdict\",\"verdict\":\"great\",\"remarks\":[],\"took\":0}",
-            "is no verdict",
+            "is not a verdict",
         ),
     ] {
         at(

@@ -482,8 +482,8 @@ fn the_commands_say_what_they_do_and_end_with_the_right_code() {
     check(&["list"], 0, "lab                  free");
     check(&["list"], 0, "wrong                bad");
     check(&["list", "--format", "json"], 0, "\"state\": \"bad\"");
-    check(&["show", "wrong"], 2, "`baud` is no key of [ring.1]");
-    check(&["show", "nothing"], 2, "there are lab, sim-1");
+    check(&["show", "wrong"], 2, "`baud` is not a key of [ring.1]");
+    check(&["show", "nothing"], 2, "the rigs are lab, sim-1");
     check(&["show", "lab"], 0, "allow_motion = false");
     check(&["schema"], 0, "\"$schema\"");
     check(

@@ -156,28 +156,28 @@ impl fmt::Display for Denial {
                 whom(f)?;
                 write!(
                     f,
-                    " can make the motor turn, and for `max_speed` = {most} rpm in the rig's [limits] it must be known \
+                    " can make the motor turn; to check it against `max_speed` = {most} rpm in the rig's [limits], the guard must know \
                      {missing}"
                 )
             }
             Cause::InDoubt => f.write_str(
-                "it is not known where in a telegram the drives are; 17 zeros and the check sequence come first \
-                 (ND21 9.8), unless the rig's [limits] allow everything and have no `max_speed`",
+                "the position of the drives in a telegram is not known; send 17 zeros and the check sequence first \
+                 (ND21 9.8), or allow everything in the rig's [limits] without `max_speed`",
             ),
             Cause::NoAddress => f.write_str(
-                "nobody knows whom a short address means before an address byte has been sent (ND21 9.2)",
+                "a short telegram has no meaning before an address byte has been sent (ND21 9.2)",
             ),
             Cause::CheckSequence => f.write_str(
-                "the check sequence, as it is or as drives in the error mode would make it, passes only behind \
+                "the check sequence, or bytes from which drives in the error mode would make it, is permitted only after \
                  17 zeros (ND21 9.7, 9.8)",
             ),
             Cause::TooMany { most } => write!(
                 f,
-                "{most} bytes have been sent within a second, which is the most that the rig's [limits] allow"
+                "{most} bytes have been sent within a second; the rig's [limits] allow no more"
             ),
             Cause::TooLong { most } => write!(
                 f,
-                "{most} bytes have been sent, which is the most that the rig's [limits] allow"
+                "{most} bytes have been sent; the rig's [limits] allow no more"
             ),
             Cause::Closed => f.write_str("an earlier byte was not allowed"),
         }

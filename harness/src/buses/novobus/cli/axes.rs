@@ -20,7 +20,7 @@ impl FromStr for Axes {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "`{text}` is no drive: a number (3, or 2:3 in the second ring), a range (0..2) or `all` expected"
+                "`{text}` is not a drive: a number (3, or 2:3 in the second ring), a range (0..2) or `all` expected"
             )
         };
         if text == "all" {

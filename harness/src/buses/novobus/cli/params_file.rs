@@ -160,7 +160,7 @@ fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(Location, Writte
         for (key, value) in table {
             let span = place(key.span());
             let Some(at) = names.iter().position(|name| *name == key.get_ref()) else {
-                let message = format!("`{}` is no parameter", key.get_ref());
+                let message = format!("`{}` is not a parameter", key.get_ref());
                 let expected =
                     "a name of FF60-FF7F or of a cell with a home in the EEPROM (ND21 14.2)";
                 let problem = Problem::new(span, message, expected);

@@ -26,7 +26,7 @@ impl Signal {
         });
         signal.ok_or_else(|| {
             Failure::refused(format!(
-                "`{text}` is no signal of the oscilloscope: a cell FF00 to FFFF expected (ND21 14.10.6.1)"
+                "`{text}` is not a signal of the oscilloscope: a cell FF00 to FFFF expected (ND21 14.10.6.1)"
             ))
         })
     }

@@ -160,7 +160,7 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)
             .iter()
             .any(|(other, _)| (other.ring, other.link) == (given.ring, link))
         {
-            return Err(refused("somebody sits at this link already"));
+            return Err(refused("another --tap or --cut uses this link already"));
         }
         if given.places.len() != roles.len() {
             return Err(refused(

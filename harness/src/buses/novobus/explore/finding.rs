@@ -69,12 +69,12 @@ impl Finding {
         }
         let json = read_text(&file)?;
         let finding: Self = serde_json::from_str(&json).map_err(|error| {
-            ExploreError::Usage(format!("{} is no finding: {error}", file.display()))
+            ExploreError::Usage(format!("{} is not a finding: {error}", file.display()))
         })?;
         let sound = finding.schema == SCHEMA && finding.case.is_kept();
         if !sound {
             return Err(ExploreError::Usage(format!(
-                "{} is no finding of schema {SCHEMA} within the bounds of a case",
+                "{} is not a finding of schema {SCHEMA} within the bounds of a case",
                 file.display()
             )));
         }

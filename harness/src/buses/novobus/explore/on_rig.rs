@@ -200,7 +200,7 @@ impl Target for OnRig<'_, '_> {
         }
         let foreseen = self.judges[case.ring()].foresee(case);
         if foreseen.is_harmful {
-            let why = "what comes of it is the drive's choice: it writes cells with which the drive's program works, or a fault meets what a drive holds";
+            let why = "the result is the drive's choice: it writes cells that the drive's program uses, or a fault hits the drive's own data";
             return Ok(Tried {
                 not_played: Some(why.to_owned()),
                 ..Tried::default()
@@ -255,7 +255,7 @@ impl Target for OnRig<'_, '_> {
     fn over(&mut self) -> Option<String> {
         let session = self.run.session();
         if session.overdue() {
-            return Some("the rig's file allows no longer run (max_run)".to_owned());
+            return Some("the run reached `max_run` of the rig's file".to_owned());
         }
         match session.link().trouble() {
             None | Some(Trouble::Denied(_)) => None,

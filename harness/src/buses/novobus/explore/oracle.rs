@@ -360,7 +360,7 @@ fn beside_bus(ring: usize, drive: u8, rule: &str, section: &str, detail: &str) -
         meant: None,
         byte: None,
         time: false,
-        about: format!("drive {name}: {rule}{detail} is otherwise than in the reference model"),
+        about: format!("drive {name}: {rule}{detail} differs from the reference model"),
     }
 }
 

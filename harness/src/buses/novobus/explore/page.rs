@@ -109,7 +109,7 @@ fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Sh
     let again = format!("seen again {} of {} times", finding.seen_again, finding.of);
     outcome.remarks.insert(0, again);
     if finding.ports {
-        let model = "the picture shows the model, not the rig: what drives on a rig say to each other nobody hears";
+        let model = "the picture shows the model, not the rig: the bench cannot hear the links between drives on a rig";
         outcome.remarks.push(model.to_owned());
     }
     let about = &finding.difference.about;

@@ -71,7 +71,7 @@ pub fn promote(finding: &Finding, naming: &Naming, top: &Path) -> Result<Promote
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '.';
     if name.is_empty() || name.len() > 80 || !name.chars().all(plain) || name.starts_with('.') {
         return Err(ExploreError::Usage(format!(
-            "`{name}` is no name: small letters, digits, `-` and `.`, such as 9.6-checksum-of-a-read"
+            "`{name}` is not a name: small letters, digits, `-` and `.`, such as 9.6-checksum-of-a-read"
         )));
     }
     let files = [

@@ -266,8 +266,8 @@ mod tests {
     #[test]
     fn messages_without_names_and_numbers() {
         assert_eq!(
-            shape("`foo` is no drive of 250: \"a\""),
-            ".. is no drive of N ..",
+            shape("`foo` is not a drive of 250: \"a\""),
+            ".. is not a drive of N ..",
         );
         assert_eq!(shape("line 1, an open `quote"), "line N an open");
         assert_eq!(

@@ -66,7 +66,7 @@ impl Interlocks {
         for entry in &mut self.all {
             if entry.look(line)?.is_none() {
                 return Err(format!(
-                    "{}: the drive does not answer, so that nobody knows",
+                    "{}: the drive does not answer, so its state is not known",
                     entry.words()
                 ));
             }
@@ -170,7 +170,7 @@ impl Entry {
             .filter_map(|(name, bound)| Some(format!("{name} {}", bound?)));
         let bounds: Vec<_> = bounds.collect();
         Some(Err(format!(
-            "{words} was read, {} must it be",
+            "{words} was read, {} is required",
             bounds.join(" and ")
         )))
     }
@@ -187,7 +187,11 @@ impl Entry {
         let wanted = level == Level::High;
         Some(match input.level_in(byte) {
             Some(high) if high == wanted => Ok(()),
-            Some(high) => Err(format!("it is {}, {} must it be", name(high), name(wanted))),
+            Some(high) => Err(format!(
+                "it is {}, {} is required",
+                name(high),
+                name(wanted)
+            )),
             None => Err(format!(
                 "{byte:02X} in its place is the code of an internal error"
             )),

@@ -317,7 +317,7 @@ pub(super) static DEVIATIONS: &[MasterDeviation] = &[
     MasterDeviation {
         name: "unknown-told-as-done",
         section: "11.5",
-        about: "it tells that a job is done where nobody knows whether it ran",
+        about: "it reports a job as done that may not have run",
         how: How::Tells(|_, event| {
             Some(match event {
                 Event::Ended {
@@ -360,7 +360,7 @@ pub(super) static DEVIATIONS: &[MasterDeviation] = &[
     MasterDeviation {
         name: "error-not-told",
         section: "11.5",
-        about: "it corrects an error and tells nobody",
+        about: "it corrects an error and does not report it",
         how: How::Tells(|_, event| match event {
             Event::Disturbed { .. } | Event::Recovered { .. } => None,
             event => Some(event),

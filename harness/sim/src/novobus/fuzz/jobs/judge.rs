@@ -229,7 +229,10 @@ impl<'w> Judge<'w> {
         match wrong.filter(|index| !told && long_ago(index)) {
             Some(index) => Err(Lie::new(
                 "11.5",
-                format!("byte {} came back wrong, and it told nobody", index + 1),
+                format!(
+                    "byte {} came back wrong, and it was not reported",
+                    index + 1
+                ),
             )),
             None => Ok(()),
         }
@@ -256,8 +259,7 @@ impl<'w> Judge<'w> {
             if let Some(address) =
                 stray.filter(|_| !self.work.may_fool() && self.work.faults.len() < 2)
             {
-                let text =
-                    format!("cell {address:04X} of drive {k} was written, and nobody asked for it");
+                let text = format!("cell {address:04X} of drive {k} was written without a request");
                 return Err(Lie::new("9.3", text));
             }
             let value = [drive.memory.peek(DATA_IN), drive.memory.peek(DATA_IN + 1)];

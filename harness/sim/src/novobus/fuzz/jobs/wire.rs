@@ -80,7 +80,7 @@ pub(super) fn read(drives: u8, sent: &[u8]) -> Result<Read, Lie> {
         at += 1;
         let SyncByte::Telegram(header) = sync else {
             if byte != SYNCO {
-                return Err(Lie::new("9.2", "it sent PAUSE, which nobody asked for"));
+                return Err(Lie::new("9.2", "it sent PAUSE without a request"));
             }
             continue;
         };

@@ -61,7 +61,7 @@ pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
             return Ok(Job::Master { calls, once });
         }
         if calls.len() == MOST_CALLS {
-            return Err(scanner.unexpected("the end of the line (so many jobs in one line)"));
+            return Err(scanner.unexpected("the end of the line (no more jobs fit into one line)"));
         }
     }
 }

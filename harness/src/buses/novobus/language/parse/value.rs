@@ -262,7 +262,7 @@ pub(crate) fn cell_check(
     {
         return Err(Problem::new(
             span,
-            "`off` is no number",
+            "`off` is not a number",
             "a number with a unit expected here",
         ));
     }

@@ -145,7 +145,7 @@ impl Planner {
         if size > NUMBER {
             return Err(Problem::new(
                 place.span,
-                format!("`{}` has {size} bytes and is no number", place.name),
+                format!("`{}` has {size} bytes and is not a number", place.name),
                 "a cell of at most four bytes expected here",
             ));
         }
@@ -178,7 +178,7 @@ impl Planner {
         if size > NUMBER {
             return Err(Problem::new(
                 place.span,
-                format!("`{}` has {size} bytes and is no number", place.name),
+                format!("`{}` has {size} bytes and is not a number", place.name),
                 "a cell of at most four bytes expected here",
             ));
         }

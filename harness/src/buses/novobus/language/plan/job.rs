@@ -162,7 +162,7 @@ impl Planner {
                 let change = OutputChange::from_code(code).ok_or_else(|| {
                     Problem::new(
                         data.map_or(Span::default(), Written::span),
-                        format!("{code:02X} is no output code"),
+                        format!("{code:02X} is not an output code"),
                         "00 to 03 expected here (ND21 10.4)",
                     )
                 })?;
@@ -188,7 +188,7 @@ impl Planner {
         let address = u16::try_from(address).map_err(|_| {
             Problem::new(
                 offset.span,
-                format!("{address} is no address"),
+                format!("{address} is not an address"),
                 "0000 to FFFF expected here",
             )
         })?;

@@ -106,7 +106,7 @@ impl<'s> Iterator for Unroll<'s> {
 fn too_many(span: Span) -> Problem {
     Problem::new(
         span,
-        format!("the loops of the scenario come to more than {MAX_STEPS} steps"),
+        format!("the loops of the scenario unroll to more than {MAX_STEPS} steps"),
         "loops with fewer turns expected",
     )
 }
