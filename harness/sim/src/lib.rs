@@ -4,10 +4,11 @@
 //! the same bytes at the same times. No code sleeps or polls: a run jumps from event to event.
 //!
 //! [`novobus`] is the ring with its drives, [`nd21`] the whole drive on it, [`fault`] the faults of a line, and [`record`]
-//! the records of a run.
+//! the records of a run. [`unitek`] is the UNITEK drive on CAN.
 #![forbid(unsafe_code)]
 
 pub mod fault;
 pub mod nd21;
 pub mod novobus;
 pub mod record;
+pub mod unitek;

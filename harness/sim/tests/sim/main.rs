@@ -4,3 +4,4 @@ mod deviations;
 mod master;
 mod nd21;
 mod ring;
+mod unitek;

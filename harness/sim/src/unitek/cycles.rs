@@ -1,0 +1,86 @@
+//! The table of 8 registers that are sent cyclically (5.2, ex 9, App 8).
+
+use harness_proto::unitek::frame::CYCLES;
+use harness_proto::unitek::properties::TableFull;
+
+/// A register that is sent every so often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cycle {
+    /// The register.
+    pub register: u8,
+    /// 1 to 254 ms.
+    pub every: u8,
+    /// The millisecond of the next frame.
+    pub due: u64,
+    /// Requests are counted; the smallest number was requested longest ago.
+    order: u64,
+}
+
+/// The table.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Cycles {
+    places: [Option<Cycle>; CYCLES],
+    requests: u64,
+}
+
+impl Cycles {
+    /// Begins a cycle in millisecond `now`, or begins it again with another interval; `false` if the table is full.
+    pub fn start(&mut self, register: u8, every: u8, now: u64, full: TableFull) -> bool {
+        let own = self.place_of(register);
+        let free = || self.places.iter().position(Option::is_none);
+        let Some(place) = own.or_else(free).or_else(|| self.to_give_up(full)) else {
+            return false;
+        };
+        self.requests += 1;
+        self.places[place] = Some(Cycle {
+            register,
+            every,
+            due: now + u64::from(every),
+            order: self.requests,
+        });
+        true
+    }
+
+    /// Ends the cycle of a register, if it has one.
+    pub fn stop(&mut self, register: u8) {
+        if let Some(place) = self.place_of(register) {
+            self.places[place] = None;
+        }
+    }
+
+    /// The millisecond of the next frame.
+    #[must_use]
+    pub fn next_due(&self) -> Option<u64> {
+        self.running().map(|cycle| cycle.due).min()
+    }
+
+    /// The registers that are due in millisecond `now`, in the order of their places; their next frames are one interval later.
+    pub fn due(&mut self, now: u64) -> impl Iterator<Item = u8> {
+        self.places.iter_mut().flatten().filter_map(move |cycle| {
+            let due = cycle.due <= now;
+            if due {
+                cycle.due = now + u64::from(cycle.every);
+            }
+            due.then_some(cycle.register)
+        })
+    }
+
+    /// The cycles in the order of their places.
+    pub fn running(&self) -> impl Iterator<Item = &Cycle> {
+        self.places.iter().flatten()
+    }
+
+    fn place_of(&self, register: u8) -> Option<usize> {
+        self.places
+            .iter()
+            .position(|cycle| cycle.is_some_and(|cycle| cycle.register == register))
+    }
+
+    fn to_give_up(&self, full: TableFull) -> Option<usize> {
+        let oldest = || (0..CYCLES).min_by_key(|&place| self.places[place].map(|c| c.order));
+        match full {
+            TableFull::Refuse => None,
+            TableFull::Oldest => oldest(),
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! The simulated UNITEK drive: registers, cycles, events and the motor behind them.
+//!
+//! What the manual says is cited as in [`harness_proto::unitek`]; plant and inputs are our choice.
+
+pub mod cycles;
+pub mod drive;
+pub mod inputs;
+pub mod outbox;
+pub mod plant;
+pub mod reference;
+
+pub use drive::Drive;
+pub use inputs::Inputs;
+pub use outbox::{Cause, Waiting};
+pub use plant::Control;

@@ -1,0 +1,4 @@
+//! The UNITEK drive: the manual's examples, the open points, and random frames against the reference.
+
+mod against_reference;
+mod examples;
