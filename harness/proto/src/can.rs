@@ -210,6 +210,39 @@ impl Frame {
         self.wire_bits() - END_BITS
     }
 
+    /// Bits from the start bit to the first bit that differs on the wire from another frame, that bit included; `None` for equal frames.
+    ///
+    /// Where two stations send different frames with equal arbitration fields, one of them finds a bit error there.
+    #[must_use]
+    pub fn bits_to_difference(&self, other: &Self) -> Option<u32> {
+        let mut coder = Coder::default();
+        for (own, its) in self.plain_bits().zip(other.plain_bits()) {
+            coder.push(own, 1);
+            if own != its {
+                // A stuff bit behind the differing bit is not sent.
+                let stuffed_behind = u32::from(coder.run == 1 && coder.last != own);
+                return Some(coder.bits + coder.stuffed - stuffed_behind);
+            }
+        }
+        None
+    }
+
+    /// Header and data, without stuff bits and CRC. Equal headers mean equal lengths.
+    fn plain_bits(&self) -> impl Iterator<Item = u32> + '_ {
+        let bits = |value: u32, count: u32| (0..count).rev().map(move |place| value >> place & 1);
+        let header = if self.id.is_extended() {
+            bits(self.arbitration(), 32).chain(bits(self.len.into(), 6))
+        } else {
+            // IDE is the last bit of the field that counts.
+            bits(self.arbitration() >> 19, 13).chain(bits(self.len.into(), 5))
+        };
+        let data = self
+            .data()
+            .iter()
+            .flat_map(move |&byte| bits(byte.into(), 8));
+        core::iter::once(0).chain(header).chain(data)
+    }
+
     /// The largest number of bits that a frame with these many data bytes can take on the wire, intermission included.
     #[must_use]
     pub const fn worst_wire_bits(extended: bool, data_bytes: usize) -> u32 {

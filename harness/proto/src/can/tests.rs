@@ -148,6 +148,19 @@ fn arbitration_is_the_order_of_the_bits() {
     }
 }
 
+/// ISO 11898-1: where two senders of the same identifier differ.
+#[test]
+fn first_difference_on_the_wire() {
+    let bits = |a: &str, b: &str| {
+        let (a, b): (Frame, Frame) = (a.parse().unwrap(), b.parse().unwrap());
+        assert_eq!(a.bits_to_difference(&b), b.bits_to_difference(&a));
+        a.bits_to_difference(&b)
+    };
+    assert_eq!(bits("181#40810100", "181#40810100"), None);
+    // Start bit, 11 bits with a stuff bit behind their five zeros, RTR, IDE, r0; length codes 0100 and 0110 differ in the third bit.
+    assert_eq!(bits("181#40810100", "181#408101000000"), Some(19));
+}
+
 #[test]
 fn text_of_candump() {
     for text in [
@@ -225,6 +238,19 @@ proptest! {
         prop_assert_eq!(bits as usize, independent::wire_bits(&frame));
         let bytes = frame.data().len();
         prop_assert!(bits <= Frame::worst_wire_bits(frame.id().is_extended(), bytes));
+    }
+
+    #[test]
+    fn difference_as_the_independent_coder(id in 0..=Id::MAX_BASE, a in any::<[u8; 4]>(), b in any::<[u8; 4]>()) {
+        let wire = |data: &[u8]| {
+            let bits = independent::bits(false, id.into(), false, 4, data);
+            independent::stuffed(&bits)
+        };
+        let (left, right) = (wire(&a), wire(&b));
+        let first = left.chars().zip(right.chars()).position(|(l, r)| l != r);
+        let frame = |data: &[u8]| Frame::base(id, data).unwrap();
+        let bits = frame(&a).bits_to_difference(&frame(&b));
+        prop_assert_eq!(bits, first.map(|place| place as u32 + 1).filter(|_| a != b));
     }
 
     #[test]

@@ -7,10 +7,12 @@
 //! * [`register`]: the register table, names and aliases; [`words`]: words whose bits have names; [`units`]: per cent, rpm, turns, A;
 //! * [`frame`]: requests and replies; [`properties`]: what the manual leaves open; [`bit_timing`]: NBT;
 //! * [`guard`]: what a frame may do to a physical drive.
+//! * [`master`]: jobs in, frames out, results back.
 
 pub mod bit_timing;
 pub mod frame;
 pub mod guard;
+pub mod master;
 pub mod properties;
 pub mod register;
 

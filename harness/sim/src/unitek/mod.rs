@@ -8,6 +8,7 @@ pub mod inputs;
 pub mod outbox;
 pub mod plant;
 pub mod reference;
+mod station;
 
 pub use drive::Drive;
 pub use inputs::Inputs;

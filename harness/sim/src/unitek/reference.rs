@@ -114,11 +114,11 @@ impl Reference {
     }
 
     fn ready(&self) -> bool {
-        self.read(0x8F) % 65_536 == 0
+        self.read(0x8F) & 0xFFFF == 0
     }
 
     fn enabled(&self) -> bool {
-        self.inputs.run && self.inputs.rfe && self.ready() && self.at(0x51) / 4 % 2 == 0
+        self.inputs.run && self.inputs.rfe && self.ready() && self.at(0x51) & 4 == 0
     }
 
     fn tolerance(&self) -> bool {
@@ -364,7 +364,7 @@ impl Reference {
         }
         self.before = status;
         for (number, t, since, _) in self.table.into_iter().flatten() {
-            if (self.now - since) % t == 0 {
+            if (self.now - since).is_multiple_of(t) {
                 out.extend(self.answer(number, false));
             }
         }

@@ -1,4 +1,7 @@
 //! The UNITEK drive: the manual's examples, the open points, and random frames against the reference.
 
 mod against_reference;
+mod common;
 mod examples;
+mod master;
+mod segment;

@@ -7,6 +7,7 @@ use harness_sim::unitek::reference::Reference;
 use harness_sim::unitek::{Drive, Inputs};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[derive(Clone, Debug)]
 enum Event {
@@ -112,6 +113,9 @@ fn sent(drive: &mut Drive, out: &mut Vec<(u64, Frame)>) {
     }
 }
 
+/// Frames compared so far: a comparison of nothing proves nothing.
+static COMPARED: AtomicUsize = AtomicUsize::new(0);
+
 fn play(properties: Properties, events: &[Event]) -> Result<(), TestCaseError> {
     let mut drive = Drive::new(properties, Inputs::default(), Instant::START);
     let mut reference = Reference::new(properties, Inputs::default());
@@ -155,6 +159,7 @@ fn play(properties: Properties, events: &[Event]) -> Result<(), TestCaseError> {
         prop_assert_eq!(seen.last(), expected.last(), "after {:?}", event);
     }
     prop_assert_eq!(&seen, &expected);
+    COMPARED.fetch_add(seen.len(), Ordering::Relaxed);
     drive.advance(Instant::START + Span::from_millis(now));
     for number in 0..=255 {
         prop_assert_eq!(
@@ -188,7 +193,7 @@ fn property(cases: u32) {
 
 #[test]
 fn random_frames_agree_with_the_reference() {
-    property(400);
+    property(150);
 }
 
 #[test]

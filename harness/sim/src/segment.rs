@@ -1,0 +1,529 @@
+//! A CAN segment: stations on one pair of wires, with arbitration by identifier and exact frame times.
+//!
+//! All stations that want to send when the bus is free begin together, and the frame with the lowest arbitration field goes on. A frame
+//! that no other station acknowledges, or that is damaged, ends with an error frame and is repeated. Error counters follow ISO
+//! 11898-1 as far as they decide who sends: 8 more for an error, 1 less for a success, passive from 128 on, bus-off at 256.
+//!
+//! A segment on which no station has anything to do costs nothing.
+
+use harness_proto::can::{BitRate, BusError, ERROR_FRAME_BITS, Frame, Heard};
+use harness_proto::time::{Instant, Span};
+use std::collections::VecDeque;
+
+/// Bits that a passive station waits behind its own frame.
+const SUSPEND_BITS: u32 = 8;
+/// Bits of the intermission: receivers have the frame before them.
+const INTERMISSION_BITS: u32 = 3;
+/// Error counts from which a station is passive, and from which it is bus-off.
+const PASSIVE: u16 = 128;
+const BUS_OFF: u16 = 256;
+
+/// What takes part in a segment.
+pub trait Station {
+    /// A frame of another station has ended at `at`.
+    fn hear(&mut self, at: Instant, frame: &Frame);
+    /// The next frame that it wants to send, and from when on.
+    fn wants(&self) -> Option<(Instant, Frame)>;
+    /// The frame that it wants to send was sent, and ended at `at`.
+    fn sent(&mut self, at: Instant);
+    /// Something went wrong on the bus at `at`.
+    fn notice(&mut self, at: Instant, error: BusError) {
+        let _ = (at, error);
+    }
+    /// When it does something by itself; `None` while it only waits for frames.
+    fn next_action(&self) -> Option<Instant>;
+    /// Does everything that is due up to and including `to`.
+    fn advance(&mut self, to: Instant);
+    /// Whether it acknowledges what it hears; a listener and a station without power do not.
+    fn acknowledges(&self) -> bool {
+        true
+    }
+}
+
+impl<S: Station + ?Sized> Station for Box<S> {
+    fn hear(&mut self, at: Instant, frame: &Frame) {
+        (**self).hear(at, frame);
+    }
+    fn wants(&self) -> Option<(Instant, Frame)> {
+        (**self).wants()
+    }
+    fn sent(&mut self, at: Instant) {
+        (**self).sent(at);
+    }
+    fn notice(&mut self, at: Instant, error: BusError) {
+        (**self).notice(at, error);
+    }
+    fn next_action(&self) -> Option<Instant> {
+        (**self).next_action()
+    }
+    fn advance(&mut self, to: Instant) {
+        (**self).advance(to);
+    }
+    fn acknowledges(&self) -> bool {
+        (**self).acknowledges()
+    }
+}
+
+/// What happens to a frame on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FrameFault {
+    /// No station receives it, and its sender does not notice: every receiver has overrun.
+    Lost,
+    /// Its sender finds an error in the last bit, where receivers have already taken it, and repeats it.
+    Doubled,
+    /// Its sender holds it back for this long. Other frames may go first.
+    Late(Span),
+    /// It is damaged: an error frame, and its sender repeats it.
+    Corrupt,
+    /// No station acknowledges it: an error frame, and its sender repeats it.
+    NoAcknowledge,
+    /// It is damaged, and its sender goes to bus-off.
+    BusOff,
+}
+
+/// A fault and the frame that it happens to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Placed {
+    /// The sender.
+    pub station: usize,
+    /// Which of its frames, counted from 1; a repetition is no frame of its own.
+    pub frame: u64,
+    /// The fault.
+    pub fault: FrameFault,
+}
+
+/// How a frame on the wire ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// All other stations have it.
+    Good,
+    /// No other station has it, though it was acknowledged.
+    Lost,
+    /// An error frame ended it.
+    Error(BusError),
+}
+
+/// A frame on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineFrame {
+    /// The station that sent it; the first of them where several sent the same frame.
+    pub from: usize,
+    /// The start bit.
+    pub start: Instant,
+    /// The end of the last bit of the frame, or of the error frame, in front of the intermission.
+    pub end: Instant,
+    /// The frame.
+    pub frame: Frame,
+    /// How it ended.
+    pub outcome: End,
+}
+
+/// What the segment keeps of a station.
+#[derive(Clone, Copy, Debug, Default)]
+struct Member {
+    /// Transmit error counter.
+    errors: u16,
+    off: bool,
+    /// Frames sent, the present one included.
+    frames: u64,
+    /// The frame under way was counted.
+    counted: bool,
+    /// Not before.
+    held_until: Instant,
+}
+
+impl Member {
+    fn failed(&mut self, error: BusError) {
+        // A passive station alone on a bus does not count on, so that it never goes to bus-off (ISO 11898-1).
+        if error == BusError::NoAcknowledge && self.errors >= PASSIVE {
+            return;
+        }
+        self.errors += 8;
+        self.off |= self.errors >= BUS_OFF;
+    }
+}
+
+/// The segment.
+#[derive(Debug)]
+pub struct Segment<S> {
+    rate: BitRate,
+    stations: Vec<S>,
+    members: Vec<Member>,
+    faults: Vec<Placed>,
+    /// From when on the next frame may begin.
+    free_at: Instant,
+    now: Instant,
+    busy_bits: u64,
+    record: Option<Vec<LineFrame>>,
+}
+
+impl<S: Station> Segment<S> {
+    /// A segment with these stations. It keeps a record until [`Segment::keep_no_record`].
+    #[must_use]
+    pub fn new(rate: BitRate, stations: Vec<S>) -> Self {
+        Self {
+            rate,
+            members: vec![Member::default(); stations.len()],
+            stations,
+            faults: Vec::new(),
+            free_at: Instant::START,
+            now: Instant::START,
+            busy_bits: 0,
+            record: Some(Vec::new()),
+        }
+    }
+
+    /// Keeps no record from now on, for long runs.
+    pub fn keep_no_record(&mut self) {
+        self.record = None;
+    }
+
+    /// The frames on the wire so far, in order of time.
+    #[must_use]
+    pub fn record(&self) -> &[LineFrame] {
+        self.record.as_deref().unwrap_or_default()
+    }
+
+    /// Takes the record out; it goes on empty.
+    pub fn take_record(&mut self) -> Vec<LineFrame> {
+        self.record.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// The time up to which the segment has run.
+    #[must_use]
+    pub const fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// The rate.
+    #[must_use]
+    pub const fn rate(&self) -> BitRate {
+        self.rate
+    }
+
+    /// Bits that frames and error frames have taken.
+    #[must_use]
+    pub const fn busy_bits(&self) -> u64 {
+        self.busy_bits
+    }
+
+    /// A station.
+    #[must_use]
+    pub fn station(&self, place: usize) -> &S {
+        &self.stations[place]
+    }
+
+    /// A station, to be given work or changed.
+    pub fn station_mut(&mut self, place: usize) -> &mut S {
+        &mut self.stations[place]
+    }
+
+    /// Plans a fault.
+    pub fn inject(&mut self, placed: Placed) {
+        self.faults.push(placed);
+    }
+
+    /// Planned faults whose frame was not sent.
+    #[must_use]
+    pub fn unused_faults(&self) -> &[Placed] {
+        &self.faults
+    }
+
+    /// Whether a station takes no part any more.
+    #[must_use]
+    pub fn is_off(&self, place: usize) -> bool {
+        self.members[place].off
+    }
+
+    /// Restarts the controller of a station after bus-off.
+    pub fn restart(&mut self, place: usize) {
+        self.members[place].errors = 0;
+        self.members[place].off = false;
+    }
+
+    /// Runs up to and including `to`. A frame that has begun by then is carried to its end.
+    pub fn run_until(&mut self, to: Instant) {
+        loop {
+            let start = self.next_start();
+            let act = self.stations.iter().filter_map(S::next_action).min();
+            match (start, act) {
+                // What happens at the instant of the start bit still takes part.
+                (start, Some(act)) if act <= to && start.is_none_or(|start| act <= start) => {
+                    for station in &mut self.stations {
+                        if station.next_action().is_some_and(|own| own <= act) {
+                            station.advance(act);
+                        }
+                    }
+                }
+                (Some(start), _) if start <= to => self.carry(start),
+                _ => break,
+            }
+        }
+        self.now = self.now.max(to);
+        for station in &mut self.stations {
+            station.advance(to);
+        }
+    }
+
+    /// When the next frame begins, as far as the stations know by now.
+    fn next_start(&self) -> Option<Instant> {
+        let members = self.stations.iter().zip(&self.members);
+        let ready = members.filter_map(|(station, member)| ready_at(station, member));
+        ready.min().map(|ready| ready.max(self.free_at))
+    }
+
+    /// Arbitration at `start`, and the frame that wins it.
+    fn carry(&mut self, start: Instant) {
+        let senders = self.stations.iter().zip(&self.members).enumerate();
+        let mut contenders: Vec<(usize, Frame)> = senders
+            .filter(|(_, (station, member))| {
+                ready_at(*station, member).is_some_and(|at| at <= start)
+            })
+            .filter_map(|(place, (station, _))| Some((place, station.wants()?.1)))
+            .collect();
+        let Some(lowest) = contenders
+            .iter()
+            .map(|(_, frame)| frame.arbitration())
+            .min()
+        else {
+            return;
+        };
+        contenders.retain(|(_, frame)| frame.arbitration() == lowest);
+        let (first, frame) = contenders[0];
+        let fault = self.fault_of(first);
+        if let Some(FrameFault::Late(span)) = fault {
+            self.members[first].held_until = start + span;
+            return;
+        }
+        let differs = contenders[1..]
+            .iter()
+            .filter_map(|(_, other)| frame.bits_to_difference(other))
+            .min();
+        let places: Vec<usize> = contenders.iter().map(|(place, _)| *place).collect();
+        let alone = self.is_alone(&places);
+        let (bits, error) = match (differs, fault) {
+            (Some(bits), _) => (bits, Some(BusError::ErrorFrame)),
+            (None, Some(FrameFault::Corrupt | FrameFault::BusOff)) => {
+                (frame.bits_to_acknowledge(), Some(BusError::ErrorFrame))
+            }
+            (None, fault) if alone || fault == Some(FrameFault::NoAcknowledge) => {
+                // The error flag begins behind the acknowledge slot, in place of its delimiter.
+                (
+                    frame.bits_to_acknowledge() - 1,
+                    Some(BusError::NoAcknowledge),
+                )
+            }
+            (None, Some(FrameFault::Doubled)) => {
+                let whole = frame.wire_bits() - INTERMISSION_BITS;
+                (whole + ERROR_FRAME_BITS, None)
+            }
+            (None, _) => (frame.wire_bits(), None),
+        };
+        match error {
+            Some(error) => self.fail(start, frame, bits, &places, error, fault),
+            None => self.complete(start, frame, bits, &places, fault),
+        }
+    }
+
+    fn fail(
+        &mut self,
+        start: Instant,
+        frame: Frame,
+        bits: u32,
+        places: &[usize],
+        error: BusError,
+        fault: Option<FrameFault>,
+    ) {
+        let bits = bits + ERROR_FRAME_BITS;
+        let end = self.occupy(start, bits);
+        for &place in places {
+            let member = &mut self.members[place];
+            member.failed(error);
+            if fault == Some(FrameFault::BusOff) {
+                member.off = true;
+            }
+            self.suspend(place);
+            self.stations[place].notice(end, error);
+            if self.members[place].off {
+                self.stations[place].notice(end, BusError::BusOff);
+            }
+        }
+        if error == BusError::ErrorFrame {
+            self.all_but(places, |station| station.notice(end, error));
+        }
+        self.keep(start, end, frame, places[0], End::Error(error));
+    }
+
+    fn complete(
+        &mut self,
+        start: Instant,
+        frame: Frame,
+        bits: u32,
+        places: &[usize],
+        fault: Option<FrameFault>,
+    ) {
+        let end = self.occupy(start, bits);
+        let lost = fault == Some(FrameFault::Lost);
+        if !lost {
+            self.all_but(places, |station| station.hear(end, &frame));
+        }
+        let outcome = if lost { End::Lost } else { End::Good };
+        self.keep(start, end, frame, places[0], outcome);
+        if fault == Some(FrameFault::Doubled) {
+            // The sender repeats it: it still wants to send it, and counts it as the same frame.
+            return;
+        }
+        for &place in places {
+            let member = &mut self.members[place];
+            member.errors = member.errors.saturating_sub(1);
+            member.counted = false;
+            self.suspend(place);
+            self.stations[place].sent(end);
+        }
+    }
+
+    /// The bus is taken for `bits`, intermission included; gives the end without it.
+    fn occupy(&mut self, start: Instant, bits: u32) -> Instant {
+        self.busy_bits += u64::from(bits);
+        self.free_at = start + self.rate.time_of(bits);
+        self.now = self.now.max(start);
+        self.free_at - self.rate.time_of(INTERMISSION_BITS)
+    }
+
+    fn suspend(&mut self, place: usize) {
+        let member = &mut self.members[place];
+        if member.errors >= PASSIVE {
+            member.held_until = self.free_at + self.rate.time_of(SUSPEND_BITS);
+        }
+    }
+
+    fn all_but(&mut self, places: &[usize], mut act: impl FnMut(&mut S)) {
+        for (place, station) in self.stations.iter_mut().enumerate() {
+            if !places.contains(&place) && !self.members[place].off {
+                act(station);
+            }
+        }
+    }
+
+    fn is_alone(&self, places: &[usize]) -> bool {
+        // Of several senders of one frame each acknowledges the other's.
+        let others = self.stations.iter().zip(&self.members).enumerate();
+        places.len() == 1
+            && !others
+                .filter(|(place, _)| !places.contains(place))
+                .any(|(_, (station, member))| !member.off && station.acknowledges())
+    }
+
+    /// Counts the frame that a station begins, and takes out the fault that was planned for it.
+    fn fault_of(&mut self, place: usize) -> Option<FrameFault> {
+        let member = &mut self.members[place];
+        if !member.counted {
+            member.counted = true;
+            member.frames += 1;
+        }
+        let frames = member.frames;
+        let found = self
+            .faults
+            .iter()
+            .position(|p| p.station == place && p.frame == frames)?;
+        Some(self.faults.remove(found).fault)
+    }
+
+    fn keep(&mut self, start: Instant, end: Instant, frame: Frame, from: usize, outcome: End) {
+        if let Some(record) = &mut self.record {
+            record.push(LineFrame {
+                from,
+                start,
+                end,
+                frame,
+                outcome,
+            });
+        }
+    }
+}
+
+fn ready_at<S: Station>(station: &S, member: &Member) -> Option<Instant> {
+    if member.off {
+        return None;
+    }
+    let (ready, _) = station.wants()?;
+    Some(ready.max(member.held_until))
+}
+
+/// A station that sends what it is given and keeps what it hears: a bench, a client, a tap.
+#[derive(Clone, Debug, Default)]
+pub struct Host {
+    queue: VecDeque<(Instant, Frame)>,
+    heard: VecDeque<(Instant, Heard)>,
+    /// Ends of own frames.
+    sent: VecDeque<Instant>,
+    /// It hears, and does not even acknowledge.
+    silent: bool,
+}
+
+impl Host {
+    /// A host that only listens.
+    #[must_use]
+    pub fn listener() -> Self {
+        Self {
+            silent: true,
+            ..Self::default()
+        }
+    }
+
+    /// Puts a frame behind the others, to be sent from `at` on. A listener sends nothing.
+    pub fn send(&mut self, at: Instant, frame: Frame) {
+        if !self.silent {
+            self.queue.push_back((at, frame));
+        }
+    }
+
+    /// What it has heard, in order of time.
+    pub fn receive(&mut self) -> Option<(Instant, Heard)> {
+        self.heard.pop_front()
+    }
+
+    /// When its next frame that was sent had ended.
+    pub fn confirmation(&mut self) -> Option<Instant> {
+        self.sent.pop_front()
+    }
+
+    /// Frames that wait.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.queue.len()
+    }
+}
+
+impl Station for Host {
+    fn hear(&mut self, at: Instant, frame: &Frame) {
+        self.heard.push_back((at, Heard::Frame(*frame)));
+    }
+
+    fn wants(&self) -> Option<(Instant, Frame)> {
+        self.queue.front().copied()
+    }
+
+    fn sent(&mut self, at: Instant) {
+        self.queue.pop_front();
+        self.sent.push_back(at);
+    }
+
+    fn notice(&mut self, at: Instant, error: BusError) {
+        // One that repeats is kept once.
+        let again = |last: &(Instant, Heard)| last.1 == Heard::Error(error);
+        if !self.heard.back().is_some_and(again) {
+            self.heard.push_back((at, Heard::Error(error)));
+        }
+    }
+
+    fn next_action(&self) -> Option<Instant> {
+        None
+    }
+
+    fn advance(&mut self, _to: Instant) {}
+
+    fn acknowledges(&self) -> bool {
+        !self.silent
+    }
+}

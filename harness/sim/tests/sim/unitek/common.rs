@@ -1,0 +1,134 @@
+//! A desk: a host and a drive on one segment at 500 kbit/s.
+
+use harness_proto::can::{BitRate, Frame, Heard};
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::properties::Properties;
+use harness_sim::segment::{Host, LineFrame, Segment, Station};
+use harness_sim::unitek::{Drive, Inputs};
+
+/// A station of the tests.
+pub(super) enum Member {
+    Host(Host),
+    Drive(Box<Drive>),
+}
+
+impl Member {
+    fn station(&self) -> &dyn Station {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => &**drive,
+        }
+    }
+
+    fn station_mut(&mut self) -> &mut dyn Station {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => &mut **drive,
+        }
+    }
+}
+
+impl Station for Member {
+    fn hear(&mut self, at: Instant, frame: &Frame) {
+        self.station_mut().hear(at, frame);
+    }
+    fn wants(&self) -> Option<(Instant, Frame)> {
+        self.station().wants()
+    }
+    fn sent(&mut self, at: Instant) {
+        self.station_mut().sent(at);
+    }
+    fn notice(&mut self, at: Instant, error: harness_proto::can::BusError) {
+        self.station_mut().notice(at, error);
+    }
+    fn next_action(&self) -> Option<Instant> {
+        self.station().next_action()
+    }
+    fn advance(&mut self, to: Instant) {
+        self.station_mut().advance(to);
+    }
+    fn acknowledges(&self) -> bool {
+        self.station().acknowledges()
+    }
+}
+
+/// Station 0 is the host, station 1 the drive.
+pub(super) struct Desk {
+    pub(super) segment: Segment<Member>,
+    now: Instant,
+}
+
+impl Default for Desk {
+    fn default() -> Self {
+        Self::with(Properties::default())
+    }
+}
+
+impl Desk {
+    pub(super) fn with(properties: Properties) -> Self {
+        Self::new(properties, Inputs::default(), &[])
+    }
+
+    pub(super) fn new(properties: Properties, inputs: Inputs, setup: &[(u8, u32)]) -> Self {
+        let drive = Drive::new(properties, inputs, Instant::START).with_setup(setup);
+        let stations = vec![
+            Member::Host(Host::default()),
+            Member::Drive(Box::new(drive)),
+        ];
+        Self {
+            segment: Segment::new(BitRate::K500, stations),
+            now: Instant::START,
+        }
+    }
+
+    pub(super) fn host(&mut self) -> &mut Host {
+        match self.segment.station_mut(0) {
+            Member::Host(host) => host,
+            Member::Drive(_) => panic!("station 0 is the host"),
+        }
+    }
+
+    pub(super) fn drive(&mut self) -> &mut Drive {
+        match self.segment.station_mut(1) {
+            Member::Drive(drive) => drive,
+            Member::Host(_) => panic!("station 1 is the drive"),
+        }
+    }
+
+    /// Sends a frame, and gives what the drive sends within 2 ms.
+    pub(super) fn ask(&mut self, frame: &str) -> Vec<String> {
+        let now = self.now;
+        self.host().send(now, frame.parse().expect("a frame"));
+        self.wait(2)
+    }
+
+    /// What the drive sends within this many milliseconds.
+    pub(super) fn wait(&mut self, millis: u64) -> Vec<String> {
+        self.now += Span::from_millis(millis);
+        self.segment.run_until(self.now);
+        let mut heard = Vec::new();
+        while let Some((_, what)) = self.host().receive() {
+            match what {
+                Heard::Frame(frame) => heard.push(frame.to_string()),
+                Heard::Error(error) => heard.push(error.to_string()),
+            }
+        }
+        heard
+    }
+
+    pub(super) fn inputs(&mut self, change: impl FnOnce(&mut Inputs)) {
+        let now = self.now;
+        let mut inputs = *self.drive().inputs();
+        change(&mut inputs);
+        self.drive().set_inputs(now, inputs);
+    }
+
+    pub(super) fn restart(&mut self) {
+        let now = self.now;
+        self.drive().restart(now);
+    }
+
+    pub(super) fn record(&self) -> &[LineFrame] {
+        self.segment.record()
+    }
+}
