@@ -217,11 +217,11 @@ impl Frame {
     pub fn bits_to_difference(&self, other: &Self) -> Option<u32> {
         let mut coder = Coder::default();
         for (own, its) in self.plain_bits().zip(other.plain_bits()) {
+            let stuffed = coder.stuffed;
             coder.push(own, 1);
             if own != its {
                 // A stuff bit behind the differing bit is not sent.
-                let stuffed_behind = u32::from(coder.run == 1 && coder.last != own);
-                return Some(coder.bits + coder.stuffed - stuffed_behind);
+                return Some(coder.bits + stuffed);
             }
         }
         None
@@ -229,18 +229,17 @@ impl Frame {
 
     /// Header and data, without stuff bits and CRC. Equal headers mean equal lengths.
     fn plain_bits(&self) -> impl Iterator<Item = u32> + '_ {
-        let bits = |value: u32, count: u32| (0..count).rev().map(move |place| value >> place & 1);
-        let header = if self.id.is_extended() {
-            bits(self.arbitration(), 32).chain(bits(self.len.into(), 6))
-        } else {
-            // IDE is the last bit of the field that counts.
-            bits(self.arbitration() >> 19, 13).chain(bits(self.len.into(), 5))
+        let (header, count) = self.header();
+        let bits = |value: u64, count: u32| {
+            (0..count)
+                .rev()
+                .map(move |place| (value >> place & 1) as u32)
         };
         let data = self
             .data()
             .iter()
             .flat_map(move |&byte| bits(byte.into(), 8));
-        core::iter::once(0).chain(header).chain(data)
+        bits(header, count).chain(data)
     }
 
     /// The largest number of bits that a frame with these many data bytes can take on the wire, intermission included.
@@ -265,24 +264,26 @@ impl Frame {
     /// Everything in front of the CRC.
     fn coded(&self) -> Coder {
         let mut coder = Coder::default();
-        let number = self.id.number();
-        coder.push(0, 1); // start of frame
-        if self.id.is_extended() {
-            coder.push(number >> 18, 11);
-            coder.push(0b11, 2); // SRR, IDE
-            coder.push(number & 0x3_FFFF, 18);
-            coder.push(self.remote.into(), 1);
-            coder.push(0, 2); // r1, r0
-        } else {
-            coder.push(number, 11);
-            coder.push(self.remote.into(), 1);
-            coder.push(0, 2); // IDE, r0
-        }
-        coder.push(self.len.into(), 4);
+        let (value, count) = self.header();
+        let above = count.saturating_sub(32);
+        coder.push((value >> 32) as u32, above);
+        coder.push(value as u32, count - above);
         for &byte in self.data() {
             coder.push(byte.into(), 8);
         }
         coder
+    }
+
+    /// Start bit, arbitration field, reserved bits and length code, and how many bits they are.
+    fn header(&self) -> (u64, u32) {
+        let arbitration = u64::from(self.arbitration());
+        let len = u64::from(self.len);
+        if self.id.is_extended() {
+            (arbitration << 6 | len, 39)
+        } else {
+            // The field ends with IDE, its 13th bit.
+            ((arbitration >> 19) << 5 | len, 19)
+        }
     }
 }
 
@@ -291,9 +292,88 @@ struct Coder {
     bits: u32,
     stuffed: u32,
     crc: u16,
-    last: u32,
-    /// Equal bits at the end of what is on the wire, stuff bits included.
-    run: u32,
+    line: Stuffing,
+}
+
+/// What the stuffing of further bits depends on.
+#[derive(Clone, Copy)]
+struct Stuffing {
+    last: u8,
+    /// Equal bits at the end of what is on the wire, stuff bits included: 0 to 4.
+    run: u8,
+}
+
+impl Stuffing {
+    const FREE: Self = Self { last: 1, run: 0 };
+
+    /// The next bit; whether a stuff bit follows it.
+    const fn push(self, bit: u8) -> (Self, bool) {
+        let run = if bit == self.last { self.run + 1 } else { 1 };
+        if run == 5 {
+            // The stuff bit is the opposite one, and the first of a run.
+            let last = 1 - bit;
+            (Self { last, run: 1 }, true)
+        } else {
+            (Self { last: bit, run }, false)
+        }
+    }
+
+    const fn index(self) -> usize {
+        (self.last * 5 + self.run) as usize
+    }
+}
+
+/// For each state of the stuffing and each byte: the next state and the stuff bits.
+static STUFFING: [[(Stuffing, u8); 256]; 10] = {
+    let mut table = [[(Stuffing::FREE, 0); 256]; 10];
+    let mut state = 0;
+    while state < 10 {
+        let mut byte = 0;
+        while byte < 256 {
+            let mut line = Stuffing {
+                last: state as u8 / 5,
+                run: state as u8 % 5,
+            };
+            let mut stuffed = 0;
+            let mut place = 8;
+            while place > 0 {
+                place -= 1;
+                let (next, more) = line.push((byte >> place & 1) as u8);
+                line = next;
+                stuffed += more as u8;
+            }
+            table[state][byte] = (line, stuffed);
+            byte += 1;
+        }
+        state += 1;
+    }
+    table
+};
+
+/// The CRC of each byte.
+static CRC: [u16; 256] = {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let mut crc = (byte as u16) << 7;
+        let mut bit = 0;
+        while bit < 8 {
+            crc = next_crc(crc, 0);
+            bit += 1;
+        }
+        table[byte] = crc;
+        byte += 1;
+    }
+    table
+};
+
+const fn next_crc(crc: u16, bit: u16) -> u16 {
+    let shifted = crc << 1 & 0x7FFF;
+    if crc >> 14 & 1 == bit {
+        shifted
+    } else {
+        shifted ^ CRC_POLYNOMIAL
+    }
 }
 
 impl Default for Coder {
@@ -302,31 +382,29 @@ impl Default for Coder {
             bits: 0,
             stuffed: 0,
             crc: 0,
-            last: 1,
-            run: 0,
+            line: Stuffing::FREE,
         }
     }
 }
 
 impl Coder {
-    /// Appends the lowest `count` bits of `value`, most significant first.
+    /// Appends the lowest `count` bits of `value`, most significant first: single bits, then whole bytes.
     fn push(&mut self, value: u32, count: u32) {
         self.bits += count;
-        for place in (0..count).rev() {
+        let bytes = count / 8;
+        for place in (8 * bytes..count).rev() {
             let bit = value >> place & 1;
-            let top = u32::from(self.crc >> 14) & 1;
-            self.crc = self.crc << 1 & 0x7FFF;
-            if top != bit {
-                self.crc ^= CRC_POLYNOMIAL;
-            }
-            self.run = if bit == self.last { self.run + 1 } else { 1 };
-            self.last = bit;
-            if self.run == 5 {
-                // A stuff bit: the opposite one, and the first of a run.
-                self.stuffed += 1;
-                self.last = 1 - bit;
-                self.run = 1;
-            }
+            self.crc = next_crc(self.crc, bit as u16);
+            let (line, stuffed) = self.line.push(bit as u8);
+            self.line = line;
+            self.stuffed += u32::from(stuffed);
+        }
+        for byte in value.to_be_bytes().into_iter().skip(4 - bytes as usize) {
+            let index = (self.crc >> 7) as u8 ^ byte;
+            self.crc = self.crc << 8 & 0x7FFF ^ CRC[usize::from(index)];
+            let (line, stuffed) = STUFFING[self.line.index()][usize::from(byte)];
+            self.line = line;
+            self.stuffed += u32::from(stuffed);
         }
     }
 }

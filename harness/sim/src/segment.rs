@@ -154,6 +154,8 @@ pub struct Segment<S> {
     free_at: Instant,
     now: Instant,
     busy_bits: u64,
+    /// The senders of the frame on the wire; kept for its allocation.
+    senders: Vec<usize>,
     record: Option<Vec<LineFrame>>,
 }
 
@@ -169,6 +171,7 @@ impl<S: Station> Segment<S> {
             free_at: Instant::START,
             now: Instant::START,
             busy_bits: 0,
+            senders: Vec::new(),
             record: Some(Vec::new()),
         }
     }
@@ -268,38 +271,39 @@ impl<S: Station> Segment<S> {
     /// When the next frame begins, as far as the stations know by now.
     fn next_start(&self) -> Option<Instant> {
         let members = self.stations.iter().zip(&self.members);
-        let ready = members.filter_map(|(station, member)| ready_at(station, member));
-        ready.min().map(|ready| ready.max(self.free_at))
+        let ready = members.filter_map(|(station, member)| wanted(station, member));
+        ready
+            .map(|(ready, _)| ready)
+            .min()
+            .map(|ready| ready.max(self.free_at))
     }
 
     /// Arbitration at `start`, and the frame that wins it.
     fn carry(&mut self, start: Instant) {
-        let senders = self.stations.iter().zip(&self.members).enumerate();
-        let mut contenders: Vec<(usize, Frame)> = senders
-            .filter(|(_, (station, member))| {
-                ready_at(*station, member).is_some_and(|at| at <= start)
-            })
-            .filter_map(|(place, (station, _))| Some((place, station.wants()?.1)))
-            .collect();
-        let Some(lowest) = contenders
-            .iter()
-            .map(|(_, frame)| frame.arbitration())
-            .min()
+        let Some((first, frame)) = self
+            .contenders(start)
+            .min_by_key(|(_, frame)| frame.arbitration())
         else {
             return;
         };
-        contenders.retain(|(_, frame)| frame.arbitration() == lowest);
-        let (first, frame) = contenders[0];
+        let equal = |other: &Frame| other.arbitration() == frame.arbitration();
         let fault = self.fault_of(first);
         if let Some(FrameFault::Late(span)) = fault {
             self.members[first].held_until = start + span;
             return;
         }
-        let differs = contenders[1..]
-            .iter()
-            .filter_map(|(_, other)| frame.bits_to_difference(other))
-            .min();
-        let places: Vec<usize> = contenders.iter().map(|(place, _)| *place).collect();
+        let mut places = std::mem::take(&mut self.senders);
+        places.clear();
+        let mut differs: Option<u32> = None;
+        for (place, other) in self.contenders(start).filter(|(_, other)| equal(other)) {
+            places.push(place);
+            let bits = if place == first {
+                None
+            } else {
+                frame.bits_to_difference(&other)
+            };
+            differs = [differs, bits].into_iter().flatten().min();
+        }
         let alone = self.is_alone(&places);
         let (bits, error) = match (differs, fault) {
             (Some(bits), _) => (bits, Some(BusError::ErrorFrame)),
@@ -323,6 +327,16 @@ impl<S: Station> Segment<S> {
             Some(error) => self.fail(start, frame, bits, &places, error, fault),
             None => self.complete(start, frame, bits, &places, fault),
         }
+        self.senders = places;
+    }
+
+    /// The stations that begin a frame at `start`.
+    fn contenders(&self, start: Instant) -> impl Iterator<Item = (usize, Frame)> {
+        let senders = self.stations.iter().zip(&self.members).enumerate();
+        senders.filter_map(move |(place, (station, member))| {
+            let (ready, frame) = wanted(station, member)?;
+            (ready <= start).then_some((place, frame))
+        })
     }
 
     fn fail(
@@ -442,12 +456,13 @@ impl<S: Station> Segment<S> {
     }
 }
 
-fn ready_at<S: Station>(station: &S, member: &Member) -> Option<Instant> {
+/// The next frame of a station that takes part, and from when on it is sent.
+fn wanted<S: Station>(station: &S, member: &Member) -> Option<(Instant, Frame)> {
     if member.off {
         return None;
     }
-    let (ready, _) = station.wants()?;
-    Some(ready.max(member.held_until))
+    let (ready, frame) = station.wants()?;
+    Some((ready.max(member.held_until), frame))
 }
 
 /// A station that sends what it is given and keeps what it hears: a bench, a client, a tap.

@@ -94,13 +94,18 @@ fn any_frame() -> impl Strategy<Value = Frame> {
 /// The check value of the catalogue of CRCs (CRC-15/CAN of the digits 1 to 9 is 059E), by both coders.
 #[test]
 fn crc_of_the_catalogue() {
-    let mut coder = Coder::default();
+    let (mut coder, mut single) = (Coder::default(), Coder::default());
     let mut bits = String::new();
     for digit in b"123456789" {
         coder.push(u32::from(*digit), 8);
+        // Bit by bit the same.
+        (0..8)
+            .rev()
+            .for_each(|place| single.push(u32::from(*digit) >> place & 1, 1));
         bits += &std::format!("{digit:08b}");
     }
-    assert_eq!(coder.crc, 0x059E);
+    assert_eq!((coder.crc, single.crc), (0x059E, 0x059E));
+    assert_eq!((coder.bits, coder.stuffed), (single.bits, single.stuffed));
     assert_eq!(independent::remainder(&bits), "000010110011110");
 }
 

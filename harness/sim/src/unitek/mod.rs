@@ -3,6 +3,7 @@
 //! What the manual says is cited as in [`harness_proto::unitek`]; plant and inputs are our choice.
 
 pub mod cycles;
+pub mod deviation;
 pub mod drive;
 pub mod inputs;
 pub mod outbox;

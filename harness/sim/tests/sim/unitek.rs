@@ -2,6 +2,8 @@
 
 mod against_reference;
 mod common;
+mod deviations;
 mod examples;
+mod invariants;
 mod master;
 mod segment;

@@ -6,29 +6,29 @@ use harness_proto::unitek::properties::Properties;
 use harness_sim::segment::{Host, LineFrame, Segment, Station};
 use harness_sim::unitek::{Drive, Inputs};
 
-/// A station of the tests.
-pub(super) enum Member {
+/// A host or a drive.
+pub(super) enum Member<D = Box<Drive>> {
     Host(Host),
-    Drive(Box<Drive>),
+    Drive(D),
 }
 
-impl Member {
+impl<D: Station> Member<D> {
     fn station(&self) -> &dyn Station {
         match self {
             Self::Host(host) => host,
-            Self::Drive(drive) => &**drive,
+            Self::Drive(drive) => drive,
         }
     }
 
     fn station_mut(&mut self) -> &mut dyn Station {
         match self {
             Self::Host(host) => host,
-            Self::Drive(drive) => &mut **drive,
+            Self::Drive(drive) => drive,
         }
     }
 }
 
-impl Station for Member {
+impl<D: Station> Station for Member<D> {
     fn hear(&mut self, at: Instant, frame: &Frame) {
         self.station_mut().hear(at, frame);
     }

@@ -257,3 +257,20 @@ fn overfull_bus() {
     desk.wait(5);
     assert_eq!(desk.host().waiting(), 0);
 }
+
+/// Not a test of time: prints how much faster than the bus a full segment runs.
+#[test]
+#[ignore = "a measurement"]
+fn how_fast() {
+    let mut desk = Desk::default();
+    desk.segment.keep_no_record();
+    for register in 0xE2..=0xE9 {
+        desk.ask(&format!("201#3D{register:02X}01"));
+    }
+    let started = std::time::Instant::now();
+    let mut frames = 0;
+    for _ in 0..100 {
+        frames += desk.wait(1_000).len();
+    }
+    println!("{frames} frames in {:?} for 100 s", started.elapsed());
+}
