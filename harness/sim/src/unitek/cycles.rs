@@ -54,15 +54,13 @@ impl Cycles {
         self.running().map(|cycle| cycle.due).min()
     }
 
-    /// The registers that are due in millisecond `now`, in the order of their places; their next frames are one interval later.
-    pub fn due(&mut self, now: u64) -> impl Iterator<Item = u8> {
-        self.places.iter_mut().flatten().filter_map(move |cycle| {
-            let due = cycle.due <= now;
-            if due {
-                cycle.due = now + u64::from(cycle.every);
-            }
-            due.then_some(cycle.register)
-        })
+    /// The register of a place, if it is due in millisecond `now`; its next frame is one interval later.
+    pub fn take_due(&mut self, place: usize, now: u64) -> Option<u8> {
+        let cycle = self.places[place]
+            .as_mut()
+            .filter(|cycle| cycle.due <= now)?;
+        cycle.due = now + u64::from(cycle.every);
+        Some(cycle.register)
     }
 
     /// The cycles in the order of their places.

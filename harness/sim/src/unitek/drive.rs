@@ -11,7 +11,7 @@ use super::plant::{Control, Demand, Plant};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::bit_timing::Nbt;
-use harness_proto::unitek::frame::{Occasion, reply_data};
+use harness_proto::unitek::frame::{CYCLES, Occasion, reply_data};
 use harness_proto::unitek::properties::{
     CanCounters, CyclicFirst, EventMask, IdChange, IdRange, LockAtPowerUp, LockClearsCommand,
     OneshotStops, PowerUpMode, Properties, StatusBits, UnknownRegister,
@@ -60,8 +60,8 @@ pub struct Drive {
     power_up: Instant,
     /// Scans since power-up.
     scans: u64,
-    /// Something changed since the last scan that the next one may report.
-    changed: bool,
+    /// The next scan that is not the same as the last one; `None` while the drive only waits for frames.
+    next: Option<u64>,
 }
 
 impl Drive {
@@ -86,7 +86,7 @@ impl Drive {
             last_status: 0,
             power_up,
             scans: 0,
-            changed: false,
+            next: None,
         };
         drive.restart(power_up);
         drive
@@ -138,7 +138,7 @@ impl Drive {
         self.outbox.clear();
         self.power_up = at;
         self.scans = 0;
-        self.changed = true;
+        self.next = Some(1);
         self.last_status = self.status();
     }
 
@@ -158,7 +158,7 @@ impl Drive {
     pub fn set_inputs(&mut self, at: Instant, inputs: Inputs) {
         self.advance(at);
         self.inputs = inputs;
-        self.changed = true;
+        self.next = Some(self.scans + 1);
     }
 
     /// The identifiers on which it receives and sends now.
@@ -228,7 +228,7 @@ impl Drive {
     /// Overwrites the contents of a register from outside the bus, as a test or a deviation does.
     pub fn poke(&mut self, number: u8, raw: u32) {
         self.cells[usize::from(number)] = raw & Register::of(number).mask();
-        self.changed = true;
+        self.next = Some(self.scans + 1);
     }
 
     /// A frame has ended on the bus at `at`.
@@ -247,7 +247,8 @@ impl Drive {
         };
         self.count(0x95, true);
         self.last_frame = at;
-        self.changed = true;
+        // What the frame changes shows in the next scan.
+        self.next = Some(self.scans + 1);
         match request {
             Request::Read { register } => {
                 if self.properties.oneshot_stops == OneshotStops::Yes {
@@ -283,49 +284,48 @@ impl Drive {
     /// When its next scan may do something; `None` while it only waits for frames.
     #[must_use]
     pub fn next_scan(&self) -> Option<Instant> {
-        self.next_busy().map(|scan| self.power_up + SCAN * scan)
+        self.next.map(|scan| self.power_up + SCAN * scan)
     }
 
     /// Runs all scans up to and including `to`.
     pub fn advance(&mut self, to: Instant) {
         let last = to.since(self.power_up).units() / SCAN.units();
         while self.scans < last {
-            let next = self
-                .next_busy()
-                .map_or(last + 1, |scan| scan.max(self.scans + 1));
-            let idle = next.min(last + 1) - 1 - self.scans;
-            self.plant.skip(&self.demand(), idle);
-            self.scans += idle;
-            if next <= last {
+            let next = self.next.filter(|scan| *scan <= last);
+            let idle = next.map_or(last, |scan| scan - 1) - self.scans;
+            if idle > 0 {
+                self.plant.skip(&self.demand(), idle);
+                self.scans += idle;
+            }
+            if next.is_some() {
                 self.scan();
+                self.next = self.next_busy();
             }
         }
     }
 
-    /// The next scan that is not the same as the last one.
+    /// The next scan that is not the same as the last one, if no frame comes and no input changes before it.
     fn next_busy(&self) -> Option<u64> {
-        if self.changed || !self.plant.is_settled(&self.demand(), self.homing.is_some()) {
+        if !self.plant.is_settled(&self.demand(), self.homing.is_some()) {
             return Some(self.scans + 1);
         }
         let times_out = self.times_out_at().map(|at| {
             // The first scan at or after that instant.
             at.since(self.power_up).units().div_ceil(SCAN.units())
         });
-        [self.cycles.next_due(), times_out]
+        let next = [self.cycles.next_due(), times_out]
             .into_iter()
             .flatten()
-            .min()
+            .min();
+        next.map(|scan| scan.max(self.scans + 1))
     }
 
     fn scan(&mut self) {
         self.scans += 1;
         let now = self.power_up + SCAN * self.scans;
-        self.changed = false;
         self.run_plant();
         if self.times_out_at().is_some_and(|at| at <= now) {
             self.timed_out = true;
-            // The motor coasts from the next scan on.
-            self.changed = true;
         }
         let status = self.status();
         let differs = (status ^ self.last_status) & self.cells[0x52] != 0;
@@ -333,9 +333,8 @@ impl Drive {
             self.reply(now, 0x40, Cause::Event);
         }
         self.last_status = status;
-        if self.cycles.next_due().is_some_and(|due| due <= self.scans) {
-            let due: Vec<u8> = self.cycles.due(self.scans).collect();
-            for register in due {
+        for place in 0..CYCLES {
+            if let Some(register) = self.cycles.take_due(place, self.scans) {
                 self.reply(now, register, Cause::Cycle(register));
             }
         }
