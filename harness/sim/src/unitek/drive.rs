@@ -4,6 +4,9 @@
 //! cyclic frames. Frames from the bus act at once, between two scans. A drive in which nothing changes skips scans, so that it
 //! costs nothing.
 
+mod show;
+mod write;
+
 use super::cycles::Cycles;
 use super::inputs::Inputs;
 use super::outbox::{Cause, Outbox, Waiting};
@@ -11,22 +14,15 @@ use super::plant::{Control, Demand, Plant};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::bit_timing::Nbt;
-use harness_proto::unitek::frame::{CYCLES, Occasion, reply_data};
+use harness_proto::unitek::frame::CYCLES;
 use harness_proto::unitek::properties::{
-    CanCounters, CyclicFirst, EventMask, IdChange, IdRange, LockAtPowerUp, LockClearsCommand,
-    OneshotStops, PowerUpMode, Properties, StatusBits, UnknownRegister,
+    CanCounters, CyclicFirst, EventMask, LockAtPowerUp, OneshotStops, PowerUpMode, Properties,
 };
-use harness_proto::unitek::words::{
-    ERROR_NO_POWER, ERROR_TIME_OUT, ERRORS_FAULT, ERRORS_NOT_READY, MODE_EVENT, MODE_LOCK, status,
-};
-use harness_proto::unitek::{Access, Data, Ignored, REGISTERS, Register, Reply, Request};
+use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
+use harness_proto::unitek::{Ignored, REGISTERS, Register, Request};
 
 /// One scan of the drive.
 const SCAN: Span = Span::from_millis(1);
-/// Speeds below this count as standing: 1 % (F5).
-const STANDING: i64 = 328;
-/// What a cell without a meaning reads (dump).
-const UNASSIGNED: u32 = 0xFACE;
 /// The position at power-up: 6D of the dump.
 const POWER_UP_POSITION: i32 = 0x86B9;
 
@@ -57,6 +53,8 @@ pub struct Drive {
     outbox: Outbox,
     /// STATUS in the last scan.
     last_status: u32,
+    /// Whether it has its supply; without it, it does not even acknowledge.
+    powered: bool,
     power_up: Instant,
     /// Scans since power-up.
     scans: u64,
@@ -84,6 +82,7 @@ impl Drive {
             cycles: Cycles::default(),
             outbox: Outbox::default(),
             last_status: 0,
+            powered: true,
             power_up,
             scans: 0,
             next: None,
@@ -109,7 +108,21 @@ impl Drive {
         self
     }
 
-    /// Switches the drive off and on at `at`.
+    /// Switches the drive off: nothing is heard, sent or moved until [`Drive::restart`].
+    pub fn switch_off(&mut self, at: Instant) {
+        self.advance(at);
+        self.powered = false;
+        self.outbox.clear();
+        self.next = None;
+    }
+
+    /// Whether the drive has its supply.
+    #[must_use]
+    pub const fn is_powered(&self) -> bool {
+        self.powered
+    }
+
+    /// Switches the drive on at `at`, after switching it off if it is on. What is not in the EEPROM is as at the first power-up.
     pub fn restart(&mut self, at: Instant) {
         self.cells = REGISTERS.map(|register| register.dump);
         self.load(0);
@@ -136,6 +149,7 @@ impl Drive {
         self.last_frame = at;
         self.cycles = Cycles::default();
         self.outbox.clear();
+        self.powered = true;
         self.power_up = at;
         self.scans = 0;
         self.next = Some(1);
@@ -158,7 +172,7 @@ impl Drive {
     pub fn set_inputs(&mut self, at: Instant, inputs: Inputs) {
         self.advance(at);
         self.inputs = inputs;
-        self.next = Some(self.scans + 1);
+        self.next = self.powered.then_some(self.scans + 1);
     }
 
     /// The identifiers on which it receives and sends now.
@@ -186,49 +200,10 @@ impl Drive {
         self.control
     }
 
-    /// The contents of a register as a read gives them, with the bits that the register has.
-    #[must_use]
-    pub fn register(&self, number: u8) -> u32 {
-        let position = self.plant.position().cast_unsigned();
-        let destination = self.cells[0x6E];
-        let follows = self.control == Control::Position && self.is_enabled();
-        let command = if follows { destination } else { position };
-        let inputs = &self.inputs;
-        let raw = match number {
-            0x20 | 0x27 | 0x5F => self.current(),
-            0x30 | 0x32 | 0xA8 => (self.plant.speed() & 0xFFFF) as u32,
-            0x40 => self.status(),
-            0x49 => inputs.motor_temperature.into(),
-            0x4A => inputs.igbt_temperature.into(),
-            0x4B => inputs.air_temperature.into(),
-            0x6D => position,
-            0x70 => command.wrapping_sub(position),
-            0x8F => self.errors(),
-            0x91 => command,
-            0xCE => self.cells[0xC8],
-            0xD8 => self.io(),
-            0xE2 => self.is_ready().into(),
-            0xE3 => self.is_enabled().into(),
-            0xE4 => inputs.limit1.into(),
-            0xE5 => inputs.limit2.into(),
-            0xE6 => inputs.din1.into(),
-            0xE7 => inputs.din2.into(),
-            0xE8 => inputs.run.into(),
-            0xEB => inputs.bus_voltage().into(),
-            0xEF => (self.errors() & ERRORS_FAULT == 0).into(),
-            0xF2 => (!self.is_enabled()).into(),
-            0xF3 => inputs.icns.into(),
-            0xF4 => self.in_tolerance().into(),
-            0xF5 => self.is_standing().into(),
-            _ => self.cells[usize::from(number)],
-        };
-        raw & Register::of(number).mask()
-    }
-
     /// Overwrites the contents of a register from outside the bus, as a test or a deviation does.
     pub fn poke(&mut self, number: u8, raw: u32) {
         self.cells[usize::from(number)] = raw & Register::of(number).mask();
-        self.next = Some(self.scans + 1);
+        self.next = self.powered.then_some(self.scans + 1);
     }
 
     /// A frame has ended on the bus at `at`.
@@ -287,8 +262,11 @@ impl Drive {
         self.next.map(|scan| self.power_up + SCAN * scan)
     }
 
-    /// Runs all scans up to and including `to`.
+    /// Runs all scans up to and including `to`; none without its supply.
     pub fn advance(&mut self, to: Instant) {
+        if !self.powered {
+            return;
+        }
         let last = to.since(self.power_up).units() / SCAN.units();
         while self.scans < last {
             let next = self.next.filter(|scan| *scan <= last);
@@ -393,216 +371,5 @@ impl Drive {
         if counts && self.properties.can_counters == CanCounters::Live {
             self.cells[number] = (self.cells[number] + 1) & 0xFFFF;
         }
-    }
-}
-
-/// What a write does.
-impl Drive {
-    fn write(&mut self, number: u8, data: Data) {
-        let register = Register::of(number);
-        let held = self.cells[usize::from(number)];
-        let raw = data.written_to(register, held, self.properties.short_write);
-        match register.access {
-            Access::RO | Access::UK => {}
-            Access::FN => self.call(number, raw),
-            Access::RW | Access::SP => {
-                if self.takes(number, raw) {
-                    self.cells[usize::from(number)] = raw;
-                    self.act(number, raw);
-                }
-            }
-        }
-    }
-
-    /// Whether a register takes a value; only identifiers refuse some.
-    fn takes(&self, number: u8, raw: u32) -> bool {
-        match (number, self.properties.id_range) {
-            (0x68 | 0x69, IdRange::Any) => (1..=0x7FF).contains(&raw),
-            (0x68, IdRange::Printed) => (0x201..=0x27F).contains(&raw),
-            (0x69, IdRange::Printed) => (0x181..=0x1FF).contains(&raw),
-            _ => true,
-        }
-    }
-
-    /// What a write causes besides the new contents.
-    fn act(&mut self, number: u8, raw: u32) {
-        match number {
-            0x31 => self.control = Control::Speed,
-            0x90 => self.control = Control::Torque,
-            0x6E => self.control = Control::Position,
-            0x35 | 0xED | 0xC7 => self.plant.forget_ramp(),
-            0x51 if raw & u32::from(MODE_LOCK) != 0 => self.lock(),
-            0x68 | 0x69 => self.use_identifiers(),
-            0x7A => self.plant.preset(raw.cast_signed()),
-            _ => {}
-        }
-    }
-
-    fn lock(&mut self) {
-        if self.properties.lock_clears_command == LockClearsCommand::Yes {
-            self.cells[0x31] = 0;
-            self.cells[0x90] = 0;
-        }
-    }
-
-    fn use_identifiers(&mut self) {
-        if self.properties.id_change == IdChange::Immediate {
-            self.identifiers = (self.cell16(0x68), self.cell16(0x69));
-        }
-    }
-
-    /// A function; values that it does not know are ignored.
-    fn call(&mut self, number: u8, value: u32) {
-        match (number, value) {
-            (0x78, 1) if self.is_enabled() => {
-                self.control = Control::Position;
-                self.cells[0x6E] = self.plant.position().cast_unsigned();
-                self.homing = Some(self.properties.homing_time.units() / SCAN.units());
-            }
-            (0x83, 0 | 1) => {
-                self.load(usize::from(value == 1));
-                self.use_identifiers();
-            }
-            (0x84, 0 | 1) => {
-                self.eeprom[usize::from(value == 1)] = Some(Box::new(self.cells));
-            }
-            (0x8E, _) => self.timed_out = false,
-            _ => {}
-        }
-    }
-
-    /// Brings the parameters (RW) of a level back; an empty level changes nothing.
-    fn load(&mut self, level: usize) {
-        let Some(stored) = &self.eeprom[level] else {
-            return;
-        };
-        for (place, register) in REGISTERS.iter().enumerate() {
-            if register.access == Access::RW {
-                self.cells[place] = stored[place];
-            }
-        }
-    }
-
-    fn reply(&mut self, at: Instant, number: u8, cause: Cause) {
-        let register = Register::of(number);
-        let unassigned = register.dump == UNASSIGNED;
-        if unassigned && self.properties.unknown_register == UnknownRegister::Silent {
-            return;
-        }
-        let occasion = match cause {
-            Cause::Event => Occasion::Event,
-            Cause::Asked | Cause::Cycle(_) => Occasion::Asked,
-        };
-        let wide = self.cell16(0xDC) & 0x0100 != 0;
-        let raw = self.register(number);
-        let reply = Reply {
-            register: number,
-            data: reply_data(register, raw, occasion, wide, &self.properties),
-            stuff: self.properties.stuff,
-        };
-        let delay = match cause {
-            Cause::Asked => self.properties.reply_delay,
-            Cause::Cycle(_) | Cause::Event => Span::ZERO,
-        };
-        if let Ok(frame) = reply.encode(self.identifiers.1) {
-            self.outbox.put(Waiting {
-                ready: at + delay,
-                cause,
-                frame,
-            });
-        }
-    }
-}
-
-/// What the registers show of inputs and plant.
-impl Drive {
-    fn errors(&self) -> u32 {
-        let mut errors = self.inputs.faults;
-        if self.timed_out {
-            errors |= ERROR_TIME_OUT;
-        }
-        if !self.inputs.dc_bus {
-            errors |= ERROR_NO_POWER;
-        }
-        errors
-    }
-
-    /// Whether the drive is ready: E2 (BTB).
-    #[must_use]
-    pub fn is_ready(&self) -> bool {
-        self.errors() & ERRORS_NOT_READY == 0
-    }
-
-    /// Whether the drive is enabled: both inputs closed, ready, not locked.
-    #[must_use]
-    pub fn is_enabled(&self) -> bool {
-        let locked = self.cell16(0x51) & MODE_LOCK != 0;
-        self.inputs.run && self.inputs.rfe && self.is_ready() && !locked
-    }
-
-    fn is_standing(&self) -> bool {
-        self.plant.speed().abs() < STANDING
-    }
-
-    fn in_tolerance(&self) -> bool {
-        let destination = i64::from(self.cells[0x6E].cast_signed());
-        let away = (destination - i64::from(self.plant.position())).abs();
-        self.control == Control::Position
-            && self.homing.is_none()
-            && away <= i64::from(self.cell16(0x79))
-    }
-
-    /// STATUS (40).
-    fn status(&self) -> u32 {
-        let printed = [
-            (status::ENABLED, self.is_enabled()),
-            (status::LIMIT_PLUS, self.inputs.limit1),
-            (status::LIMIT_MINUS, self.inputs.limit2),
-            (status::CONTINUOUS, self.inputs.icns),
-            (status::POSITION, self.control == Control::Position),
-            (status::SPEED, self.control != Control::Torque),
-            (status::CALIBRATED, self.calibrated),
-            (status::TOLERANCE, self.in_tolerance()),
-        ];
-        let full = [
-            (status::OK | status::READY, self.is_ready()),
-            (status::TORQUE, self.control == Control::Torque),
-            (status::STANDING, self.is_standing()),
-            (status::HOMING, self.homing.is_some()),
-        ];
-        let more = self.properties.status_bits == StatusBits::Full;
-        let full = full.iter().filter(|_| more);
-        printed
-            .iter()
-            .chain(full)
-            .filter(|(_, set)| *set)
-            .map(|(bits, _)| bits)
-            .sum()
-    }
-
-    /// Inputs and outputs (D8).
-    fn io(&self) -> u32 {
-        let inputs = &self.inputs;
-        let bits = [
-            (0, inputs.limit1),
-            (1, inputs.limit2),
-            (2, inputs.din2),
-            (3, inputs.din1),
-            (4, inputs.run),
-            (5, inputs.rfe),
-            (10, self.is_ready()),
-            (11, self.is_enabled()),
-        ];
-        bits.iter().map(|(bit, set)| u32::from(*set) << bit).sum()
-    }
-
-    /// The current in units of the converter (20, 27, 5F).
-    fn current(&self) -> u32 {
-        if self.control != Control::Torque || !self.is_enabled() {
-            return 0;
-        }
-        let torque = i64::from(self.cell16(0x90).cast_signed());
-        let size = torque.abs() * i64::from(self.cell16(0xD9)) / 43_690;
-        ((torque.signum() * size) & 0xFFFF) as u32
     }
 }

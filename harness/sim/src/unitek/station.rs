@@ -7,8 +7,10 @@ use harness_proto::time::Instant;
 
 impl Station for Drive {
     fn hear(&mut self, at: Instant, frame: &Frame) {
-        // What it ignores is its own affair.
-        let _ = self.receive(at, frame);
+        if self.is_powered() {
+            // What it ignores is its own affair.
+            let _ = self.receive(at, frame);
+        }
     }
 
     fn wants(&self) -> Option<(Instant, Frame)> {
@@ -25,5 +27,9 @@ impl Station for Drive {
 
     fn advance(&mut self, to: Instant) {
         Drive::advance(self, to);
+    }
+
+    fn acknowledges(&self) -> bool {
+        self.is_powered()
     }
 }

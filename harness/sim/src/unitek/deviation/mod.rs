@@ -316,4 +316,8 @@ impl Station for Deviant {
         Station::advance(&mut self.drive, to);
         self.settle();
     }
+
+    fn acknowledges(&self) -> bool {
+        self.drive.acknowledges()
+    }
 }

@@ -483,3 +483,20 @@ fn eeprom_levels() {
         "power-up loads level 0"
     );
 }
+
+/// Without its supply the drive is no station: nothing acknowledges. After it, cycles, lock and identifiers are as at power-up.
+#[test]
+fn switched_off_and_on() {
+    let mut desk = Desk::default();
+    for frame in ["201#3D1B0A", "201#510400", "201#681002"] {
+        desk.ask(frame);
+    }
+    let now = desk.segment.now();
+    desk.drive().switch_off(now);
+    assert_eq!(desk.ask("210#3D1B00"), ["no-acknowledge"]);
+    assert!(!desk.drive().is_powered());
+    desk.restart();
+    // The host repeats its frame until it is acknowledged; the drive listens at 201 again.
+    assert_eq!(desk.wait(20), [""; 0]);
+    assert_eq!(desk.ask("201#3D4000"), ["181#40010100"]);
+}
