@@ -1,12 +1,15 @@
 //! Where scenarios come from: the files and folders that are named, or the built-in ones.
 
-use crate::scenario::parse::parse;
+use crate::buses::{Bus, settle};
+use crate::scenario::parse::{self, parse};
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::{Problems, nearest};
+use crate::scenario::settled::Settled;
 use crate::scenario::source::{Source, SourceError};
 use crate::scenario::syntax::Scenario;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The scenarios that the binary carries.
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/scenarios");
@@ -61,10 +64,12 @@ pub struct Entry {
     pub name: String,
     /// Its text.
     pub source: Source,
-    /// What it says.
+    /// What it says; of another bus than [`Bus::DEFAULT`] only what it says in the words of every bus.
     pub scenario: Scenario,
-    /// The same for rings of given sizes; `None` for a bus that is not built yet.
+    /// The same settled for a bench of a given size; `None` for another bus.
     pub plan: Option<Plan>,
+    /// The same of another bus; `None` for [`Bus::DEFAULT`], and for a bus that is not built.
+    pub other: Option<Arc<dyn Settled>>,
 }
 
 impl Entry {
@@ -73,17 +78,26 @@ impl Entry {
     /// # Errors
     /// Its mistakes.
     pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
-        let scenario = parse(&source)?;
-        let plan = if scenario.bus.is_built() {
-            Some(plan(&scenario, &source, size)?)
-        } else {
-            None
+        let name = source.name.clone();
+        let bus = parse::bus(&source);
+        let other = match bus {
+            Bus::DEFAULT => None,
+            other => settle(other, &source, size).transpose()?,
+        };
+        let (scenario, plan, other) = match other {
+            Some((scenario, other)) => (scenario, None, Some(other)),
+            None => {
+                let scenario = parse(&source)?;
+                let own = (bus == Bus::DEFAULT).then(|| plan(&scenario, &source, size));
+                (scenario, own.transpose()?, None)
+            }
         };
         Ok(Self {
-            name: source.name.clone(),
+            name,
             source,
             scenario,
             plan,
+            other,
         })
     }
 
@@ -92,7 +106,7 @@ impl Entry {
     /// # Errors
     /// Its mistakes.
     pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
-        let scenario = parse(&source)?;
+        let scenario: Scenario = parse(&source)?;
         let range = scenario.header.rings.first();
         let fits = |n: &u8| range.is_some_and(|own| (own.smallest..=own.largest).contains(n));
         Self::new(source, drives.filter(fits))

@@ -24,5 +24,6 @@ pub mod line;
 pub mod marks;
 pub mod nd21;
 pub mod novobus;
+pub mod ratio;
 pub mod time;
 pub mod unitek;

@@ -2,8 +2,36 @@
 
 pub mod novobus;
 
-pub(crate) use novobus::language::write;
+pub use novobus::language::{argument, plan, syntax};
+pub use novobus::simulate;
+
+/// What of playing belongs to the one bus whose drives are played on over their bus today.
+pub mod run {
+    pub use super::novobus::language::run::bytes::show;
+    pub use super::novobus::language::run::now::{Now, now};
+    pub use super::novobus::language::run::over_bus::{
+        NotReady, play_over_bus, reset_drives, start_anew,
+    };
+    pub(crate) use super::novobus::language::run::over_bus::{come_home, read_byte};
+    pub use super::novobus::language::run::record::{MAX_SAMPLES, Record, Sample};
+}
+
+pub(crate) use harness_proto::novobus::guard::Setting;
+pub(crate) use novobus::language::parse::header;
+
+/// The bus of a scenario without a `bus` line.
+pub use novobus::language::Novobus as DefaultBus;
+
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
+
+use crate::scenario::problem::Problems;
+use crate::scenario::settled::{self, Settled};
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Scenario;
+use std::sync::Arc;
+
+/// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
+type Found = Result<(Scenario, Arc<dyn Settled>), Problems>;
 
 /// What happens to a drive from outside the bus, by the bus that it is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,10 +71,29 @@ impl Bus {
             Self::Nordac => "nordac",
         }
     }
+}
 
-    /// Whether its scenarios can be settled and played.
-    #[must_use]
-    pub const fn is_built(self) -> bool {
-        matches!(self, Self::Novobus)
-    }
+/// Makes the languages of buses known: a line a bus.
+macro_rules! languages {
+    ($($bus:ident => $language:ty),+ $(,)?) => {
+        impl Bus {
+            /// Whether its scenarios can be settled and played.
+            #[must_use]
+            pub const fn is_built(self) -> bool {
+                matches!(self, $(Self::$bus)|+)
+            }
+        }
+
+        /// Reads and settles a scenario in the words of its bus; `None` if that is not built.
+        pub(crate) fn settle(bus: Bus, source: &Source, size: Option<u8>) -> Option<Found> {
+            match bus {
+                $(Bus::$bus => Some(settled::settle::<$language>(source, size)),)+
+                _ => None,
+            }
+        }
+    };
+}
+
+languages! {
+    Novobus => novobus::language::Novobus,
 }

@@ -1,8 +1,8 @@
 //! One fault of a case: where it is and what it does, with the name by which people call it.
 
+use crate::buses::syntax::LinkFaultKind;
 use crate::file::values::{Time, Wire};
 use crate::link::{LinkFault, link_name};
-use crate::scenario::syntax::LinkFaultKind;
 use crate::scenario::times;
 use harness_proto::time::Span;
 use harness_sim::fault::Flips;

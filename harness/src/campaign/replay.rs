@@ -2,9 +2,10 @@
 
 use super::fault::Case;
 use super::run::{Campaign, Contradiction};
+use crate::buses::syntax::{Fault, Header, Job, LinkEnds, RingStep};
 use crate::link::link_name;
 use crate::scenario::pattern::{Expected, Pattern};
-use crate::scenario::syntax::{Action, Fault, Header, Job, LinkEnds, Scenario};
+use crate::scenario::syntax::{Action, Scenario};
 use crate::scenario::write::Text;
 use harness_proto::line::Rate;
 
@@ -28,7 +29,7 @@ pub fn scenario(campaign: &Campaign, case: &Case) -> Result<String, Contradictio
         rate: entry.scenario.header.rate.or_else(|| Some(Rate::default())),
         ..entry.scenario.header.and(&Header::of_rings(&[drives]))
     };
-    let mut text = Text::default();
+    let mut text: Text = Text::default();
     text.header(&Scenario {
         sources: entry.scenario.sources.clone(),
         ..Scenario::new(&title, header)
@@ -46,12 +47,12 @@ pub fn scenario(campaign: &Campaign, case: &Case) -> Result<String, Contradictio
         for (distance, what) in fault.what.lines() {
             let ends = LinkEnds::of_place(drives, fault.link);
             let fault = Fault::on_link(0, ends, what, fault.byte + distance);
-            text.step(&Action::Fault(fault).into(), "");
+            text.step(&RingStep::Fault(fault).into(), "");
         }
     }
     if campaign.by_driver() {
         for step in &entry.scenario.steps {
-            if let Action::Job(Job::Master { .. } | Job::Count(..)) = step.action {
+            if let Action::Own(RingStep::Job(Job::Master { .. } | Job::Count(..))) = step.action {
                 text.step(step, "");
             }
         }
@@ -61,7 +62,14 @@ pub fn scenario(campaign: &Campaign, case: &Case) -> Result<String, Contradictio
         text.remark(said.why);
         let bytes: Vec<_> = said.bytes.iter().copied().map(Expected::Byte).collect();
         for bytes in Pattern::of(&bytes, RUN).lines(ITEMS_A_LINE) {
-            text.step(&Action::Send { ring: 0, bytes }.into(), "");
+            text.step(
+                &Action::Send {
+                    port: 0,
+                    message: bytes,
+                }
+                .into(),
+                "",
+            );
         }
     }
     Ok(text.into())

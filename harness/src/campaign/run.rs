@@ -3,6 +3,7 @@
 use super::fault::Case;
 use super::file::{CampaignFile, Expect, read};
 use super::plan::{Shape, cases};
+use crate::buses::syntax::{Setup, SetupKind};
 use crate::campaign::by_driver::ByDriver;
 use crate::campaign::by_manual::{ByManual, Said};
 use crate::campaign::class::{Class, Evidence};
@@ -11,7 +12,6 @@ use crate::library::{Entry, LibraryError, sources};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::simulate::bench;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Setup, SetupKind};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;

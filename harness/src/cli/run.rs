@@ -17,6 +17,7 @@ use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, play};
+use crate::scenario::settled::Settled;
 use crate::scenario::simulate::simulated;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -217,19 +218,20 @@ pub(crate) struct Played {
     pub(crate) traces: Vec<Trace>,
 }
 
-/// Plays a scenario on simulated rings.
+/// Plays a scenario on a simulated bench.
 pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> Played {
-    let Some(plan) = &entry.plan else {
+    let own = entry.plan.as_ref().map(|plan| plan as &dyn Settled);
+    let Some(plan) = own.or(entry.other.as_deref()) else {
         return Played {
             outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
             traces: Vec::new(),
         };
     };
-    let mut link = simulated(plan);
-    let outcome = play(plan, &mut link, at_mismatch);
+    let mut link = plan.simulate();
+    let outcome = plan.play(&mut *link, at_mismatch);
     Played {
         outcome,
-        traces: traces(plan, &link),
+        traces: (0..plan.ports()).map(|port| link.trace(port)).collect(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! A finding, shown as the manual's table with the first byte that differs, expected beside received.
 
 use crate::report::table::{LEGEND, Part, table};
-use crate::scenario::run::{Difference, Mismatch, Shown, show};
+use crate::scenario::run::{Difference, Mismatch, show};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
@@ -71,10 +71,7 @@ fn beside(difference: &Difference) -> String {
         }
     }
     for index in from..to {
-        let expected = difference
-            .expected
-            .get(index)
-            .map(|e| Shown(*e).to_string());
+        let expected = difference.expected.get(index).map(|e| e.to_string());
         let received = difference.received.get(index).map(|r| show(*r));
         let (expected, received) = match (expected, received) {
             (None, None) => break,

@@ -6,20 +6,21 @@
 //! described in `LANGUAGE.md` beside this file.
 
 pub mod expression;
+pub mod language;
+#[cfg(test)]
+mod language_test;
 pub mod parse;
 pub mod pattern;
+pub mod plan;
 pub mod problem;
 pub mod quantity;
 pub mod run;
-pub(crate) mod scanner;
+pub mod scanner;
+pub(crate) mod settled;
 pub mod source;
 pub mod syntax;
 pub(crate) mod times;
 pub mod verdict;
 pub mod write;
 
-/// What is settled, simulated and read by the one bus that is played today.
-pub use crate::buses::novobus::{
-    language::{argument, plan},
-    simulate,
-};
+pub use crate::buses::{argument, simulate};

@@ -2,7 +2,7 @@
 
 use super::problem::{Problem, Span};
 use super::scanner::Scanner;
-use harness_proto::nd21::units::{Ratio, Scale, Value};
+use harness_proto::ratio::Ratio;
 use std::fmt;
 
 /// Digits behind the point that are shown of turns: one increment is 0.000015 turns.
@@ -56,8 +56,8 @@ const fn unit(name: &'static str, dimension: Dimension, factor: (i128, i128)) ->
     }
 }
 
-/// Every unit. The first of a dimension is the one in which the scales of the drive measure it
-/// ([`Scale::unit`]). A current is written in A or Aeff, whichever the cell measures: the cell decides.
+/// Every unit. The first of a dimension is the one in which the scales of the drive measure it.
+/// A current is written in A or Aeff, whichever the cell measures: the cell decides.
 static UNITS: [Unit; 25] = [
     unit("rpm", Dimension::Speed, (1, 1)),
     unit("rpm/s", Dimension::Ramp, (1, 1)),
@@ -88,28 +88,6 @@ static UNITS: [Unit; 25] = [
 ];
 
 impl Dimension {
-    /// What the values of a scale measure; `None` for plain numbers and dates.
-    #[must_use]
-    pub const fn of(scale: Scale) -> Option<Self> {
-        Some(match scale {
-            Scale::Speed | Scale::MaxSpeed | Scale::AnalogueSpeed => Self::Speed,
-            Scale::Ramp => Self::Ramp,
-            Scale::MomentaryCurrent
-            | Scale::EffectiveCurrent
-            | Scale::TorqueLimit
-            | Scale::Torque => Self::Current,
-            Scale::Turns | Scale::Angle | Scale::Position | Scale::SlippingError => Self::Angle,
-            Scale::CoolerTemperature => Self::Temperature,
-            Scale::MotorSensor => Self::Resistance,
-            Scale::Emf => Self::Voltage,
-            Scale::TachoFilter | Scale::ScopePeriod => Self::Time,
-            Scale::Hours => Self::Hours,
-            Scale::MotorPoles | Scale::EncoderImpulses | Scale::SerialNumber | Scale::Date => {
-                return None;
-            }
-        })
-    }
-
     /// The name of its first unit.
     pub(crate) fn unit(self) -> &'static str {
         let own = |unit: &&Unit| unit.dimension == self;
@@ -147,22 +125,6 @@ pub fn figures(value: f64, unit: &str) -> String {
         _ => DIGITS - 1 - [1e1, 1e2, 1e3, 1e4].map(before).iter().sum::<usize>(),
     };
     trimmed(value, decimals)
-}
-
-/// The value of a cell as text, in the unit of its scale: `1500.1 rpm`, `off`, `1996-01-31`.
-#[must_use]
-pub fn shown(value: Value, scale: Scale) -> String {
-    let number = match value {
-        Value::Exact(ratio) => ratio.to_f64(),
-        Value::Approximate(number) => number,
-        Value::Off => return "off".to_owned(),
-        Value::Date(date) => {
-            return format!("{}-{:02}-{:02}", date.year(), date.month(), date.day());
-        }
-    };
-    let unit = scale.unit();
-    let text = format!("{} {unit}", figures(number, unit));
-    text.trim_end().to_owned()
 }
 
 /// A number with at most `decimals` decimals and no trailing zeros.

@@ -4,7 +4,7 @@ use super::problem::{Problem, Span, Spanned};
 
 /// A line without its comment.
 #[derive(Clone, Debug)]
-pub(crate) struct Scanner<'a> {
+pub struct Scanner<'a> {
     text: &'a str,
     /// Where the line starts in the file.
     offset: usize,

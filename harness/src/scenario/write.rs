@@ -4,8 +4,10 @@
 //! this file and to the buses' `write`.
 
 use super::syntax::{Action, Bus, Scenario, Step, When};
-use crate::buses::write as bus;
+use crate::buses;
+use crate::scenario::language::Language;
 use std::fmt::Write as _;
+use std::marker::PhantomData;
 
 /// The column at which a comment behind a step begins, if the step is not longer.
 const COMMENT_AT: usize = 32;
@@ -15,8 +17,8 @@ const MOST_REMARK: usize = 100;
 
 /// A scenario as text.
 #[must_use]
-pub fn write(scenario: &Scenario) -> String {
-    let mut text = Text::default();
+pub fn write<L: Language>(scenario: &Scenario<L>) -> String {
+    let mut text = Text::<L>::default();
     text.header(scenario);
     text.empty_line();
     for step in &scenario.steps {
@@ -26,20 +28,30 @@ pub fn write(scenario: &Scenario) -> String {
 }
 
 /// The text of a scenario, line by line.
-#[derive(Clone, Debug, Default)]
-pub struct Text {
+#[derive(Clone, Debug)]
+pub struct Text<L: Language = buses::DefaultBus> {
     lines: String,
+    bus: PhantomData<L>,
 }
 
-impl From<Text> for String {
-    fn from(text: Text) -> Self {
+impl<L: Language> Default for Text<L> {
+    fn default() -> Self {
+        Self {
+            lines: String::new(),
+            bus: PhantomData,
+        }
+    }
+}
+
+impl<L: Language> From<Text<L>> for String {
+    fn from(text: Text<L>) -> Self {
         text.lines
     }
 }
 
-impl Text {
+impl<L: Language> Text<L> {
     /// Writes the header of a scenario.
-    pub fn header(&mut self, scenario: &Scenario) {
+    pub fn header(&mut self, scenario: &Scenario<L>) {
         if !scenario.title.is_empty() {
             self.word("title", &scenario.title);
         }
@@ -49,7 +61,8 @@ impl Text {
         if scenario.bus != Bus::DEFAULT {
             self.word("bus", scenario.bus.name());
         }
-        for (word, value) in bus::header(&scenario.header) {
+        let (words, devices) = L::write_header(&scenario.header);
+        for (word, value) in words {
             self.word(word, &value);
         }
         if scenario.strict {
@@ -62,13 +75,13 @@ impl Text {
             let needs: Vec<_> = scenario.needs.iter().map(|need| need.name()).collect();
             self.word("needs", &needs.join(", "));
         }
-        for line in bus::devices(&scenario.header) {
+        for line in devices {
             self.line(&line);
         }
     }
 
     /// Writes a step, with a comment behind it if that is not empty.
-    pub fn step(&mut self, step: &Step, comment: &str) {
+    pub fn step(&mut self, step: &Step<L>, comment: &str) {
         let step = written(step);
         // Writing to a String cannot fail.
         let _infallible = match comment {
@@ -109,27 +122,25 @@ impl Text {
 }
 
 /// A step as text.
-fn written(step: &Step) -> String {
+fn written<L: Language>(step: &Step<L>) -> String {
     let when = match step.when {
         When::Now => String::new(),
         When::After(window) => format!("+{window} "),
         When::At(window) => format!("@{window} "),
     };
-    let side = |ring: usize| if ring == 0 { "" } else { "2" };
+    let side = |port: usize| match port {
+        0 => String::new(),
+        port => (port + 1).to_string(),
+    };
     let action = match &step.action {
-        Action::Send { ring, bytes } => format!("{}> {bytes}", side(*ring)),
-        Action::Receive { ring, bytes } => format!("{}< {bytes}", side(*ring)),
-        Action::Fault(fault) => format!("! {}", bus::fault(fault)),
-        Action::Check(check) => format!("? {}", bus::check(check)),
-        Action::Until(check, within) => {
-            format!("until {} within {within}", bus::drive_check(check))
+        Action::Send { port, message } => format!("{}> {}", side(*port), L::write_message(message)),
+        Action::Receive { port, message } => {
+            format!("{}< {}", side(*port), L::write_message(message))
         }
         Action::Wait(time) => format!("wait {time}"),
-        Action::Influence(drives, influence) => bus::influence_on(drives, influence),
-        Action::Record(recording) => bus::record(recording),
-        Action::Job(job) => bus::job(job),
         Action::For(counter, from, to) => format!("for {counter} in {from}..{to}"),
         Action::End => "end".to_owned(),
+        Action::Own(step) => L::write_step(step),
     };
     when + &action
 }

@@ -93,7 +93,7 @@ fn plans() -> &'static [Plan] {
 /// A scenario on drives that have just been switched on.
 fn as_they_are() -> Way {
     Way {
-        rings: ring(&[]).expect("a ring").0.rings,
+        rings: ring(&[]).expect("a ring").0.rings.clone(),
         attempts: None,
         anew: false,
     }

@@ -1,7 +1,8 @@
 //! The simulated rings that a plan asks for.
 
+use crate::buses::novobus::language::plan::PlannedSetupKind;
 use crate::link::SimulatedLink;
-use crate::scenario::plan::{Plan, PlannedSetupKind};
+use crate::scenario::plan::Plan;
 use harness_proto::nd21::ee;
 use harness_proto::novobus::properties::Properties;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, set_parity};

@@ -6,7 +6,7 @@ use super::write::Html;
 use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
-use crate::scenario::run::{Difference, Mismatch, Outcome, Shown as Byte, show};
+use crate::scenario::run::{Difference, Mismatch, Outcome, show};
 use crate::scenario::source::line_number;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
@@ -126,12 +126,7 @@ fn beside(html: &mut Html, difference: &Difference) {
     let from = difference.index.saturating_sub(AROUND);
     let longest = difference.expected.len().max(difference.received.len());
     let to = longest.min(difference.index + AROUND + 1);
-    let expected = |at: usize| {
-        difference
-            .expected
-            .get(at)
-            .map(|byte| Byte(*byte).to_string())
-    };
+    let expected = |at: usize| difference.expected.get(at).map(|byte| byte.to_string());
     let received = |at: usize| difference.received.get(at).map(|byte| show(*byte));
     html.element("table", &[("class", &"bytes")], |html| {
         let place = difference.byte;

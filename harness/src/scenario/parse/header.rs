@@ -1,13 +1,13 @@
 //! The header, and the lines one after another.
 
-use super::bus_header as bus;
 use super::step;
 use super::words::named;
 use crate::link::Capability;
+use crate::scenario::language::Language;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Action, Bus, Citation, Header, Scenario, Step};
+use crate::scenario::syntax::{Action, Bus, Citation, Scenario, Step};
 use crate::scenario::times;
 
 /// The most lines of a scenario.
@@ -29,15 +29,26 @@ pub(crate) enum Part {
 ///
 /// # Errors
 /// Every line that is no line of the language, or a header that is not complete.
-pub fn parse(source: &Source) -> Result<Scenario, Problems> {
+pub fn parse<L: Language>(source: &Source) -> Result<Scenario<L>, Problems> {
     read(source, Part::Whole)
+}
+
+/// The bus that a `bus` line names; a bus that no line names or that is not known counts as [`Bus::DEFAULT`].
+pub(crate) fn bus(source: &Source) -> Bus {
+    let named = source.text.lines().find_map(|line| {
+        let mut words = line.split(['#']).next()?.split_whitespace();
+        let is_bus = words.next() == Some("bus");
+        words.next().filter(|_| is_bus)
+    });
+    let known = Bus::NAMES.iter().find(|(name, _)| Some(*name) == named);
+    known.map_or(Bus::DEFAULT, |(_, bus)| *bus)
 }
 
 /// Reads one line as a step, whatever stands before it.
 ///
 /// # Errors
 /// The line is no step.
-pub fn parse_step(source: &Source) -> Result<Step, Problems> {
+pub fn parse_step<L: Language>(source: &Source) -> Result<Step<L>, Problems> {
     step::step(&mut Scanner::new(&source.text, 0))
         .map_err(|problem| Problems::new(&source.name, source.text.clone(), vec![problem]))
 }
@@ -46,8 +57,8 @@ pub fn parse_step(source: &Source) -> Result<Step, Problems> {
 ///
 /// # Errors
 /// As of [`parse`].
-pub(crate) fn read(source: &Source, part: Part) -> Result<Scenario, Problems> {
-    let mut reader = Reader::default();
+pub(crate) fn read<L: Language>(source: &Source, part: Part) -> Result<Scenario<L>, Problems> {
+    let mut reader = Reader::<L>::new();
     let mut offset = 0;
     for (number, line) in source.text.split('\n').enumerate() {
         if number == MAX_LINES {
@@ -72,20 +83,33 @@ pub(crate) fn read(source: &Source, part: Part) -> Result<Scenario, Problems> {
         .map_err(|problems| Problems::new(&source.name, source.text.clone(), problems))
 }
 
-#[derive(Default)]
-struct Reader {
+struct Reader<L: Language> {
     title: Option<String>,
     sources: Vec<Citation>,
     bus: Option<Bus>,
-    header: Header,
+    header: L::Header,
     needs: Vec<Capability>,
     strict: bool,
     deadline: Option<times::Duration>,
-    steps: Vec<Step>,
+    steps: Vec<Step<L>>,
     problems: Vec<Problem>,
 }
 
-impl Reader {
+impl<L: Language> Reader<L> {
+    fn new() -> Self {
+        Self {
+            title: None,
+            sources: Vec::new(),
+            bus: None,
+            header: L::Header::default(),
+            needs: Vec::new(),
+            strict: false,
+            deadline: None,
+            steps: Vec::new(),
+            problems: Vec::new(),
+        }
+    }
+
     fn line(&mut self, mut scanner: Scanner<'_>) -> Result<(), Problem> {
         if scanner.at_end() {
             return Ok(());
@@ -100,7 +124,7 @@ impl Reader {
                     false => self.header(word, &mut scanner),
                 };
             }
-            if let Some(read) = bus::line(word, &mut scanner, &mut self.header, begun) {
+            if let Some(read) = L::header(word, &mut scanner, &mut self.header, begun) {
                 return read;
             }
         }
@@ -119,7 +143,7 @@ impl Reader {
                 once(&mut self.title, text, word)
             }
             "source" => {
-                self.sources.push(citation(scanner)?);
+                self.sources.push(citation(scanner, L::SOURCE)?);
                 Ok(())
             }
             "bus" => {
@@ -147,12 +171,12 @@ impl Reader {
         }
     }
 
-    fn finish(mut self, part: Part) -> Result<Scenario, Vec<Problem>> {
+    fn finish(mut self, part: Part) -> Result<Scenario<L>, Vec<Problem>> {
         let bus = self.bus.unwrap_or(Bus::DEFAULT);
         if part == Part::Whole && bus.is_built() && self.problems.is_empty() {
-            let no_step = self.steps.is_empty().then(no_step);
+            let no_step = self.steps.is_empty().then(|| no_step(L::EXAMPLE));
             self.problems
-                .extend(bus::incomplete(&self.header).or(no_step));
+                .extend(L::incomplete(&self.header).or(no_step));
         }
         self.problems.extend(broken_loop(&self.steps));
         if !self.problems.is_empty() {
@@ -171,17 +195,14 @@ impl Reader {
     }
 }
 
-fn no_step() -> Problem {
-    let problem = Problem::new(
-        Span::default(),
-        "the scenario has no step",
-        "a step expected",
-    );
-    problem.help("add a line such as `> 80`: the master sends SYNCO")
+fn no_step(example: &str) -> Problem {
+    let what = "the scenario has no step";
+    let problem = Problem::new(Span::default(), what, "a step expected");
+    problem.help(format!("add a line such as {example}"))
 }
 
 /// The loop that has no `end`, or the `end` that has no loop.
-fn broken_loop(steps: &[Step]) -> Option<Problem> {
+fn broken_loop<L: Language>(steps: &[Step<L>]) -> Option<Problem> {
     let mut open = Vec::new();
     for step in steps {
         match step.action {
@@ -224,7 +245,7 @@ pub(crate) fn stands_twice(word: &Spanned<&str>) -> Problem {
     Problem::new(word.span, what, "this line may stand once")
 }
 
-fn citation(scanner: &mut Scanner<'_>) -> Result<Citation, Problem> {
+fn citation(scanner: &mut Scanner<'_>, example: &str) -> Result<Citation, Problem> {
     let here = scanner.here();
     let text: Vec<_> = scanner.rest().split_whitespace().collect();
     let span = Span {
@@ -235,7 +256,7 @@ fn citation(scanner: &mut Scanner<'_>) -> Result<Citation, Problem> {
         return Err(Problem::new(
             span,
             "a source is a document and a section",
-            "a document and a section expected here, such as `nd21 9.7`",
+            format!("a document and a section expected here, such as `{example}`"),
         ));
     }
     Ok(Citation {

@@ -2,11 +2,8 @@
 
 pub(crate) mod header;
 pub(crate) mod step;
+pub(crate) mod words;
 
-pub(crate) use crate::buses::novobus::language::parse::header as bus_header;
-pub use crate::buses::novobus::language::parse::header::{parse_header, parse_setup};
-pub(crate) use crate::buses::novobus::language::parse::value::{bytes, eeprom_place, place, value};
-/// The words of the one bus that is read today.
-pub(crate) use crate::buses::novobus::language::parse::{check, drive, job, words};
+pub use crate::buses::header::{parse_header, parse_setup};
+pub(crate) use header::bus;
 pub use header::{parse, parse_step};
-pub(crate) use words::equals;

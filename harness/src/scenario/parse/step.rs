@@ -1,23 +1,18 @@
 //! Steps: a time or none, then `>`, `<`, `!`, `?` or a job.
 
-use super::check;
-use super::drive::{self, DriveLine};
-use super::job;
-use super::place as cell;
-use super::words::{drives, named, required, ring_prefix};
-use crate::scenario::expression::{self, Counter, Located};
-use crate::scenario::pattern;
+use super::words::required;
+use crate::scenario::expression::{self, Counter};
+use crate::scenario::language::{Language, Opening};
 use crate::scenario::problem::{Problem, Span, nearest};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{
-    Action, Check, DriveCheck, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Looks, Recording,
-    SetupKind, Step, When,
-};
+use crate::scenario::syntax::{Action, Step, When};
 use crate::scenario::times;
-use harness_sim::fault::{DriveFault, Flips};
+
+/// What a line must be.
+const EXPECTED: &str = "a step (`>`, `<`, `!`, `?` or a job) or a header line";
 
 /// Reads a step.
-pub(crate) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
+pub(crate) fn step<L: Language>(scanner: &mut Scanner<'_>) -> Result<Step<L>, Problem> {
     let start = scanner.here();
     let when = if scanner.eat("+") {
         When::After(times::window(scanner)?)
@@ -48,61 +43,85 @@ pub(crate) fn step(scanner: &mut Scanner<'_>) -> Result<Step, Problem> {
     })
 }
 
-fn action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
+fn action<L: Language>(scanner: &mut Scanner<'_>) -> Result<Action<L>, Problem> {
     let rest = scanner.rest();
-    let mut ring = 0;
+    let mut port = 0;
     if rest.starts_with("2>") || rest.starts_with("2<") {
         scanner.eat("2");
-        ring = 1;
+        port = 1;
     } else if rest.starts_with("1>") || rest.starts_with("1<") {
         scanner.eat("1");
     }
     match scanner.peek() {
         Some('>') => {
             scanner.eat(">");
-            let bytes = pattern::pattern(scanner)?;
-            Ok(Action::Send { ring, bytes })
+            let message = L::message(scanner)?;
+            Ok(Action::Send { port, message })
         }
         Some('<') => {
             scanner.eat("<");
-            let bytes = pattern::pattern(scanner)?;
-            Ok(Action::Receive { ring, bytes })
+            let message = L::message(scanner)?;
+            Ok(Action::Receive { port, message })
         }
         Some('!') => {
             scanner.eat("!");
-            Ok(Action::Fault(fault(scanner)?))
+            own(Opening::Fault, scanner)
         }
         Some('?') => {
             scanner.eat("?");
-            Ok(Action::Check(check::check(scanner)?))
+            own(Opening::Check, scanner)
         }
         _ => word_action(scanner),
     }
 }
 
+/// What stands behind a symbol of which every bus says what it means.
+fn own<L: Language>(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Result<Action<L>, Problem> {
+    let step = L::step(opening, scanner);
+    step.unwrap_or_else(|| Err(scanner.unexpected(EXPECTED)))
+        .map(Action::Own)
+}
+
 /// A step that begins with a word.
-fn word_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
-    let here = scanner.here();
+fn word_action<L: Language>(scanner: &mut Scanner<'_>) -> Result<Action<L>, Problem> {
     let mut ahead = scanner.clone();
-    let word = ahead.word().map_or("", |word| word.value);
-    let action = match word {
-        "until" => until(&mut ahead)?,
+    let Some(word) = ahead.word() else {
+        return Err(scanner.unexpected(EXPECTED));
+    };
+    let action = match word.value {
         "wait" => Action::Wait(times::duration(&mut ahead)?),
         "for" => begin_loop(&mut ahead)?,
         "end" => Action::End,
-        "record" => Action::Record(record(&mut ahead)?),
-        word if drive::WORDS.contains(&word) => {
-            let (drives, line) = drive::line(&mut ahead)?;
-            drive_action(drives, line, ahead.since(here))?
-        }
-        _ => return job_action(scanner),
+        name => match L::step(Opening::Word(&word), &mut ahead) {
+            Some(step) => Action::Own(step?),
+            None => return Err(unknown::<L>(name, scanner)),
+        },
     };
     *scanner = ahead;
     Ok(action)
 }
 
+/// A word with which no line begins.
+fn unknown<L: Language>(word: &str, scanner: &mut Scanner<'_>) -> Problem {
+    let (jobs, others) = L::step_words();
+    let mut known = jobs.clone();
+    known.extend(super::header::WORDS);
+    known.extend(L::header_words());
+    known.extend(others);
+    known.extend(["wait", "for", "end"]);
+    let problem = scanner.unexpected(EXPECTED);
+    match nearest(word, &known) {
+        Some(near) => problem.help(format!("did you mean `{near}`?")),
+        None => problem.help(format!(
+            "jobs are {}; other steps are {}, wait",
+            jobs.join(", "),
+            others.join(", ")
+        )),
+    }
+}
+
 /// `k in 0..last`
-fn begin_loop(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
+fn begin_loop<L: Language>(scanner: &mut Scanner<'_>) -> Result<Action<L>, Problem> {
     let before = scanner.clone();
     let name = scanner.take_while(|c| c.is_ascii_alphanumeric());
     let Some(counter) = name.and_then(|name| Counter::named(name.value)) else {
@@ -115,19 +134,6 @@ fn begin_loop(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
         return Err(scanner.unexpected("`..` and the last number, as in `for k in 0..last`"));
     }
     Ok(Action::For(counter, from, expression::sum(scanner)?))
-}
-
-/// A line that begins with `drive`, as a step.
-pub(crate) fn drive_action(drives: Drives, line: DriveLine, span: Span) -> Result<Action, Problem> {
-    match line {
-        DriveLine::Setup(what) => Err(not_a_step(span, &what)),
-        DriveLine::Influence(influence) => Ok(Action::Influence(drives, influence)),
-        DriveLine::Condition(condition) => Ok(Action::Check(Check::Drive(DriveCheck {
-            drives,
-            condition,
-            span,
-        }))),
-    }
 }
 
 /// A header line among the steps.
@@ -143,253 +149,4 @@ pub(crate) fn behind_the_first(span: Span, word: &str) -> Problem {
 pub(crate) fn header_too_late(span: Span, word: &str) -> Problem {
     let help = format!("move the line up, above the first step (line `{word}`)");
     behind_the_first(span, word).help(help)
-}
-
-/// What a drive is set to hold or to be, among the steps.
-pub(crate) fn not_a_step(span: Span, what: &SetupKind) -> Problem {
-    let help = match what {
-        SetupKind::Memory(..) => {
-            "move the line up, above the first step; `? drive ...` checks cells, `write-byte` writes one"
-        }
-        _ => "move the line up, above the first step (line `drive`)",
-    };
-    behind_the_first(span, "drive").help(help)
-}
-
-/// `until drive 3 ps_status = 01 within 2s`
-fn until(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
-    required(scanner, &drive::WORDS)?;
-    let check = drive::check(scanner)?;
-    if !scanner.eat_word("within") {
-        return Err(scanner.unexpected("`within` and the longest time, as in `within 2s`"));
-    }
-    Ok(Action::Until(check, times::duration(scanner)?))
-}
-
-/// `record drive 0 nist every 10ms`
-fn record(scanner: &mut Scanner<'_>) -> Result<Recording, Problem> {
-    required(scanner, &drive::WORDS)?;
-    let drives = drives(scanner)?;
-    let place = cell(scanner)?;
-    let names = [("every", 0), ("changes", 1), ("off", 2)];
-    let looks = match named(scanner, &names, "when to look at it")? {
-        0 => Looks::Every(times::duration(scanner)?),
-        1 => Looks::Changes,
-        _ => Looks::Off,
-    };
-    Ok(Recording {
-        drives,
-        place,
-        looks,
-    })
-}
-
-fn job_action(scanner: &mut Scanner<'_>) -> Result<Action, Problem> {
-    let mut ahead = scanner.clone();
-    let expected = "a step (`>`, `<`, `!`, `?` or a job) or a header line";
-    let Some(name) = ahead.word() else {
-        return Err(scanner.unexpected(expected));
-    };
-    match job::job(name.value, &mut ahead) {
-        Some(job) => {
-            *scanner = ahead;
-            Ok(Action::Job(job?))
-        }
-        None => {
-            let mut known = job::names();
-            known.extend(super::header::WORDS);
-            known.extend(super::bus_header::WORDS);
-            known.extend(["until", "wait", "record", "for", "end"]);
-            let problem = scanner.unexpected(expected);
-            Err(match nearest(name.value, &known) {
-                Some(near) => problem.help(format!("did you mean `{near}`?")),
-                None => problem.help(format!(
-                    "jobs are {}; other steps are drive, until, wait, record",
-                    job::names().join(", ")
-                )),
-            })
-        }
-    }
-}
-
-fn fault(scanner: &mut Scanner<'_>) -> Result<Fault, Problem> {
-    if scanner.eat_word("drive") {
-        let ring = ring_prefix(scanner);
-        let drive = expression::sum(scanner)?;
-        let (byte, at) = place(scanner)?;
-        let what = drive_fault(scanner, drive)?;
-        return Ok(Fault {
-            ring,
-            what,
-            byte,
-            at,
-        });
-    }
-    let (ring, link, ends) = link(scanner)?;
-    let (byte, at) = place(scanner)?;
-    let kind = link_fault(scanner)?;
-    Ok(Fault {
-        ring,
-        what: FaultKind::Link(link, ends, kind),
-        byte,
-        at,
-    })
-}
-
-/// A link by its two ends: its ring, where it stands, and the ends.
-pub(crate) fn link(scanner: &mut Scanner<'_>) -> Result<(usize, Located, LinkEnds), Problem> {
-    let here = scanner.here();
-    let ring = ring_prefix(scanner);
-    let from = end(scanner)?;
-    if !scanner.eat("->") {
-        return Err(scanner.unexpected("`->`, as in 98->97"));
-    }
-    let to = end(scanner)?;
-    let place = Located {
-        span: scanner.since(here),
-        ..Located::number(0)
-    };
-    Ok((ring, place, LinkEnds { from, to }))
-}
-
-/// An end of a link: a drive, or `master` (`None`).
-fn end(scanner: &mut Scanner<'_>) -> Result<Option<Located>, Problem> {
-    let mut ahead = scanner.clone();
-    let letters = ahead.take_while(|c| c.is_ascii_alphabetic());
-    match letters.map(|word| word.value) {
-        Some("master") => {
-            *scanner = ahead;
-            Ok(None)
-        }
-        Some(other) if !matches!(other, "N" | "last") => Err(scanner
-            .unexpected("`master` or a drive's number")
-            .did_you_mean(other, &["master", "last"])),
-        _ => Ok(Some(expression::sum(scanner)?)),
-    }
-}
-
-/// `byte n`, `from byte n`, `@20ms`, `from 20ms`, or nothing, and a colon.
-fn place(scanner: &mut Scanner<'_>) -> Result<(Option<Located>, Option<times::Duration>), Problem> {
-    let mut byte = None;
-    let mut at = None;
-    let from = scanner.eat_word("from");
-    if scanner.eat_word("byte") {
-        byte = Some(expression::sum(scanner)?);
-    } else if scanner.eat("@") || from {
-        at = Some(times::duration(scanner)?);
-    }
-    scanner.eat(":");
-    Ok((byte, at))
-}
-
-fn drive_fault(scanner: &mut Scanner<'_>, drive: Located) -> Result<FaultKind, Problem> {
-    let names = [
-        ("off", 0),
-        ("on", 1),
-        ("stuck", 2),
-        ("unstuck", 3),
-        ("error", 4),
-    ];
-    let fault = match named(scanner, &names, "a fault of a drive")? {
-        0 => DriveFault::Off,
-        1 => DriveFault::On,
-        2 => DriveFault::Stuck(byte(scanner)?),
-        3 => DriveFault::Unstuck,
-        _ => return Ok(FaultKind::Error(drive, drive::error(scanner)?)),
-    };
-    Ok(FaultKind::Drive(drive, fault))
-}
-
-fn link_fault(scanner: &mut Scanner<'_>) -> Result<LinkFaultKind, Problem> {
-    let names = [
-        ("flip", 0),
-        ("replace", 1),
-        ("drop", 2),
-        ("duplicate", 3),
-        ("insert", 4),
-        ("delay", 5),
-        ("break", 6),
-        ("overrun", 7),
-        ("cut", 8),
-        ("join", 9),
-    ];
-    Ok(match named(scanner, &names, "a fault of a link")? {
-        0 => LinkFaultKind::Flip(flips(scanner)?),
-        1 => LinkFaultKind::Replace(byte(scanner)?),
-        2 => LinkFaultKind::Drop,
-        3 => LinkFaultKind::Duplicate,
-        4 => LinkFaultKind::Insert(byte(scanner)?),
-        5 => LinkFaultKind::Delay(times::duration(scanner)?),
-        6 => LinkFaultKind::Break(times::duration(scanner)?),
-        7 => LinkFaultKind::Overrun,
-        8 => LinkFaultKind::Cut,
-        _ => LinkFaultKind::Join,
-    })
-}
-
-/// Bits 0 to 7, `p`, `s` and `b`.
-fn flips(scanner: &mut Scanner<'_>) -> Result<Flips, Problem> {
-    let expected = "a bit: 0 to 7, p (parity), s (stop) or b (start)";
-    let mut flips = Flips::default();
-    if scanner.at_end() {
-        return Err(scanner.unexpected(expected));
-    }
-    while !scanner.at_end() {
-        let bit = scanner.peek();
-        let known = match bit {
-            Some('p') => Flips {
-                parity: true,
-                ..Flips::default()
-            },
-            Some('s') => Flips {
-                stop: true,
-                ..Flips::default()
-            },
-            Some('b') => Flips {
-                start: true,
-                ..Flips::default()
-            },
-            Some(digit @ '0'..='7') => Flips {
-                data: 1 << digit.to_digit(8).unwrap_or(0),
-                ..Flips::default()
-            },
-            _ => return Err(scanner.unexpected(expected)),
-        };
-        if flips.and(known) != merge(flips, known) {
-            let here = scanner.here();
-            return Err(Problem::new(
-                here,
-                "a bit that is flipped twice is not flipped",
-                "each bit once",
-            ));
-        }
-        flips = flips.and(known);
-        let mut ahead = scanner.clone();
-        if ahead.chunk().value.trim_end_matches(',').len() != 1 {
-            return Err(scanner.unexpected(expected));
-        }
-        *scanner = ahead;
-    }
-    Ok(flips)
-}
-
-fn merge(a: Flips, b: Flips) -> Flips {
-    Flips {
-        data: a.data | b.data,
-        parity: a.parity | b.parity,
-        stop: a.stop | b.stop,
-        start: a.start | b.start,
-    }
-}
-
-fn byte(scanner: &mut Scanner<'_>) -> Result<u8, Problem> {
-    let before = scanner.clone();
-    let word = scanner.take_while(|c| c.is_ascii_alphanumeric());
-    match word.map(|word| (word.value.len(), u8::from_str_radix(word.value, 16))) {
-        Some((2, Ok(byte))) => Ok(byte),
-        _ => {
-            *scanner = before;
-            Err(scanner.unexpected("a byte of two hexadecimal digits"))
-        }
-    }
 }

@@ -1,13 +1,10 @@
 //! How a conversation ends: at its last step, at a finding, or where it cannot go on.
 
-use super::outcome::{Mismatch, Stop};
+use super::outcome::Stop;
 use super::player::{MAX_ROUND, Runner};
-use crate::buses::novobus::link::BesideTheBus;
 use crate::link::Trouble;
+use crate::scenario::language::Language;
 use crate::scenario::plan::MAX_CARRIED;
-
-/// Maximum number of drives in the error mode that are named.
-const NAMED: usize = 6;
 
 /// Why a scenario cannot go on.
 #[derive(Clone, Debug)]
@@ -18,7 +15,7 @@ pub(crate) enum Halt {
     Trouble(Trouble),
 }
 
-impl Runner<'_> {
+impl<L: Language> Runner<'_, L> {
     /// Ends the conversation: nothing more is sent, and what is under way comes back. Trouble of the
     /// link outweighs every finding, as a finding may be its effect.
     pub(crate) fn wind_up(&mut self, result: Result<(), Stop>) -> Result<(), Stop> {
@@ -27,7 +24,7 @@ impl Runner<'_> {
             (result, _) => result,
         };
         if let Err(stop) = &mut result {
-            stop.finding.in_error = self.in_error();
+            stop.finding.in_error = L::in_error(self);
         }
         if result.is_err() {
             self.settle();
@@ -39,7 +36,7 @@ impl Runner<'_> {
             (_, result) => halted.and(result),
         };
         if let Err(stop) = &mut result {
-            self.complete(&mut stop.finding);
+            L::complete(self, &mut stop.finding);
         }
         result
     }
@@ -63,7 +60,7 @@ impl Runner<'_> {
         let carried = self.link.carried() > MAX_CARRIED;
         let carried =
             carried.then(|| format!("more than {MAX_CARRIED} bytes on the ring's links: too long"));
-        let too_much = carried.or_else(|| self.recorder.too_much());
+        let too_much = carried.or_else(|| L::too_much(&self.own));
         let trouble = || self.link.trouble().cloned().map(Halt::Trouble);
         self.full = too_much.map(Halt::Full).or_else(trouble);
     }
@@ -73,34 +70,5 @@ impl Runner<'_> {
         let end = self.link.now() + MAX_ROUND;
         while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
         self.fetch();
-    }
-
-    /// The drives in the error mode, in ring order.
-    fn in_error(&self) -> String {
-        let mut named = Vec::new();
-        for ring in 0..self.rings.len() {
-            for drive in (0..self.link.drives(ring)).rev() {
-                if let Some(Some(error)) = self.link.error_of(ring, drive) {
-                    let prefix = if ring == 0 { "" } else { "2:" };
-                    named.push(format!("{prefix}{drive} ({error})"));
-                }
-            }
-        }
-        let more = named.len().saturating_sub(NAMED);
-        named.truncate(NAMED);
-        if more > 0 {
-            named.push(format!("and {more} more"));
-        }
-        named.join(", ")
-    }
-
-    /// Adds to a finding what has been received meanwhile.
-    fn complete(&self, finding: &mut Mismatch) {
-        if let Some(difference) = &mut finding.difference {
-            let first = difference.byte - 1 - difference.index;
-            let wanted = difference.expected.len().max(1);
-            let received = self.rings[difference.ring].received.iter();
-            difference.received = received.skip(first).take(wanted).map(|(_, b)| *b).collect();
-        }
     }
 }

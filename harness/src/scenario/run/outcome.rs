@@ -139,7 +139,7 @@ pub struct Difference {
 }
 
 /// Why playing stops.
-pub(crate) struct Stop {
+pub struct Stop {
     pub(crate) verdict: Verdict,
     pub(crate) finding: Box<Mismatch>,
 }
@@ -192,8 +192,9 @@ impl Stop {
         }
     }
 
-    pub(crate) fn differs(mut self, difference: Difference) -> Self {
-        self.finding.difference = Some(difference);
+    /// The same with the pieces that differ, where they are shown.
+    pub(crate) fn with(mut self, difference: Option<Difference>) -> Self {
+        self.finding.difference = difference;
         self
     }
 }

@@ -1,23 +1,15 @@
 //! Step by step.
 
 use super::halt::Halt;
-use super::outcome::{Difference, Outcome, Stop};
-use super::{Shown, matches, resolve, show};
-use crate::buses::novobus::language::run::record::Recorder;
-use crate::link::{Capability, Link, Moment, Octets};
-use crate::scenario::pattern::Expected;
+use super::outcome::{Outcome, Stop};
+use super::skip::lacks;
+use crate::buses::DefaultBus;
+use crate::link::{Capability, Link};
+use crate::scenario::language::Language;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen, PlannedWindow};
 use crate::scenario::problem::Span;
-use crate::scenario::run::skip::lacks;
-use crate::scenario::syntax::Ending;
 use crate::scenario::verdict::Verdict;
-use harness_proto::line::Received;
-use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
-use harness_proto::novobus::command::Command;
-use harness_proto::novobus::error::BusError;
-use harness_proto::novobus::master::Fault;
 use harness_proto::time::{self, Instant};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// How long bytes may be on their way round: more than the most that a scenario can send takes at 9600
 /// bit/s, with the longest delays.
@@ -25,9 +17,6 @@ pub(crate) const MAX_ROUND: time::Span = time::Span::from_millis(3_600_000);
 
 /// How long a link may need for a pause.
 const PAUSE: time::Span = time::Span::from_millis(50);
-
-/// Bytes that no line asks for shown at most.
-const UNASKED: usize = 16;
 
 /// What to do at a line that is not met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,12 +28,12 @@ pub enum AtMismatch {
 }
 
 /// Plays a plan on a link up to its end or to the first line that is not met.
-pub fn run(plan: &Plan, link: &mut dyn Link) -> Outcome {
+pub fn run<L: Language>(plan: &Plan<L>, link: &mut dyn Link) -> Outcome {
     play(plan, link, AtMismatch::Stop)
 }
 
 /// Plays a plan on a link. The outcome tells of the first line that was not met.
-pub fn play(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
+pub fn play<L: Language>(plan: &Plan<L>, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
     if let Some(lacks) = lacks(plan, link) {
         return Outcome::skipped(lacks);
     }
@@ -67,108 +56,66 @@ pub fn play(plan: &Plan, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcom
         finding,
         remarks,
         took,
-        records: runner.recorder.records,
+        records: L::records(runner.own),
         unready: None,
         skip: None,
     }
 }
 
-/// What the master has received from one ring.
-#[derive(Default)]
-pub(crate) struct RingRecord {
-    pub(crate) received: Vec<(Instant, Received)>,
-    /// The first byte that no line has asked for yet.
+/// What the master has received on one port.
+pub struct Port<L: Language> {
+    pub(crate) received: Vec<(Instant, L::Received)>,
+    /// The first piece that no line has asked for yet.
     pub(crate) next: usize,
-    /// The first byte behind the last check sequence.
-    pub(crate) since_recovery: usize,
-    /// What was sent, and whether no fault was put on it at the master's end.
-    pub(crate) sent: Vec<(u8, bool)>,
 }
 
-pub(crate) struct Runner<'a> {
+/// A plan that is being played. What a bus keeps of its own meanwhile is in `own`.
+pub struct Runner<'a, L: Language = DefaultBus> {
     pub(crate) link: &'a mut dyn Link,
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a Plan<L>,
     at_mismatch: AtMismatch,
     strict: bool,
     /// Why nothing more can be played: the recording is full, or the link is in trouble.
     pub(crate) full: Option<Halt>,
     /// The first check on something that the link does not show.
     pub(crate) unseen: Option<Stop>,
-    pub(crate) recorder: Recorder,
-    /// Cells that were read over the bus, where the link does not show them.
-    pub(crate) seen: BTreeMap<(usize, u8, u16), u8>,
-    /// Drives that have just answered a telegram, where the link does not show the error mode.
-    pub(crate) answers: BTreeSet<(usize, u8)>,
-    /// Drives whose error mode taps have just shown, with its cause; `None` where they are not in it.
-    pub(crate) tapped: BTreeMap<(usize, u8), Option<BusError>>,
-    pub(crate) rings: Vec<RingRecord>,
+    pub(crate) ports: Vec<Port<L>>,
     /// When the line before was done.
     pub(crate) line_before: Instant,
     deadline: time::Span,
-    pub(crate) corrected: u64,
-    /// The faults that the driver reported in its last job, in order.
-    pub(crate) disturbed: Vec<Fault>,
-    /// How the commands of that job have ended.
-    pub(crate) ended: Vec<Ending>,
-    /// The commands that each ring was sent by the driver; `None` where there may be others.
-    pub(crate) asked: Vec<Option<Vec<(u8, Command)>>>,
-    /// When the driver last left the line of a ring free in the middle of its work, if it did.
-    pub(crate) gap: Option<Instant>,
-    pub(crate) sent: u64,
-    pub(crate) sent_from: Instant,
-    pub(crate) sent_to: Instant,
     /// The step that is under way, or the last one.
     pub(crate) place: Span,
+    pub(crate) own: L::State,
 }
 
-impl<'a> Runner<'a> {
-    pub(crate) fn new(plan: &'a Plan, link: &'a mut dyn Link, at_mismatch: AtMismatch) -> Self {
+impl<'a, L: Language> Runner<'a, L> {
+    pub(crate) fn new(plan: &'a Plan<L>, link: &'a mut dyn Link, at_mismatch: AtMismatch) -> Self {
+        let port = |_| Port {
+            received: Vec::new(),
+            next: 0,
+        };
         Self {
-            rings: plan.rings.iter().map(|_| RingRecord::default()).collect(),
+            ports: (0..L::ports(plan)).map(port).collect(),
             line_before: link.now(),
             deadline: plan.deadline,
-            corrected: 0,
-            disturbed: Vec::new(),
-            ended: Vec::new(),
-            asked: plan.rings.iter().map(|_| Some(Vec::new())).collect(),
-            gap: None,
-            sent: 0,
-            sent_from: link.now(),
-            sent_to: link.now(),
+            own: L::state(plan, link),
             link,
             plan,
             at_mismatch,
             strict: plan.strict,
             full: None,
             unseen: None,
-            recorder: Recorder::default(),
-            seen: BTreeMap::new(),
-            answers: BTreeSet::new(),
-            tapped: BTreeMap::new(),
             place: Span::default(),
         }
     }
 }
 
-impl Runner<'_> {
+impl<L: Language> Runner<'_, L> {
     fn play(&mut self) -> Result<(), Stop> {
         let plan = self.plan;
         self.place = plan.steps.first().map_or(Span::default(), |step| step.span);
         self.halted()?;
-        for (ring, drives, influence) in plan.influences() {
-            influence.act(self.link, ring, drives);
-        }
-        // A fault at a byte is armed from the start, wherever its line stands: its byte is counted
-        // from the start too.
-        for step in &plan.steps {
-            if let PlannedAction::Fault(ring, fault, moment @ (Moment::Byte(_) | Moment::At(_))) =
-                step.action
-            {
-                self.place = step.span;
-                self.link.inject(ring, fault, moment);
-                self.halted()?;
-            }
-        }
+        L::begin(self)?;
         let mut first = Ok(());
         for step in &plan.steps {
             self.place = step.span;
@@ -183,7 +130,7 @@ impl Runner<'_> {
         first.and_then(|()| self.nothing_unasked(self.place))
     }
 
-    fn step(&mut self, step: &PlannedStep) -> Result<(), Stop> {
+    fn step(&mut self, step: &PlannedStep<L>) -> Result<(), Stop> {
         self.link.step(step.span.start);
         if let PlannedAction::Receive(ring, expected) = &step.action {
             return self.receive(step, *ring, expected);
@@ -196,7 +143,7 @@ impl Runner<'_> {
     }
 
     /// Lets time pass until a step with a time in front is due.
-    fn pass_until_due(&mut self, step: &PlannedStep) -> Result<(), Stop> {
+    fn pass_until_due(&mut self, step: &PlannedStep<L>) -> Result<(), Stop> {
         let at = match step.when {
             PlannedWhen::Now => return Ok(()),
             PlannedWhen::After(window) => self.line_before + window.from,
@@ -214,86 +161,48 @@ impl Runner<'_> {
         Ok(())
     }
 
-    fn act(&mut self, step: &PlannedStep) -> Result<(), Stop> {
+    fn act(&mut self, step: &PlannedStep<L>) -> Result<(), Stop> {
         match &step.action {
-            PlannedAction::Send(ring, bytes) => {
-                self.not_the_driver(*ring);
-                self.send(*ring, bytes);
+            PlannedAction::Send(port, pieces) => {
+                self.send(*port, pieces);
                 Ok(())
             }
-            PlannedAction::Fault(ring, fault, Moment::Now) => {
-                // With a time in front it is the byte at that time, without one the first byte of the lines behind.
-                let moment = match step.when {
-                    PlannedWhen::Now => Moment::Now,
-                    _ => Moment::At(self.link.now()),
-                };
-                self.link.inject(*ring, *fault, moment);
-                Ok(())
-            }
-            PlannedAction::Fault(..) | PlannedAction::Receive(..) => Ok(()),
-            PlannedAction::Influence(ring, drives, influence) => {
-                influence.act(self.link, *ring, drives.clone());
-                Ok(())
-            }
-            PlannedAction::Record(record) => {
-                self.record(record);
-                Ok(())
-            }
+            PlannedAction::Receive(..) => Ok(()),
             PlannedAction::Wait(time) => {
                 self.line_before = self.line_before.max(self.link.now()) + *time;
                 self.pass_until(self.line_before);
                 Ok(())
             }
-            PlannedAction::Until(check, within) => self.until(check, *within, step.span),
-            PlannedAction::Check(check) => {
-                if step.when == PlannedWhen::Now {
-                    self.settle();
-                    self.line_before = self.line_before.max(self.link.now());
-                }
-                let result = self.check(check, step.when != PlannedWhen::Now, step.span);
-                self.sent = 0;
-                result
-            }
-            PlannedAction::Telegram(ring, bytes, expected, reading) => {
-                self.not_the_driver(*ring);
-                self.settle();
-                let asked = self.nothing_unasked(step.span);
-                if asked.is_err() && self.at_mismatch == AtMismatch::Stop {
-                    return asked;
-                }
-                self.forget(*ring);
-                self.send(*ring, bytes);
-                asked
-                    .and(self.expect(step.span, *ring, expected, None))
-                    .and_then(|()| self.read(*ring, expected.len(), reading.as_ref(), step.span))
-            }
-            PlannedAction::Recover(ring) => self.recover(*ring, step.span),
-            PlannedAction::Master(ring, calls, once) => self.master(*ring, calls, *once, step.span),
-            PlannedAction::Count(ring, drives) => self.count(*ring, *drives, step.span),
+            PlannedAction::Own(act) => L::act(self, act, step),
         }
     }
 
-    pub(crate) fn send(&mut self, ring: usize, bytes: &[u8]) -> Instant {
-        if self.sent == 0 {
-            self.sent_from = self.link.now().max(self.sent_to);
-        }
-        self.sent += bytes.len() as u64;
-        let good = |byte| (byte, true);
-        if let Some(record) = self.rings.get_mut(ring) {
-            record.sent.extend(bytes.iter().copied().map(good));
-        }
-        self.line_before = self.link.send_octets(ring, bytes);
-        self.sent_to = self.line_before;
-        self.sent_to
+    /// Whether playing stops at the first line that is not met.
+    pub(crate) fn stops_at_mismatch(&self) -> bool {
+        self.at_mismatch == AtMismatch::Stop
+    }
+
+    /// Sends the pieces of a `>` line. Returns when the last one will have left.
+    pub(crate) fn send(&mut self, port: usize, pieces: &[L::Sent]) -> Instant {
+        L::by_hand(&mut self.own, port);
+        self.transmit(port, pieces)
+    }
+
+    /// Sends pieces of a line or of a job. Returns when the last one will have left.
+    pub(crate) fn transmit(&mut self, port: usize, pieces: &[L::Sent]) -> Instant {
+        let from = self.link.now();
+        self.line_before = L::transmit(self.link, port, pieces);
+        L::sent(&mut self.own, port, pieces, (from, self.line_before));
+        self.line_before
     }
 
     /// Takes the next received byte that no step has taken.
-    pub(crate) fn take_next(&mut self, ring: usize) -> Option<(Instant, Received)> {
+    pub(crate) fn take_next(&mut self, port: usize) -> Option<(Instant, L::Received)> {
         self.fetch();
-        let record = &mut self.rings[ring];
-        let byte = record.received.get(record.next).copied()?;
-        record.next += 1;
-        Some(byte)
+        let port = &mut self.ports[port];
+        let piece = port.received.get(port.next).copied()?;
+        port.next += 1;
+        Some(piece)
     }
 
     /// Lets time pass up to `until`, with a pause for the link where it wants one and there is room for it.
@@ -332,9 +241,9 @@ impl Runner<'_> {
                 self.fetch();
                 return false;
             }
-            // Time stops on its way where a cell is to be looked at.
-            let more = self.link.wait(until.min(self.recorder.next()));
-            self.note();
+            // Time stops on its way where the bus wants to look at something.
+            let more = self.link.wait(until.min(L::next_look(&self.own)));
+            L::look(self);
             self.fetch();
             if more || self.link.now() >= until {
                 return more;
@@ -343,123 +252,109 @@ impl Runner<'_> {
     }
 
     pub(crate) fn fetch(&mut self) {
-        for (index, record) in self.rings.iter_mut().enumerate() {
-            while let Some(byte) = self.link.receive_octet(index) {
-                record.received.push(byte);
-                if ends_with_sequence(&record.received[record.since_recovery..]) {
-                    record.since_recovery = record.received.len();
-                    self.corrected += 1;
-                }
+        for (index, port) in self.ports.iter_mut().enumerate() {
+            while let Some(piece) = L::fetch(&mut self.own, self.link, index) {
+                port.received.push(piece);
+                L::received(&mut self.own, index, &port.received);
             }
         }
     }
 
-    /// Bytes that no line has asked for are none of the next line's business.
-    pub(crate) fn forget(&mut self, ring: usize) {
-        self.rings[ring].next = self.rings[ring].received.len();
+    /// What no line has asked for is none of the next line's business.
+    pub(crate) fn forget(&mut self, port: usize) {
+        self.ports[port].next = self.ports[port].received.len();
     }
 
     fn receive(
         &mut self,
-        step: &PlannedStep,
-        ring: usize,
-        expected: &[Expected],
+        step: &PlannedStep<L>,
+        port: usize,
+        wanted: &[L::Wanted],
     ) -> Result<(), Stop> {
         let window = match step.when {
             PlannedWhen::Now => None,
             PlannedWhen::After(window) => Some((self.line_before, window)),
             PlannedWhen::At(window) => Some((Instant::START, window)),
         };
-        self.expect(step.span, ring, expected, window)
+        self.expect(step.span, port, wanted, window)
     }
 
-    /// The next bytes must be these; with a window, the first of them must come in it.
-    fn expect(
+    /// The next pieces must be these; with a window, the first of them must come in it.
+    pub(crate) fn expect(
         &mut self,
         span: Span,
-        ring: usize,
-        expected: &[Expected],
+        port: usize,
+        wanted: &[L::Wanted],
         window: Option<(Instant, PlannedWindow)>,
     ) -> Result<(), Stop> {
-        let first = self.rings[ring].next;
+        let first = self.ports[port].next;
         let tolerance = self.link.time_tolerance();
-        for index in 0..expected.len() {
+        for (index, own) in wanted.iter().enumerate() {
             let until = match window {
                 Some((base, window)) if index == 0 => {
                     base + window.to + window.tolerance + tolerance
                 }
                 _ => self.link.now().max(self.line_before) + self.deadline,
             };
-            let arrived = self.next_byte(ring, first + index, until);
+            let arrived = self.next_piece(port, first + index, until);
             if arrived.is_none() {
                 // It may only be late.
                 self.settle();
             }
-            let received = &self.rings[ring].received[first..];
-            let difference = || Difference {
-                ring,
-                byte: first + index + 1,
-                at: received.get(index).map(|(at, _)| *at),
-                index,
-                // A checking byte is shown as the byte that it must be, where that is known.
-                expected: (0..expected.len())
-                    .map(|i| match received.get(..i) {
-                        Some(before) => resolve(expected[i], before),
-                        None => expected[i],
-                    })
-                    .collect(),
-                received: received.iter().map(|(_, byte)| *byte).collect(),
+            let received = &self.ports[port].received[first..];
+            let failed = |message: String| {
+                let found = L::difference(port, (first, index), wanted, received);
+                Stop::failed(span, message).with(found)
             };
-            let Some((at, byte)) = arrived else {
-                if let Some((at, byte)) = received.get(index) {
-                    let byte = show(*byte);
-                    let message = format!("{byte} came at {at}, expected at {until} at the latest");
+            let Some((at, piece)) = arrived else {
+                if let Some((at, piece)) = received.get(index) {
+                    let piece = L::show(*piece);
+                    let message =
+                        format!("{piece} came at {at}, expected at {until} at the latest");
                     return Err(Stop::failed(span, message));
                 }
-                let message = format!(
+                return Err(failed(format!(
                     "nothing more was received up to {}, where {} is expected",
                     until.min(self.link.now()),
-                    Shown(expected[index])
-                );
-                return Err(Stop::failed(span, message).differs(difference()));
+                    L::describe(own)
+                )));
             };
-            let wanted = resolve(expected[index], &received[..index]);
-            if !matches(wanted, byte) {
-                let message = format!(
+            let resolved = L::resolve(own, &received[..index]);
+            if !L::matches(&resolved, piece) {
+                return Err(failed(format!(
                     "the master received {} where {} is expected",
-                    show(byte),
-                    Shown(wanted)
-                );
-                return Err(Stop::failed(span, message).differs(difference()));
+                    L::show(piece),
+                    L::describe(&resolved)
+                )));
             }
             if let Some((base, window)) = window.filter(|_| index == 0) {
                 let earliest = base + window.from - window.tolerance;
                 if at + tolerance < earliest {
                     let message = format!(
                         "{} came at {at}, expected at {} at the earliest",
-                        show(byte),
+                        L::show(piece),
                         base + window.from
                     );
                     return Err(Stop::failed(span, message));
                 }
             }
-            self.rings[ring].next = first + index + 1;
+            self.ports[port].next = first + index + 1;
             self.line_before = at;
         }
         Ok(())
     }
 
-    /// Waits for the `index`-th byte received.
-    fn next_byte(
+    /// Waits for the `index`-th piece received.
+    fn next_piece(
         &mut self,
-        ring: usize,
+        port: usize,
         index: usize,
         until: Instant,
-    ) -> Option<(Instant, Received)> {
+    ) -> Option<(Instant, L::Received)> {
         loop {
             self.fetch();
-            if let Some(byte) = self.rings[ring].received.get(index) {
-                return Some(*byte).filter(|(at, _)| *at <= until);
+            if let Some(piece) = self.ports[port].received.get(index) {
+                return Some(*piece).filter(|(at, _)| *at <= until);
             }
             if self.link.now() >= until || !self.wait(until) {
                 return None;
@@ -467,58 +362,27 @@ impl Runner<'_> {
         }
     }
 
-    /// ND21 9.8: 17 zeros and the five bytes; they must come back.
-    fn recover(&mut self, ring: usize, span: Span) -> Result<(), Stop> {
-        self.settle();
-        let before = self.corrected;
-        self.send(ring, &CHECK_SEQUENCE);
-        self.settle();
-        self.forget(ring);
-        self.line_before = self.link.now();
-        if self.corrected > before {
-            return Ok(());
-        }
-        Err(Stop::failed(
-            span,
-            "the check sequence FF 44 72 4C 41 did not come back (ND21 9.8)",
-        ))
-    }
-
-    /// A strict scenario asks for every byte.
-    fn nothing_unasked(&self, span: Span) -> Result<(), Stop> {
-        let rings = self.rings.iter().enumerate().filter(|_| self.strict);
-        for (ring, record) in rings {
-            let unasked = &record.received[record.next..];
-            if let Some((at, byte)) = unasked.first() {
+    /// A strict scenario asks for everything.
+    pub(crate) fn nothing_unasked(&self, span: Span) -> Result<(), Stop> {
+        let ports = self.ports.iter().enumerate().filter(|_| self.strict);
+        for (index, port) in ports {
+            let unasked = &port.received[port.next..];
+            if let Some((at, piece)) = unasked.first() {
                 let message = format!(
                     "{} was received at {at}, but no line asks for it (the scenario is strict)",
-                    show(*byte)
+                    L::show(*piece)
                 );
-                return Err(Stop::failed(span, message).differs(Difference {
-                    ring,
-                    byte: record.next + 1,
-                    at: Some(*at),
-                    index: 0,
-                    expected: Vec::new(),
-                    received: unasked.iter().take(UNASKED).map(|(_, b)| *b).collect(),
-                }));
+                let found = L::difference(index, (port.next, 0), &[], unasked);
+                return Err(Stop::failed(span, message).with(found));
             }
         }
         Ok(())
     }
 }
 
-fn ends_with_sequence(received: &[(Instant, Received)]) -> bool {
-    received.len() >= SEQUENCE.len()
-        && received[received.len() - SEQUENCE.len()..]
-            .iter()
-            .zip(SEQUENCE)
-            .all(|((_, byte), wanted)| byte.is(wanted))
-}
-
 /// What a plan needs that a rig may lack, in words.
 #[must_use]
-pub fn needs(plan: &Plan) -> Vec<&'static str> {
+pub fn needs<L: Language>(plan: &Plan<L>) -> Vec<&'static str> {
     plan.needs
         .iter()
         .map(|need: &Capability| need.name())

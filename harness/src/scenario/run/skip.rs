@@ -1,9 +1,10 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
+use crate::buses::Setting;
 use crate::link::{Capability, Link};
+use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
 use crate::scenario::syntax::Bus;
-use harness_proto::novobus::guard::Setting;
 use std::collections::BTreeSet;
 use std::fmt;
 
@@ -194,7 +195,7 @@ fn name(bus: Bus) -> &'static str {
 
 /// What a link lacks for a plan; `None` where the plan can be played.
 #[must_use]
-pub fn lacks(plan: &Plan, link: &dyn Link) -> Option<Skip> {
+pub fn lacks<L: Language>(plan: &Plan<L>, link: &dyn Link) -> Option<Skip> {
     let able = |need: &Capability| link.capabilities().contains(need);
     let missing: Vec<_> = plan
         .needs
@@ -202,14 +203,14 @@ pub fn lacks(plan: &Plan, link: &dyn Link) -> Option<Skip> {
         .copied()
         .filter(|need| !able(need))
         .collect();
-    let name = |(ring, place): &(usize, usize)| plan.link_name(*ring, *place);
-    let unreached: Vec<_> = plan
-        .fault_links()
+    let name = |(port, place): &(usize, usize)| L::link_name(plan, *port, *place);
+    let unreached: Vec<_> = L::fault_links(plan)
+        .into_iter()
         .filter(|(ring, place)| !link.reaches(*ring, *place))
         .collect();
     // An interposer sees what it passes on.
-    let unheard: Vec<_> = plan
-        .heard_links()
+    let unheard: Vec<_> = L::heard_links(plan)
+        .into_iter()
         .filter(|(ring, place)| !link.listens(*ring, *place))
         .filter(|place| !unreached.contains(place))
         .collect();

@@ -1,21 +1,15 @@
 //! The scenario, its header and its steps.
 
-use crate::buses::Bus;
-use crate::buses::novobus::language::syntax::cell::CellPlace;
-use crate::buses::novobus::language::syntax::check::{Check, DriveCheck};
-use crate::buses::novobus::language::syntax::header::{Drives, Header, Influence};
-use crate::buses::novobus::language::syntax::job::Job;
+use crate::buses::{Bus, DefaultBus};
 use crate::link::Capability;
 use crate::scenario::expression::{Counter, Located};
-use crate::scenario::pattern::Pattern;
+use crate::scenario::language::Language;
 use crate::scenario::problem::Span;
 use crate::scenario::times::{Duration, Window};
-use harness_proto::nd21::errors::ErrorCode;
-use harness_sim::fault::{DriveFault, Flips, LinkFault};
 
-/// A scenario: what it is, the ring it needs, and its steps.
+/// A scenario: what it is, the bench that it needs, and its steps.
 #[derive(Clone, Debug)]
-pub struct Scenario {
+pub struct Scenario<L: Language = DefaultBus> {
     /// What the conversation shows, in a line.
     pub title: String,
     /// The tables of which manuals it pins.
@@ -23,7 +17,7 @@ pub struct Scenario {
     /// Which bus.
     pub bus: Bus,
     /// The header lines of the bus.
-    pub header: Header,
+    pub header: L::Header,
     /// What it says that it needs of a rig.
     pub needs: Vec<Capability>,
     /// Whether bytes that no line asked for are a failure.
@@ -31,21 +25,37 @@ pub struct Scenario {
     /// How long a line without a time waits.
     pub deadline: Option<Duration>,
     /// The steps, in order.
-    pub steps: Vec<Step>,
+    pub steps: Vec<Step<L>>,
 }
 
-impl Scenario {
+impl<L: Language> Scenario<L> {
     /// A scenario without steps.
     #[must_use]
-    pub fn new(title: &str, header: Header) -> Self {
+    pub fn new(title: &str, header: L::Header) -> Self {
         Self {
             title: title.to_owned(),
             sources: Vec::new(),
-            bus: Bus::DEFAULT,
+            bus: L::BUS,
             header,
             needs: Vec::new(),
             strict: false,
             deadline: None,
+            steps: Vec::new(),
+        }
+    }
+}
+
+impl<L: Language> Scenario<L> {
+    /// What it says in words that every bus has; without the header lines of its bus and without steps.
+    pub(crate) fn in_common(self) -> Scenario {
+        Scenario {
+            title: self.title,
+            sources: self.sources,
+            bus: self.bus,
+            header: Default::default(),
+            needs: self.needs,
+            strict: self.strict,
+            deadline: self.deadline,
             steps: Vec::new(),
         }
     }
@@ -60,42 +70,20 @@ pub struct Citation {
     pub span: Span,
 }
 
-/// A cell that is recorded: `record drive 0 nist every 10ms`.
-#[derive(Clone, Debug)]
-pub struct Recording {
-    /// Of which drives.
-    pub drives: Drives,
-    /// Which cell.
-    pub place: CellPlace,
-    /// When it is looked at.
-    pub looks: Looks,
-}
-
-/// When a recorded cell is noted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Looks {
-    /// `every T`
-    Every(Duration),
-    /// `changes`
-    Changes,
-    /// `off`: no longer.
-    Off,
-}
-
 /// A step.
 #[derive(Clone, Debug)]
-pub struct Step {
+pub struct Step<L: Language = DefaultBus> {
     /// The time in front.
     pub when: When,
     /// What happens.
-    pub action: Action,
+    pub action: Action<L>,
     /// Where it stands.
     pub span: Span,
 }
 
-impl From<Action> for Step {
+impl<L: Language> From<Action<L>> for Step<L> {
     /// A step without a time in front.
-    fn from(action: Action) -> Self {
+    fn from(action: Action<L>) -> Self {
         Self {
             when: When::Now,
             action,
@@ -117,146 +105,27 @@ pub enum When {
 
 /// What a step does.
 #[derive(Clone, Debug)]
-pub enum Action {
+pub enum Action<L: Language = DefaultBus> {
     /// `>`: the master sends.
     Send {
-        /// Which ring, counted from 0.
-        ring: usize,
+        /// On which port of the bench, counted from 0.
+        port: usize,
         /// What.
-        bytes: Pattern,
+        message: L::Message,
     },
     /// `<`: the master receives.
     Receive {
-        /// Which ring, counted from 0.
-        ring: usize,
+        /// On which port of the bench, counted from 0.
+        port: usize,
         /// What.
-        bytes: Pattern,
+        message: L::Message,
     },
-    /// `!`: a fault.
-    Fault(Fault),
-    /// `?`: a check.
-    Check(Check),
-    /// `until`: time passes until a check holds, at most so long.
-    Until(DriveCheck, Duration),
     /// `wait`: time passes.
     Wait(Duration),
-    /// `drive ...`: something happens to drives from outside the bus.
-    Influence(Drives, Influence),
-    /// `record`: cells are recorded from here on, or no longer.
-    Record(Recording),
-    /// A job of the master.
-    Job(Job),
     /// `for k in 0..last`: what stands up to its `end` is played for each number, in this order.
     For(Counter, Located, Located),
     /// `end`: of the loop that began last.
     End,
-}
-
-/// A fault as written.
-#[derive(Clone, Debug)]
-pub struct Fault {
-    /// Which ring, counted from 0.
-    pub ring: usize,
-    /// Where and what.
-    pub what: FaultKind,
-    /// At which byte, counted from 1.
-    pub byte: Option<Located>,
-    /// At which time since the start.
-    pub at: Option<Duration>,
-}
-
-impl Fault {
-    /// A fault on a link of a ring, counted from 0, at a byte, counted from 1.
-    #[must_use]
-    pub fn on_link(ring: usize, ends: LinkEnds, kind: LinkFaultKind, byte: u64) -> Self {
-        Self {
-            ring,
-            what: FaultKind::Link(Located::number(0), ends, kind),
-            byte: Some(Located::number(byte.cast_signed())),
-            at: None,
-        }
-    }
-}
-
-/// Where a fault happens, and what.
-#[derive(Clone, Debug)]
-pub enum FaultKind {
-    /// On a link.
-    Link(Located, LinkEnds, LinkFaultKind),
-    /// In a drive.
-    Drive(Located, DriveFault),
-    /// The drive's own monitoring reports an error.
-    Error(Located, ErrorCode),
-}
-
-/// The ends of a link.
-#[derive(Clone, Debug)]
-pub struct LinkEnds {
-    /// The transmitter; `None` for the master.
-    pub from: Option<Located>,
-    /// The receiver; `None` for the master.
-    pub to: Option<Located>,
-}
-
-impl LinkEnds {
-    /// The ends of the link that goes from one drive to another; `None` is the master.
-    #[must_use]
-    pub fn between(from: Option<u8>, to: Option<u8>) -> Self {
-        let end = |drive: u8| Located::number(drive.into());
-        Self {
-            from: from.map(end),
-            to: to.map(end),
-        }
-    }
-
-    /// The ends of a link of a ring of `drives`, by its place: 0 for the link that begins at the master.
-    #[must_use]
-    pub fn of_place(drives: u8, place: usize) -> Self {
-        let behind = |place: usize| u8::try_from(usize::from(drives).checked_sub(place)?).ok();
-        let from = behind(place).filter(|_| place > 0);
-        Self::between(from, behind(place + 1))
-    }
-}
-
-/// What happens on a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LinkFaultKind {
-    /// `flip b ...`
-    Flip(Flips),
-    /// `replace HH`
-    Replace(u8),
-    /// `drop`
-    Drop,
-    /// `duplicate`
-    Duplicate,
-    /// `insert HH`
-    Insert(u8),
-    /// `delay T`
-    Delay(Duration),
-    /// `break T`
-    Break(Duration),
-    /// `overrun`
-    Overrun,
-    /// `cut`
-    Cut,
-    /// `join`
-    Join,
-}
-
-impl From<LinkFault> for LinkFaultKind {
-    /// The same fault; times to the nanosecond.
-    fn from(fault: LinkFault) -> Self {
-        match fault {
-            LinkFault::Flip(flips) => Self::Flip(flips),
-            LinkFault::Replace(byte) => Self::Replace(byte),
-            LinkFault::Drop => Self::Drop,
-            LinkFault::Duplicate => Self::Duplicate,
-            LinkFault::Insert(byte) => Self::Insert(byte),
-            LinkFault::Delay(time) => Self::Delay(Duration::nanos(time.as_nanos())),
-            LinkFault::Break(time) => Self::Break(Duration::nanos(time.as_nanos())),
-            LinkFault::Overrun => Self::Overrun,
-            LinkFault::Cut => Self::Cut,
-            LinkFault::Join => Self::Join,
-        }
-    }
+    /// A step of the bus.
+    Own(L::Step),
 }

@@ -8,11 +8,11 @@ mod runs;
 mod texts;
 mod witness;
 
+use harness::buses::syntax::Header;
 use harness::explore::{
     About, Bounds, Campaign, Difference, End, ExploreError, Finding, OnSim, Planted, Pool,
     Progress, Rehearsal, RingScope, Scope, Setup, Spice, Swarm, Target, Tried, Watcher,
 };
-use harness::scenario::syntax::Header;
 use harness_proto::novobus::guard::Limits;
 
 /// The seed of every random test: `DRIVEBENCH_SEED`, or always the same.

@@ -5,13 +5,14 @@ use super::findings::empty_checkout;
 use super::{Heard, about, bounds, scope_of};
 use crate::program::{ended, findings, name};
 use harness::buses::novobus::explore::shrink::{Subject, shrink};
+use harness::buses::syntax::Header;
+use harness::buses::syntax::Header;
 use harness::explore::{
     About, Beside, Campaign, Case, Finding, LogLine, OnSim, Planted, Setup, Target, beside,
     by_novelty, play,
 };
 use harness::link::Line as _;
 use harness::link::Octets;
-use harness::scenario::syntax::Header;
 use harness_proto::time::Span;
 use std::path::Path;
 

@@ -3,7 +3,9 @@
 use harness::fuzz::written;
 use harness::library::sources;
 use harness::scenario::parse::parse;
+use harness::scenario::problem::Problems;
 use harness::scenario::source::Source;
+use harness::scenario::syntax::Scenario;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 use std::path::Path;
@@ -12,10 +14,14 @@ fn source(text: &str) -> Source {
     Source::from_bytes("test.scn".to_owned(), text.as_bytes().to_vec()).expect("a text")
 }
 
+fn read(text: &str) -> Result<Scenario, Problems> {
+    parse(&source(text))
+}
+
 /// Whether a text is a scenario; the writer must give the same one.
 #[track_caller]
 fn comes_back(text: &str) -> bool {
-    let Ok(scenario) = parse(&source(text)) else {
+    let Ok(scenario) = read(text) else {
         return false;
     };
     written(&scenario);
@@ -205,7 +211,7 @@ fn generated_scenarios_come_back() {
     runner
         .run(&lines, |(headers, steps)| {
             // Lines that cannot be read are left out, so that most scenarios can.
-            let alone = |own: &String| parse(&source(&format!("ring 3, 2\n{own}\n> 80\n"))).is_ok();
+            let alone = |own: &String| read(&format!("ring 3, 2\n{own}\n> 80\n")).is_ok();
             let headers = headers
                 .iter()
                 .map(|picks| line(HEADERS, picks))

@@ -12,11 +12,11 @@
 mod current;
 mod information;
 mod motion;
-mod ratio;
 mod scale;
 mod scope;
 mod temperature;
 
+pub use crate::ratio::Ratio;
 pub use current::{
     effective_current_from_raw, effective_current_to_raw, emf_from_raw, emf_to_raw,
     limit_maximum_raw, momentary_current_from_raw, momentary_current_to_raw, torque_from_raw,
@@ -34,7 +34,6 @@ pub use motion::{
     slipping_error_from_raw, slipping_error_to_raw, speed_from_raw, speed_to_raw,
     tacho_filter_from_raw, tacho_filter_to_raw, turns_from_raw, turns_in_radians, turns_to_raw,
 };
-pub use ratio::Ratio;
 pub use scale::{Drive, Scale, Value};
 pub use scope::{
     SCOPE_MEASUREMENTS, TriggerDelay, scope_address, scope_period_us, scope_signal, scope_timer0,

@@ -1,7 +1,7 @@
 //! Speeds, ramps, angles, and what else is measured in turns and cycles.
 
-use super::ratio::round_div;
 use super::{Ratio, Reason, SpeedRange, UnitError, check, encode};
+use crate::ratio::round_div;
 
 /// The cycle of the speed and position regulators in microseconds (ND21 4.1).
 pub const CYCLE_US: u32 = 432;

@@ -1,7 +1,7 @@
 //! The memory oscilloscope (ND21 14.10.6).
 
-use super::ratio::round_div;
 use super::{Ratio, Reason, UnitError};
+use crate::ratio::round_div;
 
 /// How many measurements a recording has, one byte each (ND21 14.10.6.2, E130).
 pub const SCOPE_MEASUREMENTS: u32 = 256;

@@ -1,7 +1,7 @@
 //! The temperature of the cooler and the resistance of the motor's sensor.
 
-use super::ratio::round_div;
 use super::{Ratio, Reason, UnitError, check};
+use crate::ratio::round_div;
 
 const COOLER_WHAT: (&str, &str) = ("cooler temperature", "14.5.7.1");
 const SENSOR_WHAT: (&str, &str) = ("resistance of the motor sensor in ohm", "14.5.7.2");

@@ -1,7 +1,8 @@
 //! What the master sends in a campaign, taken from a scenario, and what must come back (ND21 9.1-9.6).
 
+use crate::buses::novobus::language::plan::{PlannedCall, RingAct};
 use crate::campaign::plan::Shape;
-use crate::scenario::plan::{Plan, PlannedAction, PlannedCall, PlannedWhen};
+use crate::scenario::plan::{Plan, PlannedAction, PlannedWhen};
 use crate::scenario::problem::{Problem, Span};
 use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
@@ -45,7 +46,8 @@ pub fn talk(plan: &Plan) -> Result<Talk, Problem> {
     let mut calls = Vec::new();
     for step in &plan.steps {
         match &step.action {
-            PlannedAction::Fault(..) | PlannedAction::Check(_) | PlannedAction::Receive(..) => {
+            PlannedAction::Own(RingAct::Fault(..) | RingAct::Check(_))
+            | PlannedAction::Receive(..) => {
                 continue;
             }
             _ if step.when != PlannedWhen::Now => {
@@ -54,10 +56,10 @@ pub fn talk(plan: &Plan) -> Result<Talk, Problem> {
                     "a campaign keeps the line without a gap: no line has a time",
                 );
             }
-            PlannedAction::Send(_, sent) | PlannedAction::Telegram(_, sent, ..) => {
+            PlannedAction::Send(_, sent) | PlannedAction::Own(RingAct::Telegram(_, sent, ..)) => {
                 bytes.extend_from_slice(sent);
             }
-            PlannedAction::Master(_, all, false) => calls.push(all.clone()),
+            PlannedAction::Own(RingAct::Master(_, all, false)) => calls.push(all.clone()),
             _ => return refused(step.span, "a campaign does not play this"),
         }
         if bytes.len().max(calls.iter().map(Vec::len).sum()) > MAX_LENGTH {

@@ -1,15 +1,16 @@
 //! Converts a capture to a scenario: the bytes sent with their times, the faults on the way, and the bytes that came back.
 
 use super::stimuli::{Told, told};
+use crate::buses::novobus::language::syntax::{
+    CellPlace, Drives, Header, RingStep, Setup, SetupKind, Written,
+};
 use crate::capture::Capture;
 use crate::capture::faults::faults;
 use crate::scenario::parse::parse;
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{
-    Action, CellPlace, Drives, Header, Scenario, Setup, SetupKind, Step, When, Written,
-};
+use crate::scenario::syntax::{Action, Scenario, Step, When};
 use crate::scenario::times::Duration;
 use crate::scenario::write::Text;
 use harness_proto::line::{Rate, Received};
@@ -80,13 +81,13 @@ pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, Sket
         .map(|r| r.first.bytes.len() + r.received.len())
         .sum();
     let width = (bytes * 2 / LINES).clamp(A_LINE, MOST_A_LINE);
-    let mut text = Text::default();
+    let mut text: Text = Text::default();
     text.header(&head(capture, options, &rings)?);
     text.empty_line();
     for (index, trace) in capture.traces.iter().enumerate() {
         for link in &trace.links {
             for fault in faults(index, link, capture.rate) {
-                text.step(&Action::Fault(fault).into(), "");
+                text.step(&RingStep::Fault(fault).into(), "");
             }
         }
     }
@@ -141,7 +142,10 @@ fn head(
     let sizes: Vec<_> = rings.iter().map(|ring| ring.size.drives()).collect();
     // A setup also defines the contents of the cells.
     let setups = match options.setup {
-        Some(setup) => parse(setup).map_err(Box::new)?.header.setups,
+        Some(setup) => {
+            let scenario: Scenario = parse(setup).map_err(Box::new)?;
+            scenario.header.setups
+        }
         None => cells(rings),
     };
     let header = Header {
@@ -223,7 +227,10 @@ fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<S
         };
         let run: Vec<_> = run.into_iter().map(Expected::Byte).collect();
         for bytes in Pattern::of(&run, usize::MAX).lines(width) {
-            let step = Step::from(Action::Send { ring, bytes });
+            let step: Step = Step::from(Action::Send {
+                port: ring,
+                message: bytes,
+            });
             steps.push(Step { when, ..step });
             when = When::Now;
         }
@@ -245,7 +252,14 @@ fn receives(text: &mut Text, index: usize, ring: &Ring<'_>, width: usize) {
         )
         .collect();
     for bytes in Pattern::of(&shown, usize::MAX).lines(width) {
-        text.step(&Action::Receive { ring: index, bytes }.into(), "");
+        text.step(
+            &Action::Receive {
+                port: index,
+                message: bytes,
+            }
+            .into(),
+            "",
+        );
     }
     if end < ring.received.len() {
         text.remark(&format!(

@@ -7,12 +7,12 @@ use super::read::columns;
 use super::rig::{self, Bench, Use};
 use crate::buses::novobus::driver::cell::{Found, find};
 use crate::buses::novobus::driver::{Axis, Identity, State};
+use crate::buses::novobus::language::scale::shown;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::run::progress_bar;
 use crate::counted::counted;
 use crate::scenario::argument::{Location, cells};
-use crate::scenario::quantity::shown;
 use harness_proto::nd21::units::{Date, Scale, Value};
 use serde_json::json;
 

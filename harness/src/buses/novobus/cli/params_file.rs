@@ -7,10 +7,10 @@
 //! ```
 
 use crate::buses::novobus::driver::cell::{Found, hex};
+use crate::buses::novobus::language::syntax::Written;
 use crate::scenario::argument::{Location, Memory, value_at};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Written;
 use harness_proto::nd21::cells::{Access, Cell, RAM};
 use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::ram;

@@ -6,10 +6,10 @@ use super::failure::Failure;
 use super::rig::{self, Bench, Use};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{self, Found, find, hex};
+use crate::buses::novobus::language::syntax::Written;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::scenario::argument::{Location, Memory, assignments, encode};
-use crate::scenario::syntax::Written;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::ram;
 

@@ -1,8 +1,8 @@
 //! Cells of drives: read, written, shown.
 
 use super::{Axis, Bus, Error};
+use crate::buses::novobus::language::scale::shown;
 use crate::scenario::argument::{Location, Memory};
-use crate::scenario::quantity::shown;
 use harness_proto::nd21::bits;
 use harness_proto::nd21::units::{Drive, Value};
 use harness_proto::novobus::command::Kind;

@@ -2,6 +2,7 @@
 
 use crate::buses::novobus::explore::judge::Judge;
 use crate::buses::novobus::explore::text::{Expected, Page, text};
+use crate::buses::novobus::language::syntax::Header;
 use crate::explore::Case;
 use crate::explore::Difference;
 use crate::explore::ExploreError;
@@ -9,7 +10,6 @@ use crate::explore::Seen;
 use crate::explore::Setup;
 use crate::explore::files::{read_text, write_whole};
 use crate::manual::tables;
-use crate::scenario::syntax::Header;
 use harness_proto::novobus::address::RingSize;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -2,13 +2,13 @@
 
 use super::case::Case;
 use super::play::{Seen, play};
+use crate::buses::novobus::language::plan::plan_header;
+use crate::buses::novobus::language::syntax::{Drives, Header, Setup as HeaderLine, SetupKind};
 use crate::link::SimulatedLink;
 use crate::rig::Rig;
 use crate::scenario::expression::{Located, Scope};
-use crate::scenario::plan::plan_header;
 use crate::scenario::problem::Problems;
 use crate::scenario::simulate;
-use crate::scenario::syntax::{Drives, Header, Setup as HeaderLine, SetupKind};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::novobus::deviation;
 use serde::{Deserialize, Serialize};

@@ -3,12 +3,13 @@
 use super::case::{Act, Case, Harm, Talk, To, What};
 use super::oracle::{answered, sent};
 use super::play::Seen;
+use crate::buses::novobus::language::syntax::{
+    Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
+};
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::{Expected as Byte, Pattern};
 use crate::scenario::problem::Span;
-use crate::scenario::syntax::{
-    Action, Citation, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, Scenario, Step, When,
-};
+use crate::scenario::syntax::{Action, Citation, Scenario, Step, When};
 use crate::scenario::times::Duration;
 use crate::scenario::write::Text;
 use harness_proto::novobus::address::RingSize;
@@ -60,7 +61,7 @@ pub fn text(case: &Case, page: &Page<'_>) -> String {
         text: text.clone(),
         span: Span::default(),
     };
-    let mut text = Text::default();
+    let mut text: Text = Text::default();
     text.header(&Scenario {
         sources: page.sources.iter().map(source).collect(),
         strict: page.expected.is_some_and(|own| is_strict(case, own)),
@@ -81,7 +82,7 @@ pub fn text(case: &Case, page: &Page<'_>) -> String {
         for (link, byte, harm) in faults.by_ref().take(own) {
             let ends = LinkEnds::of_place(case.drives, usize::from(link));
             let fault = Fault::on_link(case.ring(), ends, kind(harm), byte);
-            text.step(&Action::Fault(fault).into(), "");
+            text.step(&RingStep::Fault(fault).into(), "");
         }
     }
     if let Some(expected) = page.expected {
@@ -110,7 +111,7 @@ fn steps(text: &mut Text, act: &Act, case: &Case) {
                 byte: None,
                 at: None,
             };
-            text.step(&Action::Fault(fault).into(), "");
+            text.step(&RingStep::Fault(fault).into(), "");
         }
         _ => {
             let words = words(&act.what);
@@ -119,7 +120,14 @@ fn steps(text: &mut Text, act: &Act, case: &Case) {
                 let mut comment = if index == 0 { &words[..] } else { "its rest" };
                 let known: Vec<_> = part.iter().copied().map(Byte::Byte).collect();
                 for bytes in Pattern::of(&known, RUN).lines(ITEMS_A_LINE) {
-                    text.step(&Action::Send { ring, bytes }.into(), comment);
+                    text.step(
+                        &Action::Send {
+                            port: ring,
+                            message: bytes,
+                        }
+                        .into(),
+                        comment,
+                    );
                     comment = "";
                 }
             }
@@ -217,7 +225,10 @@ fn answer(text: &mut Text, case: &Case, range: std::ops::Range<usize>, expected:
         let mut at = at;
         for bytes in Pattern::of(&words, RUN).lines(ITEMS_A_LINE) {
             let ring = case.ring();
-            let step = Step::from(Action::Receive { ring, bytes });
+            let step: Step = Step::from(Action::Receive {
+                port: ring,
+                message: bytes,
+            });
             match at.take() {
                 None => text.step(&step, ""),
                 Some(at) => {

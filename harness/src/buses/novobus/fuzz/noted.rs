@@ -8,7 +8,7 @@ use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
-use crate::scenario::syntax::Bus;
+use crate::scenario::syntax::{Bus, Scenario};
 use harness_proto::line::LineError;
 use harness_proto::nd21::cells::cell;
 use harness_sim::novobus::fuzz::{Feature, Notebook};
@@ -29,7 +29,7 @@ pub(crate) fn scenario(data: &[u8], notes: &mut Notebook<'_>) {
     let Ok(source) = Source::from_bytes("input.scn".to_owned(), data.to_vec()) else {
         return notes.note(|| Feature::new("", "no text", "not UTF-8"));
     };
-    let scenario = match parse(&source) {
+    let scenario: Scenario = match parse(&source) {
         Ok(scenario) => scenario,
         Err(found) => return problems(notes, "a mistake", &found),
     };

@@ -2,12 +2,13 @@
 //! in the same words.
 
 use super::plan::{in_memory, number_bytes};
+use crate::buses::novobus::language::parse::value::{bytes, eeprom_place, place, value};
+use crate::buses::novobus::language::syntax::{CellPlace, Written};
 use crate::scenario::expression::{self, Scope};
-use crate::scenario::parse::{bytes, eeprom_place, equals, place, value};
+use crate::scenario::parse::words::equals;
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::quantity::{self, Dimension, Quantity};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{CellPlace, Written};
 use crate::scenario::times;
 use harness_proto::nd21::cells::{Access, Cell};
 use harness_proto::nd21::units::{self, Scale};

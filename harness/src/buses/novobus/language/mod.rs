@@ -4,5 +4,201 @@ pub mod argument;
 pub(crate) mod parse;
 pub mod plan;
 pub(crate) mod run;
-pub(crate) mod syntax;
+pub(crate) mod scale;
+pub mod syntax;
 pub(crate) mod write;
+
+use self::plan::{Bench, Planner, RingAct, planner};
+use self::run::bytes;
+use self::run::record::Record;
+use self::run::state::{self, State};
+use self::syntax::{Header, RingStep};
+use crate::buses::Bus;
+use crate::buses::novobus::simulate;
+use crate::link::{Link, Octets as _};
+use crate::scenario::language::{Language, Opening};
+use crate::scenario::pattern::{self, Expected, Pattern};
+use crate::scenario::plan::{Plan, PlannedStep};
+use crate::scenario::problem::{Problem, Spanned};
+use crate::scenario::run::outcome::{Difference, Mismatch, Stop};
+use crate::scenario::run::player::Runner;
+use crate::scenario::scanner::Scanner;
+use crate::scenario::syntax::Scenario;
+use harness_proto::line::Received;
+use harness_proto::time::Instant;
+
+/// The language of scenarios with the words of this bus.
+#[derive(Clone, Copy, Debug)]
+pub struct Novobus;
+
+impl Language for Novobus {
+    const BUS: Bus = Bus::Novobus;
+    const STRICT: bool = false;
+    const SOURCE: &'static str = "nd21 9.7";
+    const EXAMPLE: &'static str = "`> 80`: the master sends SYNCO";
+
+    type Header = Header;
+    type Message = Pattern;
+    type Step = RingStep;
+    type Setup = Bench;
+    type Sent = u8;
+    type Wanted = Expected;
+    type Act = RingAct;
+    type Received = Received;
+    type State = State;
+    type Planner = Planner;
+
+    fn header_words() -> Vec<&'static str> {
+        parse::header::WORDS.to_vec()
+    }
+
+    fn step_words() -> (Vec<&'static str>, &'static [&'static str]) {
+        (parse::job::names(), &parse::step::WORDS)
+    }
+
+    fn header(
+        word: &Spanned<&str>,
+        scanner: &mut Scanner<'_>,
+        header: &mut Header,
+        begun: bool,
+    ) -> Option<Result<(), Problem>> {
+        parse::header::line(word, scanner, header, begun)
+    }
+
+    fn incomplete(header: &Header) -> Option<Problem> {
+        parse::header::incomplete(header)
+    }
+
+    fn message(scanner: &mut Scanner<'_>) -> Result<Pattern, Problem> {
+        pattern::pattern(scanner)
+    }
+
+    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<RingStep, Problem>> {
+        parse::step::step(opening, scanner)
+    }
+
+    fn settle(
+        scenario: &Scenario<Self>,
+        size: Option<u8>,
+        found: &mut Vec<Problem>,
+    ) -> Result<Planner, Problem> {
+        planner::settle(scenario, size, found)
+    }
+
+    fn resume(bench: &Bench) -> Planner {
+        planner::resume(bench)
+    }
+
+    fn simulate(plan: &Plan<Self>) -> Box<dyn Link> {
+        Box::new(simulate::simulated(plan))
+    }
+
+    fn fault_links(plan: &Plan<Self>) -> Vec<(usize, usize)> {
+        plan.fault_links().collect()
+    }
+
+    fn heard_links(plan: &Plan<Self>) -> Vec<(usize, usize)> {
+        plan.heard_links().collect()
+    }
+
+    fn link_name(plan: &Plan<Self>, ring: usize, link: usize) -> String {
+        plan.link_name(ring, link)
+    }
+
+    fn ports(plan: &Plan<Self>) -> usize {
+        plan.rings.len()
+    }
+
+    fn state(plan: &Plan<Self>, link: &dyn Link) -> State {
+        State::new(plan, link)
+    }
+
+    fn begin(runner: &mut Runner<'_>) -> Result<(), Stop> {
+        runner.begin()
+    }
+
+    fn act(runner: &mut Runner<'_>, act: &RingAct, step: &PlannedStep) -> Result<(), Stop> {
+        runner.act_of_ring(act, step)
+    }
+
+    fn by_hand(state: &mut State, ring: usize) {
+        state.by_hand(ring);
+    }
+
+    fn transmit(link: &mut dyn Link, ring: usize, bytes: &[u8]) -> Instant {
+        link.send_octets(ring, bytes)
+    }
+
+    fn sent(state: &mut State, ring: usize, bytes: &[u8], times: (Instant, Instant)) {
+        state.sent(ring, bytes, times);
+    }
+
+    fn fetch(_: &mut State, link: &mut dyn Link, ring: usize) -> Option<(Instant, Received)> {
+        link.receive_octet(ring)
+    }
+
+    fn received(state: &mut State, ring: usize, all: &[(Instant, Received)]) {
+        state.received(ring, all);
+    }
+
+    fn resolve(wanted: &Expected, before: &[(Instant, Received)]) -> Expected {
+        bytes::resolve(*wanted, before)
+    }
+
+    fn matches(wanted: &Expected, received: Received) -> bool {
+        bytes::matches(*wanted, received)
+    }
+
+    fn describe(wanted: &Expected) -> String {
+        wanted.to_string()
+    }
+
+    fn show(received: Received) -> String {
+        bytes::show(received)
+    }
+
+    fn difference(
+        ring: usize,
+        place: (usize, usize),
+        wanted: &[Expected],
+        received: &[(Instant, Received)],
+    ) -> Option<Difference> {
+        Some(state::difference(ring, place, wanted, received))
+    }
+
+    fn next_look(state: &State) -> Instant {
+        state.recorder.next()
+    }
+
+    fn look(runner: &mut Runner<'_>) {
+        runner.note();
+    }
+
+    fn too_much(state: &State) -> Option<String> {
+        state.recorder.too_much()
+    }
+
+    fn in_error(runner: &Runner<'_>) -> String {
+        runner.in_error()
+    }
+
+    fn complete(runner: &Runner<'_>, finding: &mut Mismatch) {
+        runner.complete(finding);
+    }
+
+    fn records(state: State) -> Vec<Record> {
+        state.recorder.records
+    }
+
+    fn write_header(header: &Header) -> (Vec<(&'static str, String)>, Vec<String>) {
+        (write::header(header), write::devices(header))
+    }
+
+    fn write_message(message: &Pattern) -> String {
+        message.to_string()
+    }
+
+    fn write_step(step: &RingStep) -> String {
+        write::step(step)
+    }
+}

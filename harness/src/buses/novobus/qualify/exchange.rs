@@ -1,10 +1,11 @@
 //! Repeats an attempt with the drives' roles exchanged: the address of every telegram is shifted. A single wrong drive is then wrong at
 //! other bytes. A fault on the path of all telegrams, or in every drive, shows at the same byte again.
 
+use crate::buses::novobus::language::syntax::{Fault, Header, LinkEnds, RingStep};
 use crate::buses::novobus::twin::{Conversation, Done};
 use crate::link::{Moment, PlacedFault};
 use crate::scenario::pattern::{Expected, Pattern};
-use crate::scenario::syntax::{Action, Fault, Header, LinkEnds, Scenario};
+use crate::scenario::syntax::{Action, Scenario, Step};
 use crate::scenario::times::Duration;
 use crate::scenario::write::Text;
 use harness_proto::nd21::ram;
@@ -240,33 +241,32 @@ impl Sent {
 
     fn text(&self, bytes: &[(u8, bool)], drives: u8, step: u8) -> String {
         let title = format!("The same conversation, each telegram {step} addresses on");
-        let mut text = Text::default();
+        let mut text: Text = Text::default();
         text.header(&Scenario::new(&title, Header::of_rings(&[drives])));
         text.empty_line();
         let mut left = bytes.iter().map(|(byte, _)| Expected::Byte(*byte));
         // Bytes stand together up to a gap or a fault.
         let pieces = self.patient();
         for run in pieces.chunk_by(|one, other| one.is_byte() && other.is_byte()) {
-            let actions = match run {
-                [Piece::Gap(gap)] => vec![Action::Wait(Duration::micros(gap.as_nanos() / 1_000))],
+            let steps: Vec<Step> = match run {
+                [Piece::Gap(gap)] => {
+                    let time = Duration::micros(gap.as_nanos() / 1_000);
+                    vec![Action::Wait(time).into()]
+                }
                 [Piece::Fault(byte, fault)] => {
                     let ends = LinkEnds::of_place(drives, 0);
-                    vec![Action::Fault(Fault::on_link(
-                        0,
-                        ends,
-                        (*fault).into(),
-                        *byte,
-                    ))]
+                    let fault = Fault::on_link(0, ends, (*fault).into(), *byte);
+                    vec![RingStep::Fault(fault).into()]
                 }
                 run => {
                     let bytes: Vec<_> = left.by_ref().take(run.len()).collect();
                     let lines = Pattern::of(&bytes, usize::MAX).lines(BYTES_A_LINE);
-                    let send = |bytes| Action::Send { ring: 0, bytes };
+                    let send = |message| Action::Send { port: 0, message }.into();
                     lines.into_iter().map(send).collect()
                 }
             };
-            for action in actions {
-                text.step(&action.into(), "");
+            for step in steps {
+                text.step(&step, "");
             }
         }
         text.into()
@@ -344,7 +344,7 @@ fn is_written_as_read(fault: &LinkFault) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::plan::Exchange;
+    use crate::buses::novobus::language::plan::Exchange;
     use harness_proto::novobus::command::Command;
 
     /// ND21 14.10.5: only the customer's cells of another drive are written when roles are exchanged.

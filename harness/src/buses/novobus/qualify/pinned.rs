@@ -3,9 +3,9 @@
 //! what is written to them (14.2.1).
 
 use super::blame::Sighting;
+use crate::buses::novobus::language::plan::Exchange;
 use crate::buses::novobus::twin::Conversation;
 use crate::library::Entry;
-use crate::scenario::plan::Exchange;
 use crate::scenario::source::Source;
 use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::command::Command;

@@ -1,10 +1,10 @@
 //! The probes: a conversation for each property that the manual leaves open, and its possible values.
 
 use super::hypothesis::Hypothesis;
+use crate::buses::novobus::language::plan::Exchange;
 use crate::buses::novobus::twin::Look;
 use crate::library::Entry;
 use crate::link::link_name;
-use crate::scenario::plan::Exchange;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
 use harness_proto::nd21::bits::{flags2, ps_status, status};

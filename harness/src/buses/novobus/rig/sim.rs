@@ -1,6 +1,7 @@
 //! Simulated rigs: what their drives are before anything is sent.
 
 use crate::buses::novobus::language::parse::header::parse_lines;
+use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
 use crate::rig::check::Rig;
 use crate::rig::file::{DriveEntry, Hooks, RigFile};
 use crate::rig::profile::KnownProfile;
@@ -9,7 +10,7 @@ use crate::scenario::parse::parse_header;
 use crate::scenario::plan::{Plan, plan};
 use crate::scenario::problem::{Problems, Span};
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{Drives, Header, Scenario, Setup, SetupKind};
+use crate::scenario::syntax::Scenario;
 use harness_sim::novobus::drive::Model;
 
 /// The types of the device that a header knows, and a model of a rig's file begins with behind `ND21-`.

@@ -2,12 +2,12 @@
 
 use super::drive;
 use super::job;
+use super::step;
 use super::words::{drives, named, required};
+use crate::buses::novobus::language::syntax::{Check, Drives, Ending};
 use crate::scenario::expression::{self, Located};
-use crate::scenario::parse::step;
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Check, Drives, Ending};
 use crate::scenario::times;
 use harness_proto::novobus::error::BusError;
 

@@ -3,11 +3,13 @@
 
 use super::value::{assigned, bytes, cell_by_name, cell_check, cell_names, eeprom_place, place};
 use super::words::{deviates, drives, equals, named, required};
+use crate::buses::novobus::language::syntax::{
+    Condition, DriveCheck, Drives, Influence, SetupKind, Showing,
+};
 use crate::scenario::expression;
 use crate::scenario::problem::{Problem, Spanned};
 use crate::scenario::quantity::{self, Dimension};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Condition, DriveCheck, Drives, Influence, SetupKind, Showing};
 use crate::scenario::times;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;

@@ -1,10 +1,11 @@
 //! Header lines: `ring`, `line`, `drive`, `master deviates`.
 
 use super::drive::{self, DriveLine};
+use super::step;
 use super::words::master_deviates;
 use crate::buses::novobus::language::syntax::header::{Header, RingRange, Setup, SetupKind};
 use crate::scenario::parse::header::{Part, once, read, stands_twice};
-use crate::scenario::parse::step;
+use crate::scenario::parse::step as core;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::source::Source;
@@ -26,7 +27,7 @@ pub(crate) fn line(
     begun: bool,
 ) -> Option<Result<(), Problem>> {
     match word.value {
-        "ring" | "line" if begun => Some(Err(step::header_too_late(word.span, word.value))),
+        "ring" | "line" if begun => Some(Err(core::header_too_late(word.span, word.value))),
         "ring" => Some(rings(scanner).and_then(|rings| {
             if header.rings.is_empty() {
                 header.rings = rings;
@@ -83,7 +84,7 @@ fn deviating_master(
     begun: bool,
 ) -> Result<(), Problem> {
     if begun {
-        let problem = step::behind_the_first(word.span, "master deviates");
+        let problem = core::behind_the_first(word.span, "master deviates");
         return Err(problem.help("move the line up, above the first step"));
     }
     let here = scanner.here();
@@ -103,7 +104,7 @@ fn deviating_master(
 /// # Errors
 /// As of [`parse`](crate::scenario::parse::parse).
 pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
-    let mut scenario = read(source, Part::Header)?;
+    let mut scenario: Scenario = read(source, Part::Header)?;
     if scenario.header.rings.is_empty() {
         scenario.header.rings = rings.iter().copied().map(RingRange::of).collect();
     }
@@ -120,7 +121,7 @@ pub fn parse_setup(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> 
 /// # Errors
 /// Every line that cannot be understood, and every step.
 pub(crate) fn parse_lines(source: &Source) -> Result<Header, Problems> {
-    let scenario = read(source, Part::Header)?;
+    let scenario: Scenario = read(source, Part::Header)?;
     let problems: Vec<_> = scenario.steps.iter().map(no_header_line).collect();
     match problems.is_empty() {
         true => Ok(scenario.header),
@@ -139,7 +140,7 @@ fn no_header_line(step: &Step) -> Problem {
 /// # Errors
 /// Every line that cannot be understood, every step, and a `ring` line for other sizes.
 pub fn parse_header(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
-    let mut scenario = read(source, Part::Header)?;
+    let mut scenario: Scenario = read(source, Part::Header)?;
     let own = &mut scenario.header.rings;
     if own.is_empty() {
         *own = rings.iter().copied().map(RingRange::of).collect();

@@ -3,11 +3,13 @@
 use super::master;
 use super::value::{assigned, place, tolerance};
 use super::words::{drives, equals};
+use crate::buses::novobus::language::syntax::{
+    CellPlace, Drives, Job, JobKind, MasterCall, Written,
+};
 use crate::scenario::expression;
 use crate::scenario::pattern::{self, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{CellPlace, Drives, Job, JobKind, MasterCall, Written};
 
 /// What stands behind a job's name.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -3,12 +3,12 @@
 use super::job::{driver_command, process_data, which_ring};
 use super::value::eeprom_place;
 use super::words::{drives, equals};
+use crate::buses::novobus::language::syntax::{Drives, Job, MasterCall, Target};
 use crate::scenario::expression;
 use crate::scenario::pattern;
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::{self, Dimension};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{Drives, Job, MasterCall, Target};
 
 /// The calls that are more than one command.
 const CALLS: [&str; 11] = [

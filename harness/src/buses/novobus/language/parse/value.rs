@@ -1,11 +1,11 @@
 //! Cells by name or address, and their values: bytes, or a number with a unit.
 
 use super::words::equals;
+use crate::buses::novobus::language::syntax::{CellCheck, CellPlace, Relation, Written};
 use crate::scenario::pattern::{self, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::{self, Dimension, Tolerance};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{CellCheck, CellPlace, Relation, Written};
 use harness_proto::nd21::cells::{self, Cell};
 use harness_proto::nd21::eeprom;
 use harness_proto::nd21::units::Scale;

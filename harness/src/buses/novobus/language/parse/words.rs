@@ -1,33 +1,12 @@
 //! What stands in several kinds of lines: words of a list, drives.
 
+use super::super::syntax::Drives;
 use crate::scenario::expression;
+pub(crate) use crate::scenario::parse::words::{equals, named, required};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::Drives;
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
 use harness_sim::novobus::deviation::{deviation, deviations, master_deviation, master_deviations};
-
-/// Reads one of a list of words.
-pub(crate) fn named<T: Copy>(
-    scanner: &mut Scanner<'_>,
-    names: &[(&str, T)],
-    what: &str,
-) -> Result<T, Problem> {
-    let known: Vec<_> = names.iter().map(|(name, _)| *name).collect();
-    let before = scanner.clone();
-    let Some(word) = scanner.word() else {
-        return Err(scanner.unexpected(&format!("{what} ({})", known.join(", "))));
-    };
-    match names.iter().find(|(name, _)| *name == word.value) {
-        Some((_, value)) => Ok(*value),
-        None => {
-            *scanner = before;
-            Err(scanner
-                .unexpected(&format!("{what} ({})", known.join(", ")))
-                .did_you_mean(word.value, &known))
-        }
-    }
-}
 
 /// The name of a deviation of a drive.
 pub(crate) fn deviates(scanner: &mut Scanner<'_>) -> Result<&'static Deviation, Problem> {
@@ -99,24 +78,4 @@ pub(crate) fn ring_prefix(scanner: &mut Scanner<'_>) -> usize {
         scanner.eat("1:");
     }
     0
-}
-
-pub(crate) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
-    if scanner.eat("=") {
-        Ok(())
-    } else {
-        Err(scanner.unexpected("`=`"))
-    }
-}
-
-/// One of these words must come next; the first of them is named where none does.
-pub(crate) fn required(scanner: &mut Scanner<'_>, words: &[&str]) -> Result<(), Problem> {
-    if words.iter().any(|word| scanner.eat_word(word)) {
-        return Ok(());
-    }
-    let mut ahead = scanner.clone();
-    let found = ahead.chunk().value;
-    Err(scanner
-        .unexpected(&format!("`{}`", words[0]))
-        .did_you_mean(found, words))
 }

@@ -5,13 +5,14 @@ use super::setup::{OUTSIDE, in_memory, number_bytes};
 use super::types::{
     CellTest, LOOK, PlannedCell, PlannedCondition, PlannedDriveCheck, PlannedLooks, PlannedRecord,
 };
-use crate::link::Capability;
-use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
-use crate::scenario::problem::{Problem, Span};
-use crate::scenario::syntax::{
+use crate::buses::novobus::language::syntax::{
     CellCheck, CellPlace, Condition, DriveCheck, Drives, Influence, Looks, Recording, Relation,
     Written,
 };
+use crate::link::Capability;
+use crate::scenario::language::Settle as _;
+use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
+use crate::scenario::problem::{Problem, Span};
 use harness_proto::time;
 use std::collections::BTreeSet;
 
@@ -185,7 +186,7 @@ impl Planner {
         in_memory(place, size)?;
         let looks = match recording.looks {
             Looks::Every(every) => {
-                let time = every.on(self.byte_time);
+                let time = every.on(self.byte_time());
                 if time < LOOK {
                     return Err(Problem::new(
                         every.span(),
@@ -212,7 +213,7 @@ impl Planner {
 }
 
 /// Records that run, by ring, drive and address, and how many there were.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Running {
     cells: BTreeSet<(usize, u8, u16)>,
     records: usize,

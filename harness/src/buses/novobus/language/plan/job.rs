@@ -2,10 +2,10 @@
 
 use super::planner::Planner;
 use super::setup::number_bytes;
-use super::types::{CellTest, PlannedAction, PlannedCell, Reading, setups_of};
+use super::types::{CellTest, PlannedCell, Reading, RingAct, setups_of};
+use crate::buses::novobus::language::syntax::{CellPlace, Job, JobKind, Relation, Written};
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::problem::{Problem, Span};
-use crate::scenario::syntax::{CellPlace, Job, JobKind, Relation, Written};
 use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
 use harness_proto::nd21::units::Scale;
@@ -17,11 +17,11 @@ use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::novobus::telegram::{Address, Telegram};
 
 impl Planner {
-    pub(crate) fn job(&self, job: &Job) -> Result<PlannedAction, Problem> {
+    pub(crate) fn job(&self, job: &Job) -> Result<RingAct, Problem> {
         match job {
             Job::Recover(ring) => {
                 self.ring(*ring, Span::default())?;
-                Ok(PlannedAction::Recover(*ring))
+                Ok(RingAct::Recover(*ring))
             }
             Job::Master { calls, once } => self.master(calls, *once),
             Job::Count(ring, number) => {
@@ -34,7 +34,7 @@ impl Planner {
                         "1 to 250 expected here",
                     )
                 })?;
-                Ok(PlannedAction::Count(*ring, drives))
+                Ok(RingAct::Count(*ring, drives))
             }
             Job::Exchange {
                 drive,
@@ -286,7 +286,7 @@ impl Planner {
         process_data: Option<u16>,
         parameters: &[u8],
         answer: Vec<Expected>,
-    ) -> Result<PlannedAction, Problem> {
+    ) -> Result<RingAct, Problem> {
         let wrong = |message: String| Problem::new(span, message, "this drive");
         let address = self
             .ring(ring, span)?
@@ -297,7 +297,7 @@ impl Planner {
             .encode();
         let mut expected = vec![Expected::Byte(bytes[0]), Expected::Byte(drive)];
         expected.extend(answer);
-        Ok(PlannedAction::Telegram(ring, bytes, expected, None))
+        Ok(RingAct::Telegram(ring, bytes, expected, None))
     }
 }
 
@@ -361,10 +361,10 @@ fn data_places(command: &Command, width: usize, form: ReadLongAnswer) -> Vec<usi
     (0..width).filter_map(place).map(|i| i + 2).collect()
 }
 
-fn with_reading(action: PlannedAction, reading: Option<Reading>) -> PlannedAction {
+fn with_reading(action: RingAct, reading: Option<Reading>) -> RingAct {
     match action {
-        PlannedAction::Telegram(ring, bytes, expected, _) => {
-            PlannedAction::Telegram(ring, bytes, expected, reading)
+        RingAct::Telegram(ring, bytes, expected, _) => {
+            RingAct::Telegram(ring, bytes, expected, reading)
         }
         other => other,
     }

@@ -1,11 +1,13 @@
 //! What the driver is to do, settled.
 
 use super::planner::Planner;
-use super::types::{PlannedAction, PlannedCall};
+use super::types::{PlannedCall, RingAct};
+use crate::buses::novobus::language::syntax::{
+    CellPlace, Drives, JobKind, MasterCall, Target, Written,
+};
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::Quantity;
-use crate::scenario::syntax::{CellPlace, Drives, JobKind, MasterCall, Target, Written};
 use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::units::turns_to_raw;
 
@@ -14,7 +16,7 @@ impl Planner {
         &self,
         calls: &[(Drives, MasterCall)],
         once: bool,
-    ) -> Result<PlannedAction, Problem> {
+    ) -> Result<RingAct, Problem> {
         let ring = calls.first().map_or(0, |(drives, _)| drives.ring);
         let mut planned = Vec::new();
         for (drives, call) in calls {
@@ -22,7 +24,7 @@ impl Planner {
                 planned.push((drive, self.call((ring, drive), call)?));
             }
         }
-        Ok(PlannedAction::Master(ring, planned, once))
+        Ok(RingAct::Master(ring, planned, once))
     }
 
     fn call(&self, drive: (usize, u8), call: &MasterCall) -> Result<PlannedCall, Problem> {

@@ -1,22 +1,19 @@
-//! A scenario settled for rings of given sizes: every number is known, everything that cannot be is
-//! refused, and nothing has been sent yet.
+//! The header and the steps of this bus, settled for rings of given sizes.
 
 mod drive;
 mod job;
 mod master;
-mod planner;
+pub(crate) mod planner;
 mod setup;
 mod types;
-mod unroll;
 
 pub(crate) use drive::{MAX_LOOKS, number};
 pub(crate) use job::Exchange;
-pub(crate) use planner::MAX_CARRIED;
-pub use planner::{plan, plan_header, plan_step};
+pub(crate) use planner::Planner;
+pub use planner::plan_header;
 pub(crate) use setup::{in_memory, number_bytes};
 pub(crate) use types::PlannedSetupKind;
 pub use types::{
-    CellTest, LOOK, Plan, PlannedAction, PlannedCall, PlannedCell, PlannedCheck, PlannedCondition,
-    PlannedDriveCheck, PlannedLooks, PlannedRecord, PlannedStep, PlannedWhen, PlannedWindow,
-    Reading,
+    Bench, CellTest, LOOK, PlannedCall, PlannedCell, PlannedCheck, PlannedCondition,
+    PlannedDriveCheck, PlannedLooks, PlannedRecord, Reading, RingAct,
 };

@@ -2,151 +2,32 @@
 
 use super::drive::Running;
 use super::setup::model_unless_said;
-use super::types::{
-    Plan, PlannedAction, PlannedCheck, PlannedSetup, PlannedStep, PlannedWhen, PlannedWindow,
-};
-use super::unroll::Unroll;
+use super::types::{Bench, PlannedCheck, RingAct};
 use crate::buses::Stimulus;
+use crate::buses::novobus::language::Novobus;
+use crate::buses::novobus::language::parse::header::parse_header;
+use crate::buses::novobus::language::syntax::{
+    Check, Drives, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
+};
 use crate::link::{Capability, Moment, PlacedFault, needs_line_errors, only_simulated};
 use crate::scenario::expression::{Located, Scope};
-use crate::scenario::parse::parse_header;
-use crate::scenario::pattern::MAX_BYTES;
+use crate::scenario::language::Settle;
+use crate::scenario::pattern::{Expected, MAX_BYTES, Pattern};
+use crate::scenario::plan::MAX_CARRIED;
+use crate::scenario::plan::{Plan, Unroll, plan};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
-use crate::scenario::syntax::{
-    Action, Check, Drives, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, Scenario, Step, When,
-};
-use crate::scenario::times::Window;
-use harness_proto::nd21::units;
+use crate::scenario::syntax::Scenario;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::time::{self, Instant};
 use harness_sim::fault::LinkFault;
 use harness_sim::nd21;
 use harness_sim::novobus::drive::Model;
-use std::ops::RangeInclusive;
-
-/// Maximum number of bytes that a run may carry on all links together: its record is kept in memory.
-pub(crate) const MAX_CARRIED: u64 = 20_000_000;
+use std::ops::{Deref, DerefMut, RangeInclusive};
 
 /// The longest delay or break.
 const MAX_FAULT: time::Span = time::Span::from_millis(10_000);
-
-/// Default wait of a line without a time.
-const DEADLINE: time::Span = time::Span::from_millis(1000);
-
-/// Settles a scenario, for a first ring of `size` drives where that is given.
-///
-/// # Errors
-/// Everything that cannot be in rings of these sizes.
-pub fn plan(scenario: &Scenario, source: &Source, size: Option<u8>) -> Result<Plan, Problems> {
-    let problems = |all| Problems::new(&source.name, source.text.clone(), all);
-    let rings = sizes(scenario, size).map_err(|problem| problems(vec![problem]))?;
-    let mut planner = Planner {
-        byte_time: scenario.header.rate.unwrap_or_default().byte_time(),
-        rings,
-        setups: Vec::new(),
-        units: Vec::new(),
-        model: model_unless_said(scenario),
-        models: Vec::new(),
-        scope: Scope::default(),
-    };
-    let mut found = planner.set_up(&scenario.header.setups);
-    let mut running = Running::default();
-    let mut steps = Vec::new();
-    let mut needs = scenario.needs.clone();
-    let (mut sent, mut expected) = (0, 0);
-    let links: u64 = planner
-        .rings
-        .iter()
-        .map(|ring| u64::from(ring.drives()) + 1)
-        .sum();
-    let room = MAX_BYTES.min(usize::try_from(MAX_CARRIED / links.max(1)).unwrap_or(MAX_BYTES));
-    let mut unroll = Unroll::new(&scenario.steps, planner.size(0));
-    while let Some(next) = unroll.next() {
-        let step = match next {
-            Ok((step, scope)) => {
-                planner.scope = scope;
-                step
-            }
-            Err(problem) => {
-                found.push(problem);
-                break;
-            }
-        };
-        let action = planner.action(step, &mut needs);
-        let action = action.and_then(|action| match &action {
-            PlannedAction::Record(record) => running.take(record).map(|()| action),
-            _ => Ok(action),
-        });
-        match action {
-            Ok(action) => {
-                sent += action.bytes_sent();
-                expected += action.bytes_expected();
-                if expected > MAX_BYTES {
-                    found.push(Problem::new(
-                        step.span,
-                        format!("more than {MAX_BYTES} bytes expected in one scenario"),
-                        "fewer bytes expected here",
-                    ));
-                    break;
-                }
-                if sent > room {
-                    found.push(Problem::new(
-                        step.span,
-                        format!("more than {room} bytes sent in one scenario on this ring"),
-                        "fewer bytes expected here",
-                    ));
-                    break;
-                }
-                steps.push(PlannedStep {
-                    when: planner.when(step.when),
-                    action,
-                    span: step.span,
-                });
-            }
-            Err(problem) => {
-                found.push(problem);
-                // Another turn would tell the same again.
-                if unroll.in_loop() {
-                    break;
-                }
-            }
-        }
-    }
-    if !found.is_empty() {
-        found.sort_by_key(|problem| problem.span.start);
-        return Err(problems(found));
-    }
-    if planner.rings.len() > 1 {
-        needs.push(Capability::TwoRings);
-    }
-    needs.extend(planner.setups.iter().filter_map(|setup| setup.what.needs()));
-    // The effect of a wrong master on a machine is unknown.
-    needs.extend(
-        scenario
-            .header
-            .master
-            .as_ref()
-            .map(|_| Capability::Simulator),
-    );
-    needs.sort();
-    needs.dedup();
-    Ok(Plan {
-        rate: scenario.header.rate.unwrap_or_default(),
-        strict: scenario.strict,
-        deadline: scenario
-            .deadline
-            .map_or(DEADLINE, |deadline| deadline.on(planner.byte_time)),
-        needs,
-        master: scenario.header.master.as_ref().map(|master| master.value),
-        steps,
-        setups: planner.setups,
-        units: planner.units,
-        models: planner.models,
-        rings: planner.rings,
-    })
-}
 
 /// Settles a header for rings of these sizes: what a bench is before anything is sent.
 ///
@@ -159,7 +40,7 @@ pub fn plan_header(name: &str, header: &Header, sizes: &[u8]) -> Result<Plan, Pr
     };
     let whole = header.and(&Header::of_rings(sizes));
     let settled = plan(&Scenario::new("", whole), &source, None);
-    settled.map_err(|mistakes| {
+    settled.map_err(|mistakes: Problems| {
         // What was put together from several texts has its places in none of them.
         let placed = parse_header(&source, sizes).map(|own| plan(&own, &source, None));
         match placed {
@@ -169,32 +50,7 @@ pub fn plan_header(name: &str, header: &Header, sizes: &[u8]) -> Result<Plan, Pr
     })
 }
 
-/// Settles one more step for the rings and drives of a plan.
-///
-/// # Errors
-/// What cannot be in these rings.
-pub fn plan_step(plan: &Plan, step: &Step, source: &Source) -> Result<PlannedStep, Problems> {
-    let planner = Planner {
-        byte_time: plan.rate.byte_time(),
-        rings: plan.rings.clone(),
-        setups: plan.setups.clone(),
-        units: plan.units.clone(),
-        // The model of every drive is settled.
-        model: Model::default(),
-        models: plan.models.clone(),
-        scope: Scope::default(),
-    };
-    let action = planner
-        .action(step, &mut Vec::new())
-        .map_err(|problem| Problems::new(&source.name, source.text.clone(), vec![problem]))?;
-    Ok(PlannedStep {
-        when: planner.when(step.when),
-        action,
-        span: step.span,
-    })
-}
-
-fn sizes(scenario: &Scenario, size: Option<u8>) -> Result<Vec<RingSize>, Problem> {
+fn sizes(scenario: &Scenario<Novobus>, size: Option<u8>) -> Result<Vec<RingSize>, Problem> {
     let mut rings = Vec::new();
     for (index, range) in scenario.header.rings.iter().enumerate() {
         let wanted = size.filter(|_| index == 0).unwrap_or(range.default);
@@ -212,37 +68,130 @@ fn sizes(scenario: &Scenario, size: Option<u8>) -> Result<Vec<RingSize>, Problem
     Ok(rings)
 }
 
-impl PlannedAction {
-    /// How many bytes the master sends.
-    fn bytes_sent(&self) -> usize {
-        match self {
-            Self::Send(_, bytes) | Self::Telegram(_, bytes, ..) => bytes.len(),
-            Self::Recover(_) => CHECK_SEQUENCE.len(),
-            _ => 0,
-        }
-    }
+/// Settles the header for a first ring of `size` drives where that is given.
+///
+/// # Errors
+/// The scenario is not for a ring of this size.
+pub(crate) fn settle(
+    scenario: &Scenario<Novobus>,
+    size: Option<u8>,
+    found: &mut Vec<Problem>,
+) -> Result<Planner, Problem> {
+    let header = &scenario.header;
+    let mut planner = Planner {
+        bench: Bench {
+            rings: sizes(scenario, size)?,
+            rate: header.rate.unwrap_or_default(),
+            master: header.master.as_ref().map(|master| master.value),
+            setups: Vec::new(),
+            units: Vec::new(),
+            models: Vec::new(),
+        },
+        model: model_unless_said(scenario),
+        scope: Scope::default(),
+        running: Running::default(),
+    };
+    found.extend(planner.set_up(&header.setups));
+    Ok(planner)
+}
 
-    /// How many bytes the master must receive.
-    fn bytes_expected(&self) -> usize {
-        match self {
-            Self::Receive(_, bytes) | Self::Telegram(_, _, bytes, _) => bytes.len(),
-            _ => 0,
-        }
+/// Settles one more step for rings that are settled.
+pub(crate) fn resume(bench: &Bench) -> Planner {
+    Planner {
+        bench: bench.clone(),
+        // The model of every drive is settled.
+        model: Model::default(),
+        scope: Scope::default(),
+        running: Running::default(),
     }
 }
 
-pub(crate) struct Planner {
-    pub(crate) byte_time: time::Span,
-    pub(crate) rings: Vec<RingSize>,
-    pub(crate) setups: Vec<PlannedSetup>,
-    /// What the scales of each ring's drives depend on.
-    pub(crate) units: Vec<Vec<units::Drive>>,
+/// Settles the lines of a scenario for rings of given sizes.
+#[derive(Debug)]
+pub struct Planner {
+    pub(crate) bench: Bench,
     /// The model of drives of which the header does not say it.
     pub(crate) model: Model,
-    /// The model of each ring's drives.
-    pub(crate) models: Vec<Vec<Model>>,
     /// The counters of the loops around the step in hand.
     pub(crate) scope: Scope,
+    running: Running,
+}
+
+impl Deref for Planner {
+    type Target = Bench;
+
+    fn deref(&self) -> &Bench {
+        &self.bench
+    }
+}
+
+impl DerefMut for Planner {
+    fn deref_mut(&mut self) -> &mut Bench {
+        &mut self.bench
+    }
+}
+
+impl Settle<Novobus> for Planner {
+    fn unroll<'s>(&self, scenario: &'s Scenario<Novobus>) -> Unroll<'s, Novobus> {
+        Unroll::new(&scenario.steps, self.size(0))
+    }
+
+    fn enter(&mut self, scope: Scope) {
+        self.scope = scope;
+    }
+
+    fn byte_time(&self) -> time::Span {
+        self.rate.byte_time()
+    }
+
+    fn room(&self) -> usize {
+        let links = self.rings.iter().map(|ring| u64::from(ring.drives()) + 1);
+        let room = MAX_CARRIED / links.sum::<u64>().max(1);
+        MAX_BYTES.min(usize::try_from(room).unwrap_or(MAX_BYTES))
+    }
+
+    fn send(&self, port: usize, message: &Pattern) -> Result<Vec<u8>, Problem> {
+        self.ring(port, message.span)?;
+        message.expand_known(self.size(port), MAX_BYTES)
+    }
+
+    fn receive(&self, port: usize, message: &Pattern) -> Result<Vec<Expected>, Problem> {
+        self.ring(port, message.span)?;
+        message.expand(self.size(port), MAX_BYTES)
+    }
+
+    fn act(
+        &mut self,
+        step: &RingStep,
+        span: Span,
+        needs: &mut Vec<Capability>,
+    ) -> Result<RingAct, Problem> {
+        let act = self.step(step, span, needs)?;
+        if let RingAct::Record(record) = &act {
+            self.running.take(record)?;
+        }
+        Ok(act)
+    }
+
+    fn pieces(act: &RingAct) -> (usize, usize) {
+        match act {
+            RingAct::Telegram(_, sent, expected, _) => (sent.len(), expected.len()),
+            RingAct::Recover(_) => (CHECK_SEQUENCE.len(), 0),
+            _ => (0, 0),
+        }
+    }
+
+    fn needs(&self, scenario: &Scenario<Novobus>) -> Vec<Capability> {
+        let two = (self.rings.len() > 1).then_some(Capability::TwoRings);
+        let setups = self.setups.iter().filter_map(|setup| setup.what.needs());
+        // The effect of a wrong master on a machine is unknown.
+        let master = scenario.header.master.iter().map(|_| Capability::Simulator);
+        two.into_iter().chain(setups).chain(master).collect()
+    }
+
+    fn finish(self) -> Bench {
+        self.bench
+    }
 }
 
 impl Planner {
@@ -289,74 +238,34 @@ impl Planner {
         Ok((drives.ring, self.drive(drives.ring, &drives.from)?))
     }
 
-    fn when(&self, when: When) -> PlannedWhen {
-        match when {
-            When::Now => PlannedWhen::Now,
-            When::After(window) => PlannedWhen::After(self.window(window)),
-            When::At(window) => PlannedWhen::At(self.window(window)),
-        }
-    }
-
-    fn window(&self, window: Window) -> PlannedWindow {
-        let tolerance = if window.is_exact() {
-            window.from.tolerance(self.byte_time)
-        } else {
-            time::Span::ZERO
-        };
-        PlannedWindow {
-            from: window.from.on(self.byte_time),
-            to: window.to.on(self.byte_time),
-            tolerance,
-        }
-    }
-
-    fn action(&self, step: &Step, needs: &mut Vec<Capability>) -> Result<PlannedAction, Problem> {
-        match &step.action {
-            Action::Send { ring, bytes } => {
-                self.ring(*ring, bytes.span)?;
-                Ok(PlannedAction::Send(
-                    *ring,
-                    bytes.expand_known(self.size(*ring), MAX_BYTES)?,
-                ))
-            }
-            Action::Receive { ring, bytes } => {
-                self.ring(*ring, bytes.span)?;
-                Ok(PlannedAction::Receive(
-                    *ring,
-                    bytes.expand(self.size(*ring), MAX_BYTES)?,
-                ))
-            }
-            Action::Fault(fault) => self.fault(fault, needs),
-            Action::Check(check) => Ok(PlannedAction::Check(self.check(check, needs)?)),
-            Action::Job(job) => {
+    fn step(
+        &self,
+        step: &RingStep,
+        span: Span,
+        needs: &mut Vec<Capability>,
+    ) -> Result<RingAct, Problem> {
+        match step {
+            RingStep::Fault(fault) => self.fault(fault, needs),
+            RingStep::Check(check) => Ok(RingAct::Check(self.check(check, needs)?)),
+            RingStep::Job(job) => {
                 needs.extend(job.needs());
                 self.job(job)
             }
-            Action::Until(check, within) => {
+            RingStep::Until(check, within) => {
                 let check = self.drive_check(check, needs)?;
-                Ok(PlannedAction::Until(check, within.on(self.byte_time)))
+                Ok(RingAct::Until(check, within.on(self.byte_time())))
             }
-            Action::Wait(time) => Ok(PlannedAction::Wait(time.on(self.byte_time))),
-            Action::Influence(drives, influence) => {
+            RingStep::Influence(drives, influence) => {
                 needs.push(influence.needs());
-                self.influence(drives, influence, step.span)?;
+                self.influence(drives, influence, span)?;
                 let range = self.drives(drives)?;
-                Ok(PlannedAction::Influence(
-                    drives.ring,
-                    range,
-                    influence.clone(),
-                ))
+                Ok(RingAct::Influence(drives.ring, range, influence.clone()))
             }
-            Action::Record(recording) => Ok(PlannedAction::Record(self.record(recording)?)),
-            Action::For(..) | Action::End => Err(Problem::new(
-                step.span,
-                "a loop stands where one step is expected",
-                "a step expected here",
-            )),
+            RingStep::Record(recording) => Ok(RingAct::Record(self.record(recording)?)),
         }
     }
 
-    fn fault(&self, fault: &Fault, needs: &mut Vec<Capability>) -> Result<PlannedAction, Problem> {
+    fn fault(&self, fault: &Fault, needs: &mut Vec<Capability>) -> Result<RingAct, Problem> {
         let size = self.size(fault.ring);
         let last = self.rings.get(fault.ring);
         let last = last.map_or(0, |ring| usize::from(ring.drives()));
@@ -413,10 +322,10 @@ impl Planner {
                     }
                 }
             }
-            (None, Some(at)) => Moment::At(Instant::START + at.on(self.byte_time)),
+            (None, Some(at)) => Moment::At(Instant::START + at.on(self.byte_time())),
             (None, None) => Moment::Now,
         };
-        Ok(PlannedAction::Fault(fault.ring, placed, moment))
+        Ok(RingAct::Fault(fault.ring, placed, moment))
     }
 
     fn link(&self, ring: usize, span: Span, ends: &LinkEnds) -> Result<usize, Problem> {
@@ -452,7 +361,7 @@ impl Planner {
 
     fn link_fault(&self, kind: LinkFaultKind) -> Result<LinkFault, Problem> {
         if let LinkFaultKind::Delay(span) | LinkFaultKind::Break(span) = kind
-            && span.on(self.byte_time) > MAX_FAULT
+            && span.on(self.byte_time()) > MAX_FAULT
         {
             return Err(Problem::new(
                 span.span(),
@@ -466,8 +375,8 @@ impl Planner {
             LinkFaultKind::Drop => LinkFault::Drop,
             LinkFaultKind::Duplicate => LinkFault::Duplicate,
             LinkFaultKind::Insert(byte) => LinkFault::Insert(byte),
-            LinkFaultKind::Delay(span) => LinkFault::Delay(span.on(self.byte_time)),
-            LinkFaultKind::Break(span) => LinkFault::Break(span.on(self.byte_time)),
+            LinkFaultKind::Delay(span) => LinkFault::Delay(span.on(self.byte_time())),
+            LinkFaultKind::Break(span) => LinkFault::Break(span.on(self.byte_time())),
             LinkFaultKind::Overrun => LinkFault::Overrun,
             LinkFaultKind::Cut => LinkFault::Cut,
             LinkFaultKind::Join => LinkFault::Join,
@@ -507,7 +416,7 @@ impl Planner {
             Check::Ended(ending) => PlannedCheck::Ended(*ending),
             Check::RulesKept(ring) => PlannedCheck::RulesKept(*ring),
             Check::Sent { bytes, time } => {
-                let time = time.map(|t| (t.on(self.byte_time), t.tolerance(self.byte_time)));
+                let time = time.map(|t| (t.on(self.byte_time()), t.tolerance(self.byte_time())));
                 PlannedCheck::Sent(count(bytes)?, time)
             }
             Check::Received(bytes) => PlannedCheck::Received(count(bytes)?),

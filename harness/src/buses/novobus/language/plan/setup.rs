@@ -2,12 +2,15 @@
 
 use super::planner::Planner;
 use super::types::{PlannedSetup, PlannedSetupKind, setups_of};
-use crate::scenario::pattern::MAX_CELLS;
-use crate::scenario::problem::{Problem, Span};
-use crate::scenario::syntax::{
-    Action, CellPlace, Check, Condition, DriveCheck, Drives, FaultKind, Influence, Scenario, Setup,
+use crate::buses::novobus::language::Novobus;
+use crate::buses::novobus::language::syntax::{
+    CellPlace, Check, Condition, DriveCheck, Drives, FaultKind, Influence, RingStep, Setup,
     SetupKind, Written,
 };
+use crate::scenario::language::Settle as _;
+use crate::scenario::pattern::MAX_CELLS;
+use crate::scenario::problem::{Problem, Span};
+use crate::scenario::syntax::{Action, Scenario};
 use harness_proto::nd21;
 use harness_proto::nd21::units::{self, Device, Scale, SpeedRange, Value};
 use harness_proto::novobus::memory;
@@ -40,10 +43,10 @@ impl Planner {
                 }
             }
             planned.sort_by_key(|(line, _)| *line);
-            self.setups = planned.iter().map(|(_, setup)| setup.clone()).collect();
+            self.bench.setups = planned.iter().map(|(_, setup)| setup.clone()).collect();
             if !numbers {
-                self.units = self.of_each(Self::read_units);
-                self.models = self.of_each(Self::read_model);
+                self.bench.units = self.of_each(Self::read_units);
+                self.bench.models = self.of_each(Self::read_model);
             }
         }
         found.extend(setups.iter().filter_map(|setup| self.idle(setup)));
@@ -81,7 +84,7 @@ impl Planner {
                 PlannedSetupKind::Word(name.value.clone(), word.value.clone())
             }
             SetupKind::Time(name, duration) => {
-                let span = duration.on(self.byte_time);
+                let span = duration.on(self.byte_time());
                 set_property(&name.value, Setting::Time(span), duration.span())?;
                 PlannedSetupKind::Time(name.value.clone(), span)
             }
@@ -217,7 +220,7 @@ impl Planner {
 }
 
 /// The default model: `nd21` if no line names a model and a line needs a feature that only this model has.
-pub(crate) fn model_unless_said(scenario: &Scenario) -> Model {
+pub(crate) fn model_unless_said(scenario: &Scenario<Novobus>) -> Model {
     let said = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
     if scenario.header.setups.iter().any(said) {
         return Model::default();
@@ -236,9 +239,11 @@ pub(crate) fn model_unless_said(scenario: &Scenario) -> Model {
         });
     let shows = |check: &DriveCheck| matches!(check.condition, Condition::Shows(_));
     let done = scenario.steps.iter().any(|step| match &step.action {
-        Action::Influence(_, Influence::Stimuli(_)) => true,
-        Action::Check(Check::Drive(check)) | Action::Until(check, _) => shows(check),
-        Action::Fault(fault) => matches!(fault.what, FaultKind::Error(..)),
+        Action::Own(RingStep::Influence(_, Influence::Stimuli(_))) => true,
+        Action::Own(RingStep::Check(Check::Drive(check)) | RingStep::Until(check, _)) => {
+            shows(check)
+        }
+        Action::Own(RingStep::Fault(fault)) => matches!(fault.what, FaultKind::Error(..)),
         _ => false,
     });
     if set || done {

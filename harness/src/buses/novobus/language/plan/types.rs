@@ -1,10 +1,12 @@
 //! What a plan consists of.
 
+use crate::buses::novobus::language::Novobus;
+use crate::buses::novobus::language::syntax::{CellPlace, Ending, Influence, Relation, Showing};
 use crate::link::{Capability, Moment, PlacedFault};
 use crate::scenario::pattern::Expected;
+use crate::scenario::plan::{Plan, PlannedAction, PlannedStep};
 use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
-use crate::scenario::syntax::{CellPlace, Ending, Influence, Relation, Showing};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::Position;
 use harness_proto::nd21::units::{self, Device, Scale};
@@ -23,23 +25,15 @@ use std::ops::RangeInclusive;
 /// regulators (ND21 4.1).
 pub const LOOK: time::Span = time::Span::from_micros(108);
 
-/// A scenario for rings of given sizes.
+/// What a bench is before anything is sent: the header of a scenario, settled for rings of given sizes.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct Bench {
     /// The rings; one or two.
     pub rings: Vec<RingSize>,
     /// The rate of the line.
     pub rate: Rate,
-    /// Whether bytes that no line expects are a failure.
-    pub strict: bool,
-    /// How long a line without a time waits.
-    pub deadline: time::Span,
-    /// What a rig must have.
-    pub needs: Vec<Capability>,
     /// How the bench's own master breaks the manual, on purpose.
     pub master: Option<&'static MasterDeviation>,
-    /// The steps, in order.
-    pub steps: Vec<PlannedStep>,
     pub(crate) setups: Vec<PlannedSetup>,
     /// What the scales of each ring's drives depend on.
     pub(crate) units: Vec<Vec<units::Drive>>,
@@ -118,46 +112,9 @@ impl Influence {
     }
 }
 
-/// A step, settled.
+/// A step of this bus, settled.
 #[derive(Clone, Debug)]
-pub struct PlannedStep {
-    /// The time in front.
-    pub when: PlannedWhen,
-    /// What happens.
-    pub action: PlannedAction,
-    /// Where it stands.
-    pub span: Span,
-}
-
-/// A time in front of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlannedWhen {
-    /// None.
-    Now,
-    /// After the line before.
-    After(PlannedWindow),
-    /// Since the start.
-    At(PlannedWindow),
-}
-
-/// A time from, to, and how exact they are meant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PlannedWindow {
-    /// From.
-    pub from: time::Span,
-    /// To.
-    pub to: time::Span,
-    /// Half a unit of the last digit written, for an exact time; zero for a window.
-    pub tolerance: time::Span,
-}
-
-/// What a step does.
-#[derive(Clone, Debug)]
-pub enum PlannedAction {
-    /// The master sends.
-    Send(usize, Vec<u8>),
-    /// The master receives.
-    Receive(usize, Vec<Expected>),
+pub enum RingAct {
     /// A fault.
     Fault(usize, PlacedFault, Moment),
     /// A check.
@@ -172,8 +129,6 @@ pub enum PlannedAction {
     Count(usize, u8),
     /// Time passes until a check holds, at most this long.
     Until(PlannedDriveCheck, time::Span),
-    /// Time passes.
-    Wait(time::Span),
     /// Something happens to drives from outside the bus.
     Influence(usize, RangeInclusive<u8>, Influence),
     /// Cells are recorded from here on, or no longer.
@@ -345,14 +300,51 @@ pub enum PlannedCheck {
     Received(u64),
 }
 
-impl Plan {
+impl Plan<Novobus> {
     /// Whether the bench's own master has a part in it.
     #[must_use]
     pub fn asks_the_driver(&self) -> bool {
-        let asks = |step: &PlannedStep| matches!(step.action, PlannedAction::Master(..));
+        let asks =
+            |step: &PlannedStep| matches!(step.action, PlannedAction::Own(RingAct::Master(..)));
         self.steps.iter().any(asks)
     }
 
+    /// The links on which faults are put, by ring and place.
+    pub(crate) fn fault_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.steps.iter().filter_map(|step| match step.action {
+            PlannedAction::Own(RingAct::Fault(ring, PlacedFault::Link(link, _), _)) => {
+                Some((ring, link))
+            }
+            _ => None,
+        })
+    }
+
+    /// The links in front of and behind the drives whose error mode must be seen, by ring and place; none where no drive must be seen in it,
+    /// as a drive that answers is in none.
+    pub(crate) fn heard_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let wanted = self.needs.contains(&Capability::Tap);
+        let steps = self.steps.iter().filter(move |_| wanted);
+        let acts = steps.filter_map(|step| match &step.action {
+            PlannedAction::Own(act) => Some(act),
+            _ => None,
+        });
+        let drives = acts.filter_map(|act| match act {
+            RingAct::Check(PlannedCheck::Error(ring, drive, _)) => Some((*ring, *drive..=*drive)),
+            RingAct::Check(PlannedCheck::Drive(check)) | RingAct::Until(check, _) => {
+                let seen = matches!(check.condition, PlannedCondition::InError(_));
+                seen.then(|| (check.ring, check.drives.clone()))
+            }
+            _ => None,
+        });
+        drives.flat_map(|(ring, drives)| {
+            let size = self.rings.get(ring).map_or(0, |ring| ring.drives());
+            let behind = drives.map(move |drive| usize::from(size.saturating_sub(drive)));
+            behind.flat_map(move |place| [(ring, place.saturating_sub(1)), (ring, place)])
+        })
+    }
+}
+
+impl Bench {
     /// The model of drive `drive`.
     #[must_use]
     pub fn model(&self, ring: usize, drive: u8) -> Model {
@@ -391,36 +383,6 @@ impl Plan {
                 Some((setup.ring, setup.drives.clone(), *address, &bytes[..]))
             }
             _ => None,
-        })
-    }
-
-    /// The links on which faults are put, by ring and place.
-    pub(crate) fn fault_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        self.steps.iter().filter_map(|step| match step.action {
-            PlannedAction::Fault(ring, PlacedFault::Link(link, _), _) => Some((ring, link)),
-            _ => None,
-        })
-    }
-
-    /// The links in front of and behind the drives whose error mode must be seen, by ring and place; none where no drive must be seen in it,
-    /// as a drive that answers is in none.
-    pub(crate) fn heard_links(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let wanted = self.needs.contains(&Capability::Tap);
-        let steps = self.steps.iter().filter(move |_| wanted);
-        let drives = steps.filter_map(|step| match &step.action {
-            PlannedAction::Check(PlannedCheck::Error(ring, drive, _)) => {
-                Some((*ring, *drive..=*drive))
-            }
-            PlannedAction::Check(PlannedCheck::Drive(check)) | PlannedAction::Until(check, _) => {
-                let seen = matches!(check.condition, PlannedCondition::InError(_));
-                seen.then(|| (check.ring, check.drives.clone()))
-            }
-            _ => None,
-        });
-        drives.flat_map(|(ring, drives)| {
-            let size = self.rings.get(ring).map_or(0, |ring| ring.drives());
-            let behind = drives.map(move |drive| usize::from(size.saturating_sub(drive)));
-            behind.flat_map(move |place| [(ring, place.saturating_sub(1)), (ring, place)])
         })
     }
 

@@ -40,17 +40,3 @@ pub fn show(received: Received) -> String {
     }
     text
 }
-
-/// An expected byte as reports show it.
-#[derive(Clone, Copy)]
-pub struct Shown(pub Expected);
-
-impl std::fmt::Display for Shown {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.0 {
-            Expected::Byte(byte) => write!(f, "{byte:02X}"),
-            Expected::Any => f.write_str("xx"),
-            Expected::MinusChecksum(_) => f.write_str("-checksum"),
-        }
-    }
-}

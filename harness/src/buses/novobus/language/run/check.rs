@@ -1,12 +1,12 @@
 //! Checks.
 
 use super::look::Miss;
+use crate::buses::novobus::language::plan::PlannedCheck;
+use crate::buses::novobus::language::syntax::Ending;
 use crate::buses::novobus::locate::{self, Location};
-use crate::scenario::plan::PlannedCheck;
 use crate::scenario::problem::Span;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
-use crate::scenario::syntax::Ending;
 use harness_proto::novobus::master::{End, Fault, RingLink};
 use harness_proto::novobus::sync::SYNCO;
 
@@ -67,22 +67,22 @@ impl Runner<'_> {
                 };
                 self.judged(seen, span)
             }
-            PlannedCheck::Corrected(times) if *times == self.corrected => Ok(()),
+            PlannedCheck::Corrected(times) if *times == self.own.corrected => Ok(()),
             PlannedCheck::Corrected(times) => failed(format!(
                 "{} check sequences came back, expected are {times}",
-                self.corrected
+                self.own.corrected
             )),
             PlannedCheck::Named(ring, link, broken) => self.named((*ring, *link), *broken, span),
             PlannedCheck::Ended(ending) => self.all_ended(*ending, span),
             PlannedCheck::RulesKept(ring) => self.rules_kept(*ring, span),
             PlannedCheck::Sent(bytes, time) => {
-                if *bytes != self.sent {
+                if *bytes != self.own.sent {
                     return failed(format!(
                         "{} bytes were sent since the last check, expected are {bytes}",
-                        self.sent
+                        self.own.sent
                     ));
                 }
-                let took = self.sent_to.since(self.sent_from);
+                let took = self.own.sent_to.since(self.own.sent_from);
                 let own = self.link.time_tolerance();
                 match time {
                     Some((time, tolerance))
@@ -94,7 +94,7 @@ impl Runner<'_> {
                 }
             }
             PlannedCheck::Received(bytes) => {
-                let received = self.rings[0].received.len() as u64;
+                let received = self.ports[0].received.len() as u64;
                 if received == *bytes {
                     return Ok(());
                 }
@@ -107,8 +107,8 @@ impl Runner<'_> {
 
     /// Whether all commands of the driver's last job have ended so.
     fn all_ended(&self, ending: Ending, span: Span) -> Result<(), Stop> {
-        let other = self.ended.iter().find(|own| **own != ending);
-        let message = match (self.ended.is_empty(), other) {
+        let other = self.own.ended.iter().find(|own| **own != ending);
+        let message = match (self.own.ended.is_empty(), other) {
             (false, None) => return Ok(()),
             (true, _) => "the driver has had no command before".to_owned(),
             (_, Some(other)) => format!(
@@ -124,7 +124,7 @@ impl Runner<'_> {
     fn named(&self, (ring, link): (usize, usize), broken: bool, span: Span) -> Result<(), Stop> {
         let what = if broken { "broken" } else { "damaged" };
         let expected = format!("{what} {}", self.plan.link_name(ring, link));
-        let Some(fault) = self.disturbed.first() else {
+        let Some(fault) = self.own.disturbed.first() else {
             let message =
                 format!("the driver says of nothing that it is wrong, expected is {expected}");
             return Err(Stop::failed(span, message));
@@ -151,8 +151,8 @@ impl Runner<'_> {
     /// The address that the ring spells out. Lets the ring continue if it has not spelled it out yet.
     fn locate(&mut self, ring: usize) -> Option<Location> {
         let size = self.link.drives(ring);
-        let record = &self.rings[ring];
-        let mut heard: Vec<_> = record.received[record.since_recovery..]
+        let record = &self.ports[ring];
+        let mut heard: Vec<_> = record.received[self.own.rings[ring].since_recovery..]
             .iter()
             .map(|(_, byte)| *byte)
             .collect();

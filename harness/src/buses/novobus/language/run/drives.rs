@@ -2,12 +2,12 @@
 
 use super::look::{Miss, judge};
 use crate::buses::Stimulus;
+use crate::buses::novobus::language::plan::{LOOK, PlannedDriveCheck, Reading};
+use crate::buses::novobus::language::syntax::Influence;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
-use crate::scenario::plan::{LOOK, PlannedDriveCheck, Reading};
 use crate::scenario::problem::Span;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
-use crate::scenario::syntax::Influence;
 use harness_proto::time;
 use std::ops::RangeInclusive;
 
@@ -56,7 +56,7 @@ impl Runner<'_> {
                     return Err(Stop::failed(span, message));
                 }
                 Err(Miss::Otherwise(_)) => {
-                    self.recorder.count_look();
+                    self.own.recorder.count_look();
                     self.pass_until(end.min(now + LOOK));
                     // The caller that plays the step reports why there is no room.
                     if self.full.is_some() {
@@ -92,7 +92,7 @@ impl Runner<'_> {
         let Some(reading) = reading else {
             return Ok(());
         };
-        let record = &self.rings[ring];
+        let record = &self.ports[ring];
         let answer = &record.received[record.next - answer..record.next];
         let bytes: Vec<_> = reading.bytes.iter().map(|i| answer[*i].1.byte).collect();
         let units = self.plan.units(ring, reading.drive);

@@ -1,12 +1,14 @@
 //! Compares the visible state of drives with what must hold.
 
-use crate::buses::novobus::language::run::bytes::{Shown as Byte, matches};
+use crate::buses::novobus::language::plan::{
+    CellTest, PlannedCell, PlannedCondition, PlannedDriveCheck, number,
+};
+use crate::buses::novobus::language::run::bytes::matches;
+use crate::buses::novobus::language::syntax::{Relation, Showing};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{CellTest, PlannedCell, PlannedCondition, PlannedDriveCheck, number};
 use crate::scenario::quantity::{Quantity, Tolerance, Unit};
 use crate::scenario::run::player::Runner;
-use crate::scenario::syntax::{Relation, Showing};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits;
 use harness_proto::nd21::units::{self, Scale, Value};
@@ -73,7 +75,7 @@ impl Runner<'_> {
         let mut wrong = Vec::new();
         let mut unseen = Vec::new();
         for drive in drives {
-            let answered = || self.answers.contains(&(ring, drive)).then_some(None);
+            let answered = || self.own.answers.contains(&(ring, drive)).then_some(None);
             match self.shown_error(ring, drive).or_else(answered) {
                 None => unseen.push(drive),
                 Some(error) if error.is_some() != expected => wrong.push(drive),
@@ -112,7 +114,7 @@ impl Runner<'_> {
                         return Err(Miss::Otherwise(format!(
                             "cell {cell:04X} of {} holds {found:02X}, expected is {}",
                             label(),
-                            Byte(*expected)
+                            expected
                         )));
                     }
                 }
@@ -135,7 +137,7 @@ impl Runner<'_> {
 
     /// A byte as the link shows it, or as it was read over the bus for this look.
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8> {
-        let read = || self.seen.get(&(ring, drive, address)).copied();
+        let read = || self.own.seen.get(&(ring, drive, address)).copied();
         self.link.peek(ring, drive, address).or_else(read)
     }
 
@@ -174,10 +176,7 @@ pub(crate) fn judge(cell: &PlannedCell, found: &[u8], units: units::Drive) -> Re
             if same {
                 return Ok(());
             }
-            let known: Vec<_> = expected
-                .iter()
-                .map(|byte| Byte(*byte).to_string())
-                .collect();
+            let known: Vec<_> = expected.iter().map(|byte| byte.to_string()).collect();
             let bits = match expected[..] {
                 [Expected::Byte(byte)] => with_bits(cell.address, &[byte]),
                 _ => known.concat(),

@@ -2,15 +2,15 @@
 //! recorded, limited and shown is all the same.
 
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, conduct, count_drives};
+use crate::buses::novobus::language::plan::PlannedCall;
+use crate::buses::novobus::language::syntax::Ending;
 use crate::link::{Lead, Line, Octets, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::PlannedCall;
 use crate::scenario::problem::Span;
 use crate::scenario::run::halt::Halt;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
-use crate::scenario::syntax::Ending;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Event, Job, Outcome};
@@ -37,14 +37,14 @@ impl Line for Through<'_, '_> {
     }
 
     fn send(&mut self, _ring: usize, what: Out<'_>) -> Instant {
-        let end = self.runner.send(self.ring, what.octets());
+        let end = self.runner.transmit(self.ring, what.octets());
         let start = end - self.byte_time() * what.len() as u64;
         let tolerance = self.runner.link.time_tolerance();
         let late = tolerance.max(self.runner.link.lead().gap());
         if let Some(left) = self.left.replace(end)
             && left + late < start
         {
-            self.runner.gap = Some(left);
+            self.runner.own.gap = Some(left);
         }
         end
     }
@@ -105,7 +105,7 @@ impl Runner<'_> {
             ..Options::default()
         };
         self.ask(ring, calls);
-        let gap = self.gap;
+        let gap = self.own.gap;
         let line = Through {
             runner: self,
             ring,
@@ -126,30 +126,24 @@ impl Runner<'_> {
             Event::Disturbed { fault, .. } => Some(fault),
             _ => None,
         });
-        self.disturbed = faults.collect();
-        if !self.disturbed.is_empty() {
+        self.own.disturbed = faults.collect();
+        if !self.own.disturbed.is_empty() {
             // Between two recoveries the driver leaves the line free (9.9).
-            self.gap = gap;
+            self.own.gap = gap;
         }
-        self.ended = ended;
+        self.own.ended = ended;
         self.settle();
         self.forget(ring);
         self.line_before = self.link.now();
         result
     }
 
-    /// A line sends by itself what the driver is not asked for.
-    pub(crate) fn not_the_driver(&mut self, ring: usize) {
-        if let Some(asked) = self.asked.get_mut(ring) {
-            *asked = None;
-        }
-    }
-
     /// Notes what the driver is asked for; calls of several steps ask for more than is known here.
     fn ask(&mut self, ring: usize, calls: &[(u8, PlannedCall)]) {
-        let Some(own) = self.asked.get_mut(ring) else {
+        let Some(own) = self.own.rings.get_mut(ring) else {
             return;
         };
+        let own = &mut own.asked;
         for (drive, call) in calls {
             match (call, &mut *own) {
                 (PlannedCall::Command(command, _), Some(asked)) => asked.push((*drive, *command)),
@@ -163,14 +157,14 @@ impl Runner<'_> {
     /// of a busy computer, and no drive's fault.
     pub(crate) fn rules_kept(&self, ring: usize, span: Span) -> Result<(), Stop> {
         let drives = self.link.drives(ring);
-        let record = self.rings.get(ring);
+        let record = self.own.rings.get(ring);
         let sent = record.into_iter().flat_map(|record| &record.sent);
         let sent: Vec<u8> = sent.map(|(byte, _)| *byte).collect();
-        let asked = self.asked.get(ring).and_then(Option::as_deref);
+        let asked = record.and_then(|record| record.asked.as_deref());
         let own = |wrong: String| format!("of the bench's own master: {wrong}");
         conduct(drives, &sent, asked)
             .map_err(|wrong| Stop::failed(span, own(wrong.to_string())))?;
-        let Some(gap) = self.gap else {
+        let Some(gap) = self.own.gap else {
             return Ok(());
         };
         let message = own(format!("it left a gap on the line behind {gap} (ND21 9.1)"));

@@ -5,6 +5,8 @@ pub(crate) mod check;
 pub(crate) mod drives;
 pub(crate) mod look;
 pub(crate) mod master;
+pub(crate) mod now;
 pub(crate) mod over_bus;
 pub(crate) mod record;
+pub(crate) mod state;
 pub(crate) mod tapped;

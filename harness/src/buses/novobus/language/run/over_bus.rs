@@ -2,12 +2,13 @@
 //!
 //! Reads for a check are not part of the conversation: their bytes are not counted, and no line expects them.
 
+use crate::buses::novobus::language::plan::{Exchange, PlannedCondition, PlannedDriveCheck};
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin::unknowable;
 use crate::link::{Line, Link, Octets, Trouble};
 use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{Exchange, Plan, PlannedCondition, PlannedDriveCheck};
+use crate::scenario::plan::Plan;
 use crate::scenario::run::outcome::{Outcome, Unready};
 use crate::scenario::run::player::{AtMismatch, Runner, play};
 use crate::scenario::run::skip::lacks;
@@ -38,16 +39,16 @@ impl Runner<'_> {
         let in_error = matches!(check.condition, PlannedCondition::InError(_));
         let shown = |drive| {
             self.link.peek(check.ring, drive, address).is_some()
-                || in_error && self.tapped.contains_key(&(check.ring, drive))
+                || in_error && self.own.tapped.contains_key(&(check.ring, drive))
         };
         !check.drives.clone().all(shown)
     }
 
     /// What was asked before says nothing of now.
     pub(crate) fn forget_answers(&mut self) {
-        self.seen.clear();
-        self.answers.clear();
-        self.tapped.clear();
+        self.own.seen.clear();
+        self.own.answers.clear();
+        self.own.tapped.clear();
     }
 
     /// How much later an answer over the bus can come than the cell itself: the cell is asked for again and again.
@@ -84,17 +85,17 @@ impl Runner<'_> {
         }
         let ring = check.ring;
         self.settle();
-        let tapped = std::mem::take(&mut self.tapped);
+        let tapped = std::mem::take(&mut self.own.tapped);
         self.forget_answers();
-        self.tapped = tapped;
+        self.own.tapped = tapped;
         let Ok(size_of_ring) = RingSize::new(u64::from(self.link.drives(ring))) else {
             return;
         };
-        let damaged = self.plan.fault_links().next().is_some() && self.corrected == 0;
-        if damaged || !at_rest(size_of_ring, &self.rings[ring].sent) {
+        let damaged = self.plan.fault_links().next().is_some() && self.own.corrected == 0;
+        if damaged || !at_rest(size_of_ring, &self.own.rings[ring].sent) {
             return;
         }
-        let received = self.rings[ring].received.len();
+        let received = self.ports[ring].received.len();
         for drive in check.drives.clone() {
             for address in (address..=u16::MAX).take(size) {
                 // The sum of the address passes through BusAddr (FF36) of every drive: a telegram that asks for it
@@ -104,12 +105,12 @@ impl Runner<'_> {
                 }
                 let read = exchange(self.link, ring, drive, Command::ReadByte { address });
                 if let Some([byte]) = read.as_deref() {
-                    self.seen.insert((ring, drive, address), *byte);
-                    self.answers.insert((ring, drive));
+                    self.own.seen.insert((ring, drive, address), *byte);
+                    self.own.answers.insert((ring, drive));
                 }
             }
         }
-        self.rings[ring].received.truncate(received);
+        self.ports[ring].received.truncate(received);
         self.line_before = self.line_before.max(self.link.now());
     }
 }

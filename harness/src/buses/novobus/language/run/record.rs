@@ -1,7 +1,7 @@
 //! Cells that are recorded while a scenario is played.
 
 use super::look::{hex, physical};
-use crate::scenario::plan::{LOOK, MAX_LOOKS, PlannedLooks, PlannedRecord};
+use crate::buses::novobus::language::plan::{LOOK, MAX_LOOKS, PlannedLooks, PlannedRecord};
 use crate::scenario::run::player::Runner;
 use harness_proto::nd21::units::{self, Scale};
 use harness_proto::time::{Instant, Span};
@@ -127,7 +127,7 @@ impl Runner<'_> {
     /// Begins or ends records. A cell has one record at a time.
     pub(crate) fn record(&mut self, record: &PlannedRecord) {
         for drive in record.drives.clone() {
-            let recorder = &mut self.recorder;
+            let recorder = &mut self.own.recorder;
             recorder.running.retain(|(index, _)| {
                 let other = &recorder.records[*index];
                 (other.ring, other.drive, other.address) != (record.ring, drive, record.address)
@@ -158,31 +158,31 @@ impl Runner<'_> {
     /// Samples the cells that are due.
     pub(crate) fn note(&mut self) {
         let now = self.link.now();
-        if self.recorder.next() > now {
+        if self.own.recorder.next() > now {
             return;
         }
-        self.recorder.count_look();
-        for place in 0..self.recorder.running.len() {
-            let (index, at) = self.recorder.running[place];
+        self.own.recorder.count_look();
+        for place in 0..self.own.recorder.running.len() {
+            let (index, at) = self.own.recorder.running[place];
             if at > now {
                 continue;
             }
-            let record = &self.recorder.records[index];
+            let record = &self.own.recorder.records[index];
             let step = record.every.unwrap_or(LOOK);
             let found = self.bytes(record.ring, record.drive, record.address, record.size);
             let next = at + step;
-            self.recorder.running[place].1 = if next > now { next } else { now + step };
+            self.own.recorder.running[place].1 = if next > now { next } else { now + step };
             // A cell that the link does not show gets no sample.
             let Some(found) = found else { continue };
             let sample = Sample::new(now, &found);
-            let record = &mut self.recorder.records[index];
+            let record = &mut self.own.recorder.records[index];
             let same = record
                 .samples
                 .last()
                 .is_some_and(|last| last.bytes() == sample.bytes());
             if record.every.is_some() || !same {
                 record.samples.push(sample);
-                self.recorder.samples += 1;
+                self.own.recorder.samples += 1;
             }
         }
     }

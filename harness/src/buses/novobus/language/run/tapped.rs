@@ -45,14 +45,14 @@ impl Runner<'_> {
             if let [Some(input), Some(output)] = columns
                 && let Some(shown) = shown(&input, &output)
             {
-                self.tapped.insert((ring, drive), shown);
+                self.own.tapped.insert((ring, drive), shown);
             }
         }
     }
 
     /// What a link has carried. The port of a tap may be slower than that of the ring: each link carries as many bytes as have come round.
     fn column(&mut self, ring: usize, place: usize) -> Option<Vec<Received>> {
-        let round = self.rings.get(ring).map_or(0, |own| own.received.len());
+        let round = self.ports.get(ring).map_or(0, |own| own.received.len());
         let end = self.link.now() + PATIENCE;
         loop {
             let column = self.link.tapped(ring, place)?;
@@ -66,7 +66,7 @@ impl Runner<'_> {
 
     /// The error mode of a drive, as the link or its taps show it.
     pub(crate) fn shown_error(&self, ring: usize, drive: u8) -> Option<Option<BusError>> {
-        let tapped = || self.tapped.get(&(ring, drive)).copied();
+        let tapped = || self.own.tapped.get(&(ring, drive)).copied();
         self.link.error_of(ring, drive).or_else(tapped)
     }
 }

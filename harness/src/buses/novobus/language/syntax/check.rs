@@ -1,11 +1,11 @@
 //! What a scenario can check.
 
 use super::cell::{CellCheck, CellPlace};
+use crate::buses::novobus::language::syntax::{Drives, LinkEnds};
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
-use crate::scenario::syntax::{Drives, LinkEnds};
 use crate::scenario::times::Duration;
 use harness_proto::novobus::error::BusError;
 use harness_sim::nd21::Mode;

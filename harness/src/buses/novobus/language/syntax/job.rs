@@ -1,11 +1,11 @@
 //! The jobs of the master that a scenario can give.
 
 use super::cell::{CellPlace, Written};
+use crate::buses::novobus::language::syntax::Drives;
 use crate::link::Capability;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::quantity::{Quantity, Tolerance};
-use crate::scenario::syntax::Drives;
 
 /// A job as written.
 #[derive(Clone, Debug)]

@@ -4,3 +4,10 @@ pub(crate) mod cell;
 pub(crate) mod check;
 pub(crate) mod header;
 pub(crate) mod job;
+pub(crate) mod step;
+
+pub use cell::{CellCheck, CellPlace, Relation, Written};
+pub use check::{Check, Condition, DriveCheck, Ending, Showing};
+pub use header::{Drives, Header, Influence, RingRange, Setup, SetupKind};
+pub use job::{Job, JobKind, MasterCall, Target};
+pub use step::{Fault, FaultKind, LinkEnds, LinkFaultKind, Looks, Recording, RingStep};

@@ -1,10 +1,10 @@
 //! Cells and their values.
 
 use super::named;
+use crate::buses::novobus::language::syntax::{CellCheck, CellPlace, Relation, Written};
 use crate::scenario::pattern::Pattern;
 use crate::scenario::quantity::{self, Tolerance};
 use crate::scenario::scanner::Scanner;
-use crate::scenario::syntax::{CellCheck, CellPlace, Relation, Written};
 
 /// `FE13`, `nist`, `FE10+i`
 pub(super) fn place(place: &CellPlace) -> String {

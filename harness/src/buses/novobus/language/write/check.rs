@@ -1,7 +1,9 @@
 //! What must hold.
 
 use super::{cell, drives, link, named, which_ring};
-use crate::scenario::syntax::{Check, Condition, DriveCheck, Looks, Recording, Showing};
+use crate::buses::novobus::language::syntax::{
+    Check, Condition, DriveCheck, Looks, Recording, Showing,
+};
 use harness_sim::nd21::Mode;
 
 /// What stands behind `?`.

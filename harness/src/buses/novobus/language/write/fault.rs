@@ -1,7 +1,7 @@
 //! Faults.
 
 use super::{link, ring_prefix};
-use crate::scenario::syntax::{Fault, FaultKind, LinkFaultKind};
+use crate::buses::novobus::language::syntax::{Fault, FaultKind, LinkFaultKind};
 use harness_sim::fault::LinkFault;
 
 /// What stands behind `!`: `98->97 byte 10: flip 0`, `drive 3 @20ms: off`.

@@ -2,9 +2,11 @@
 
 use super::{cell, drives, which_ring};
 use crate::buses::novobus::language::parse::job::FORMS;
+use crate::buses::novobus::language::syntax::{
+    CellPlace, Drives, Job, JobKind, MasterCall, Target, Written,
+};
 use crate::scenario::pattern::Pattern;
 use crate::scenario::quantity::Tolerance;
-use crate::scenario::syntax::{CellPlace, Drives, Job, JobKind, MasterCall, Target, Written};
 
 /// `read-byte 95 FE13 = 88`, `recover`, `master reference 1`
 pub(crate) fn job(job: &Job) -> String {

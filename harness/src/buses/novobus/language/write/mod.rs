@@ -6,12 +6,23 @@ mod fault;
 mod header;
 mod job;
 
-pub(crate) use check::{check, drive_check, record};
-pub(crate) use fault::fault;
-pub(crate) use header::{devices, header, influence_on, lines, setup};
-pub(crate) use job::job;
+pub(crate) use header::{devices, header, lines, setup};
 
-use crate::scenario::syntax::{Drives, LinkEnds};
+use super::syntax::{Drives, LinkEnds, RingStep};
+
+/// A step, with its symbol or its word.
+pub(crate) fn step(step: &RingStep) -> String {
+    match step {
+        RingStep::Fault(fault) => format!("! {}", fault::fault(fault)),
+        RingStep::Check(check) => format!("? {}", check::check(check)),
+        RingStep::Until(check, within) => {
+            format!("until {} within {within}", check::drive_check(check))
+        }
+        RingStep::Influence(drives, influence) => header::influence_on(drives, influence),
+        RingStep::Record(recording) => check::record(recording),
+        RingStep::Job(job) => job::job(job),
+    }
+}
 
 /// `2:` in front of a drive or a link of the second ring; the ring is counted from 0.
 pub(crate) const fn ring_prefix(ring: usize) -> &'static str {

@@ -1,6 +1,7 @@
 //! Loops: the steps of a scenario in the order in which they are played.
 
 use crate::scenario::expression::{Counter, Scope};
+use crate::scenario::language::Language;
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::syntax::{Action, Step};
 
@@ -8,6 +9,7 @@ use crate::scenario::syntax::{Action, Step};
 const MAX_STEPS: usize = 200_000;
 
 /// A loop under way.
+#[derive(Debug)]
 struct Loop {
     counter: Counter,
     /// The place of its first step.
@@ -19,17 +21,18 @@ struct Loop {
 }
 
 /// Every step with the scope in which it is played.
-pub(crate) struct Unroll<'s> {
-    steps: &'s [Step],
+#[derive(Debug)]
+pub struct Unroll<'s, L: Language> {
+    steps: &'s [Step<L>],
     next: usize,
     scope: Scope,
     loops: Vec<Loop>,
     played: usize,
 }
 
-impl<'s> Unroll<'s> {
+impl<'s, L: Language> Unroll<'s, L> {
     /// The steps of a scenario whose loops are whole, as the parser has checked. Numbers of loops refer to ring 1.
-    pub(crate) const fn new(steps: &'s [Step], scope: Scope) -> Self {
+    pub(crate) const fn new(steps: &'s [Step<L>], scope: Scope) -> Self {
         Self {
             steps,
             next: 0,
@@ -70,8 +73,8 @@ impl<'s> Unroll<'s> {
     }
 }
 
-impl<'s> Iterator for Unroll<'s> {
-    type Item = Result<(&'s Step, Scope), Problem>;
+impl<'s, L: Language> Iterator for Unroll<'s, L> {
+    type Item = Result<(&'s Step<L>, Scope), Problem>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {

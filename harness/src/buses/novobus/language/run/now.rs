@@ -1,8 +1,9 @@
 //! Steps that are done at once, beside the conversation of another master.
 
-use super::player::{AtMismatch, Runner};
+use crate::buses::novobus::language::plan::{PlannedCheck, RingAct};
 use crate::link::Link;
-use crate::scenario::plan::{Plan, PlannedAction, PlannedCheck, PlannedStep, PlannedWhen};
+use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen};
+use crate::scenario::run::player::{AtMismatch, Runner};
 
 /// The outcome of a step that is done at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,15 +25,15 @@ pub fn now(plan: &Plan, link: &mut dyn Link, step: &PlannedStep) -> Now {
         );
     }
     match &step.action {
-        PlannedAction::Fault(ring, fault, moment) => {
+        PlannedAction::Own(RingAct::Fault(ring, fault, moment)) => {
             link.inject(*ring, *fault, *moment);
             Now::Done
         }
-        PlannedAction::Influence(ring, drives, influence) => {
+        PlannedAction::Own(RingAct::Influence(ring, drives, influence)) => {
             influence.act(link, *ring, drives.clone());
             Now::Done
         }
-        PlannedAction::Check(check) => look(plan, link, check, step),
+        PlannedAction::Own(RingAct::Check(check)) => look(plan, link, check, step),
         _ => Now::Refused(
             "only faults (`!`), checks (`?`) and what happens to drives (`drive ...`) can be done at once: \
              the bytes are the master's",

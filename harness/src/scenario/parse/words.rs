@@ -1,0 +1,47 @@
+//! What stands in lines of several kinds: words of a list, signs.
+
+use crate::scenario::problem::Problem;
+use crate::scenario::scanner::Scanner;
+
+/// Reads one of a list of words.
+pub(crate) fn named<T: Copy>(
+    scanner: &mut Scanner<'_>,
+    names: &[(&str, T)],
+    what: &str,
+) -> Result<T, Problem> {
+    let known: Vec<_> = names.iter().map(|(name, _)| *name).collect();
+    let before = scanner.clone();
+    let Some(word) = scanner.word() else {
+        return Err(scanner.unexpected(&format!("{what} ({})", known.join(", "))));
+    };
+    match names.iter().find(|(name, _)| *name == word.value) {
+        Some((_, value)) => Ok(*value),
+        None => {
+            *scanner = before;
+            Err(scanner
+                .unexpected(&format!("{what} ({})", known.join(", ")))
+                .did_you_mean(word.value, &known))
+        }
+    }
+}
+
+/// `=` must come next.
+pub(crate) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
+    if scanner.eat("=") {
+        Ok(())
+    } else {
+        Err(scanner.unexpected("`=`"))
+    }
+}
+
+/// One of these words must come next; the first of them is named where none does.
+pub(crate) fn required(scanner: &mut Scanner<'_>, words: &[&str]) -> Result<(), Problem> {
+    if words.iter().any(|word| scanner.eat_word(word)) {
+        return Ok(());
+    }
+    let mut ahead = scanner.clone();
+    let found = ahead.chunk().value;
+    Err(scanner
+        .unexpected(&format!("`{}`", words[0]))
+        .did_you_mean(found, words))
+}

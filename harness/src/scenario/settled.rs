@@ -1,0 +1,58 @@
+//! A settled scenario of any bus, for rooms that need not know which.
+
+use super::language::Language;
+use super::parse::parse;
+use super::plan::{Plan, plan};
+use super::problem::Problems;
+use super::run::{AtMismatch, Outcome, play};
+use super::source::Source;
+use super::syntax::Scenario;
+use crate::link::{Capability, Link};
+use std::fmt::Debug;
+use std::sync::Arc;
+
+/// A settled scenario, and what every bus can do with it.
+pub trait Settled: Debug + Send + Sync {
+    /// What a rig must have for it.
+    fn needs(&self) -> &[Capability];
+
+    /// How many ports the master has on its bench.
+    fn ports(&self) -> usize;
+
+    /// A simulated bench for it.
+    fn simulate(&self) -> Box<dyn Link>;
+
+    /// Plays it on a link.
+    fn play(&self, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome;
+}
+
+impl<L: Language> Settled for Plan<L> {
+    fn needs(&self) -> &[Capability] {
+        &self.needs
+    }
+
+    fn ports(&self) -> usize {
+        L::ports(self)
+    }
+
+    fn simulate(&self) -> Box<dyn Link> {
+        L::simulate(self)
+    }
+
+    fn play(&self, link: &mut dyn Link, at_mismatch: AtMismatch) -> Outcome {
+        play(self, link, at_mismatch)
+    }
+}
+
+/// Reads and settles a scenario in the words of a bus. What it says in the words of every bus comes back as well.
+///
+/// # Errors
+/// Its mistakes.
+pub(crate) fn settle<L: Language>(
+    source: &Source,
+    size: Option<u8>,
+) -> Result<(Scenario, Arc<dyn Settled>), Problems> {
+    let scenario: Scenario<L> = parse(source)?;
+    let plan = plan(&scenario, source, size)?;
+    Ok((scenario.in_common(), Arc::new(plan)))
+}
