@@ -7,7 +7,7 @@ use harness::library::{Entry, sources};
 use harness::link::{Capability, Event, Octets, Recording, SimulatedLink};
 use harness::qualify::{
     Answer, Culprit, Meant, Named, Pinned, Seen, Sighting, Whose, agreed, answer, conversations,
-    culprit, exchange, hypotheses, name, probes, questions,
+    culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
 };
 use harness::rig::{Way, play_one};
 use harness::scenario::plan::Plan;
@@ -352,6 +352,43 @@ fn what_is_right_refutes_a_name() {
     let names: Vec<_> = named.iter().map(|own| own.deviation.name).collect();
     assert!(!names.contains(&"writes-ignored"), "{names:?}");
     assert!(names.contains(&"ram-bit-stuck-at-0"), "{names:?}");
+}
+
+/// ND21 14.10.5: a thorough qualification writes each cell of an EEPROM and leaves what was there.
+#[test]
+fn a_march_over_an_eeprom_leaves_what_was_there() {
+    let text = format!(
+        "title x\nring {DRIVES}\ndrive 0..last model nd21\ndrive 1 eeprom 60 = 12 34 56\n\n> 80\n"
+    );
+    let source = Source {
+        name: "ring".to_owned(),
+        text: text.into(),
+    };
+    let ring = Entry::new(source, None).expect("no mistakes");
+    let mut link = bench(&ring.plan.expect("novobus"));
+    let byte_time = link.byte_time();
+    let mut play = |entry: &Entry| {
+        let mut events: Vec<Event> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut events);
+        let plan = entry.plan.as_ref().expect("novobus");
+        let outcome = play_one(&mut recording, plan, &as_they_are()).expect("it is played");
+        assert_eq!(outcome.verdict, harness::scenario::verdict::Verdict::Passed);
+        Conversation::all(&events, byte_time, true)
+    };
+    let (drive, read) = dumps(DRIVES).swap_remove(1);
+    let written = marches(DRIVES, drive, &play(&read));
+    assert_eq!(written.len(), 4);
+    let positions = &written[3].source.text;
+    for line in ["write-eeprom 1 61 = CB", "write-eeprom 1 61 = 34"] {
+        assert!(positions.contains(line), "{positions}");
+    }
+    for entry in &written {
+        play(entry);
+    }
+    let after = marches(DRIVES, drive, &play(&read));
+    for (before, after) in written.iter().zip(&after) {
+        assert_eq!(before.source.text, after.source.text);
+    }
 }
 
 /// ND21 14.2.1, 9.3, 9.7: a ring that is asked shows which drive is wrong, or which cell, and keeps to what the bytes say.
