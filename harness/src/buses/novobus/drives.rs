@@ -235,7 +235,7 @@ impl Drives {
         }
     }
 
-    /// Takes a rig to its safe state and gives it back: every drive stands and is blocked. A drop does the same and tells nobody.
+    /// Takes a rig to its safe state and gives it back: every drive stands and is blocked. A drop does the same and reports nothing.
     ///
     /// # Errors
     /// The safe state is not confirmed: switch the power off.

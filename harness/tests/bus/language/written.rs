@@ -207,7 +207,7 @@ fn generated_scenarios_come_back() {
         rng_seed: RngSeed::Fixed(9),
         ..Config::default()
     });
-    let read = std::cell::Cell::new(0);
+    let parsed = std::cell::Cell::new(0);
     runner
         .run(&lines, |(headers, steps)| {
             // Lines that cannot be read are left out, so that most scenarios can.
@@ -219,9 +219,9 @@ fn generated_scenarios_come_back() {
             let steps = steps.iter().map(|picks| line(STEPS, picks)).filter(alone);
             let text: Vec<_> = headers.chain(["> 80".to_owned()]).chain(steps).collect();
             let text = format!("ring 3..250 default 100, 2\n{}\n", text.join("\n"));
-            read.set(read.get() + usize::from(comes_back(&text)));
+            parsed.set(parsed.get() + usize::from(comes_back(&text)));
             Ok(())
         })
         .unwrap_or_else(|error| panic!("{error}"));
-    assert!(read.get() > 2_000, "only {} could be read", read.get());
+    assert!(parsed.get() > 2_000, "only {} could be read", parsed.get());
 }
