@@ -6,7 +6,6 @@ use super::{Heard, about, bounds, scope_of};
 use crate::program::{ended, findings, name};
 use harness::buses::novobus::explore::shrink::{Subject, shrink};
 use harness::buses::syntax::Header;
-use harness::buses::syntax::Header;
 use harness::explore::{
     About, Beside, Campaign, Case, Finding, LogLine, OnSim, Planted, Setup, Target, beside,
     by_novelty, play,
