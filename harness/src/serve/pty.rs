@@ -1,13 +1,14 @@
 //! A pseudo terminal with a link to it at a path of its own.
 //!
-//! It carries no parity, rate or break; a client's settings of them have no effect. The server keeps the client's end open, so
-//! that a client that closes it does no harm, and detects with inotify when clients come and go. A pseudo terminal cannot turn a
-//! second program away: each program that opens it reads a share of the bytes.
+//! It carries no parity, rate or break; a client's settings of them have no effect. The server's end hangs up while no program has the
+//! client's end open; inotify wakes the server when one opens it. The events of inotify are not counted, because the kernel merges equal
+//! ones. A pseudo terminal cannot turn a second program away: each program that opens it reads a share of the bytes.
 
 use super::shell::ServeError;
-use rustix::event::{PollFd, PollFlags};
-use rustix::fs::inotify::{CreateFlags, ReadFlags, Reader, WatchFlags, add_watch, init};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::inotify::{CreateFlags, Reader, WatchFlags, add_watch, init};
 use rustix::fs::{Mode, OFlags};
+use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
 use std::ffi::OsStr;
@@ -24,12 +25,9 @@ const EVENTS: usize = 64;
 #[derive(Debug)]
 pub(super) struct Pty {
     master: OwnedFd,
-    slave: OwnedFd,
     watch: OwnedFd,
     link: PathBuf,
     device: PathBuf,
-    /// How many have opened it and not closed it yet.
-    open: usize,
     here: bool,
 }
 
@@ -42,7 +40,7 @@ pub(super) enum Change {
 
 impl Pty {
     pub(super) fn open(link: &Path) -> Result<Self, ServeError> {
-        let failed = |error: rustix::io::Errno| ServeError::Pty {
+        let failed = |error: Errno| ServeError::Pty {
             path: link.to_owned(),
             error: error.into(),
         };
@@ -52,14 +50,14 @@ impl Pty {
         unlockpt(&master).map_err(failed)?;
         let name = ptsname(&master, Vec::new()).map_err(failed)?;
         let device = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
-        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
-        let slave = rustix::fs::open(&device, flags, Mode::empty()).map_err(failed)?;
+        let slave = client_end(&device).map_err(failed)?;
         let mut line = tcgetattr(&slave).map_err(failed)?;
         line.make_raw();
         tcsetattr(&slave, OptionalActions::Now, &line).map_err(failed)?;
+        drop(slave);
         rustix::io::ioctl_fionbio(&master, true).map_err(failed)?;
         let watch = init(CreateFlags::CLOEXEC | CreateFlags::NONBLOCK).map_err(failed)?;
-        let events = WatchFlags::OPEN | WatchFlags::CLOSE;
+        let events = WatchFlags::OPEN;
         add_watch(&watch, &device, events).map_err(failed)?;
         std::os::unix::fs::symlink(&device, link).map_err(|error| match error.kind() {
             io::ErrorKind::AlreadyExists => ServeError::Exists {
@@ -72,11 +70,9 @@ impl Pty {
         })?;
         Ok(Self {
             master,
-            slave,
             watch,
             link: link.to_owned(),
             device,
-            open: 0,
             here: false,
         })
     }
@@ -85,34 +81,37 @@ impl Pty {
         &self.link
     }
 
-    /// Returns whether clients have come or gone. The kernel may report several openings in a row as one, so a byte read counts
-    /// as a client's arrival too.
-    pub(super) fn changes(&mut self) -> Vec<Change> {
-        let mut changes = Vec::new();
-        let mut here = self.here;
+    /// Returns whether a client has come or gone; call it after reading what the client sent. A client that has come and gone since the
+    /// last call shows in two calls.
+    pub(super) fn change(&mut self) -> Option<Change> {
+        let opened = self.was_opened();
+        match (self.here, self.is_open()) {
+            (false, open) if open || opened => {
+                self.here = true;
+                Some(Change::Came)
+            }
+            // It stays here until `gone` is called: its bytes may still have to be read.
+            (true, false) => Some(Change::Gone),
+            _ => None,
+        }
+    }
+
+    /// Whether the client's end was opened since the last call.
+    fn was_opened(&self) -> bool {
         let mut buffer = [MaybeUninit::uninit(); 1024];
         let mut reader = Reader::new(&self.watch, &mut buffer);
-        for _ in 0..EVENTS {
-            let Ok(event) = reader.next() else {
-                break;
-            };
-            let events = event.events();
-            if events.contains(ReadFlags::OPEN) {
-                self.open += 1;
-                changes.extend((!here).then_some(Change::Came));
-                here = true;
-            }
-            if events.intersects(ReadFlags::CLOSE_WRITE | ReadFlags::CLOSE_NOWRITE) {
-                self.open = self.open.saturating_sub(1);
-                if self.open == 0 {
-                    changes.extend(here.then_some(Change::Gone));
-                    here = false;
-                }
-            }
-        }
-        // A client that has closed stays here until `gone` is called: its bytes may still have to be read.
-        self.here |= !changes.is_empty();
-        changes
+        (0..EVENTS).take_while(|_| reader.next().is_ok()).count() > 0
+    }
+
+    /// Whether a program has the client's end open.
+    fn is_open(&self) -> bool {
+        let mut fds = [PollFd::new(&self.master, PollFlags::empty())];
+        let now = Timespec {
+            tv_sec: 0,
+            tv_nsec: 0,
+        };
+        let polled = poll(&mut fds, Some(&now));
+        polled.is_ok() && !fds[0].revents().contains(PollFlags::HUP)
     }
 
     /// Notes that a client is there, because bytes have come; returns whether it was not known before.
@@ -121,26 +120,43 @@ impl Pty {
     }
 
     pub(super) fn read(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        Ok(rustix::io::read(&self.master, buffer)?)
+        rustix::io::read(&self.master, buffer).map_err(|error| match error {
+            // No client is there, and all that the last one sent has been read.
+            Errno::IO => io::ErrorKind::WouldBlock.into(),
+            error => error.into(),
+        })
     }
 
     pub(super) fn write(&self, bytes: &[u8]) -> io::Result<usize> {
         Ok(rustix::io::write(&self.master, bytes)?)
     }
 
-    /// The client has gone, and all that it sent has been read: what it did not read is dropped.
-    pub(super) fn gone(&mut self) {
-        self.here = self.open > 0;
+    /// The client has gone, and all that it sent has been read: what it did not read is dropped. Returns whether another one is there.
+    pub(super) fn gone(&mut self) -> bool {
         // Where it fails, the next client reads it.
-        let _unflushed = tcflush(&self.slave, QueueSelector::IFlush);
+        let _unflushed =
+            client_end(&self.device).and_then(|slave| tcflush(&slave, QueueSelector::IFlush));
+        // That opening is the server's own.
+        let _own = self.was_opened();
+        self.here = self.is_open();
+        self.here
     }
 
-    /// What to wait for: the stream, and openings and closings where it is read.
-    pub(super) fn polls(&self, stream: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
+    /// What to wait for: the stream while a client is there, and openings where it is read.
+    pub(super) fn polls(&self, stream: PollFlags) -> [Option<PollFd<'_>>; 2] {
         let read = stream.contains(PollFlags::IN);
-        let watch = read.then(|| PollFd::new(&self.watch, PollFlags::IN));
-        (PollFd::new(&self.master, stream), watch)
+        let waits = self.here && !stream.is_empty();
+        [
+            waits.then(|| PollFd::new(&self.master, stream)),
+            read.then(|| PollFd::new(&self.watch, PollFlags::IN)),
+        ]
     }
+}
+
+/// Opens the client's end.
+fn client_end(device: &Path) -> Result<OwnedFd, Errno> {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+    rustix::fs::open(device, flags, Mode::empty())
 }
 
 impl Drop for Pty {
@@ -148,6 +164,51 @@ impl Drop for Pty {
     fn drop(&mut self) {
         if std::fs::read_link(&self.link).is_ok_and(|target| target == self.device) {
             let _gone = std::fs::remove_file(&self.link);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::{File, OpenOptions};
+    use std::io::Read as _;
+
+    /// Two openings that the server sees late look like one, and the first closing does not leave the other client alone.
+    #[test]
+    fn a_client_is_there_until_the_last_one_has_closed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let link = folder.path().join("tap");
+        let mut pty = Pty::open(&link).expect("a pseudo terminal");
+        let open = || -> File {
+            let mut options = OpenOptions::new();
+            options
+                .read(true)
+                .write(true)
+                .open(&link)
+                .expect("it opens")
+        };
+        for _ in 0..3 {
+            assert_eq!(pty.change(), None);
+            let client = open();
+            drop(open());
+            assert_eq!(pty.change(), Some(Change::Came));
+            drop(open());
+            assert_eq!(pty.change(), None);
+            assert_eq!(pty.write(b"\x80\x81").expect("room"), 2);
+            let mut bytes = [0; 2];
+            (&client).read_exact(&mut bytes).expect("its bytes");
+            assert_eq!(bytes, *b"\x80\x81");
+            // What it leaves unread is not the next client's.
+            assert_eq!(pty.write(b"\x82").expect("room"), 1);
+            drop(client);
+            assert_eq!(pty.change(), Some(Change::Gone));
+            assert!(!pty.gone());
+            // One that is gone before the server looks.
+            drop(open());
+            assert_eq!(pty.change(), Some(Change::Came));
+            assert_eq!(pty.change(), Some(Change::Gone));
+            assert!(!pty.gone());
         }
     }
 }

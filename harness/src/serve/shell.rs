@@ -340,11 +340,7 @@ impl Shell<'_> {
                     fds.push(door);
                     fds.extend(client);
                 }
-                Seat::Pty(pty) => {
-                    let (stream, watch) = pty.polls(stream);
-                    fds.push(stream);
-                    fds.extend(watch);
-                }
+                Seat::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
             }
         }
         if let Some(control) = &self.control {
@@ -405,7 +401,7 @@ impl Shell<'_> {
             (Err(error), _) => self.fail(seat, &error),
             // Keeps the client's seat until its input is drained.
             (Ok(true), Seat::Pty(pty)) => {
-                for change in pty.changes() {
+                if let Some(change) = pty.change() {
                     self.change(seat, change);
                 }
             }
@@ -413,8 +409,7 @@ impl Shell<'_> {
         }
     }
 
-    /// Handles a failed stream. A socket's client has disconnected. At a pseudo terminal no client is left, which inotify
-    /// reports.
+    /// Handles a failed stream. A socket's client has disconnected. At a pseudo terminal no client is left, which its hang-up shows.
     fn fail(&mut self, seat: usize, error: &io::Error) {
         if let Seat::Tcp(tcp) = &mut self.ends[seat]
             && tcp.taken()
@@ -435,10 +430,14 @@ impl Shell<'_> {
             Change::Gone => {
                 // Reads what the client sent last. An error only means that no client is left.
                 let _read = self.hear(seat);
-                if let Seat::Pty(pty) = &mut self.ends[seat] {
-                    pty.gone();
-                }
+                let another = match &mut self.ends[seat] {
+                    Seat::Pty(pty) => pty.gone(),
+                    Seat::Tcp(_) => false,
+                };
                 self.go(seat, "the client has gone");
+                if another {
+                    self.come(seat, "a client came");
+                }
             }
         }
     }

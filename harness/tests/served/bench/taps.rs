@@ -71,3 +71,41 @@ fn taps_unlock_what_is_said_of_them() {
     let half = desk.run(&arguments);
     ended(&half, 5, "more scenarios with: a tap at 1->0 (4)\n");
 }
+
+/// Every client of a tap on a pseudo terminal gets the bytes of its link, also the program's own, which opens the port more than once.
+#[test]
+fn a_tap_on_a_pseudo_terminal_gives_its_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = |link: &str| folder.path().join(link).display().to_string();
+    let links = ["2->1", "1->0"];
+    let options = links.map(|link| format!("{link}={}", place(link)));
+    let taps = ["--tap", &options[0], "--tap", &options[1]];
+    let served = Served::start("nd21", &[3], "pty", true, &taps);
+    let desk = Desk::of(&served);
+    let path = desk.path("desk.toml");
+    let mut text = std::fs::read_to_string(&path).expect("a rig");
+    for link in links {
+        let port = place(link);
+        text += &format!(
+            "[[tap]]\nlink = \"{link}\"\ntransport = \"pty\"\nport = \"{port}\"\nmarks = \"in-band\"\n"
+        );
+    }
+    std::fs::write(&path, &text).expect("room");
+    for number in 0..3 {
+        let kept = desk.path(&format!("kept-{number}"));
+        let name = kept.to_str().expect("a name");
+        let run = ["run", "9.2-synco", "--evidence", name];
+        // Of a busy computer the verdict is not that of the taps.
+        let _verdict = desk.run(&run);
+        let capture = std::fs::read_to_string(kept.join("captures/9.2-synco.1.json"));
+        let capture: serde_json::Value =
+            serde_json::from_str(&capture.expect("a capture")).expect("JSON");
+        for link in 0..4 {
+            let bytes = &capture["links"][link]["bytes"];
+            assert!(
+                bytes.as_array().is_some_and(|own| !own.is_empty()),
+                "{link}"
+            );
+        }
+    }
+}
