@@ -1,5 +1,6 @@
 //! What a qualification compared with the model, and what differed.
 
+use super::exit::Exit;
 use super::output::Output;
 use crate::buses::twin::{Conversation, Exactness};
 use crate::counted::counted;
@@ -53,6 +54,8 @@ pub(crate) struct Findings {
     own: u64,
     /// How many probes were asked.
     probes: usize,
+    /// Whether a scenario or a probe has failed.
+    failed: bool,
     /// What was not compared, or not equal, with its name.
     open: Vec<String>,
 }
@@ -96,6 +99,9 @@ impl Findings {
             Verdict::Flaky => "a byte differed once, and not again",
             Verdict::Aborted => "it was aborted",
             Verdict::RigError => "the rig failed",
+            Verdict::Marginal if played.late_each_time(self.tolerance).is_some() => {
+                "a byte was as late each time: the computer or a drive"
+            }
             Verdict::Passed | Verdict::Marginal if !whole => {
                 "drives sent bytes by themselves, so the order of the bytes behind them is open (ND21 9.9)"
             }
@@ -110,6 +116,7 @@ impl Findings {
 
     /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
     pub(crate) fn note_attempts(&mut self, name: &str, played: &Played) {
+        self.failed |= played.outcome.verdict == Verdict::Failed;
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());
             self.master_is_wrong |= !attempt.master_is_right;
@@ -117,7 +124,7 @@ impl Findings {
             self.sightings
                 .extend(sighting.map(|own| (name.to_owned(), own)));
         }
-        let Some((attempt, divergences)) = played.telling(self.tolerance) else {
+        let Some((attempt, divergences)) = played.telling(self.tolerance > Span::ZERO) else {
             return;
         };
         let own = match attempt.driven {
@@ -161,7 +168,7 @@ impl Findings {
             (false, _) => None,
         };
         let conversations = last.conversations.clone();
-        match played.telling(self.tolerance) {
+        match played.telling(self.tolerance > Span::ZERO) {
             Some(_) => self.differing.push(conversations),
             None if found.is_none() => self.alike.push(conversations),
             None => return None,
@@ -200,6 +207,16 @@ impl Findings {
     /// Whether something differed that a drive is to blame for.
     pub(crate) fn differ(&self) -> bool {
         !self.differing.is_empty() || !self.with_driver.is_empty() || self.culprit().is_some()
+    }
+
+    /// The exit code that the findings stand for: a drive has failed only where a scenario or a probe has.
+    pub(crate) fn exit(&self) -> Exit {
+        match self.master_is_wrong {
+            true => Exit::RigError,
+            false if self.differ() && self.failed => Exit::Failed,
+            false if self.differ() || self.is_open() => Exit::Incomplete,
+            false => Exit::Passed,
+        }
     }
 
     /// Whether something was not compared, or not equal.
@@ -364,6 +381,17 @@ mod tests {
             bytes: 90,
             ..Findings::default()
         }
+    }
+
+    /// A run ends with exit code 1 only where something has failed: what differed once and passed at the next attempt settles nothing.
+    #[test]
+    fn a_drive_has_failed_only_where_a_scenario_has() {
+        let mut differs = played();
+        assert_eq!(differs.exit(), Exit::Passed);
+        differs.differing.push(Vec::new());
+        assert_eq!(differs.exit(), Exit::Incomplete);
+        differs.failed = true;
+        assert_eq!(differs.exit(), Exit::Failed);
     }
 
     #[test]

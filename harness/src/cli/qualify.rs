@@ -130,12 +130,7 @@ pub(crate) fn settle(
         name_master(findings, output)?,
         name_drives(run, findings, (!ended).then_some(&settled), output)?
     );
-    let exit = match findings.master_is_wrong {
-        true => Exit::RigError,
-        false if findings.differ() => Exit::Failed,
-        false if findings.is_open() => Exit::Incomplete,
-        false => Exit::Passed,
-    };
+    let exit = findings.exit();
     if let Some(folder) = folder {
         if let Some(profile) = profile {
             let text = toml::to_string(&profile).unwrap_or_default();

@@ -129,18 +129,14 @@ impl Played {
     }
 
     /// The last attempt played and its differences from the model, if they say something about the drives. A difference that was not seen
-    /// again may be due to the computer: drives that could not be made ready once, or bytes that were late at another place or by another
-    /// time at the next attempt.
+    /// again may be due to the computer: drives that could not be made ready once, and, in real time, every byte that was late.
     #[must_use]
-    pub fn telling(&self, tolerance: Span) -> Option<(&Attempt, Vec<&Divergence>)> {
+    pub fn telling(&self, real_time: bool) -> Option<(&Attempt, Vec<&Divergence>)> {
         let last = self.last_played()?;
         let divergences: Vec<_> = match self.outcome.verdict {
             Verdict::Passed | Verdict::Flaky | Verdict::Inconclusive => Vec::new(),
-            Verdict::Marginal => {
-                let late = last.untimely().into_iter();
-                late.filter(|late| self.comes_each_time(late, tolerance))
-                    .collect()
-            }
+            Verdict::Marginal if real_time => Vec::new(),
+            Verdict::Marginal => last.untimely().into_iter().collect(),
             _ => {
                 let all = last.comparisons.iter();
                 all.filter_map(|c| c.divergence.as_ref()).collect()
@@ -156,13 +152,16 @@ impl Played {
         played.or(self.attempts.last())
     }
 
-    /// Whether a byte came as late at every attempt.
-    fn comes_each_time(&self, late: &Divergence, tolerance: Span) -> bool {
+    /// The first byte of the last attempt that came late, if a byte was late at every attempt, at the same place and by the same time.
+    #[must_use]
+    pub fn late_each_time(&self, tolerance: Span) -> Option<&Divergence> {
+        let late = self.last_played()?.untimely()?;
         let mut played = self.attempts.iter().filter(|own| own.was_played());
-        played.all(|attempt| {
+        let like = |attempt: &Attempt| {
             let there = attempt.untimely();
             there.is_some_and(|there| there.is_like(late, tolerance))
-        })
+        };
+        (self.outcome.verdict == Verdict::Marginal && played.all(like)).then_some(late)
     }
 }
 
@@ -345,8 +344,7 @@ mod tests {
     }
 
     fn tells(attempts: Vec<Attempt>) -> bool {
-        let tolerance = Span::from_millis(20);
-        Played::of(attempts).telling(tolerance).is_some()
+        Played::of(attempts).telling(true).is_some()
     }
 
     #[test]
@@ -383,17 +381,25 @@ mod tests {
         assert!(tells(vec![differing(attempt(Failed, DIFFERS), 0, None)]));
     }
 
+    /// A computer can be as late at every attempt: in real time that is no difference of the drives.
     #[test]
-    fn a_drive_is_as_late_each_time_and_a_computer_is_not() {
+    fn bytes_that_are_late_each_time_are_told_and_blame_no_drive() {
         let late = |step, by| differing(attempt(Marginal, ""), step, Some(by));
-        assert!(tells(vec![late(3, 40), late(3, 45), late(3, 25)]));
-        assert!(!tells(vec![late(3, 40), late(3, 90), late(3, 40)]));
-        assert!(!tells(vec![late(3, 40), late(5, 40), late(3, 40)]));
-        assert!(!tells(vec![late(3, 40), late(3, 40), attempt(Passed, "")]));
-        assert!(tells(vec![
-            late(3, 40),
-            differing(attempt(Failed, SILENT), 0, None),
-            late(3, 40)
-        ]));
+        let each_time = |attempts: Vec<Attempt>| {
+            let played = Played::of(attempts);
+            assert!(played.telling(true).is_none());
+            assert_eq!(
+                played.telling(false).is_some(),
+                played.outcome.verdict == Marginal
+            );
+            played.late_each_time(Span::from_millis(20)).is_some()
+        };
+        assert!(each_time(vec![late(3, 40), late(3, 45), late(3, 25)]));
+        assert!(!each_time(vec![late(3, 40), late(3, 90), late(3, 40)]));
+        assert!(!each_time(vec![late(3, 40), late(5, 40), late(3, 40)]));
+        let passed = attempt(Passed, "");
+        assert!(!each_time(vec![late(3, 40), late(3, 40), passed]));
+        let unready = differing(attempt(Failed, SILENT), 0, None);
+        assert!(each_time(vec![late(3, 40), unready, late(3, 40)]));
     }
 }

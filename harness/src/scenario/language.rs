@@ -223,6 +223,12 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         String::new()
     }
 
+    /// Whether fewer pieces have come than the bus gives back for those that were sent.
+    fn lacks_answers(runner: &Runner<'_, Self>) -> bool {
+        let _unknown = runner;
+        false
+    }
+
     /// Adds to a finding what has been received meanwhile.
     fn complete(runner: &Runner<'_, Self>, finding: &mut Mismatch) {
         let _whole = (runner, finding);

@@ -5,6 +5,10 @@ use super::player::{MAX_ROUND, Runner};
 use crate::link::Trouble;
 use crate::scenario::language::Language;
 use crate::scenario::plan::MAX_CARRIED;
+use harness_proto::time::Span;
+
+/// How long a computer may hold bytes that a scenario has given up.
+const LATE: Span = Span::from_millis(1_000);
 
 /// Why a scenario cannot go on.
 #[derive(Clone, Debug)]
@@ -29,6 +33,7 @@ impl<L: Language> Runner<'_, L> {
         if result.is_err() {
             self.settle();
             self.come_home();
+            self.wait_for_late();
         }
         let halted = self.halted();
         let mut result = match (&self.full, result) {
@@ -70,5 +75,17 @@ impl<L: Language> Runner<'_, L> {
         let end = self.link.now() + MAX_ROUND;
         while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
         self.fetch();
+    }
+
+    /// Waits for bytes that a busy computer may still hold, where time is real and fewer came than were sent. A byte that comes now was
+    /// late; one that does not come is lost.
+    fn wait_for_late(&mut self) {
+        if self.link.time_tolerance() == Span::ZERO {
+            return;
+        }
+        let end = self.link.now() + LATE;
+        while L::lacks_answers(self) && self.link.now() < end && self.link.wait(end) {
+            self.fetch();
+        }
     }
 }

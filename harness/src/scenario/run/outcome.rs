@@ -138,6 +138,13 @@ pub struct Difference {
     pub received: Vec<Received>,
 }
 
+impl Difference {
+    /// Whether a byte differs only by not having come yet.
+    pub(crate) fn is_absence(&self) -> bool {
+        self.at.is_none() && !self.expected.is_empty()
+    }
+}
+
 /// Why playing stops.
 pub struct Stop {
     pub(crate) verdict: Verdict,

@@ -182,6 +182,10 @@ impl Language for Novobus {
         runner.in_error()
     }
 
+    fn lacks_answers(runner: &Runner<'_>) -> bool {
+        runner.lacks_answers()
+    }
+
     fn complete(runner: &Runner<'_>, finding: &mut Mismatch) {
         runner.complete(finding);
     }

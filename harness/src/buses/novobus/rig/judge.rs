@@ -8,7 +8,7 @@ use crate::rig::file::Deviation;
 use crate::rig::run::{Way, known, play_one, twin};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::Plan;
-use crate::scenario::run::{Mismatch, Outcome};
+use crate::scenario::run::{Difference, Mismatch, Outcome};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation;
@@ -171,7 +171,7 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
                 .to_owned(),
         );
     } else if let Some(untimely) = untimely
-        && finding.difference.is_none()
+        && (finding.difference.as_ref()).is_none_or(Difference::is_absence)
         && heard.exactness.tolerance > Span::ZERO
     {
         outcome.verdict = Verdict::Inconclusive;
@@ -286,3 +286,7 @@ fn told(entry: &Deviation) -> String {
 #[cfg(test)]
 #[path = "judge_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "judge_late_tests.rs"]
+mod late_tests;

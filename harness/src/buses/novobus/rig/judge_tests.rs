@@ -3,7 +3,7 @@
 use super::{Heard, judge};
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::{Entry, sources};
-use crate::link::{Capability, Event, Octets, Recording, SimulatedLink};
+use crate::link::{Capability, Event, Link, Octets, Recording, SimulatedLink};
 use crate::rig::check::parse;
 use crate::rig::run::{Way, known, play_one, twin};
 use crate::scenario::plan::Plan;
@@ -42,13 +42,13 @@ fn source(text: String) -> Source {
     }
 }
 
-fn plan(text: String) -> Plan {
+pub(super) fn plan(text: String) -> Plan {
     let entry = Entry::new(source(text), None).expect("no mistakes");
     entry.plan.expect("novobus")
 }
 
 /// A ring of three with these header lines.
-fn link(ring: &str) -> SimulatedLink {
+pub(super) fn link(ring: &str) -> SimulatedLink {
     link_of(3, ring)
 }
 
@@ -60,8 +60,8 @@ fn link_of(drives: u8, ring: &str) -> SimulatedLink {
 }
 
 /// The verdict of a scenario that is played in this way.
-fn judged_on(
-    link: &mut SimulatedLink,
+pub(super) fn judged_on(
+    link: &mut dyn Link,
     rig: &str,
     (plan, way): (&Plan, &Way),
     change: &dyn Fn(&mut [Comparison]),
@@ -106,7 +106,7 @@ fn check(ring: &str, rig: &str, scenario: &str, expected: Verdict) {
     assert_eq!(outcome.verdict, expected, "{scenario}: {outcome:#?}");
 }
 
-const READ: &str = "> 88 FE C0 13 FE D1\n";
+pub(super) const READ: &str = "> 88 FE C0 13 FE D1\n";
 const SET: &str = "drive 1 memory FE13 = 88\n";
 
 /// ND21 10.1: the content of a cell that was not set is the drive's choice.

@@ -17,6 +17,7 @@ use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::master::Fault;
+use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::Instant;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -233,6 +234,15 @@ impl Runner<'_> {
             span,
             "the check sequence FF 44 72 4C 41 did not come back (ND21 9.8)",
         ))
+    }
+
+    /// Whether fewer bytes have come round a ring than were sent into it, PAUSE left out (9.1, 9.2).
+    pub(crate) fn lacks_answers(&self) -> bool {
+        let mut rings = self.own.rings.iter().zip(&self.ports);
+        rings.any(|(ring, port)| {
+            let answered = ring.sent.iter().filter(|(byte, _)| *byte != PAUSE);
+            port.received.len() < answered.count()
+        })
     }
 
     /// The drives in the error mode, in ring order.

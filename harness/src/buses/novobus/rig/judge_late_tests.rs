@@ -1,0 +1,159 @@
+//! Verdicts of attempts on a port whose bytes come late.
+
+use super::tests::{READ, judged_on, link, plan};
+use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use crate::medium::{self, Medium, Out};
+use crate::rig::run::Way;
+use crate::scenario::verdict::Verdict::{Failed, Inconclusive, Marginal, Passed};
+use harness_proto::line::Received;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::Trace;
+use std::collections::VecDeque;
+
+/// A port whose bytes come late from the tenth on: the link gives them up before, as one behind a computer that stands still.
+struct Late {
+    link: SimulatedLink,
+    late: Span,
+    /// Bytes held back, and how many have come.
+    held: VecDeque<(Instant, Received)>,
+    came: usize,
+    free: Instant,
+}
+
+impl Late {
+    /// How long the link waits for a byte.
+    const GIVES_UP: Span = Span::from_millis(40);
+
+    fn fetch(&mut self) {
+        while let Some((at, byte)) = self.link.receive_octet(0) {
+            self.came += 1;
+            let late = if self.came < 10 {
+                Span::ZERO
+            } else {
+                self.late
+            };
+            self.held.push_back((at + late, byte));
+        }
+    }
+}
+
+impl Line for Late {
+    fn medium(&self, port: usize) -> Medium {
+        self.link.medium(port)
+    }
+
+    fn now(&self) -> Instant {
+        self.link.now()
+    }
+
+    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+        self.free = self.link.send(ring, what);
+        self.free
+    }
+
+    fn receive(&mut self, _: usize) -> Option<(Instant, medium::Heard)> {
+        self.fetch();
+        let now = self.now();
+        let (at, _) = self.held.front()?;
+        let (at, byte) = (*at <= now).then(|| self.held.pop_front()).flatten()?;
+        Some((at, medium::Heard::Octet(byte)))
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        let end = (self.now() + self.byte_time()).min(until);
+        while self.link.now() < end {
+            self.link.wait(end);
+        }
+        self.fetch();
+        true
+    }
+
+    fn lead(&self) -> Lead {
+        Lead {
+            far: Span::from_millis(16),
+            near: Span::ZERO,
+        }
+    }
+}
+
+impl Link for Late {
+    fn capabilities(&self) -> &[Capability] {
+        self.link.capabilities()
+    }
+
+    fn begin(&mut self) {
+        self.link.begin();
+        self.held.clear();
+        (self.came, self.free) = (0, Instant::START);
+    }
+
+    fn busy(&self) -> bool {
+        let open = self.link.busy() || !self.held.is_empty();
+        open && self.now() < self.free + Self::GIVES_UP
+    }
+
+    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+        self.link.inject(ring, fault, moment);
+    }
+
+    fn time_tolerance(&self) -> Span {
+        Span::from_millis(3)
+    }
+
+    fn probe(&mut self, ring: usize, bytes: &[u8]) -> Vec<Received> {
+        self.link.probe(ring, bytes)
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        self.link.unused_faults()
+    }
+
+    fn carried(&self) -> u64 {
+        self.link.carried()
+    }
+
+    fn drives(&self, ring: usize) -> u8 {
+        self.link.drives(ring)
+    }
+
+    fn trace(&self, ring: usize) -> Trace {
+        self.link.trace(ring)
+    }
+}
+
+/// A byte that comes after the link has given it up was late, and settles nothing. One that never comes is lost: the drive's fault.
+#[test]
+fn late_bytes_fail_no_drive() {
+    const SCENARIO: &str = "> 80*4\n< 80*4\nrecover\n> 80*4\n< 80*4\n";
+    let judged = |ring: &str, late: u64, scenario: &str| {
+        let plan = plan(format!("title x\nring 3\nstrict\n{scenario}"));
+        let way = Way {
+            rings: plan.rings.clone(),
+            attempts: None,
+            anew: false,
+        };
+        let mut link = Late {
+            link: link(ring),
+            late: Span::from_millis(late),
+            held: VecDeque::new(),
+            came: 0,
+            free: Instant::START,
+        };
+        judged_on(&mut link, "", (&plan, &way), &|_| {})
+    };
+    let asked = format!("{READ}< 88 01 C0 13 xx xx\n{READ}< 88 01 C0 13 xx xx\n");
+    // A line waits longer for its bytes than a recovery does.
+    for (scenario, late, wanted) in [
+        (SCENARIO, 100, Inconclusive),
+        (SCENARIO, 900, Inconclusive),
+        (&asked, 100, Marginal),
+        (&asked, 900, Marginal),
+        (&asked, 1_500, Inconclusive),
+    ] {
+        assert_eq!(judged("", 0, scenario).verdict, Passed);
+        let outcome = judged("", late, scenario);
+        assert_eq!(outcome.verdict, wanted, "{late}: {outcome:#?}");
+        // Longer than any computer holds it.
+        assert_eq!(judged("", 60_000, scenario).verdict, Failed, "{scenario}");
+    }
+}
