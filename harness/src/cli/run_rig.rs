@@ -79,6 +79,7 @@ pub(crate) fn work(
         wait: job.wait,
         allow_motion: job.allow_motion,
         ill_as_well: job.qualify,
+        keeps_lines: false,
         interrupt: interrupt_flag(),
         alarm: alarm(),
     };

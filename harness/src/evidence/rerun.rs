@@ -32,6 +32,7 @@ pub(super) fn rerun(
         wait: Duration::ZERO,
         allow_motion: true,
         ill_as_well: header.qualified,
+        keeps_lines: false,
         interrupt: Arc::default(),
         alarm: Alarm::default(),
     };

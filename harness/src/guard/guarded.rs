@@ -12,6 +12,7 @@ use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::guard::{Cause, Denial, Found, Guard, Limits, Setting};
+use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
@@ -21,6 +22,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Why no frame leaves through this guard.
 const NO_GATE: &str = "frames are not sent: the guard judges the bytes of a ring only";
+
+/// How much SYNCO a [kept](Line::keep) line has ahead. A computer that stands still for half of it leaves no gap.
+const KEPT: Span = Span::from_millis(40);
 
 /// A line or a link that sends nothing that the limits do not allow. After a denial it is in
 /// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
@@ -41,6 +45,8 @@ pub struct Guarded<L> {
     interrupt: Arc<AtomicBool>,
     /// A fault has been put on a link in the present conversation.
     faulty: bool,
+    /// Whether the lines are [kept](Line::keep).
+    keeps: bool,
 }
 
 #[derive(Debug)]
@@ -86,7 +92,13 @@ impl<L: Line> Guarded<L> {
             watch: None,
             interrupt: Arc::default(),
             faulty: false,
+            keeps: false,
         }
+    }
+
+    /// [Keeps](Line::keep) the lines from now on: a drive has shown that it monitors time-outs (ND21 9.9).
+    pub(crate) fn keep_lines(&mut self) {
+        self.keeps = true;
     }
 
     /// Sends 17 zeros and the check sequence on every ring (ND21 9.8), waits until they have come round, and takes what came. Behind
@@ -398,6 +410,29 @@ impl<L: Line> Line for Guarded<L> {
 
     fn lead(&self) -> Lead {
         self.inner.lead()
+    }
+
+    /// Nothing is added inside a telegram, or where the number of bytes is limited.
+    fn keep(&mut self) -> Option<Instant> {
+        if !self.keeps || self.trouble().is_some() || self.limits.bytes_per_second.is_some() {
+            return None;
+        }
+        let byte_time = self.byte_time();
+        // Virtual time waits for the caller.
+        let ahead = match self.inner.lead() {
+            Lead::NONE => byte_time * 2,
+            _ => KEPT,
+        };
+        let now = self.inner.now();
+        for ring in 0..self.rings.len() {
+            let free = self.inner.send_octets(ring, &[]).max(now);
+            let missing = (now + ahead).since(free).units() / byte_time.units();
+            if missing > 0 && self.rings[ring].guard.at_rest() {
+                let count = usize::try_from(missing).unwrap_or_default();
+                self.send_octets(ring, &vec![SYNCO; count]);
+            }
+        }
+        Some(now + Span::from_nanos(ahead.as_nanos() / 2))
     }
 }
 

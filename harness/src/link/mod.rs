@@ -200,6 +200,18 @@ pub trait Line: Send {
     fn lead(&self) -> Lead {
         Lead::NONE
     }
+
+    /// Adds SYNCO on every ring, behind the bytes that wait to be sent, so that drives with time-out monitoring hear no gap (ND21 9.2,
+    /// 9.9). Returns when it must be called again; `None` for a line that is not kept. The SYNCO comes back like other bytes.
+    fn keep(&mut self) -> Option<Instant> {
+        None
+    }
+}
+
+/// Like [`Line::wait`], and meanwhile [keeps](Line::keep) the line.
+pub(crate) fn wait_keeping(line: &mut dyn Line, until: Instant) -> bool {
+    let again = line.keep();
+    line.wait(again.map_or(until, |again| again.min(until)))
 }
 
 /// A borrowed line: its owner goes on using it afterwards.
@@ -250,6 +262,10 @@ impl<L: Line + ?Sized> Line for &mut L {
 
     fn lead(&self) -> Lead {
         (**self).lead()
+    }
+
+    fn keep(&mut self) -> Option<Instant> {
+        (**self).keep()
     }
 }
 

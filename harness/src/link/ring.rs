@@ -59,9 +59,11 @@ impl Ring {
         }
     }
 
-    pub(crate) fn begin(&mut self) {
+    /// Begins a conversation at `now` on the clock of the one before. Bytes that the operating system has still occupy the line.
+    pub(crate) fn begin(&mut self, now: Instant) {
+        let given = self.queue.front().map_or(self.free, |(start, ..)| *start);
         self.queue.clear();
-        self.free = Instant::START;
+        self.free = Instant::START + given.since(now);
         self.attended = None;
         self.received.clear();
         self.last_arrival = Instant::START;

@@ -6,12 +6,13 @@ use super::ends::Ends;
 use super::file;
 use super::lock::{PortLock, RigLock};
 use super::open::open;
+use super::permitted::{limits, standing};
 use super::session_error::SessionError;
 use super::state;
 use super::watchdog::{Alarm, Watchdog};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
-use crate::guard::{Guarded, SafeState, SafeStep, Standing, Watch, blind_stop, safe_state};
+use crate::guard::{Guarded, SafeState, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, Octets, StreamLink, Trouble};
 use crate::rig::health::{self, Health, Unhealthy, examine};
 use crate::rig::interlock::Interlocks;
@@ -41,6 +42,8 @@ pub struct Options {
     pub allow_motion: bool,
     /// Whether to open a ring that fails its health check, to find out what is wrong with it.
     pub ill_as_well: bool,
+    /// Whether the lines of a ring that has timed out are [kept](Line::keep) until the caller's own master sends.
+    pub keeps_lines: bool,
     /// Set to end the program.
     pub interrupt: Arc<AtomicBool>,
     /// Called when the program shows no sign of life, after the watchdog has stopped the drives.
@@ -211,7 +214,9 @@ impl Session {
         if rig.is_simulated() {
             session.link.set_interrupt(options.interrupt.clone());
         }
-        session.listen()?;
+        if session.listen()? && options.keeps_lines {
+            session.link.keep_lines();
+        }
         let ready = options.unless_interrupted(rig);
         match ready.and_then(|()| session.make_ready()) {
             Err(_) if options.interrupt.load(Ordering::Relaxed) => {
@@ -296,10 +301,11 @@ impl Session {
         longest.is_some_and(|longest| self.started.elapsed() > longest.0)
     }
 
-    /// Listens before anything is sent: a bench must not disturb another program's conversation.
-    fn listen(&mut self) -> Result<(), SessionError> {
+    /// Listens before anything is sent: a bench must not disturb another program's conversation. Returns whether drives have missed their
+    /// master (ND21 9.9).
+    fn listen(&mut self) -> Result<bool, SessionError> {
         if self.rig.is_simulated() {
-            return Ok(());
+            return Ok(false);
         }
         let mut heard = vec![Vec::new(); self.rings.len()];
         let end = self.link.now() + LONGEST_ROUND;
@@ -327,7 +333,7 @@ impl Session {
             }
         }
         if self.link.now() <= end {
-            return Ok(());
+            return Ok(false);
         }
         let timed_out = |(ring, heard): (usize, &Vec<Received>)| {
             health::sounds_timed_out(heard, self.rings.get(ring).copied())
@@ -341,7 +347,7 @@ impl Session {
                 ill: Unhealthy::talking(&heard[ring]),
                 cause: Some(line_test::unasked(&heard[ring])),
             }),
-            None => Ok(()),
+            None => Ok(true),
         }
     }
 
@@ -364,7 +370,7 @@ impl Session {
         match error {
             SessionError::Ill { rig, ring, ill, .. } => {
                 let cause = self.link.trouble().is_none().then(|| {
-                    self.link.begin();
+                    self.settle();
                     let heard = line_test::listen(&mut self.link, ring - 1);
                     line_test::cause(&ill, &heard, self.rate())
                 });
@@ -577,10 +583,20 @@ impl Session {
         end
     }
 
-    /// Waits until what was sent has come round, and keeps that the rig is left at rest where it is.
-    fn come_home(&mut self) {
+    /// Waits until what was sent has come round. The lines are silent then.
+    pub(crate) fn settle(&mut self) {
+        self.come_round();
+        self.link.begin();
+    }
+
+    fn come_round(&mut self) {
         let end = self.link.now() + LONGEST_ROUND;
         while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
+    }
+
+    /// Waits until what was sent has come round, and keeps that the rig is left at rest where it is.
+    fn come_home(&mut self) {
+        self.come_round();
         if self.rig.is_simulated() || !self.link.at_rest() || self.link.busy() {
             return;
         }
@@ -597,41 +613,5 @@ impl Drop for Session {
         if !self.ended {
             let _told_by_nobody = self.end(true);
         }
-    }
-}
-
-/// What a rig's file says of its safe state, as far as drives go.
-fn standing(wanted: &file::SafeState) -> Standing {
-    let step = |step: &file::SafeStep| match step {
-        file::SafeStep::Stop => Some(SafeStep::Stop),
-        file::SafeStep::Block => Some(SafeStep::Block),
-        file::SafeStep::PowerOff => None,
-    };
-    Standing {
-        order: wanted.order.iter().filter_map(step).collect(),
-        rpm: wanted.speed_tolerance.0,
-        within: Span::from_nanos(u64::try_from(wanted.within.0.as_nanos()).unwrap_or(u64::MAX)),
-    }
-}
-
-/// What a rig's file and the command line allow together.
-pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
-    let own = &rig.file.limits;
-    let motion = own.allow_motion && (allow_motion || rig.is_simulated());
-    let speeds = rig.file.drive.iter().filter_map(|drive| drive.max_speed);
-    let slowest = speeds
-        .chain(own.max_speed)
-        .map(|speed| speed.0)
-        .reduce(f64::min);
-    Limits {
-        motion: motion && rig.file.drive.iter().all(|drive| drive.motion),
-        eeprom: own.allow_eeprom,
-        reset: own.allow_reset,
-        outputs: own.allow_outputs,
-        monitoring: own.allow_monitoring,
-        // Rounded down; what is not a number is not a speed.
-        max_speed: slowest.map(|rpm| rpm.clamp(0.0, 65_535.0).floor() as u16),
-        bytes_per_second: own.max_bytes_per_second,
-        ..Limits::default()
     }
 }

@@ -363,6 +363,7 @@ fn recovery_of_9_8() {
     let mut link = SimulatedLink::new(Bench::one(ring(4, Nd21Properties::default())));
     let fine = Recovery {
         before: None,
+        missed_master: false,
         after: None,
         drives: Some(size(4)),
     };

@@ -202,7 +202,9 @@ impl StreamLink {
 
     /// How long a byte may take to come back, with the recent lateness of the computer. A byte counts as lost only after one more poll.
     fn round(&self, ring: &Ring) -> Span {
-        self.rate.byte_time() * (2 * u64::from(ring.drives) + 4) + SLACK + self.lateness()
+        self.rate.byte_time() * (2 * u64::from(ring.drives) + 4)
+            + SLACK.max(self.tolerance)
+            + self.lateness()
     }
 
     /// The recent lateness of the computer.
@@ -478,14 +480,14 @@ impl Link for StreamLink {
     }
 
     fn begin(&mut self) {
-        self.look();
-        self.start = time::Instant::now();
+        let now = self.look();
+        self.start = self.clock(now);
         self.told.set(Instant::START);
         self.lying = false;
         self.looked = Instant::START;
         self.awake = None;
         self.scheduled.clear();
-        self.rings.iter_mut().for_each(Ring::begin);
+        self.rings.iter_mut().for_each(|ring| ring.begin(now));
         self.inner.iter_mut().for_each(InnerLink::begin);
     }
 

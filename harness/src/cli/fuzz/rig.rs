@@ -44,6 +44,7 @@ pub(crate) fn on_ports(
         wait: how.wait,
         allow_motion: how.allow_motion,
         ill_as_well: false,
+        keeps_lines: false,
         interrupt: interrupt_flag(),
         alarm: alarm(),
     };

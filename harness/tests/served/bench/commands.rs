@@ -76,6 +76,24 @@ fn every_command_on_a_ring_behind_a_port() {
     shows(&desk, &format!("params diff 0 {file}"), "are equal");
 }
 
+/// Drives that monitor time-outs from power-up (ND21 14.10.2) miss their master between two commands. Every command brings them back,
+/// and none takes that for a fault of a link (9.9).
+#[test]
+fn drives_that_monitor_time_outs_do_not_lock_the_bench_out() {
+    let lines = ["drive 0..last eeprom 47 = 80"];
+    let served = Served::start_with("nd21", &[3], "tcp", true, &[], &lines);
+    let desk = Desk::of(&served);
+    for _ in 0..2 {
+        let recovered = desk.run(&["recover"]);
+        ended(&recovered, 0, "3 drives answer");
+        let text = said(&recovered);
+        assert!(!text.contains("the fault is in front of it"), "{text}");
+        shows(&desk, "info", "3 drives on the bus");
+        shows(&desk, "stop all", "drive 2 is in");
+        shows(&desk, "reset all --move", "drive 2 is in go");
+    }
+}
+
 /// A ring that was left at rest is opened without a zero, and a motor that was left turning turns on.
 #[test]
 fn quietly_from_command_to_command() {

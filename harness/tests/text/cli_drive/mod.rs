@@ -403,8 +403,8 @@ fn recover_counts_the_drives() {
     assert_eq!(
         json("recover --rig sim:250,1 --format json")["rings"],
         serde_json::json!([
-            {"reported": null, "drives": 250, "still": null},
-            {"reported": null, "drives": 1, "still": null},
+            {"reported": null, "missed_master": null, "drives": 250, "still": null},
+            {"reported": null, "missed_master": null, "drives": 1, "still": null},
         ])
     );
     let folder = folder("recover");

@@ -113,6 +113,8 @@ pub struct Master {
     unconfirmed: Unconfirmed,
     /// The drive for which "same drive" would be meant; `None` where no short address is valid.
     last_addressed: Option<u8>,
+    /// No byte of the ring has come but SYNCO, with which another program may have kept the line before.
+    unheard: bool,
     pauses: u16,
     /// When the last byte came back.
     last_heard: Instant,
@@ -174,6 +176,7 @@ impl Master {
             in_flight: InFlight::new(most),
             unconfirmed: Unconfirmed::default(),
             last_addressed: None,
+            unheard: true,
             pauses: 0,
             last_heard: Instant::START,
             events: Events::default(),
@@ -361,6 +364,10 @@ impl Master {
         let silent = self.silent_until(now) >= TIME_OUT;
         self.last_heard = now;
         self.episode.heard_after(silent);
+        let works = matches!(self.state, State::Running | State::Counting { .. });
+        if works && self.unheard && self.is_before(received) {
+            return;
+        }
         match &mut self.state {
             State::Running | State::Counting { .. } => self.take(received, now),
             State::Locating { evidence, .. } => {
@@ -372,6 +379,14 @@ impl Master {
             State::Resetting { .. } | State::Verifying { .. } => self.verify(received),
             State::Draining { .. } | State::Stopped(_) => {}
         }
+    }
+
+    /// Whether a byte was sent before this master: SYNCO in front of the telegram with which it begins.
+    fn is_before(&mut self, received: Received) -> bool {
+        let first = self.in_flight.iter().next();
+        let before = first.is_none_or(|sent| sent.composed != Composed::SYNCO);
+        self.unheard &= before && received.is(SYNCO);
+        self.unheard
     }
 
     /// For how long bytes have been missed. A master that has sent nothing for a while, or never, has missed none.

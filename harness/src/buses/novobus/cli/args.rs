@@ -36,7 +36,8 @@ trigger, or from the start of the recording if there is no trigger.";
 
 const RECOVER_JSON: &str = "\
 With --format json: {\"schema\": 1, \"rings\": [...]}, each ring with `reported` (the drive that spelled out its
-address, or null), `drives` (how many answer, or null) and `still` (the drive that spells out its address now).";
+address because of a fault, or null), `missed_master` (the drive that did so because no master sent, or null),
+`drives` (how many answer, or null) and `still` (the drive that spells out its address now).";
 
 /// Commands on a bus of drives. DRIVE is an axis number: 3, 2:3 in the second ring, 0..2, all.
 #[derive(Debug, Subcommand)]

@@ -24,8 +24,8 @@ pub(crate) fn recover(arguments: &RecoverArguments, output: &mut Output) -> Resu
     let mut found = every(session.link(), rings);
     // What drives spelled out before the rig was opened.
     for (ring, drive) in before.into_iter().flat_map(|health| health.reported) {
-        if let Some(recovery) = found.get_mut(ring) {
-            recovery.before = recovery.before.or(Some(drive));
+        if let Some(recovery) = found.get_mut(ring).filter(|own| own.fault().is_none()) {
+            (recovery.before, recovery.missed_master) = (Some(drive), false);
         }
     }
     let trouble = session.link().trouble().cloned();
@@ -58,7 +58,8 @@ fn show(
                 .iter()
                 .map(|recovery| {
                     json!({
-                        "reported": recovery.before,
+                        "reported": recovery.fault(),
+                        "missed_master": recovery.before.filter(|_| recovery.missed_master),
                         "drives": recovery.drives.map(|size| size.drives()),
                         "still": recovery.after,
                     })
@@ -83,6 +84,10 @@ fn text(ring: usize, recovery: &Recovery) -> String {
         )
     };
     let before = match (recovery.before, recovery.drives) {
+        (Some(drive), _) if recovery.missed_master => format!(
+            "drive {} monitors time-outs and had heard no byte for 10 ms, because no master sent; no fault reported (ND21 9.9, 14.10.2)",
+            name(drive)
+        ),
         (Some(drive), _) => fault(drive),
         (None, Some(_)) => "no fault reported".to_owned(),
         (None, None) => "no drive reports".to_owned(),

@@ -21,6 +21,7 @@ use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{Drive, SpeedRange};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::Span;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
@@ -110,32 +111,40 @@ impl Bench {
         self.rig.as_ref()?.with(act)
     }
 
-    /// The zeros of the check sequence (9.8), with which a rig is opened, put every drive in error. Before a command that may
-    /// move drives it is confirmed, with a nominal speed of 0: a drive that was in go stands there, released.
+    /// The zeros of the check sequence (9.8), with which a rig is opened, put every drive in error, and so does a silence where time-outs are
+    /// monitored (9.9). Before a command that may move drives the error is confirmed, with a nominal speed of 0: a drive that was in go
+    /// stands there, released.
     fn confirm_bus_errors(&self, as_what: Use, output: &mut Output) -> Result<(), Failure> {
-        let mut confirmed = Vec::new();
+        let mut confirmed: BTreeMap<bool, Vec<Axis>> = BTreeMap::new();
         for axis in self.bus.axes() {
             let error = self.bus.state(axis)?.error;
-            if BusError::from_code(error).is_none() {
+            let Some(error) = BusError::from_code(error) else {
                 continue;
-            }
+            };
             if as_what.moves {
                 self.bus.write_word(axis, ram::NSOLL, 0)?;
                 self.bus.delete_error(axis)?;
             }
-            confirmed.push(axis);
-        }
-        if confirmed.is_empty() {
-            return Ok(());
+            let missed = error == BusError::TimeOut;
+            confirmed.entry(missed).or_default().push(axis);
         }
         let end = match as_what.moves {
             true => "; the error was confirmed, and the nominal speed is 0 now",
             false => "",
         };
-        output.say(&format!(
-            "the check sequence has put {} in error 0504 (ND21 9.8){end}\n",
-            axes::named(&confirmed)
-        ));
+        for (missed, drives) in &confirmed {
+            let drives = axes::named(drives);
+            let what = match missed {
+                true => format!(
+                    "no master has sent for 10 ms, and {drives} monitors that: error 0508 (ND21 9.9)"
+                ),
+                false => format!("the check sequence has put {drives} in error 0504 (ND21 9.8)"),
+            };
+            output.say(&format!("{what}{end}\n"));
+        }
+        if confirmed.is_empty() {
+            return Ok(());
+        }
         // `Status` follows in the drive's next cycles.
         self.bus.run(CYCLES);
         Ok(())
@@ -201,6 +210,7 @@ pub(crate) fn take(
         wait: Duration::from_nanos(arguments.patience.as_nanos()),
         allow_motion: as_what.moves,
         ill_as_well,
+        keeps_lines: true,
         interrupt: interrupt_flag(),
         alarm: alarm(),
     };

@@ -38,6 +38,7 @@ pub(crate) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::
     let options = Options {
         purpose: "rig check".to_owned(),
         wait: arguments.wait.unwrap_or_default(),
+        keeps_lines: true,
         interrupt: interrupt_flag(),
         alarm: alarm(),
         ..Options::default()
@@ -82,7 +83,7 @@ pub(crate) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::
     };
     for ring in figures.rings.iter().filter(|ring| ring.lost > 0) {
         output.complain(&format!(
-            "{} of {} SYNCO did not come back as they were sent (ND21 9.2)",
+            "{} of {} telegrams to no drive did not come back as they must (ND21 9.3)",
             ring.lost,
             ring.lost + ring.rounds.len()
         ));

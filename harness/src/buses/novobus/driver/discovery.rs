@@ -2,10 +2,11 @@
 
 use super::error::in_words;
 use super::{Axis, Bus, Error};
+use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::buses::novobus::locate::locate;
-use crate::link::{Line, Octets};
+use crate::link::{Line, Octets, wait_keeping};
 use harness_proto::line::Received;
-use harness_proto::nd21::bits::{flags, status};
+use harness_proto::nd21::bits::{flags, flags2, status};
 use harness_proto::nd21::errors::display_digits;
 use harness_proto::nd21::units::{
     Date, SpeedRange, operating_hours_from_bytes, serial_number_from_bytes,
@@ -67,7 +68,7 @@ pub(crate) fn count_behind(link: &mut dyn Line, ring: usize, before: &[u8]) -> O
     })
 }
 
-/// Sends bytes and shows what comes, until one of them says something or all must have come round.
+/// Sends bytes and SYNCO behind them, and shows what comes, until one of them says something or all must have come round.
 fn listen<T>(
     link: &mut dyn Line,
     ring: usize,
@@ -79,7 +80,7 @@ fn listen<T>(
     let end = sent + link.byte_time() * (u64::from(MAX_DRIVES) + 8) + Span::from_millis(50);
     // Where the link carries nothing more, its time may stand still.
     while link.now() < end && link.trouble().is_none() {
-        link.wait(end);
+        wait_keeping(link, end);
         while let Some((_, received)) = link.receive_octet(ring) {
             if let Some(found) = heard(received) {
                 return Some(found);
@@ -92,12 +93,23 @@ fn listen<T>(
 /// What a ring reported during its recovery (9.7, 9.8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recovery {
-    /// The drive that spelled out its address before: the fault was in front of it.
+    /// The drive that spelled out its address before.
     pub before: Option<u8>,
+    /// That drive monitors time-outs, and no drive between it and the master does. It names itself whenever no master sends for 10 ms
+    /// (9.9), so its address is no sign of a fault.
+    pub missed_master: bool,
     /// The drive that does so behind the check sequence: the ring is not back.
     pub after: Option<u8>,
     /// How many drives answer; `None` where the ring is not back.
     pub drives: Option<RingSize>,
+}
+
+impl Recovery {
+    /// The drive that reported a fault in front of it, before the ring was brought back.
+    #[must_use]
+    pub fn fault(&self) -> Option<u8> {
+        self.before.filter(|_| !self.missed_master)
+    }
 }
 
 /// Listens to what a ring reports, sends 17 zeros and the check sequence (9.8), and counts the drives.
@@ -106,11 +118,25 @@ pub fn recover(link: &mut dyn Line, ring: usize) -> Recovery {
     let before = reported(link, ring);
     let drives = count_behind(link, ring, &repair());
     let after = drives.map_or_else(|| reported(link, ring), |_| None);
+    let missed_master = before
+        .zip(drives)
+        .is_some_and(|(drive, size)| is_first_to_monitor(link, ring, drive, size));
     Recovery {
         before,
+        missed_master,
         after,
         drives,
     }
+}
+
+/// Whether a drive monitors time-outs and no drive between the master and it does (ND21 14.10.2): it is the one that a ring spells out
+/// when no master sends.
+fn is_first_to_monitor(link: &mut dyn Line, ring: usize, drive: u8, size: RingSize) -> bool {
+    let mut monitors = |drive| {
+        let flags2 = read_byte(link, size.drives(), (ring, drive), ram::FLAGS2);
+        flags2.is_some_and(|flags2| flags2 & flags2::MONITORING != 0)
+    };
+    monitors(drive) && !(drive + 1..size.drives()).any(monitors)
 }
 
 /// The drive that spells out its address while the master sends SYNCO (9.7, 9.9).

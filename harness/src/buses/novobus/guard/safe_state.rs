@@ -2,7 +2,7 @@
 
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Order, recover};
 use crate::counted::counted;
-use crate::link::{Lead, Line, Octets, Trouble};
+use crate::link::{Lead, Line, Octets, Trouble, wait_keeping};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nd21::bits::{flags, status};
 use harness_proto::nd21::ram;
@@ -277,12 +277,12 @@ fn bring_back(line: &mut dyn Line, ring: usize, size: RingSize) -> Result<(), St
     let mut why = String::new();
     for _ in 0..ATTEMPTS {
         let sent = line.send_octets(ring, &CHECK_SEQUENCE);
-        while line.now() < sent && line.wait(sent) {}
+        while line.now() < sent && wait_keeping(line, sent) {}
         let recovery = recover(line, ring);
         if recovery.drives == Some(size) {
             return Ok(());
         }
-        let reported = recovery.after.or(recovery.before);
+        let reported = recovery.after.or(recovery.fault());
         why = match (line.trouble(), recovery.drives, reported) {
             (Some(trouble), ..) => return Err(trouble.to_string()),
             (None, Some(found), _) => format!(
@@ -401,5 +401,9 @@ impl Line for OneRing<'_> {
 
     fn lead(&self) -> Lead {
         self.line.lead()
+    }
+
+    fn keep(&mut self) -> Option<Instant> {
+        self.line.keep()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::line_test;
 use crate::buses::novobus::driver::{self, Axis, Bus, Identity, State};
-use crate::link::{Line, Link, Octets};
+use crate::link::Octets;
 use crate::rig::Rig;
 use crate::rig::session::{End, Session};
 use crate::rig::shared::Shared;
@@ -11,8 +11,10 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Span;
 
-/// How many SYNCO go round one by one.
+/// How many telegrams go round.
 const ROUNDS: usize = 64;
+/// A telegram to no drive; its address byte comes back with the number of drives (ND21 9.3).
+const PROBE: [u8; 3] = [0x82, 0x00, SYNCO];
 /// How much longer than the ring needs a byte may take before it counts as lost.
 const PATIENCE: Span = Span::from_millis(300);
 /// Number of drives whose EEPROM is read at a time.
@@ -29,7 +31,7 @@ pub struct RingFigures {
     pub nominal: Span,
     /// How long it took: from the shortest to the longest, sorted; what does not come back is missing.
     pub rounds: Vec<Span>,
-    /// SYNCO that did not come back, or not as such (9.2).
+    /// Telegrams that did not come back as they must (9.3).
     pub lost: usize,
     /// Bytes received with a line error, and errors that the transport reported without their bytes.
     pub line_errors: u64,
@@ -99,41 +101,34 @@ pub fn measure(
     }
 }
 
-/// Sends SYNCO one by one and waits for each.
+/// Sends telegrams without a gap and times the first byte of each.
 fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     let simulated = session.rig().is_simulated();
     let stated = session.rig().file.ring.first.endpoint.line.into();
     let link = session.link();
     let rate = line_test::slower(link, ring, stated).unwrap_or(stated);
-    link.begin();
     let nominal = link.byte_time() * u64::from(size.drives());
+    let telegrams = PROBE.repeat(ROUNDS);
+    let before = link.send_octets(ring, &[]);
+    let heard = line_test::answers(link, ring, &telegrams, nominal + PATIENCE);
+    let back = [PROBE[0], size.drives(), PROBE[2]];
     let mut rounds = Vec::new();
-    let (mut lost, mut line_errors) = (0, 0);
-    for _ in 0..ROUNDS {
-        let sent = link.send_octets(ring, &[SYNCO]);
-        let end = sent + nominal + PATIENCE;
-        let back = loop {
-            match link.receive_octet(ring) {
-                Some(back) => break Some(back),
-                None if link.now() >= end || link.trouble().is_some() => break None,
-                None => {
-                    link.wait(end);
-                }
-            }
-        };
-        match back {
-            Some((at, byte)) if byte.is(SYNCO) => rounds.push(at.since(sent)),
-            Some((_, byte)) => {
-                line_errors += u64::from(byte.error.is_some());
-                lost += 1;
-            }
-            None => lost += 1,
+    // When the first byte of a telegram has left.
+    let mut sent = before + link.byte_time();
+    for telegram in heard.chunks(PROBE.len()) {
+        let sound = telegram.len() == back.len()
+            && telegram
+                .iter()
+                .zip(back)
+                .all(|((_, byte), back)| byte.is(back));
+        if sound {
+            rounds.push(telegram[0].0.since(sent));
         }
-        if link.trouble().is_some() {
-            break;
-        }
+        sent += link.byte_time() * PROBE.len() as u64;
     }
-    link.begin();
+    let lost = ROUNDS - rounds.len();
+    let damaged = heard.iter().filter(|(_, byte)| byte.error.is_some());
+    let mut line_errors = damaged.count() as u64;
     if !simulated && let Some(ports) = session.ports() {
         line_errors += ports.take_unplaced();
     }

@@ -4,8 +4,7 @@
 
 use super::health::Unhealthy;
 use crate::buses::novobus::locate::locate;
-use crate::link;
-use crate::link::Octets;
+use crate::link::{self, Octets, wait_keeping};
 use crate::rig::Rig;
 use crate::rig::file::{Endpoint, Hooks, LineFormat, Marks, Transport};
 use harness_proto::line::{Rate, Received};
@@ -18,6 +17,9 @@ const SENT: usize = 256;
 
 /// How long the test listens before it sends.
 const LISTEN: Span = Span::from_millis(100);
+
+/// For how long bytes that were sent before may still come, also from a ring at a quarter of the rate.
+const REST: Span = Span::from_millis(1_000);
 
 /// Silence after which a pass has ended: a round of 250 drives at 38400 bit/s takes 72 ms (ND21 8.2).
 const PASS_ENDS: Span = Span::from_millis(200);
@@ -118,36 +120,61 @@ impl From<LineFormat> for Rate {
 
 /// Listens, and sends SYNCO twice.
 pub(crate) fn listen(line: &mut dyn link::Line, ring: usize) -> Heard {
-    let end = line.now() + LISTEN;
-    let mut unasked = Vec::new();
-    while line.now() < end && line.trouble().is_none() {
-        line.wait(end);
-        unasked.extend(std::iter::from_fn(|| line.receive_octet(ring)).map(|(_, byte)| byte));
-        if unasked.len() > SENT {
-            break;
-        }
-    }
+    let unasked = babble(line, ring);
     let passes = [pass(line, ring), pass(line, ring)];
     Heard { unasked, passes }
 }
 
-/// What comes back for SYNCO without a gap.
+/// Bytes that come for [`REST`] although nothing is sent. Bytes that stop were sent before.
+fn babble(line: &mut dyn link::Line, ring: usize) -> Vec<Received> {
+    let rest = line.now() + REST;
+    loop {
+        let end = line.now() + LISTEN;
+        let mut heard = Vec::new();
+        while line.now() < end && line.trouble().is_none() {
+            line.wait(end);
+            heard.extend(std::iter::from_fn(|| line.receive_octet(ring)).map(|(_, byte)| byte));
+        }
+        if heard.is_empty() || line.now() >= rest || line.trouble().is_some() {
+            return heard;
+        }
+    }
+}
+
+/// The first bytes that come back for SYNCO without a gap.
 fn pass(line: &mut dyn link::Line, ring: usize) -> Pass {
     while line.receive_octet(ring).is_some() {}
     let sent = line.send_octets(ring, &[SYNCO; SENT]);
     let mut end = sent + FIRST_BYTE;
     let mut heard = Pass::new();
-    // At a quarter of the rate four times the bytes would not come; twice as many as were sent are noise.
-    while heard.len() < 2 * SENT && line.now() < end && line.trouble().is_none() {
-        line.wait(end);
+    while heard.len() < SENT && line.now() < end && line.trouble().is_none() {
+        wait_keeping(line, end);
         heard.extend(std::iter::from_fn(|| line.receive_octet(ring)));
         if let Some((last, _)) = heard.last() {
             end = (*last).max(sent) + PASS_ENDS;
-            if heard.len() == SENT {
-                break;
-            }
         }
     }
+    heard.truncate(SENT);
+    heard
+}
+
+/// Sends telegrams and returns the bytes that come back for them within `patience`. SYNCO in front of them was sent before.
+pub(crate) fn answers(
+    line: &mut dyn link::Line,
+    ring: usize,
+    telegrams: &[u8],
+    patience: Span,
+) -> Pass {
+    while line.receive_octet(ring).is_some() {}
+    let end = line.send_octets(ring, telegrams) + patience;
+    let mut heard = Pass::new();
+    while heard.len() < telegrams.len() && line.now() < end && line.trouble().is_none() {
+        wait_keeping(line, end);
+        let none = heard.is_empty();
+        let bytes = std::iter::from_fn(|| line.receive_octet(ring));
+        heard.extend(bytes.skip_while(|(_, byte)| none && byte.is(SYNCO)));
+    }
+    heard.truncate(telegrams.len());
     heard
 }
 
@@ -157,14 +184,8 @@ const WITH_FF: [u8; 5] = [0x82, 0x00, 0xFF, SYNCO, SYNCO];
 /// Whether a ring behind a port with in-band marks answers as one that knows none: it sees FF FF in place of the net byte FF, and the
 /// second one is no sync byte (ND21 9.2). Its FF and the first zero of its error mode then look like a damaged byte.
 pub(crate) fn lacks_marks(line: &mut dyn link::Line, ring: usize) -> bool {
-    while line.receive_octet(ring).is_some() {}
-    let end = line.send_octets(ring, &WITH_FF) + FIRST_BYTE;
-    let mut heard: Vec<Received> = Vec::new();
-    while heard.len() < WITH_FF.len() && line.now() < end && line.trouble().is_none() {
-        line.wait(end);
-        heard.extend(std::iter::from_fn(|| line.receive_octet(ring)).map(|(_, byte)| byte));
-    }
-    matches!(heard[..], [sync, address, damaged, ..]
+    let heard = answers(line, ring, &WITH_FF, FIRST_BYTE);
+    matches!(heard[..], [(_, sync), (_, address), (_, damaged), ..]
         if sync.is(WITH_FF[0]) && address.error.is_none() && damaged.byte == 0 && damaged.error.is_some())
 }
 

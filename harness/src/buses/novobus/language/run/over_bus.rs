@@ -5,6 +5,8 @@
 use crate::buses::novobus::language::plan::{Exchange, PlannedCondition, PlannedDriveCheck};
 use crate::buses::novobus::language::run::bytes::{matches, resolve};
 use crate::buses::novobus::link::BesideTheBus;
+use crate::buses::novobus::locate::MAX_ZEROS;
+use crate::buses::novobus::rig::health::sounds_timed_out;
 use crate::buses::novobus::twin::unknowable;
 use crate::link::{Line, Link, Octets, Trouble};
 use crate::scenario::pattern::Expected;
@@ -150,6 +152,8 @@ fn exchange_all(
         match link.receive_octet(ring) {
             // A busy computer may look for it late, but not take a late one for an answer.
             Some((at, _)) if at > end => return None,
+            // SYNCO with which the line was kept before.
+            Some((_, byte)) if received.is_empty() && byte.is(SYNCO) => {}
             Some(byte) => received.push(byte),
             None if link.now() < end && link.trouble().is_none() => {
                 link.wait(end);
@@ -299,6 +303,7 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
             reset_one_by_one(link, own)?;
         }
     }
+    let rings = cells.last().map_or(0, |cell| cell.ring + 1);
     let end = link.now() + SELF_TEST;
     let mut waiting = cells;
     loop {
@@ -319,7 +324,10 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
                 let why = "it does not come back from its reset";
                 return Err(NotReady::new(*cell, Unready::NoAnswer, why));
             }
-            Some(_) if silent => be_quiet(link),
+            Some(_) if silent => {
+                be_quiet(link);
+                (0..rings).for_each(|ring| end_time_out(link, ring));
+            }
             Some(_) => {}
         }
     }
@@ -334,7 +342,20 @@ fn be_quiet(link: &mut dyn Link) {
     }
 }
 
-/// Whether a ring passes SYNCO within the time of a self-test; the drive that was reset before may have opened it.
+/// Brings a ring back whose drives have missed their bytes in a silence (9.8, 9.9).
+fn end_time_out(link: &mut dyn Link, ring: usize) {
+    let heard: Vec<_> = std::iter::from_fn(|| link.receive_octet(ring))
+        .map(|(_, byte)| byte)
+        .collect();
+    let size = RingSize::new(u64::from(link.drives(ring))).ok();
+    if heard.len() > MAX_ZEROS && sounds_timed_out(&heard, size) {
+        let left = link.send_octets(ring, &CHECK_SEQUENCE);
+        settle(link, left);
+    }
+}
+
+/// Whether a ring passes SYNCO within the time of a self-test; the drive that was reset before may have opened it. Drives that monitor
+/// time-outs miss their bytes meanwhile (9.9), so the check sequence comes first each time (9.8).
 fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     let end = link.now() + SELF_TEST;
     while !passes_synco(link, ring) {
@@ -346,14 +367,17 @@ fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     true
 }
 
-/// Whether anything comes round for a SYNCO (9.2).
+/// Whether a SYNCO behind the check sequence comes round (9.2, 9.8).
 fn passes_synco(link: &mut dyn Link, ring: usize) -> bool {
+    let drives = u64::from(link.drives(ring));
+    let bytes = [&CHECK_SEQUENCE[..], &[SYNCO]].concat();
     while link.receive_octet(ring).is_some() {}
-    let left = link.send_octets(ring, &[SYNCO]);
-    let end = left + link.byte_time() * (u64::from(link.drives(ring)) + 4) + PATIENCE;
+    let end = link.send_octets(ring, &bytes) + link.byte_time() * (drives + 4) + PATIENCE;
+    let mut back = Vec::new();
     while link.now() < end && link.trouble().is_none() {
         link.wait(end);
-        if link.receive_octet(ring).is_some() {
+        back.extend(std::iter::from_fn(|| link.receive_octet(ring)).map(|(_, byte)| byte.byte));
+        if back.ends_with(&[CHECK_SEQUENCE[CHECK_SEQUENCE.len() - 1], SYNCO]) {
             return true;
         }
     }
