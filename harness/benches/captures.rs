@@ -9,7 +9,7 @@ use harness::report::{csv, pcapng, vcd};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Instant;
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::io::Write;
 
 /// Bytes on all links together.
@@ -36,16 +36,12 @@ fn million() -> Vec<Trace> {
                 error,
             )
         });
-        LinkTrace {
-            from: 3_u8.checked_sub(place).filter(|drive| *drive < 3),
-            to: 2_u8.checked_sub(place),
-            bytes: bytes.collect(),
-        }
+        let from = 3_u8.checked_sub(place).filter(|drive| *drive < 3);
+        Channel::of_octets(from, 2_u8.checked_sub(place), bytes.collect())
     });
     vec![Trace {
-        drives: 3,
-        links: links.collect(),
-        marks: Vec::new(),
+        channels: links.collect(),
+        ..Trace::empty(3)
     }]
 }
 
@@ -55,7 +51,7 @@ fn copied(bencher: divan::Bencher<'_, '_>) {
     let traces = million();
     bencher.counter(ItemsCount::new(BYTES)).bench_local(|| {
         let mut out = Vec::new();
-        for byte in traces[0].links.iter().flat_map(|link| &link.bytes) {
+        for byte in traces[0].channels.iter().flat_map(Channel::octets) {
             let nanos = byte.at.since_start().as_nanos().to_le_bytes();
             let put = out.write_all(&nanos).and_then(|()| {
                 let bytes = [byte.sent.unwrap_or(0), byte.received.unwrap_or(0)];

@@ -109,11 +109,11 @@ fn bytes_read(bencher: divan::Bencher<'_, '_>) {
     let all = played();
     bencher.bench_local(|| {
         let traces = all.iter().flat_map(|(.., traces)| traces);
-        let links = traces.flat_map(|trace| trace.links.iter().zip(Reader::all(trace)));
+        let links = traces.flat_map(|trace| trace.channels.iter().zip(Reader::all(trace)));
         links
             .map(|(link, mut reader)| {
                 let known = link
-                    .bytes
+                    .octets()
                     .iter()
                     .filter(|byte| reader.see(byte).meaning.drive.is_some());
                 known.count()

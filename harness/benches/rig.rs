@@ -90,18 +90,18 @@ fn cases(drives: u8) -> Vec<Case> {
 
 /// What the master sends in a conversation: behind a pause, or behind SYNCO with something to say, it has waited for what came until then.
 fn chunks(trace: &Trace, byte_time: Span) -> Vec<Chunk> {
-    let (Some(first), Some(last)) = (trace.links.first(), trace.links.last()) else {
+    let (Some(first), Some(last)) = (trace.channels.first(), trace.channels.last()) else {
         return Vec::new();
     };
     let mut chunks: Vec<Chunk> = Vec::new();
     let mut before = (harness_proto::time::Instant::START, 0x80);
-    for byte in &first.bytes {
+    for byte in first.octets() {
         let sent = byte.sent.expect("no fault");
         let says = sent != 0x80 && before.1 == 0x80;
         if chunks.is_empty() || says || before.0 + byte_time < byte.at {
             let home = |other: &&LineByte| other.at + byte_time <= byte.at;
             chunks.push(Chunk {
-                back: last.bytes.iter().filter(home).count(),
+                back: last.octets().iter().filter(home).count(),
                 bytes: Vec::new(),
             });
         }

@@ -1,9 +1,8 @@
-//! The record of a simulated run: every byte on every link, and what the drives remarked.
+//! The record of a run: everything that the channels of a bus carried, and what its stations remarked.
 
+use harness_proto::can::{BusError, Frame};
 use harness_proto::line::{LineError, Received};
-use harness_proto::novobus::error::BusError;
-use harness_proto::novobus::error_mode::Marks;
-use harness_proto::time::Instant;
+use harness_proto::time::{Instant, Span};
 
 /// A byte on a wire, at both of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,41 +46,205 @@ impl LineByte {
     }
 }
 
-/// Something that a drive remarked at a byte.
+/// A frame on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mark {
-    /// Which drive.
-    pub drive: u8,
-    /// At which byte on its inbound link, counted from 1; at a time-out, the last one before it.
-    pub byte: u64,
-    /// Which byte on its outbound link was sent for it, counted from 1.
+pub struct LineFrame {
+    /// The station that sent it; `None` for the bench's own.
+    pub from: Option<u8>,
+    /// When its start bit began.
+    pub start: Instant,
+    /// When its last bit had passed, or that of the error frame that ended it.
+    pub at: Instant,
+    /// The frame.
+    pub frame: Frame,
+    /// How it ended.
+    pub ended: FrameEnd,
+}
+
+/// How a frame on a bus ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameEnd {
+    /// The other stations have it.
+    Good,
+    /// No other station has it, although it was acknowledged.
+    Lost,
+    /// An error frame ended it.
+    Error(BusError),
+}
+
+/// Something that a station remarked at a piece that it received.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Remark {
+    /// Which station.
+    pub station: u8,
+    /// At which piece on its inbound channel, counted from 1; at a time-out, the last one before it.
+    pub piece: u64,
+    /// Which piece on its outbound channel was sent for it, counted from 1.
     pub answered_as: Option<u64>,
     /// When.
     pub at: Instant,
-    /// What.
-    pub marks: Marks,
-    /// The error for which the drive is, or last was, in the error mode.
-    pub cause: Option<BusError>,
+    /// What, in the bus's own bits.
+    pub bits: u16,
 }
 
-/// One link's part of a trace.
+/// What a channel carried, in order. A channel carries one kind for life.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LinkTrace {
-    /// The drive that sends; `None` for the master.
+pub enum Carried {
+    /// Octets, between two stations.
+    Octets(Vec<LineByte>),
+    /// Frames, from any station to all others.
+    Frames(Vec<LineFrame>),
+}
+
+/// One channel's part of a trace: a link between two stations, or a segment that all stations share.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// The station that sends; `None` for the master, and on a shared segment, whose frames say who sent them.
     pub from: Option<u8>,
-    /// The drive that receives; `None` for the master.
+    /// The station that receives; `None` for the master, and on a shared segment.
     pub to: Option<u8>,
-    /// What it carried, in order.
-    pub bytes: Vec<LineByte>,
+    /// What it carried.
+    pub carried: Carried,
 }
 
-/// Everything that happened in one ring.
-#[derive(Clone, Debug, PartialEq, Eq)]
+impl Channel {
+    /// A link of octets between two stations; `None` is the master.
+    #[must_use]
+    pub const fn of_octets(from: Option<u8>, to: Option<u8>, octets: Vec<LineByte>) -> Self {
+        Self {
+            from,
+            to,
+            carried: Carried::Octets(octets),
+        }
+    }
+
+    /// A segment of frames.
+    #[must_use]
+    pub const fn of_frames(frames: Vec<LineFrame>) -> Self {
+        Self {
+            from: None,
+            to: None,
+            carried: Carried::Frames(frames),
+        }
+    }
+
+    /// The octets that it carried; none where it carries frames.
+    #[must_use]
+    pub fn octets(&self) -> &[LineByte] {
+        match &self.carried {
+            Carried::Octets(octets) => octets,
+            Carried::Frames(_) => &[],
+        }
+    }
+
+    /// The frames that it carried; none where it carries octets.
+    #[must_use]
+    pub fn frames(&self) -> &[LineFrame] {
+        match &self.carried {
+            Carried::Octets(_) => &[],
+            Carried::Frames(frames) => frames,
+        }
+    }
+
+    /// The octets that it carried, to be changed; `None` where it carries frames.
+    pub const fn octets_mut(&mut self) -> Option<&mut Vec<LineByte>> {
+        match &mut self.carried {
+            Carried::Octets(octets) => Some(octets),
+            Carried::Frames(_) => None,
+        }
+    }
+}
+
+/// Everything that happened at one port of a bus.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Trace {
-    /// How many drives the ring has.
-    pub drives: u8,
-    /// The links in ring order, from the master's outgoing to its incoming one.
-    pub links: Vec<LinkTrace>,
-    /// The marks in order of time; at one instant, in ring order.
-    pub marks: Vec<Mark>,
+    /// How many stations there are beside the master.
+    pub stations: u8,
+    /// The channels; those of a ring in its order, from the master's outgoing to its incoming link.
+    pub channels: Vec<Channel>,
+    /// The remarks in order of time; at one instant, in order of the stations on the bus.
+    pub remarks: Vec<Remark>,
+}
+
+impl Trace {
+    /// A trace in which nothing happened.
+    #[must_use]
+    pub fn empty(stations: u8) -> Self {
+        Self {
+            stations,
+            ..Self::default()
+        }
+    }
+
+    /// Counts all times from `origin` on.
+    pub fn count_from(&mut self, origin: Span) {
+        let earlier = |at: &mut Instant| *at = *at - origin;
+        for channel in &mut self.channels {
+            match &mut channel.carried {
+                Carried::Octets(octets) => octets.iter_mut().for_each(|own| earlier(&mut own.at)),
+                Carried::Frames(frames) => frames.iter_mut().for_each(|own| {
+                    earlier(&mut own.start);
+                    earlier(&mut own.at);
+                }),
+            }
+        }
+        self.remarks.iter_mut().for_each(|own| earlier(&mut own.at));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_byte_has_16_bytes() {
+        assert_eq!(size_of::<LineByte>(), 16);
+    }
+
+    #[test]
+    fn a_channel_carries_one_kind() {
+        let frames = Channel::of_frames(Vec::new());
+        assert_eq!(
+            (frames.octets().len(), frames.clone().octets_mut()),
+            (0, None)
+        );
+        let octets = Channel::of_octets(None, Some(0), Vec::new());
+        assert_eq!(octets.clone().octets_mut(), Some(&mut Vec::new()));
+        assert!(octets.frames().is_empty());
+    }
+
+    #[test]
+    fn times_are_counted_from_an_origin() {
+        let at = |ms| Instant::START + Span::from_millis(ms);
+        let frame = LineFrame {
+            from: Some(1),
+            start: at(4),
+            at: at(5),
+            frame: Frame::base(0x181, &[1]).expect("a frame"),
+            ended: FrameEnd::Good,
+        };
+        let mut trace = Trace {
+            stations: 2,
+            channels: vec![
+                Channel::of_octets(
+                    None,
+                    Some(0),
+                    vec![LineByte::seen(at(3), Some(1), None, None)],
+                ),
+                Channel::of_frames(vec![frame]),
+            ],
+            remarks: vec![Remark {
+                station: 1,
+                piece: 1,
+                answered_as: None,
+                at: at(9),
+                bits: 1,
+            }],
+        };
+        trace.count_from(Span::from_millis(3));
+        assert_eq!(trace.channels[0].octets()[0].at, at(0));
+        let own = trace.channels[1].frames()[0];
+        assert_eq!((own.start, own.at), (at(1), at(2)));
+        assert_eq!(trace.remarks[0].at, at(6));
+    }
 }

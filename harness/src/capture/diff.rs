@@ -8,7 +8,7 @@ use crate::report::pcapng::name;
 use crate::report::walk::Reader;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::fmt;
 
 /// Bytes in front of and behind the first difference that are shown.
@@ -81,24 +81,20 @@ pub(crate) fn compare(
     left: Run<'_>,
     right: Run<'_>,
     tolerance: Span,
-    ignored: &dyn Fn(usize, &LinkTrace, usize) -> bool,
+    ignored: &dyn Fn(usize, &Channel, usize) -> bool,
     until: Option<Instant>,
 ) -> Summary {
     let mut summary = Summary::default();
-    let none = Trace {
-        drives: 0,
-        links: Vec::new(),
-        marks: Vec::new(),
-    };
+    let none = Trace::default();
     let rings = left.capture.traces.len().max(right.capture.traces.len());
     for ring in 0..rings {
         let a = left.capture.traces.get(ring).unwrap_or(&none);
         let b = right.capture.traces.get(ring).unwrap_or(&none);
-        let find = |trace: &Trace, link: &LinkTrace| {
-            let same = |other: &LinkTrace| (other.from, other.to) == (link.from, link.to);
-            trace.links.iter().position(same)
+        let find = |trace: &Trace, link: &Channel| {
+            let same = |other: &Channel| (other.from, other.to) == (link.from, link.to);
+            trace.channels.iter().position(same)
         };
-        for (at, link) in a.links.iter().enumerate() {
+        for (at, link) in a.channels.iter().enumerate() {
             let Some(other) = find(b, link) else {
                 summary
                     .alone
@@ -114,7 +110,7 @@ pub(crate) fn compare(
             };
             pair.compare(&mut summary, ignored);
         }
-        for link in b.links.iter().filter(|link| find(a, link).is_none()) {
+        for link in b.channels.iter().filter(|link| find(a, link).is_none()) {
             summary
                 .alone
                 .push(format!("{} ({})", name(ring, link), right.name));
@@ -133,13 +129,13 @@ struct Pair<'t> {
 }
 
 impl Pair<'_> {
-    fn compare(&self, summary: &mut Summary, ignored: &dyn Fn(usize, &LinkTrace, usize) -> bool) {
+    fn compare(&self, summary: &mut Summary, ignored: &dyn Fn(usize, &Channel, usize) -> bool) {
         summary.links += 1;
-        let (a, b) = (&self.a.0.links[self.a.1], &self.b.0.links[self.b.1]);
+        let (a, b) = (&self.a.0.channels[self.a.1], &self.b.0.channels[self.b.1]);
         let mut first: Option<(usize, bool)> = None;
         let mut differ = 0;
-        for index in 0..a.bytes.len().max(b.bytes.len()) {
-            let (left, right) = (a.bytes.get(index), b.bytes.get(index));
+        for index in 0..a.octets().len().max(b.octets().len()) {
+            let (left, right) = (a.octets().get(index), b.octets().get(index));
             let late = |byte: &LineByte| self.until.is_some_and(|until| byte.at > until);
             if left.is_none() && right.is_some_and(late) {
                 break;
@@ -168,7 +164,7 @@ impl Pair<'_> {
         };
         summary.differing_links += 1;
         let at = |byte: Option<&LineByte>| byte.map_or(Instant::NEVER, |byte| byte.at);
-        let at = at(a.bytes.get(index)).min(at(b.bytes.get(index)));
+        let at = at(a.octets().get(index)).min(at(b.octets().get(index)));
         // A byte that differs weighs more than one that is late.
         let earlier = summary
             .first
@@ -180,15 +176,27 @@ impl Pair<'_> {
     }
 
     fn difference(&self, index: usize, at: Instant, only_time: bool) -> Difference {
-        let (a, b) = (&self.a.0.links[self.a.1], &self.b.0.links[self.b.1]);
-        let end = a.bytes.len().max(b.bytes.len()).min(index + AROUND + 1);
-        let around = (index.saturating_sub(AROUND)..end)
-            .map(|n| (n + 1, a.bytes.get(n).copied(), b.bytes.get(n).copied()));
+        let (a, b) = (&self.a.0.channels[self.a.1], &self.b.0.channels[self.b.1]);
+        let end = a
+            .octets()
+            .len()
+            .max(b.octets().len())
+            .min(index + AROUND + 1);
+        let around = (index.saturating_sub(AROUND)..end).map(|n| {
+            (
+                n + 1,
+                a.octets().get(n).copied(),
+                b.octets().get(n).copied(),
+            )
+        });
         Difference {
             link: name(self.ring, a),
             byte: index + 1,
             at,
-            sides: [a.bytes.get(index).copied(), b.bytes.get(index).copied()],
+            sides: [
+                a.octets().get(index).copied(),
+                b.octets().get(index).copied(),
+            ],
             words: [words(self.a, index), words(self.b, index)],
             only_time,
             around: around.collect(),
@@ -198,13 +206,13 @@ impl Pair<'_> {
 
 /// What a byte is, in words, with the section of its rule.
 fn words((trace, place): (&Trace, usize), index: usize) -> String {
-    let link = &trace.links[place];
+    let link = &trace.channels[place];
     let mut readers = Reader::all(trace);
     let mut last: Option<(Meaning, Option<u8>)> = None;
-    for byte in link.bytes.iter().take(index + 1) {
+    for byte in link.octets().iter().take(index + 1) {
         last = Some((readers[place].see(byte).meaning, byte.received));
     }
-    match last.filter(|_| index < link.bytes.len()) {
+    match last.filter(|_| index < link.octets().len()) {
         Some((meaning, byte)) => format!("{}; {}", meaning.words(byte), meaning.citation()),
         None => "nothing".to_owned(),
     }

@@ -5,16 +5,16 @@ use crate::scenario::times::Duration;
 use harness_proto::line::{LineError, Rate};
 use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
+use harness_sim::record::Channel;
 use harness_sim::record::LineByte;
-use harness_sim::record::LinkTrace;
 
 /// A run of lost bytes longer than this is a cut cable.
 const CUT: usize = 8;
 
 /// The faults of a link. Bytes do not always show what a cable did: a break is assumed to last as long as bytes were
 /// lost behind it, and many lost bytes are taken for a cut. A delay is not seen.
-pub(crate) fn faults(ring: usize, link: &LinkTrace, rate: Rate) -> Vec<Fault> {
-    let bytes = &link.bytes;
+pub(crate) fn faults(ring: usize, link: &Channel, rate: Rate) -> Vec<Fault> {
+    let bytes = link.octets();
     let ends = || LinkEnds::between(link.from, link.to);
     let at_byte =
         |number: u64, fault: LinkFault| Fault::on_link(ring, ends(), fault.into(), number);

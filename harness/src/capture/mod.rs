@@ -22,7 +22,7 @@ use harness_proto::line::Rate;
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Mark, Trace};
+use harness_sim::record::{Channel, Remark, Trace};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
@@ -148,18 +148,25 @@ pub(crate) fn adjacent(from: Option<u8>, to: Option<u8>) -> bool {
     }
 }
 
+/// A link of a capture that is being read.
+pub(crate) struct LinkRead {
+    from: Option<u8>,
+    to: Option<u8>,
+    pub(crate) bytes: Vec<LineByte>,
+}
+
 /// Puts a capture together of its links.
 #[derive(Default)]
 pub(crate) struct Assembly {
     /// In ring order: that of falling numbers of the receiver, the master being the last.
-    rings: [BTreeMap<u16, LinkTrace>; 2],
+    rings: [BTreeMap<u16, LinkRead>; 2],
 }
 
 impl Assembly {
     /// The link with these ends, its bytes so far.
-    pub(crate) fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkTrace {
+    pub(crate) fn link(&mut self, ring: usize, from: Option<u8>, to: Option<u8>) -> &mut LinkRead {
         let order = to.map_or(1_000, |drive| 999 - u16::from(drive));
-        self.rings[ring.min(1)].entry(order).or_insert(LinkTrace {
+        self.rings[ring.min(1)].entry(order).or_insert(LinkRead {
             from,
             to,
             bytes: Vec::new(),
@@ -170,13 +177,13 @@ impl Assembly {
     pub(crate) fn finish(
         self,
         sizes: [Option<u8>; 2],
-        marks: [Vec<Mark>; 2],
+        remarks: [Vec<Remark>; 2],
         rate: Option<Rate>,
     ) -> Result<Capture, CaptureError> {
         let mut traces = Vec::new();
-        for ((links, size), marks) in self.rings.into_iter().zip(sizes).zip(marks) {
+        for ((links, size), remarks) in self.rings.into_iter().zip(sizes).zip(remarks) {
             let links: Vec<_> = links.into_values().collect();
-            let highest = |link: &LinkTrace| link.from.max(link.to).map_or(1, |drive| drive + 1);
+            let highest = |link: &LinkRead| link.from.max(link.to).map_or(1, |drive| drive + 1);
             let Some(least) = links.iter().map(highest).max() else {
                 continue;
             };
@@ -189,10 +196,12 @@ impl Assembly {
                     what: format!("a link of drive {} is none of it", least - 1),
                 });
             }
+            let channels = links.into_iter();
+            let channels = channels.map(|own| Channel::of_octets(own.from, own.to, own.bytes));
             traces.push(Trace {
-                drives,
-                links,
-                marks,
+                stations: drives,
+                channels: channels.collect(),
+                remarks,
             });
         }
         let mut capture = Capture {
@@ -211,8 +220,11 @@ impl Capture {
     /// Bytes of a link come one after another.
     fn check(&self) -> Result<(), CaptureError> {
         for (ring, trace) in self.traces.iter().enumerate() {
-            for link in &trace.links {
-                let early = link.bytes.windows(2).position(|two| two[1].at < two[0].at);
+            for link in &trace.channels {
+                let early = link
+                    .octets()
+                    .windows(2)
+                    .position(|two| two[1].at < two[0].at);
                 if let Some(place) = early {
                     let name = crate::report::pcapng::name(ring, link);
                     return Err(CaptureError::Link {
@@ -227,8 +239,8 @@ impl Capture {
 
     /// The fastest rate at which no byte comes sooner behind another than it can.
     fn guessed_rate(&self) -> Rate {
-        let links = self.traces.iter().flat_map(|trace| &trace.links);
-        let gaps = links.flat_map(|link| link.bytes.windows(2));
+        let links = self.traces.iter().flat_map(|trace| &trace.channels);
+        let gaps = links.flat_map(|link| link.octets().windows(2));
         let closest = gaps.map(|two| two[1].at.since(two[0].at)).min();
         let fits = |rate: &Rate| {
             let byte = rate.byte_time();
@@ -248,15 +260,15 @@ impl Capture {
     /// How many bytes there are on all links.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let links = self.traces.iter().flat_map(|trace| &trace.links);
-        links.map(|link| link.bytes.len()).sum()
+        let links = self.traces.iter().flat_map(|trace| &trace.channels);
+        links.map(|link| link.octets().len()).sum()
     }
 
     /// When the last byte had passed.
     #[must_use]
     pub fn end(&self) -> Instant {
-        let links = self.traces.iter().flat_map(|trace| &trace.links);
-        let last = links.filter_map(|link| link.bytes.last());
+        let links = self.traces.iter().flat_map(|trace| &trace.channels);
+        let last = links.filter_map(|link| link.octets().last());
         last.map(|byte| byte.at).max().unwrap_or(Instant::START)
     }
 }

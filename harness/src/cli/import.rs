@@ -79,7 +79,11 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         output.verdict(judged.verdict).trim_end_matches(' '),
         counted(capture.bytes(), "byte"),
         counted(
-            capture.traces.iter().map(|t| t.links.len()).sum::<usize>(),
+            capture
+                .traces
+                .iter()
+                .map(|t| t.channels.len())
+                .sum::<usize>(),
             "link"
         ),
         capture.end(),
@@ -136,7 +140,7 @@ fn details(judged: &Judged, capture: &Capture) -> String {
             .traces
             .iter()
             .enumerate()
-            .map(|(ring, trace)| link_name(ring, trace.drives, usize::from(trace.drives)));
+            .map(|(ring, trace)| link_name(ring, trace.stations, usize::from(trace.stations)));
         let missing: Vec<_> = missing.collect();
         let _infallible = writeln!(
             text,

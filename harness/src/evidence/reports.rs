@@ -12,7 +12,7 @@ use crate::capture::read;
 use crate::link::{Event, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::time::Instant;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -205,10 +205,10 @@ impl Ends {
             return Some("it has another number of rings than the rig".to_owned());
         }
         for (own, trace) in self.rings.iter().zip(traces) {
-            let links = [trace.links.first(), trace.links.last()];
+            let links = [trace.channels.first(), trace.channels.last()];
             for ((expected, link), name) in own.iter().zip(links).zip(["outgoing", "incoming"]) {
-                let carried = |link: &LinkTrace| -> Vec<Carried> {
-                    let arrived = link.bytes.iter().filter_map(|byte| {
+                let carried = |link: &Channel| -> Vec<Carried> {
+                    let arrived = link.octets().iter().filter_map(|byte| {
                         Some((byte.at.since_start().as_nanos(), byte.arrival()?))
                     });
                     arrived.collect()

@@ -306,7 +306,7 @@ pub trait Link: Line {
     fn tapped(&mut self, ring: usize, link: usize) -> Option<Vec<Received>> {
         let listens = self.listens(ring, link);
         let trace = listens.then(|| self.trace(ring))?;
-        let bytes = trace.links.get(link)?.bytes.iter();
+        let bytes = trace.channels.get(link)?.octets().iter();
         let arrived = bytes.filter_map(|own| {
             let byte = own.received?;
             Some(Received {

@@ -483,11 +483,7 @@ impl Link for Replay {
     }
 
     fn trace(&self, port: usize) -> Trace {
-        Trace {
-            drives: self.drives(port),
-            links: Vec::new(),
-            marks: Vec::new(),
-        }
+        Trace::empty(self.drives(port))
     }
 }
 

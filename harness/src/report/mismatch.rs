@@ -41,13 +41,13 @@ pub fn mismatch(finding: &Mismatch, traces: &[Trace], sources: &[String]) -> Str
 /// The row of the master's `byte`-th received byte: bytes that were lost on the last link have rows
 /// too.
 fn row_of(trace: &Trace, byte: usize) -> usize {
-    let Some(last) = trace.links.last() else {
+    let Some(last) = trace.channels.last() else {
         return 0;
     };
-    let arrived = (0..last.bytes.len()).filter(|i| last.bytes[*i].received.is_some());
+    let arrived = (0..last.octets().len()).filter(|i| last.octets()[*i].received.is_some());
     arrived
         .skip(byte.saturating_sub(1))
-        .chain(std::iter::once(last.bytes.len()))
+        .chain(std::iter::once(last.octets().len()))
         .next()
         .unwrap_or(0)
 }

@@ -17,7 +17,7 @@
 use crate::report::walk::in_time;
 use harness_proto::line::{LineError, Rate};
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::io::Write;
 
 /// The link type.
@@ -65,9 +65,9 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
     block.option(USER_APPLICATION, b"drivebench");
     block.option(END, &[]);
     block.end(&mut out)?;
-    let mut links: Vec<LinkTrace> = Vec::new();
+    let mut links: Vec<Channel> = Vec::new();
     for (ring, trace) in traces.iter().enumerate() {
-        for link in &trace.links {
+        for link in &trace.channels {
             block.begin(INTERFACE);
             block.put(&LINK_TYPE.to_le_bytes());
             block.put(&[0; 6]);
@@ -79,15 +79,15 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
             block.end(&mut out)?;
         }
         if traces.len() > 1 {
-            links.extend(trace.links.iter().cloned());
+            links.extend(trace.channels.iter().cloned());
         }
     }
     let all = match traces {
-        [one] => &one.links,
+        [one] => &one.channels,
         _ => &links,
     };
     for (place, index) in in_time(all) {
-        packet(&mut block, place, &all[place].bytes[index]);
+        packet(&mut block, place, &all[place].octets()[index]);
         block.end(&mut out)?;
     }
     out.flush()
@@ -128,7 +128,7 @@ fn packet(block: &mut Block, link: usize, byte: &LineByte) {
 
 /// A link's name, as a scenario writes it.
 #[must_use]
-pub fn name(ring: usize, link: &LinkTrace) -> String {
+pub fn name(ring: usize, link: &Channel) -> String {
     let end = |end: Option<u8>| end.map_or("master".to_owned(), |drive| drive.to_string());
     let prefix = if ring == 0 { "" } else { "2:" };
     format!("{prefix}{}->{}", end(link.from), end(link.to))

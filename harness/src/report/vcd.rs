@@ -23,7 +23,7 @@ use super::pcapng::name;
 use crate::report::walk::{Reader, State};
 use harness_proto::line::{LineError, Rate};
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 use std::io::Write;
@@ -53,7 +53,7 @@ pub fn write(
     let bit = rate.bit_time().units();
     let mut links = Vec::new();
     for (ring, trace) in traces.iter().enumerate() {
-        for (link, reader) in trace.links.iter().zip(Reader::all(trace)) {
+        for (link, reader) in trace.channels.iter().zip(Reader::all(trace)) {
             links.push(Drawn::new(ring, link, reader, (bit, signals)));
         }
     }
@@ -145,7 +145,7 @@ struct Drawn<'t> {
 impl<'t> Drawn<'t> {
     fn new(
         ring: usize,
-        link: &'t LinkTrace,
+        link: &'t Channel,
         reader: Reader<'t>,
         (bit, signals): (u64, Signals),
     ) -> Self {
@@ -161,7 +161,7 @@ impl<'t> Drawn<'t> {
         Self {
             name,
             codes: [code(0), code(1), code(2), code(3)],
-            bytes: link.bytes.iter(),
+            bytes: link.octets().iter(),
             reader,
             bit,
             vectors: signals == Signals::All,

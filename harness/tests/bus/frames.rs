@@ -6,7 +6,7 @@ use harness::link::{Capability, Event, Line, Link, Moment, PlacedFault, Recordin
 use harness::medium::{Heard, Medium, Out};
 use harness_proto::can::{self, BitRate, BusError, Frame};
 use harness_proto::time::{Instant, Span};
-use harness_sim::record::Trace;
+use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
 use std::collections::VecDeque;
 
 const MEDIUM: Medium = Medium::Frames(BitRate::K500);
@@ -20,7 +20,7 @@ struct Memory {
     now: Instant,
     free: Instant,
     answers: VecDeque<(Instant, can::Heard)>,
-    carried: u64,
+    carried: Vec<LineFrame>,
 }
 
 impl Line for Memory {
@@ -43,7 +43,16 @@ impl Line for Memory {
                 _ => can::Heard::Error(BusError::NoAcknowledge),
             };
             self.answers.push_back((self.free + ANSWER, answer));
-            self.carried += 1;
+            self.carried.push(LineFrame {
+                from: None,
+                start: self.free - MEDIUM.time_of(Out::Frames(std::slice::from_ref(frame))),
+                at: self.free,
+                frame: *frame,
+                ended: match answer {
+                    can::Heard::Frame(_) => FrameEnd::Good,
+                    can::Heard::Error(error) => FrameEnd::Error(error),
+                },
+            });
         }
         self.free
     }
@@ -82,7 +91,7 @@ impl Link for Memory {
     }
 
     fn carried(&self) -> u64 {
-        self.carried
+        self.carried.len() as u64
     }
 
     fn drives(&self, _port: usize) -> u8 {
@@ -91,9 +100,8 @@ impl Link for Memory {
 
     fn trace(&self, port: usize) -> Trace {
         Trace {
-            drives: self.drives(port),
-            links: Vec::new(),
-            marks: Vec::new(),
+            channels: vec![Channel::of_frames(self.carried.clone())],
+            ..Trace::empty(self.drives(port))
         }
     }
 }
@@ -120,6 +128,13 @@ fn frames_are_carried_recorded_and_played_back() {
     let mut link = Memory::default();
     let mut events = Vec::new();
     let came = talk(&mut Recording::new(&mut link, &mut events));
+    let trace = link.trace(0);
+    let carried: Vec<_> = trace.channels[0]
+        .frames()
+        .iter()
+        .map(|own| own.frame)
+        .collect();
+    assert_eq!((trace.stations, carried), (1, frames().to_vec()));
     let [question, other, _] = frames();
     let first = Instant::START + BitRate::K500.time_of(77);
     assert_eq!(question.wire_bits(), 77);

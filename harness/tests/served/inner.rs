@@ -151,7 +151,7 @@ fn play(link: &mut dyn Link, faults: &[(u64, LinkFault)]) -> [Vec<Received>; 2] 
 
 /// What a link carried.
 fn column(link: &dyn Link, place: usize) -> Vec<Seen> {
-    let bytes = link.trace(0).links[place].bytes.clone();
+    let bytes = link.trace(0).channels[place].octets().to_vec();
     let seen = bytes
         .iter()
         .map(|byte| (byte.sent, byte.received, byte.error));
@@ -290,7 +290,7 @@ fn tapped(transport: &str, marks: bool) {
     };
     for (_, place) in taps {
         assert_eq!(arrived(&link, place), arrived(&model, place), "{place}");
-        let times = link.trace(0).links[place].bytes.clone();
+        let times = link.trace(0).channels[place].octets().to_vec();
         assert!(times.windows(2).all(|two| two[0].at <= two[1].at));
         assert!(!link.reaches(0, place), "a tap changes nothing");
     }

@@ -88,6 +88,18 @@ impl Marks {
     /// `+`: a new checking byte.
     pub const CHECKSUM: Self = Self(1 << 6);
 
+    /// These bits; those that stand for nothing are left out.
+    #[must_use]
+    pub const fn from_bits(bits: u8) -> Self {
+        Self(bits & 0x7F)
+    }
+
+    /// Their bits.
+    #[must_use]
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
     /// Both.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {

@@ -14,6 +14,7 @@ pub mod device;
 pub mod drive;
 pub mod fuzz;
 pub mod link;
+pub mod mark;
 pub mod master;
 pub mod node;
 pub mod plain;

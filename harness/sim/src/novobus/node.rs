@@ -3,7 +3,8 @@
 use crate::fault::{DriveFault, Plan};
 use crate::novobus::device::Device;
 use crate::novobus::link::Link;
-use crate::record::Mark;
+use crate::novobus::mark::bits;
+use crate::record::Remark;
 use harness_proto::novobus::bus_end::{Deadline, Step};
 use harness_proto::time::{Instant, Span};
 
@@ -14,7 +15,7 @@ pub struct Node<D> {
     powered: bool,
     stuck: Option<u8>,
     plan: Plan<DriveFault>,
-    marks: Vec<Mark>,
+    remarks: Vec<Remark>,
     recording: bool,
     drive: u8,
     /// See [`Device::head_start`].
@@ -29,7 +30,7 @@ impl<D: Device> Node<D> {
             powered: true,
             stuck: None,
             plan: Plan::default(),
-            marks: Vec::new(),
+            remarks: Vec::new(),
             recording: true,
             drive,
         }
@@ -47,8 +48,8 @@ impl<D: Device> Node<D> {
         self.powered
     }
 
-    pub(crate) fn marks(&self) -> &[Mark] {
-        &self.marks
+    pub(crate) fn remarks(&self) -> &[Remark] {
+        &self.remarks
     }
 
     pub(crate) fn stop_recording(&mut self) {
@@ -63,10 +64,10 @@ impl<D: Device> Node<D> {
         self.begin();
     }
 
-    /// Discards its marks and the faults whose byte has not come.
+    /// Discards its remarks and the faults whose byte has not come.
     pub(crate) fn begin(&mut self) {
         self.plan.clear();
-        self.marks.clear();
+        self.remarks.clear();
     }
 
     /// Arms a fault for the `byte`-th byte on this drive's inbound link, lost ones included, counted from 1.
@@ -194,13 +195,12 @@ impl<D: Device> Node<D> {
             outbound.transmit(now - self.head_start, self.stuck.unwrap_or(byte), solicited);
         }
         if self.recording && !step.marks.is_empty() {
-            self.marks.push(Mark {
-                drive: self.drive,
-                byte: received,
+            self.remarks.push(Remark {
+                station: self.drive,
+                piece: received,
                 answered_as: step.byte.map(|_| outbound.transmitted()),
                 at: now,
-                marks: step.marks,
-                cause: self.device.cause(),
+                bits: bits(step.marks, self.device.cause()),
             });
         }
     }

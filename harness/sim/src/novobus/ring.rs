@@ -8,8 +8,7 @@ use crate::fault::{DriveFault, LinkFault};
 use crate::novobus::device::Device;
 use crate::novobus::link::Link;
 use crate::novobus::node::Node;
-use crate::record::LineByte;
-use crate::record::{LinkTrace, Trace};
+use crate::record::{Channel, LineByte, Trace};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
@@ -350,17 +349,17 @@ impl<D: Device> Ring<D> {
     pub fn trace(&self) -> Trace {
         let drives = self.size.drives();
         let end = |place: usize| u8::try_from(place).ok().and_then(|p| drives.checked_sub(p));
-        let links = self.links.iter().enumerate().map(|(i, link)| LinkTrace {
-            from: end(i).filter(|&k| k < drives),
-            to: end(i + 1),
-            bytes: link.log().collect(),
+        let channels = self.links.iter().enumerate().map(|(i, link)| {
+            let from = end(i).filter(|&k| k < drives);
+            Channel::of_octets(from, end(i + 1), link.log().collect())
         });
-        let mut marks: Vec<_> = self.nodes.iter().flat_map(|n| n.marks().to_vec()).collect();
-        marks.sort_by_key(|mark| mark.at);
+        let remarks = self.nodes.iter().flat_map(|node| node.remarks().to_vec());
+        let mut remarks: Vec<_> = remarks.collect();
+        remarks.sort_by_key(|remark| remark.at);
         Trace {
-            drives,
-            links: links.collect(),
-            marks,
+            stations: drives,
+            channels: channels.collect(),
+            remarks,
         }
     }
 }

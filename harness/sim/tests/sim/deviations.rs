@@ -15,7 +15,7 @@ use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::plain::PlainDrive;
 use harness_sim::novobus::ring::Ring;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use proptest::prelude::*;
 
 const DRIVES: u8 = 3;
@@ -103,7 +103,7 @@ fn play(pieces: &[Piece], flip: Option<u64>, device: impl Fn() -> Drive) -> Trac
 }
 
 fn carried(trace: &Trace) -> Vec<&[harness_sim::record::LineByte]> {
-    trace.links.iter().map(|l: &LinkTrace| &*l.bytes).collect()
+    trace.channels.iter().map(Channel::octets).collect()
 }
 
 proptest! {
@@ -119,7 +119,7 @@ proptest! {
         let plain = play(&pieces, flip, || drive(nd21));
         let wrapped = play(&pieces, flip, || wrong(nd21, &[]));
         prop_assert_eq!(carried(&plain), carried(&wrapped));
-        prop_assert_eq!(&plain.marks, &wrapped.marks);
+        prop_assert_eq!(&plain.remarks, &wrapped.remarks);
     }
 
     /// Every deviation, and every two of them, come to an end with every input: nothing panics, nothing hangs,
@@ -134,8 +134,8 @@ proptest! {
         let all: Vec<_> = deviations().collect();
         let with = [*first.get(&all), *second.get(&all)];
         let trace = play(&pieces, flip, || wrong(true, &with));
-        for link in &trace.links {
-            prop_assert!(link.bytes.windows(2).all(|two| two[0].at < two[1].at));
+        for link in &trace.channels {
+            prop_assert!(link.octets().windows(2).all(|two| two[0].at < two[1].at));
         }
     }
 }

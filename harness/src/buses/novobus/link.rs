@@ -407,20 +407,9 @@ impl Link for SimulatedLink {
     }
 
     fn trace(&self, ring: usize) -> Trace {
-        let mut trace = self.ring(ring).map_or(
-            Trace {
-                drives: 0,
-                links: Vec::new(),
-                marks: Vec::new(),
-            },
-            Ring::trace,
-        );
-        if self.origin > Instant::START {
-            let bytes = trace.links.iter_mut().flat_map(|link| &mut link.bytes);
-            bytes.for_each(|byte| byte.at = self.since_origin(byte.at));
-            let marks = trace.marks.iter_mut();
-            marks.for_each(|mark| mark.at = self.since_origin(mark.at));
-        }
+        let trace = self.ring(ring).map(Ring::trace);
+        let mut trace = trace.unwrap_or_default();
+        trace.count_from(self.origin.since_start());
         trace
     }
 }

@@ -15,7 +15,7 @@ use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Wire, wake_on_time};
 use harness_proto::line::Rate;
 use harness_proto::time::{Instant, Span};
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use rustix::event::{Timespec, poll};
 use rustix::io::Errno;
 use std::cell::Cell;
@@ -568,30 +568,25 @@ impl Link for StreamLink {
     fn trace(&self, ring: usize) -> Trace {
         let index = ring;
         let Some(ring) = self.rings.get(ring) else {
-            return Trace {
-                drives: 0,
-                links: Vec::new(),
-                marks: Vec::new(),
-            };
+            return Trace::default();
         };
         let last = usize::from(ring.drives);
-        let link = |place: usize| LinkTrace {
-            from: drive_before(place, last),
-            to: drive_before(place + 1, last),
-            bytes: match place {
-                0 => ring.log[0].clone(),
-                place if place == last => ring.log[1].clone(),
-                place => {
-                    let at = |inner: &&InnerLink| (inner.ring, inner.place) == (index, place);
-                    let inner = self.inner.iter().find(at);
-                    inner.map(|inner| inner.log.clone()).unwrap_or_default()
-                }
-            },
+        let octets = |place: usize| match place {
+            0 => ring.log[0].clone(),
+            place if place == last => ring.log[1].clone(),
+            place => {
+                let at = |inner: &&InnerLink| (inner.ring, inner.place) == (index, place);
+                let inner = self.inner.iter().find(at);
+                inner.map(|inner| inner.log.clone()).unwrap_or_default()
+            }
+        };
+        let channel = |place: usize| {
+            let ends = (drive_before(place, last), drive_before(place + 1, last));
+            Channel::of_octets(ends.0, ends.1, octets(place))
         };
         Trace {
-            drives: ring.drives,
-            links: (0..=last).map(link).collect(),
-            marks: Vec::new(),
+            channels: (0..=last).map(channel).collect(),
+            ..Trace::empty(ring.drives)
         }
     }
 }

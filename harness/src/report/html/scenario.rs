@@ -242,7 +242,7 @@ fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
     let two = played.traces.len() > 1;
     let instead = format!("It is shown by: {}", played.again);
     for (ring, trace) in played.traces.iter().enumerate() {
-        if trace.links.iter().all(|link| link.bytes.is_empty()) {
+        if trace.channels.iter().all(|link| link.octets().is_empty()) {
             continue;
         }
         let which = if two {

@@ -204,7 +204,7 @@ fn a_replay_is_the_case() {
         }
         let trace = link.trace(0);
         for fault in case.faults() {
-            let bytes = &trace.links[fault.link].bytes;
+            let bytes = trace.channels[fault.link].octets();
             let byte = bytes[usize::try_from(fault.byte - 1).expect("a byte")];
             let late = byte.at.since(bytes[0].at) > link.byte_time() * fault.byte;
             let damaged = byte.sent != byte.received || byte.error.is_some();

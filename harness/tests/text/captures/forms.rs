@@ -202,8 +202,8 @@ fn the_dump_of_a_line_is_read_back() {
     }
     assert_eq!(edges[0], (0, true), "always #0 first, and idle");
     let read = uart(&edges);
-    let link = &capture.traces[0].links[1];
-    let arrived = link.bytes.iter().filter(|byte| byte.received.is_some());
+    let link = &capture.traces[0].channels[1];
+    let arrived = link.octets().iter().filter(|byte| byte.received.is_some());
     let expected: Vec<_> = arrived
         .map(|byte| {
             // A line does not show that its receiver was slow.

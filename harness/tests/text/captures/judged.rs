@@ -134,16 +134,18 @@ fn a_wrong_drive_is_found() {
 #[test]
 fn a_capture_of_some_links() {
     let mut capture = imported(&built_in("10.1-read-byte"));
-    let all = capture.traces[0].links.clone();
+    let all = capture.traces[0].channels.clone();
     capture.traces[0]
-        .links
+        .channels
         .retain(|link| link.from.is_none() || link.to.is_none());
     let judged = judge(&capture, &options(None)).expect("judged");
     assert_eq!((judged.verdict, judged.links.links), (Verdict::Passed, 2));
-    capture.traces[0].links.retain(|link| link.from.is_none());
+    capture.traces[0]
+        .channels
+        .retain(|link| link.from.is_none());
     let judged = judge(&capture, &options(None)).expect("judged");
     assert_eq!(judged.verdict, Verdict::Inconclusive);
-    capture.traces[0].links = all[1..].to_vec();
+    capture.traces[0].channels = all[1..].to_vec();
     let error = judge(&capture, &options(None)).expect_err("no stimuli");
     assert!(error.to_string().contains("no link master->2"), "{error}");
 }
@@ -158,13 +160,14 @@ fn data_that_change_by_themselves() {
     );
     let mut capture = imported(&run(&text));
     // The second answer holds another value, with its own checking byte.
-    let last = capture.traces[0].links.last_mut().expect("a link");
+    let last = capture.traces[0].channels.last_mut().expect("a link");
     for (index, byte) in [(10, 0x10), (11, 0x1D)] {
-        let at = last.bytes[index].at;
-        last.bytes[index] = LineByte::seen(at, Some(byte), Some(byte), None);
+        let octets = last.octets_mut().expect("octets");
+        let at = octets[index].at;
+        octets[index] = LineByte::seen(at, Some(byte), Some(byte), None);
     }
     capture.traces[0]
-        .links
+        .channels
         .retain(|link| link.from.is_none() || link.to.is_none());
     let judged = judge(&capture, &options(None)).expect("judged");
     assert_eq!((judged.verdict, judged.unforeseen), (Verdict::Passed, 2));
@@ -193,7 +196,8 @@ fn with_a_setup() {
 fn the_first_difference() {
     let left = run("title a\nring 2\n> 80*8\n");
     let mut right = left.clone();
-    let byte = &mut right.traces[0].links[2].bytes[5];
+    let last = right.traces[0].channels[2].octets_mut();
+    let byte = &mut last.expect("octets")[5];
     *byte = LineByte::seen(byte.at, Some(0x80), Some(0x81), Some(LineError::Parity));
     let (a, b) = (
         Run {
@@ -218,7 +222,8 @@ fn the_first_difference() {
     );
     // Times alone.
     let mut late = left.clone();
-    let byte = &mut late.traces[0].links[0].bytes[7];
+    let first = late.traces[0].channels[0].octets_mut();
+    let byte = &mut first.expect("octets")[7];
     byte.at += Span::from_millis(1);
     let b = Run {
         name: "b",
@@ -227,7 +232,7 @@ fn the_first_difference() {
     assert!(diff(a, b, Span::ZERO).first.expect("a time").only_time);
     assert!(diff(a, b, Span::from_millis(1)).same());
     // A link that one side alone has.
-    late.traces[0].links.pop();
+    late.traces[0].channels.pop();
     let b = Run {
         name: "b",
         capture: &late,
@@ -249,9 +254,9 @@ fn hostile_names_stay_titles() {
     // Nothing sent is nothing to play.
     let mut silent = capture.clone();
     silent.traces[0]
-        .links
+        .channels
         .iter_mut()
-        .for_each(|link| link.bytes.clear());
+        .for_each(|link| link.octets_mut().expect("octets").clear());
     let error = scenario(&silent, &options(None)).expect_err("silence");
     assert!(error.to_string().contains("sent nothing"));
 }

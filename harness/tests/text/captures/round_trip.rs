@@ -5,8 +5,9 @@ use harness::capture::{Capture, Run, diff, read};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 
@@ -15,15 +16,15 @@ fn assert_same(left: &Capture, right: &Capture) {
     assert_eq!(left.rate, right.rate);
     assert_eq!(left.traces.len(), right.traces.len());
     for (left, right) in left.traces.iter().zip(&right.traces) {
-        assert_eq!(left.drives, right.drives);
-        assert_eq!(left.links.len(), right.links.len());
-        for (left, right) in left.links.iter().zip(&right.links) {
+        assert_eq!(left.stations, right.stations);
+        assert_eq!(left.channels.len(), right.channels.len());
+        for (left, right) in left.channels.iter().zip(&right.channels) {
             assert_eq!((left.from, left.to), (right.from, right.to));
             let what = |byte: &LineByte| {
                 let at = byte.at.since_start().as_nanos();
                 (at, byte.sent, byte.received, byte.error)
             };
-            let bytes = |link: &LinkTrace| link.bytes.iter().map(what).collect::<Vec<_>>();
+            let bytes = |link: &Channel| link.octets().iter().map(what).collect::<Vec<_>>();
             assert_eq!(bytes(left), bytes(right));
         }
     }
@@ -46,10 +47,10 @@ fn runs_are_read_back() {
         assert_same(&capture, &again);
         // What drives remarked is in the JSON, so that tables and pictures stay as they are.
         let marks = |capture: &Capture| {
-            let all = capture.traces[0].marks.iter();
-            let detected = all.filter(|mark| mark.marks.contains(Marks::DETECTED));
+            let all = capture.traces[0].remarks.iter();
+            let detected = all.filter(|mark| mark.marks().contains(Marks::DETECTED));
             detected
-                .map(|mark| (mark.drive, mark.byte, mark.cause))
+                .map(|mark| (mark.station, mark.piece, mark.cause()))
                 .collect::<Vec<_>>()
         };
         assert_eq!(marks(&again), marks(&capture));
@@ -91,16 +92,12 @@ fn trace(links: Vec<Vec<Any>>) -> Trace {
             let error = received.and(ERRORS[error]);
             LineByte::seen(at, sent, received, error)
         });
-        LinkTrace {
-            from: end(place).filter(|drive| *drive < drives),
-            to: end(place + 1),
-            bytes: bytes.collect(),
-        }
+        let from = end(place).filter(|drive| *drive < drives);
+        Channel::of_octets(from, end(place + 1), bytes.collect())
     });
     Trace {
-        drives,
-        links: links.collect(),
-        marks: Vec::new(),
+        channels: links.collect(),
+        ..Trace::empty(drives)
     }
 }
 
@@ -143,18 +140,21 @@ fn captures_of_others_are_read() {
     let capture = read(&std::fs::read(path).expect("a file"), None).expect("a capture");
     assert_eq!(capture.rate, Rate::Baud19200);
     let trace = &capture.traces[0];
-    assert_eq!((trace.drives, trace.links.len()), (1, 2));
-    let received: Vec<_> = trace.links[0]
-        .bytes
+    assert_eq!((trace.stations, trace.channels.len()), (1, 2));
+    let received: Vec<_> = trace.channels[0]
+        .octets()
         .iter()
         .map(|byte| byte.received)
         .collect();
     assert_eq!(received, [0x80, 0x81, 0x80].map(Some));
-    let last = &trace.links[1].bytes;
+    let last = trace.channels[1].octets();
     assert_eq!(
         (last[0].received, last[0].error),
         (Some(0), Some(LineError::Break))
     );
     // The first byte takes its time from the start on.
-    assert_eq!(trace.links[0].bytes[0].at.since_start().as_nanos(), 572_916);
+    assert_eq!(
+        trace.channels[0].octets()[0].at.since_start().as_nanos(),
+        572_916
+    );
 }

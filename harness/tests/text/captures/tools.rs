@@ -74,7 +74,7 @@ fn sigrok_reads_the_lines() {
         vcd::write(&capture.traces, capture.rate, Signals::Lines, &mut dump).expect("a Vec");
         std::fs::write(&path, dump).expect("a file");
         // Of a large ring some links are enough.
-        let links = &capture.traces[0].links;
+        let links = &capture.traces[0].channels;
         for link in links.iter().step_by(links.len().div_ceil(8)) {
             let end = |end: Option<u8>| end.map_or("master".to_owned(), |drive| drive.to_string());
             let line = format!("{}_to_{}_line", end(link.from), end(link.to));
@@ -82,7 +82,7 @@ fn sigrok_reads_the_lines() {
                 return;
             };
             let expected: Vec<_> = link
-                .bytes
+                .octets()
                 .iter()
                 .filter_map(|byte| {
                     // A line does not show that its receiver was slow.

@@ -53,7 +53,7 @@ fn shown(number: usize, name: &str, text: &str) -> Shown {
         .iter()
         .map(|s| s.text.clone())
         .collect();
-    let drives = traces[0].drives.to_string();
+    let drives = traces[0].stations.to_string();
     let own = Played {
         name: entry.short_name(),
         title: &entry.scenario.title,

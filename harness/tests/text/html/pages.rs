@@ -93,10 +93,10 @@ fn the_data_holds_every_byte() {
         let data: serde_json::Value = serde_json::from_str(&json).expect("JSON");
         let areas = numbers(&data["areas"]);
         let byte = data["byte"].as_u64().expect("a time");
-        for (place, link) in traces[0].links.iter().enumerate() {
+        for (place, link) in traces[0].channels.iter().enumerate() {
             let times = times(&numbers(&data["times"][place]), byte);
-            assert_eq!(times.len(), link.bytes.len(), "{name}, link {place}");
-            for (row, (carried, at)) in link.bytes.iter().zip(times).enumerate() {
+            assert_eq!(times.len(), link.octets().len(), "{name}, link {place}");
+            for (row, (carried, at)) in link.octets().iter().zip(times).enumerate() {
                 assert!(
                     carried.at.since_start().units().abs_diff(at) <= 6,
                     "{name}, link {place}, byte {row}"

@@ -174,7 +174,7 @@ fn a_drive_knows_its_inbound_link_only() {
     ring.run_until(Instant::START + Span::from_millis(2_000));
     for (index, k) in (0..3).rev().enumerate() {
         let mut alone = Watched::<Reached>::default();
-        for byte in &ring.trace().links[index].bytes {
+        for byte in ring.trace().channels[index].octets() {
             let received = byte.arrival().expect("nothing is lost");
             alone.receive(Instant::START, received);
         }

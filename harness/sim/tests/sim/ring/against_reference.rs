@@ -7,6 +7,7 @@ use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::time::Span;
 use harness_sim::fault::{Flips, LinkFault};
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::novobus::reference;
 
 const CASES: u64 = 3_000;
@@ -88,9 +89,9 @@ fn compare(random: &mut Random, case: u64) -> Option<bool> {
     }
     let expected = reference::run(&mut theirs, &stream, &faults);
     let trace = ours.trace();
-    for (i, (link, expected)) in trace.links.iter().zip(&expected).enumerate() {
+    for (i, (link, expected)) in trace.channels.iter().zip(&expected).enumerate() {
         let received: Vec<_> = link
-            .bytes
+            .octets()
             .iter()
             .filter_map(|byte| byte.arrival())
             .map(|byte| (byte.byte, byte.error.is_some()))
@@ -127,7 +128,7 @@ fn compare(random: &mut Random, case: u64) -> Option<bool> {
             );
         }
     }
-    Some(trace.marks.iter().any(|mark| mark.cause.is_some()))
+    Some(trace.remarks.iter().any(|mark| mark.cause().is_some()))
 }
 
 fn fault(random: &mut Random) -> (LinkFault, reference::Fault) {

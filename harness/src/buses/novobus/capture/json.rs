@@ -6,8 +6,9 @@ use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};
+use harness_sim::novobus::mark::bits;
 use harness_sim::record::LineByte;
-use harness_sim::record::Mark;
+use harness_sim::record::Remark;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -146,7 +147,7 @@ fn read_byte(byte: &ByteObject) -> Result<LineByte, &'static str> {
 }
 
 /// A mark; one that is not known is left out.
-fn mark(object: &MarkObject) -> Option<Mark> {
+fn mark(object: &MarkObject) -> Option<Remark> {
     const KINDS: [(&str, Marks); 5] = [
         ("detected", Marks::DETECTED),
         ("upstream", Marks::UPSTREAM),
@@ -157,13 +158,12 @@ fn mark(object: &MarkObject) -> Option<Mark> {
     let (_, marks) = *KINDS.iter().find(|(kind, _)| *kind == object.kind)?;
     let cause = object.cause.as_deref();
     let named = |own: &BusError| Some(own.name()) == cause;
-    Some(Mark {
-        drive: object.drive,
-        byte: object.byte,
+    Some(Remark {
+        station: object.drive,
+        piece: object.byte,
         answered_as: None,
         at: Instant::START + Span::from_nanos(object.t_ns.min(LATEST)),
-        marks,
-        cause: BusError::ALL.into_iter().find(named),
+        bits: bits(marks, BusError::ALL.into_iter().find(named)),
     })
 }
 

@@ -12,8 +12,8 @@ use crate::scenario::source::{Source, SourceError};
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Received;
 use harness_proto::time::Span;
+use harness_sim::record::Channel;
 use harness_sim::record::LineByte;
-use harness_sim::record::LinkTrace;
 
 /// The result of a judgement.
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
     let (model, remarks) = model(capture, options)?;
     let told = unforeseen(capture);
     let model = only_captured(&model, capture);
-    let behind = |ring: usize, own: &LinkTrace, index: usize| {
+    let behind = |ring: usize, own: &Channel, index: usize| {
         // Data behind the drive that cannot be predicted stand at the same place on the last link.
         own.from.is_some()
             && told
@@ -85,11 +85,11 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
     );
     let end = Some(capture.end());
     let inner =
-        |ring: usize, own: &LinkTrace, index: usize| own.to.is_some() || behind(ring, own, index);
+        |ring: usize, own: &Channel, index: usize| own.to.is_some() || behind(ring, own, index);
     let master = compare(left, right, tolerance, &inner, end);
     let links = compare(left, right, tolerance, &behind, end);
     let last =
-        |trace: &harness_sim::record::Trace| trace.links.iter().any(|link| link.to.is_none());
+        |trace: &harness_sim::record::Trace| trace.channels.iter().any(|link| link.to.is_none());
     let verdict = if !capture.traces.iter().all(last) {
         Verdict::Inconclusive
     } else if master.differ > 0 {
@@ -140,10 +140,10 @@ fn model(capture: &Capture, options: &Options<'_>) -> Result<(Capture, Vec<Strin
 fn only_captured(model: &Capture, capture: &Capture) -> Capture {
     let mut model = model.clone();
     for (trace, own) in model.traces.iter_mut().zip(&capture.traces) {
-        let ends = |link: &LinkTrace| (link.from, link.to);
+        let ends = |link: &Channel| (link.from, link.to);
         trace
-            .links
-            .retain(|link| own.links.iter().any(|o| ends(o) == ends(link)));
+            .channels
+            .retain(|link| own.channels.iter().any(|o| ends(o) == ends(link)));
     }
     model
 }
@@ -151,9 +151,9 @@ fn only_captured(model: &Capture, capture: &Capture) -> Capture {
 /// The drive that a ring spells out at the end.
 fn located(capture: &Capture) -> Option<(usize, u8)> {
     capture.traces.iter().enumerate().find_map(|(ring, trace)| {
-        let last = trace.links.iter().find(|link| link.to.is_none())?;
-        let received: Vec<Received> = last.bytes.iter().filter_map(LineByte::arrival).collect();
-        let found = crate::buses::novobus::locate::locate(&received, trace.drives)?;
+        let last = trace.channels.iter().find(|link| link.to.is_none())?;
+        let received: Vec<Received> = last.octets().iter().filter_map(LineByte::arrival).collect();
+        let found = crate::buses::novobus::locate::locate(&received, trace.stations)?;
         Some((ring, found.drive))
     })
 }

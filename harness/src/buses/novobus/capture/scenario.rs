@@ -17,7 +17,7 @@ use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 
 /// Bytes on a line of a scenario, where it is not a long one.
 const A_LINE: usize = 16;
@@ -73,19 +73,19 @@ pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, Sket
     for (index, trace) in capture.traces.iter().enumerate() {
         rings.push(Ring::of(index, trace)?);
     }
-    if rings.iter().all(|ring| ring.first.bytes.is_empty()) {
+    if rings.iter().all(|ring| ring.first.octets().is_empty()) {
         return Err(SketchError::Silent);
     }
     let bytes: usize = rings
         .iter()
-        .map(|r| r.first.bytes.len() + r.received.len())
+        .map(|r| r.first.octets().len() + r.received.len())
         .sum();
     let width = (bytes * 2 / LINES).clamp(A_LINE, MOST_A_LINE);
     let mut text: Text = Text::default();
     text.header(&head(capture, options, &rings)?);
     text.empty_line();
     for (index, trace) in capture.traces.iter().enumerate() {
-        for link in &trace.links {
+        for link in &trace.channels {
             for fault in faults(index, link, capture.rate) {
                 text.step(&RingStep::Fault(fault).into(), "");
             }
@@ -107,7 +107,7 @@ pub fn scenario(capture: &Capture, options: &Options<'_>) -> Result<String, Sket
 /// What matters of a ring.
 struct Ring<'c> {
     size: RingSize,
-    first: &'c LinkTrace,
+    first: &'c Channel,
     /// What arrived at the master.
     received: Vec<Received>,
     told: Told,
@@ -115,16 +115,16 @@ struct Ring<'c> {
 
 impl<'c> Ring<'c> {
     fn of(index: usize, trace: &'c Trace) -> Result<Self, SketchError> {
-        let size = RingSize::new(u64::from(trace.drives))
+        let size = RingSize::new(u64::from(trace.stations))
             .map_err(|error| SketchError::Ring(error.to_string()))?;
-        let first = trace.links.iter().find(|link| link.from.is_none());
+        let first = trace.channels.iter().find(|link| link.from.is_none());
         let Some(first) = first else {
             let ring = if index == 0 { "" } else { "2:" };
             let name = format!("{ring}master->{}", size.first());
             return Err(SketchError::NoMaster(name));
         };
-        let last = trace.links.iter().find(|link| link.to.is_none());
-        let last = last.map_or(&[][..], |link| &link.bytes);
+        let last = trace.channels.iter().find(|link| link.to.is_none());
+        let last = last.map_or(&[][..], |link| link.octets());
         Ok(Self {
             size,
             first,
@@ -205,7 +205,7 @@ fn sends(rings: &[Ring<'_>], rate: Rate, tolerance: Span, width: usize) -> Vec<S
     let mut runs: Vec<(Instant, usize, Vec<u8>)> = Vec::new();
     for (index, ring) in rings.iter().enumerate() {
         let mut free = Instant::START;
-        for byte in &ring.first.bytes {
+        for byte in ring.first.octets() {
             let Some(sent) = byte.sent else { continue };
             let start = byte.at - byte_time;
             let behind = start.since(free).units() <= gap;

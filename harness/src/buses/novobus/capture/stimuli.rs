@@ -6,7 +6,7 @@ use harness_proto::nd21::cells::{Access, cell_at};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_proto::novobus::sync::PAUSE;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What the first and the last link of a ring show.
@@ -21,10 +21,10 @@ pub(crate) struct Told {
 /// Reads what was sent on the first link beside what came on the last, and what each drive itself sent, as far as that
 /// was captured.
 pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
-    let first = trace.links.iter().find(|link| link.from.is_none());
+    let first = trace.channels.iter().find(|link| link.from.is_none());
     let sent: Vec<_> = first
         .iter()
-        .flat_map(|link| &link.bytes)
+        .flat_map(|link| link.octets())
         .filter_map(|byte| {
             Some((
                 byte.sent?,
@@ -40,7 +40,7 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
         .map(|(role, _)| role)
         .collect();
     let mut told = Told::default();
-    for link in trace.links.iter().filter(|link| link.from.is_some()) {
+    for link in trace.channels.iter().filter(|link| link.from.is_some()) {
         let own = of_link(link, &asked);
         let last = link.to.is_none();
         for (cell, value) in own.cells {
@@ -59,7 +59,7 @@ pub(crate) fn told(size: RingSize, trace: &Trace) -> Told {
 }
 
 /// Reads a link beside what was asked.
-fn of_link(link: &LinkTrace, asked: &[Role]) -> Told {
+fn of_link(link: &Channel, asked: &[Role]) -> Told {
     let mut reader = Reader {
         told: Told::default(),
         own: link.from.filter(|_| link.to.is_some()),
@@ -67,7 +67,7 @@ fn of_link(link: &LinkTrace, asked: &[Role]) -> Told {
         open: BTreeMap::new(),
     };
     let mut observer = Observer::new(link.from, link.to);
-    let bytes = link.bytes.iter().filter_map(|byte| match link.to {
+    let bytes = link.octets().iter().filter_map(|byte| match link.to {
         None => byte.arrival(),
         Some(_) => byte.sent.map(Received::good),
     });

@@ -89,7 +89,7 @@ fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, 
     bus.close();
     // SYNCO behind the last answer may still be on its way.
     link.run_until(link.now() + Span::from_millis(50));
-    let sent = link.trace(0).links[0].bytes.clone();
+    let sent = link.trace(0).channels[0].octets().to_vec();
     let sent = sent
         .iter()
         .map(|byte| (byte.at, byte.sent.expect("a byte")));

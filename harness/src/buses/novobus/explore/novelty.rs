@@ -8,6 +8,7 @@ use crate::explore::Dice;
 use crate::explore::Seen;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::Trace;
 use std::collections::BTreeSet;
 
@@ -40,12 +41,12 @@ pub fn features(case: &Case, seen: &Seen, trace: &Trace) -> BTreeSet<u32> {
         found.insert(hash(&[2, role, answer]));
         before = role;
     }
-    for mark in &trace.marks {
-        let index = usize::try_from(mark.byte).unwrap_or(usize::MAX);
-        let cause = mark.cause.map_or(0, |cause| u32::from(cause.code()));
+    for mark in &trace.remarks {
+        let index = usize::try_from(mark.piece).unwrap_or(usize::MAX);
+        let cause = mark.cause().map_or(0, |cause| u32::from(cause.code()));
         let signs = (0..7).fold(0, |signs, bit| {
             let own = sign(bit);
-            signs | u32::from(mark.marks.contains(own)) << bit
+            signs | u32::from(mark.marks().contains(own)) << bit
         });
         found.insert(hash(&[3, signs, cause, role_at(index.saturating_sub(1))]));
     }

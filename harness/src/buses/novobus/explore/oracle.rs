@@ -16,7 +16,7 @@ use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::reference;
 use harness_sim::novobus::witness::Complaint;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -180,9 +180,9 @@ pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Op
     if drives.iter().any(reference::Drive::has_monitored) {
         return None;
     }
-    for (place, (link, expected)) in trace.links.iter().zip(&links).enumerate() {
+    for (place, (link, expected)) in trace.channels.iter().zip(&links).enumerate() {
         let received: Vec<_> = link
-            .bytes
+            .octets()
             .iter()
             .filter_map(|byte| byte.arrival())
             .map(|byte| (byte.byte, byte.error.is_some()))
@@ -249,13 +249,13 @@ fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
     if !case.faults().is_empty() || case.acts.iter().any(waits) {
         return None;
     }
-    trace.links.windows(2).find_map(|pair| {
-        let mut heard = pair[0].bytes.iter().map(|byte| byte.at + byte_time);
+    trace.channels.windows(2).find_map(|pair| {
+        let mut heard = pair[0].octets().iter().map(|byte| byte.at + byte_time);
         // Bytes without an answer are skipped: PAUSE, and everything that a drive without power receives.
         let early = |at: Instant| !heard.any(|due| due == at);
-        let place = pair[1].bytes.iter().map(|byte| byte.at).position(early)?;
+        let place = pair[1].octets().iter().map(|byte| byte.at).position(early)?;
         let drive = pair[1].from?;
-        let (number, at) = (place + 1, pair[1].bytes[place].at.since_start());
+        let (number, at) = (place + 1, pair[1].octets()[place].at.since_start());
         let name = drive_name(case.ring(), drive);
         Some(Difference {
             what: "another time".to_owned(),
@@ -281,9 +281,9 @@ pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
         Beside::Second(_) => 1,
     };
     let trace = link.trace(other);
-    let spoke = |own: &LinkTrace| !own.bytes.is_empty();
-    let place = trace.links.iter().position(spoke)?;
-    let name = link_name(other, trace.drives, place);
+    let spoke = |own: &Channel| !own.octets().is_empty();
+    let place = trace.channels.iter().position(spoke)?;
+    let name = link_name(other, trace.stations, place);
     Some(Difference {
         what: "a byte on the other ring".to_owned(),
         section: "12.2".to_owned(),

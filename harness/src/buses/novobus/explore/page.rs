@@ -17,7 +17,7 @@ use crate::scenario::verdict::Verdict;
 use harness_proto::line::{Rate, Received};
 use harness_sim::novobus::device::Device as _;
 use harness_sim::novobus::transitions::{Reached, Watched};
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::path::Path;
 
 /// Findings shown at most.
@@ -74,7 +74,7 @@ fn reach(kept: &Kept, case: &Case, reached: &mut Reached) -> Result<(), ExploreE
     play(&mut link, case);
     for own in link
         .trace(case.ring())
-        .links
+        .channels
         .iter()
         .filter(|own| own.to.is_some())
     {
@@ -83,9 +83,9 @@ fn reach(kept: &Kept, case: &Case, reached: &mut Reached) -> Result<(), ExploreE
     Ok(())
 }
 
-fn heard(link: &LinkTrace) -> Reached {
+fn heard(link: &Channel) -> Reached {
     let mut drive = Watched::<Reached>::default();
-    for byte in &link.bytes {
+    for byte in link.octets() {
         if let Some(value) = byte.received {
             let received = Received {
                 byte: value,

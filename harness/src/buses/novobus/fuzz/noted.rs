@@ -12,7 +12,7 @@ use crate::scenario::syntax::{Bus, Scenario};
 use harness_proto::line::LineError;
 use harness_proto::nd21::cells::cell;
 use harness_sim::novobus::fuzz::{Feature, Notebook};
-use harness_sim::record::LineByte;
+use harness_sim::record::{Channel, LineByte};
 
 /// The sizes of ring for which a scenario is settled: its own, the smallest and the largest (ND21 8.4).
 const SIZES: [Option<u8>; 3] = [None, Some(1), Some(250)];
@@ -94,8 +94,8 @@ pub(crate) fn capture(data: &[u8], notes: &mut Notebook<'_>) {
     for byte in read
         .traces
         .iter()
-        .flat_map(|trace| &trace.links)
-        .flat_map(|link| &link.bytes)
+        .flat_map(|trace| &trace.channels)
+        .flat_map(Channel::octets)
     {
         note(arrival(byte).to_owned());
     }

@@ -17,8 +17,9 @@
 use super::walk::{Reader, Seen, in_time};
 use crate::report::pcapng::name;
 use harness_proto::novobus::error_mode::Marks;
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
-use harness_sim::record::{Mark, Trace};
+use harness_sim::record::{Remark, Trace};
 use std::io::Write;
 
 /// The first line.
@@ -31,10 +32,10 @@ pub const HEADING: &str = "ring,t_ns,link,n,sent,received,status,role,drive,mean
 pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
     out.write_all(HEADING.as_bytes())?;
     for (ring, trace) in traces.iter().enumerate() {
-        let names: Vec<_> = trace.links.iter().map(|link| name(ring, link)).collect();
+        let names: Vec<_> = trace.channels.iter().map(|link| name(ring, link)).collect();
         let mut readers = Reader::all(trace);
-        for (place, index) in in_time(&trace.links) {
-            let byte = &trace.links[place].bytes[index];
+        for (place, index) in in_time(&trace.channels) {
+            let byte = &trace.channels[place].octets()[index];
             let seen = readers[place].see(byte);
             let hex = |byte: Option<u8>| byte.map_or_else(String::new, |b| format!("{b:02X}"));
             let drive = seen.meaning.drive;
@@ -75,7 +76,7 @@ pub(crate) fn words(seen: &Seen<'_>, byte: &LineByte) -> String {
 }
 
 /// What a drive remarked, in a word or two.
-pub(crate) fn remark(mark: &Mark) -> String {
+pub(crate) fn remark(mark: &Remark) -> String {
     const WORDS: [(Marks, &str); 5] = [
         (Marks::DETECTED, "detected"),
         (Marks::UPSTREAM, "upstream"),
@@ -85,12 +86,12 @@ pub(crate) fn remark(mark: &Mark) -> String {
     ];
     let mut text = String::new();
     for (own, word) in WORDS {
-        if mark.marks.contains(own) {
+        if mark.marks().contains(own) {
             if !text.is_empty() {
                 text.push(' ');
             }
             text.push_str(word);
-            if let Some(cause) = mark.cause.filter(|_| own == Marks::DETECTED) {
+            if let Some(cause) = mark.cause().filter(|_| own == Marks::DETECTED) {
                 text.push(' ');
                 text.push_str(cause.name());
             }

@@ -66,7 +66,7 @@ pub(crate) fn diagram(
     let all = areas(&columns, Scale::Index);
     let cut = columns.cut || all.len() > MAX_AREAS;
     let drawn = &all[..all.len().min(MAX_AREAS)];
-    let column = (WIDE / trace.links.len().max(1)).clamp(NARROW, 48);
+    let column = (WIDE / trace.channels.len().max(1)).clamp(NARROW, 48);
     let rows = drawn.iter().map(|area| area.rows.end).max().unwrap_or(0);
     let frame = Frame { column, rows };
     let description = description(ring, trace, drawn, cut);
@@ -111,7 +111,7 @@ fn picture(
     areas: &[Area],
     frame: &Frame,
 ) {
-    let width = (LEFT + frame.column * trace.links.len() + 16).max(240);
+    let width = (LEFT + frame.column * trace.channels.len() + 16).max(240);
     let height = TOP + ROW * frame.rows + 8;
     let title = format!("Space-time diagram: {title}");
     let id = format!("{id}-");
@@ -130,7 +130,7 @@ fn picture(
 /// The senders above their columns; not each where there are many.
 fn heads(html: &mut Html, trace: &Trace, column: usize) {
     let mut free = 0;
-    for (place, link) in trace.links.iter().enumerate() {
+    for (place, link) in trace.channels.iter().enumerate() {
         let x = LEFT + column * place + column / 2;
         if x < free {
             continue;
@@ -235,10 +235,15 @@ fn legend(html: &mut Html, areas: &[Area]) {
 
 /// What the picture shows, in words: of every fault the place.
 fn description(ring: usize, trace: &Trace, areas: &[Area], cut: bool) -> String {
-    let bytes = trace.links.iter().map(|l| l.bytes.len()).max().unwrap_or(0);
+    let bytes = trace
+        .channels
+        .iter()
+        .map(|l| l.octets().len())
+        .max()
+        .unwrap_or(0);
     let mut text = format!(
         "The links of a ring of {} drives across, headed by their senders; downwards {bytes} bytes, row n the n-th byte of each link.",
-        trace.drives
+        trace.stations
     );
     let faults = areas.iter().filter(|area| area.fault);
     for area in faults.clone().take(FAULTS) {
@@ -247,7 +252,7 @@ fn description(ring: usize, trace: &Trace, areas: &[Area], cut: bool) -> String 
         } else {
             &area.remark
         };
-        let link = name(ring, &trace.links[area.links.start]);
+        let link = name(ring, &trace.channels[area.links.start]);
         let _infallible = write!(
             text,
             " Fault: {link} byte {}: {words}.",
@@ -304,8 +309,8 @@ fn data(ring: usize, trace: &Trace, areas: &[Area], frame: &Frame, rate: Rate) -
         flat.push(texts.number(area.remark.clone()));
     }
     let byte = rate.byte_time().units();
-    let times = trace.links.iter().map(|link| {
-        let ends = link.bytes.iter().take(frame.rows);
+    let times = trace.channels.iter().map(|link| {
+        let ends = link.octets().iter().take(frame.rows);
         times(ends.map(|byte| byte.at.since_start().units()), byte)
     });
     Data {
@@ -316,7 +321,7 @@ fn data(ring: usize, trace: &Trace, areas: &[Area], frame: &Frame, rate: Rate) -
         first: 0,
         rows: frame.rows,
         byte,
-        links: trace.links.iter().map(|link| name(ring, link)).collect(),
+        links: trace.channels.iter().map(|link| name(ring, link)).collect(),
         texts: texts.all,
         areas: flat,
         times: times.collect(),

@@ -25,8 +25,9 @@
 use crate::scenario::run::Record;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Span;
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Mark, Trace};
+use harness_sim::record::{Channel, Remark, Trace};
 use serde::Serialize;
 use std::io::Write;
 
@@ -110,9 +111,9 @@ fn object<'a>(
 ) -> Object<'a> {
     Object {
         schema: SCHEMA,
-        ring: trace.drives,
-        links: trace.links.iter().map(link).collect(),
-        marks: trace.marks.iter().flat_map(marks).collect(),
+        ring: trace.stations,
+        links: trace.channels.iter().map(link).collect(),
+        marks: trace.remarks.iter().flat_map(marks).collect(),
         records: records.map(record).collect(),
         second,
     }
@@ -133,12 +134,12 @@ fn record(record: &Record) -> RecordObject<'_> {
     }
 }
 
-fn link(link: &LinkTrace) -> LinkObject<'_> {
+fn link(link: &Channel) -> LinkObject<'_> {
     let end = |end: Option<u8>| end.map_or("master".to_owned(), |drive| drive.to_string());
     LinkObject {
         from: end(link.from),
         to: end(link.to),
-        bytes: &link.bytes,
+        bytes: link.octets(),
     }
 }
 
@@ -154,7 +155,7 @@ fn bytes<S: serde::Serializer>(bytes: &&[LineByte], serializer: S) -> Result<S::
     }))
 }
 
-fn marks(mark: &Mark) -> Vec<MarkObject> {
+fn marks(mark: &Remark) -> Vec<MarkObject> {
     const KINDS: [(Marks, &str); 5] = [
         (Marks::DETECTED, "detected"),
         (Marks::UPSTREAM, "upstream"),
@@ -164,14 +165,14 @@ fn marks(mark: &Mark) -> Vec<MarkObject> {
     ];
     KINDS
         .into_iter()
-        .filter(|(kind, _)| mark.marks.contains(*kind))
+        .filter(|(kind, _)| mark.marks().contains(*kind))
         .map(|(kind, name)| MarkObject {
-            drive: mark.drive,
-            byte: mark.byte,
+            drive: mark.station,
+            byte: mark.piece,
             t_ns: mark.at.since_start().as_nanos(),
             kind: name,
             cause: mark
-                .cause
+                .cause()
                 .filter(|_| kind == Marks::DETECTED)
                 .map(harness_proto::novobus::error::BusError::name),
         })

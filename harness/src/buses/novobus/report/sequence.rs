@@ -8,8 +8,9 @@ use crate::report::pcapng::name;
 use crate::report::walk::Reader;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Instant;
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Trace};
+use harness_sim::record::{Channel, Trace};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -99,7 +100,7 @@ pub(crate) fn sequence(html: &mut Html, id: &str, trace: &Trace) -> bool {
 
 fn events(trace: &Trace) -> Vec<Event> {
     let mut events = Vec::new();
-    for (link, reader) in trace.links.iter().zip(Reader::all(trace)) {
+    for (link, reader) in trace.channels.iter().zip(Reader::all(trace)) {
         if link.from.is_none() || link.to.is_none() {
             said(link, reader, &mut events);
         }
@@ -112,12 +113,12 @@ fn events(trace: &Trace) -> Vec<Event> {
 }
 
 /// What one link at the master carried, put together.
-fn said(link: &LinkTrace, mut reader: Reader<'_>, events: &mut Vec<Event>) {
+fn said(link: &Channel, mut reader: Reader<'_>, events: &mut Vec<Event>) {
     let master = link.from.is_none();
     // By drive: a command may be cut over several telegrams.
     let mut open: BTreeMap<(Option<u8>, bool), usize> = BTreeMap::new();
     let mut before = None;
-    for byte in &link.bytes {
+    for byte in link.octets() {
         let seen = reader.see(byte);
         let (meaning, value) = if master {
             (seen.sent, byte.sent)
@@ -279,10 +280,10 @@ fn asked(events: &mut [Event]) {
 fn faults(trace: &Trace, events: &mut Vec<Event>) {
     let damaged = |byte: &&LineByte| byte.sent != byte.received || byte.error.is_some();
     let mut all: Vec<_> = trace
-        .links
+        .channels
         .iter()
         .flat_map(|link| {
-            link.bytes
+            link.octets()
                 .iter()
                 .filter(damaged)
                 .map(move |byte| (link, byte))
@@ -316,9 +317,9 @@ fn faults(trace: &Trace, events: &mut Vec<Event>) {
 fn remarks(trace: &Trace, events: &mut Vec<Event>) {
     let of = |wanted: Marks| {
         trace
-            .marks
+            .remarks
             .iter()
-            .filter(move |mark| mark.marks.contains(wanted))
+            .filter(move |mark| mark.marks().contains(wanted))
     };
     let note = |at, drive, what: String, kind| Event {
         at,
@@ -335,12 +336,12 @@ fn remarks(trace: &Trace, events: &mut Vec<Event>) {
         if number + 1 == DETECTED && more > 0 {
             let _infallible = write!(what, "; and {more} times more, drives behind it");
         }
-        events.push(note(mark.at, mark.drive, what, Kind::Trouble));
+        events.push(note(mark.at, mark.station, what, Kind::Trouble));
     }
     let back = of(Marks::RECOVERED);
     if let Some(last) = back.clone().next_back() {
         let what = format!("back in normal mode, the last of {}", back.count());
-        events.push(note(last.at, last.drive, what, Kind::Sequence));
+        events.push(note(last.at, last.station, what, Kind::Sequence));
     }
 }
 

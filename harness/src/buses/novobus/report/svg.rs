@@ -130,7 +130,7 @@ struct Diagram {
 }
 
 fn diagram(ring: usize, trace: &Trace, most: usize, options: &Options<'_>) -> Diagram {
-    let count = trace.links.len().max(1);
+    let count = trace.channels.len().max(1);
     #[expect(clippy::cast_precision_loss, reason = "at most 251 columns")]
     let column = ((WIDE - LEFT) / count as f64).clamp(6.0, 48.0);
     let columns = Columns::read(trace, options.rows.clone());
@@ -145,7 +145,7 @@ fn diagram(ring: usize, trace: &Trace, most: usize, options: &Options<'_>) -> Di
     for area in areas {
         rectangle(&mut text, ring, trace, area, &place);
         if area.fault && faults.len() < 12 {
-            let at = name(ring, &trace.links[area.links.start]);
+            let at = name(ring, &trace.channels[area.links.start]);
             let words = if area.remark.is_empty() {
                 &area.status
             } else {
@@ -242,9 +242,9 @@ impl Placing {
 fn heads(out: &mut String, trace: &Trace, column: f64) {
     let mut free = 0.0;
     let mut x = LEFT + column / 2.0;
-    for (place, link) in trace.links.iter().enumerate() {
+    for (place, link) in trace.channels.iter().enumerate() {
         let text = link.from.map_or("master".to_owned(), |k| k.to_string());
-        let last = place + 1 == trace.links.len();
+        let last = place + 1 == trace.channels.len();
         if x >= free || last && x + 20.0 >= free {
             put(
                 out,
@@ -307,7 +307,7 @@ fn axis(out: &mut String, place: &Placing) {
 fn rectangle(out: &mut String, ring: usize, trace: &Trace, area: &Area, place: &Placing) {
     let (x, y, width, height) = place.rectangle(area);
     let mark = if area.fault { " x" } else { "" };
-    let links = &trace.links;
+    let links = &trace.channels;
     let first = name(ring, &links[area.links.start]);
     let whence = if area.links.len() > 1 {
         format!("{first} to {}", name(ring, &links[area.links.end - 1]))
@@ -393,10 +393,15 @@ fn description(traces: &[Trace], drawn: &[Diagram], options: &Options<'_>) -> St
         Scale::Time => "downwards the time.",
     });
     for (trace, diagram) in traces.iter().zip(drawn) {
-        let bytes = trace.links.iter().map(|l| l.bytes.len()).max().unwrap_or(0);
+        let bytes = trace
+            .channels
+            .iter()
+            .map(|l| l.octets().len())
+            .max()
+            .unwrap_or(0);
         put(
             &mut text,
-            format_args!(" A ring of {} drives, {bytes} bytes.", trace.drives),
+            format_args!(" A ring of {} drives, {bytes} bytes.", trace.stations),
         );
         for fault in &diagram.faults {
             put(&mut text, format_args!(" Fault: {fault}."));

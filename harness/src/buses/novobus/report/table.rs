@@ -5,6 +5,7 @@
 //! where that differs from what was sent (`--` for nothing, `~` behind a byte marked bad).
 
 use harness_proto::novobus::error_mode::Marks;
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
@@ -96,7 +97,12 @@ pub fn table(trace: &Trace, part: &Part) -> String {
 
 /// The rows to show; `None` stands for rows left out.
 fn rows(trace: &Trace, part: &Part) -> Vec<Option<usize>> {
-    let all = trace.links.iter().map(|l| l.bytes.len()).max().unwrap_or(0);
+    let all = trace
+        .channels
+        .iter()
+        .map(|l| l.octets().len())
+        .max()
+        .unwrap_or(0);
     let wanted = part.rows.clone().unwrap_or(0..all);
     let wanted = wanted.start.min(all)..wanted.end.min(all);
     let most = part.at_most.unwrap_or(ROWS);
@@ -139,9 +145,9 @@ impl Column {
 
 fn columns(trace: &Trace, rows: &[Option<usize>]) -> Vec<Column> {
     let mut columns = Vec::new();
-    for link in &trace.links {
+    for link in &trace.channels {
         let cells = |cell: fn(&LineByte) -> Cell| -> Vec<Cell> {
-            let byte = |row: &Option<usize>| row.and_then(|row| link.bytes.get(row));
+            let byte = |row: &Option<usize>| row.and_then(|row| link.octets().get(row));
             rows.iter()
                 .map(|row| byte(row).map(cell).unwrap_or_default())
                 .collect()
@@ -149,10 +155,10 @@ fn columns(trace: &Trace, rows: &[Option<usize>]) -> Vec<Column> {
         let head = link.from.map_or("Master".to_owned(), |k| k.to_string());
         let mut sent = cells(sent);
         if let Some(drive) = link.from {
-            sign(&mut sent, rows, trace, drive, &link.bytes);
+            sign(&mut sent, rows, trace, drive, link.octets());
         }
         columns.push(Column::new(head, sent, link.from.is_some()));
-        if link.bytes.iter().any(damaged) {
+        if link.octets().iter().any(damaged) {
             columns.push(Column::new("wire".to_owned(), cells(arrived), false));
         }
     }
@@ -204,7 +210,7 @@ fn sign(cells: &mut [Cell], rows: &[Option<usize>], trace: &Trace, drive: u8, by
     let sent: Vec<_> = (0..bytes.len())
         .filter(|i| bytes[*i].sent.is_some())
         .collect();
-    for mark in trace.marks.iter().filter(|mark| mark.drive == drive) {
+    for mark in trace.remarks.iter().filter(|mark| mark.station == drive) {
         let row = match mark.answered_as {
             Some(number) => usize::try_from(number - 1).ok().and_then(|i| sent.get(i)),
             None => {
@@ -217,7 +223,7 @@ fn sign(cells: &mut [Cell], rows: &[Option<usize>], trace: &Trace, drive: u8, by
             continue;
         };
         for (marks, sign) in SIGNS {
-            if mark.marks.contains(marks) && !cells[place].signs.contains(sign) {
+            if mark.marks().contains(marks) && !cells[place].signs.contains(sign) {
                 cells[place].signs.push(sign);
             }
         }
@@ -277,8 +283,8 @@ pub fn wires(trace: &Trace, at_most: usize) -> String {
     let mut more = 0usize;
     let name = |end: Option<u8>| end.map_or("master".to_owned(), |k| k.to_string());
     let mut lines = 0;
-    for link in &trace.links {
-        for (index, byte) in link.bytes.iter().enumerate().filter(|(_, b)| damaged(b)) {
+    for link in &trace.channels {
+        for (index, byte) in link.octets().iter().enumerate().filter(|(_, b)| damaged(b)) {
             lines += 1;
             if lines > at_most {
                 more += 1;

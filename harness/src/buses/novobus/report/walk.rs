@@ -3,22 +3,23 @@
 use super::meaning::{Meaning, Observer, Role};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Instant;
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
-use harness_sim::record::{LinkTrace, Mark, Trace};
+use harness_sim::record::{Channel, Remark, Trace};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// The bytes of every link in order of time; at one instant in order of links. Gives the link's place and the byte's.
-pub(crate) fn in_time(links: &[LinkTrace]) -> impl Iterator<Item = (usize, usize)> + '_ {
+pub(crate) fn in_time(links: &[Channel]) -> impl Iterator<Item = (usize, usize)> + '_ {
     let first = links.iter().enumerate().filter_map(|(place, link)| {
-        let byte = link.bytes.first()?;
+        let byte = link.octets().first()?;
         Some(Reverse((byte.at, place, 0)))
     });
     let mut heap: BinaryHeap<Reverse<(Instant, usize, usize)>> = first.collect();
     std::iter::from_fn(move || {
         let mut top = heap.peek_mut()?;
         let Reverse((at, place, index)) = *top;
-        match links[place].bytes.get(index + 1) {
+        match links[place].octets().get(index + 1) {
             // A capture may be out of order: then its own order counts.
             Some(next) => *top = Reverse((next.at.max(at), place, index + 1)),
             None => drop(std::collections::binary_heap::PeekMut::pop(top)),
@@ -83,7 +84,7 @@ pub struct Seen<'t> {
     /// What its sender was doing.
     pub state: State,
     /// What its sender remarked at it.
-    pub mark: Option<&'t Mark>,
+    pub mark: Option<&'t Remark>,
 }
 
 /// Reads one link of a trace byte by byte: its bytes, and what its sender remarked.
@@ -94,7 +95,7 @@ pub struct Reader<'t> {
     from: Option<u8>,
     to: Option<u8>,
     /// The sender's marks, each with the byte of this link at which it stands.
-    marks: std::iter::Peekable<std::vec::IntoIter<(usize, &'t Mark)>>,
+    marks: std::iter::Peekable<std::vec::IntoIter<(usize, &'t Remark)>>,
     /// Whether the sender is known to be in the error mode; `None` where a trace has no marks at all.
     in_error: Option<bool>,
     next: usize,
@@ -103,11 +104,11 @@ pub struct Reader<'t> {
 impl<'t> Reader<'t> {
     /// For every link of a trace.
     pub fn all(trace: &'t Trace) -> Vec<Self> {
-        let known = !trace.marks.is_empty();
-        let links = trace.links.iter();
+        let known = !trace.remarks.is_empty();
+        let links = trace.channels.iter();
         links
             .map(|link| {
-                let mut marks = placed(link, &trace.marks);
+                let mut marks = placed(link, &trace.remarks);
                 marks.sort_by_key(|(place, _)| *place);
                 Self {
                     observer: Observer::new(link.from, link.to),
@@ -125,14 +126,14 @@ impl<'t> Reader<'t> {
     /// Reads the next byte.
     pub fn see(&mut self, byte: &LineByte) -> Seen<'t> {
         let mut meaning = self.observer.see(byte.received, byte.error);
-        let mut shown: Option<&Mark> = None;
+        let mut shown: Option<&Remark> = None;
         let mut leaves = false;
         while let Some((_, mark)) = self.marks.next_if(|(place, _)| *place <= self.next) {
-            if mark.marks.contains(Marks::DETECTED) {
+            if mark.marks().contains(Marks::DETECTED) {
                 self.in_error = Some(true);
             }
-            leaves |= mark.marks.contains(Marks::RECOVERED);
-            let graver = mark.marks.contains(Marks::DETECTED) || shown.is_none();
+            leaves |= mark.marks().contains(Marks::RECOVERED);
+            let graver = mark.marks().contains(Marks::DETECTED) || shown.is_none();
             if graver {
                 shown = Some(mark);
             }
@@ -182,22 +183,22 @@ impl<'t> Reader<'t> {
 
 /// The marks of a link's sender, each with the byte of the link at which it stands: the answer to the byte that was
 /// remarked, or the next byte where none was sent (a time-out).
-fn placed<'t>(link: &LinkTrace, marks: &'t [Mark]) -> Vec<(usize, &'t Mark)> {
+fn placed<'t>(link: &Channel, marks: &'t [Remark]) -> Vec<(usize, &'t Remark)> {
     let own: Vec<_> = marks
         .iter()
-        .filter(|mark| link.from == Some(mark.drive))
+        .filter(|mark| link.from == Some(mark.station))
         .collect();
     if own.is_empty() {
         return Vec::new();
     }
-    let sent: Vec<_> = (0..link.bytes.len())
-        .filter(|place| link.bytes[*place].sent.is_some())
+    let sent: Vec<_> = (0..link.octets().len())
+        .filter(|place| link.octets()[*place].sent.is_some())
         .collect();
     own.into_iter()
         .filter_map(|mark| {
             let number = match mark.answered_as {
                 Some(number) => usize::try_from(number).ok()?.checked_sub(1)?,
-                None => sent.partition_point(|place| link.bytes[*place].at <= mark.at),
+                None => sent.partition_point(|place| link.octets()[*place].at <= mark.at),
             };
             Some((*sent.get(number)?, mark))
         })

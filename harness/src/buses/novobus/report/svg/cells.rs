@@ -4,6 +4,7 @@ use super::{MAX_ROWS, Scale};
 use crate::report::csv::{remark, status};
 use crate::report::walk::{Reader, State};
 use harness_proto::novobus::error_mode::Marks;
+use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
 use harness_sim::record::Trace;
 use std::ops::Range;
@@ -44,21 +45,26 @@ pub(crate) struct Columns {
 impl Columns {
     /// Reads the rows wanted of a trace.
     pub(crate) fn read(trace: &Trace, rows: Option<Range<usize>>) -> Self {
-        let all = trace.links.iter().map(|l| l.bytes.len()).max().unwrap_or(0);
+        let all = trace
+            .channels
+            .iter()
+            .map(|l| l.octets().len())
+            .max()
+            .unwrap_or(0);
         let rows = rows.unwrap_or(0..all);
         let wanted = rows.start.min(all)..rows.end.min(all);
         let end = wanted.end.min(wanted.start + MAX_ROWS);
         let mut links = Vec::new();
-        for (link, mut reader) in trace.links.iter().zip(Reader::all(trace)) {
+        for (link, mut reader) in trace.channels.iter().zip(Reader::all(trace)) {
             let mut cells = Vec::new();
-            for (row, byte) in link.bytes.iter().enumerate().take(end) {
+            for (row, byte) in link.octets().iter().enumerate().take(end) {
                 let seen = reader.see(byte);
                 if row < wanted.start {
                     continue;
                 }
                 let marked = seen.mark.map_or_else(String::new, remark);
                 let detected =
-                    |mark: &harness_sim::record::Mark| mark.marks.contains(Marks::DETECTED);
+                    |mark: &harness_sim::record::Remark| mark.marks().contains(Marks::DETECTED);
                 cells.push(Cell {
                     at: byte.at.since_start().units(),
                     state: seen.state,
