@@ -3,7 +3,9 @@
 pub mod novobus;
 
 pub use novobus::language::{argument, plan, syntax};
+pub use novobus::link::SimulatedLink;
 pub use novobus::simulate;
+pub use novobus::stream::StreamLink;
 
 /// What of playing belongs to the one bus whose drives are played on over their bus today.
 pub mod run {
@@ -24,14 +26,37 @@ pub use novobus::language::Novobus as DefaultBus;
 
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
 
+use crate::link::{InnerLink, Link, PortLink};
+use crate::port::Wire;
+use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
+use harness_proto::line::Rate;
+use harness_proto::time::Span;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
 type Found = Result<(Scenario, Arc<dyn Settled>), Problems>;
+
+/// A link to the drives that a plan simulates, warmed up: their self-tests are over.
+pub(crate) fn simulated(plan: &Plan) -> Box<dyn Link> {
+    Box::new(novobus::simulate::warm(plan))
+}
+
+/// A link over open ports, each with its number of drives, and over the ports of inner links.
+pub(crate) fn over_ports(
+    wires: Vec<(Wire, u8)>,
+    inner: Vec<InnerLink>,
+    (rate, tolerance): (Rate, Span),
+    interrupt: Arc<AtomicBool>,
+) -> Box<dyn PortLink> {
+    let mut link = StreamLink::new(wires, inner, rate, interrupt);
+    link.set_time_tolerance(tolerance);
+    Box::new(link)
+}
 
 /// What happens to a drive from outside the bus, by the bus that it is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,9 @@ use super::files::{
 };
 use super::record::{Line, SCHEMA, Writer};
 use super::signature;
+use crate::buses::SimulatedLink;
 use crate::buses::twin::Exactness;
-use crate::link::{Capability, Event, SimulatedLink, Sink};
+use crate::link::{Capability, Event, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;

@@ -2,9 +2,10 @@
 
 use super::files::{RIG, sum};
 use super::record::{Line, capabilities};
+use crate::buses::SimulatedLink;
 use crate::buses::twin::Exactness;
 use crate::guard::Limits;
-use crate::link::{Capability, SimulatedLink};
+use crate::link::Capability;
 use crate::rig::{Rig, Way, limits, line_rate};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;

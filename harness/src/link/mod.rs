@@ -12,8 +12,6 @@ pub(crate) mod ring;
 pub(crate) mod stamp;
 pub(crate) mod tamper;
 
-pub use crate::buses::novobus::link::SimulatedLink;
-pub use crate::buses::novobus::stream::{StreamLink, TOLERANCE};
 pub use crate::trouble::Trouble;
 pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use inner::{Delay, InnerLink, Ports};
@@ -24,10 +22,15 @@ pub use tamper::{needs_line_errors, only_simulated};
 
 use crate::buses::Stimulus;
 use crate::medium::{Heard, Medium, Out};
+use crate::port::LastWords;
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::time::Duration;
 
 /// What a rig can be asked to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -267,6 +270,30 @@ impl<L: Line + ?Sized> Line for &mut L {
     fn keep(&mut self) -> Option<Instant> {
         (**self).keep()
     }
+}
+
+/// A link over ports, in real time.
+pub trait PortLink: Link {
+    /// A counter that increases as long as the user of this link keeps calling it; a watchdog reads it.
+    fn beats(&self) -> Arc<AtomicU64>;
+
+    /// Prepares bytes for each port that a watchdog can send when the owner of this link hangs.
+    ///
+    /// # Errors
+    /// No file descriptor is left.
+    fn last_words(&self, bytes: &dyn Fn(usize) -> Vec<u8>) -> io::Result<Vec<LastWords>>;
+
+    /// Allows sending again after an interruption, so that a safe state can be reached. Other trouble stays.
+    fn resume(&mut self);
+
+    /// Number of line errors since the last call that the transport reported without their byte.
+    fn take_unplaced(&mut self) -> u64;
+
+    /// How long sending was held up around each byte with a wrong parity bit.
+    fn take_gaps(&mut self) -> Vec<Duration>;
+
+    /// The inner links at which the bench has a port.
+    fn inner_links(&self) -> &[InnerLink];
 }
 
 /// A bus as a scenario sees it.

@@ -1,21 +1,28 @@
 //! The two kinds of ring ends that a rig can have, as one link.
 
-use crate::link::{
-    Capability, Lead, Line, Link, Moment, PlacedFault, SimulatedLink, StreamLink, Trouble,
-};
+use crate::link::{Capability, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
+use std::fmt;
 
 /// Where a rig's rings end: in the simulator, or at ports.
-#[derive(Debug)]
 pub enum Ends {
     /// In the simulator, in virtual time.
-    Simulated(SimulatedLink),
+    Simulated(Box<dyn Link>),
     /// At ports, in real time.
-    Ports(StreamLink),
+    Ports(Box<dyn PortLink>),
+}
+
+impl fmt::Debug for Ends {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Simulated(_) => "Simulated",
+            Self::Ports(_) => "Ports",
+        })
+    }
 }
 
 /// The same call for whichever it is.
@@ -30,18 +37,18 @@ macro_rules! each {
 
 impl Ends {
     /// The link at ports, if it is one.
-    pub fn ports(&self) -> Option<&StreamLink> {
+    pub fn ports(&self) -> Option<&dyn PortLink> {
         match self {
             Self::Simulated(_) => None,
-            Self::Ports(link) => Some(link),
+            Self::Ports(link) => Some(link.as_ref()),
         }
     }
 
     /// The link at ports, if it is one.
-    pub fn ports_mut(&mut self) -> Option<&mut StreamLink> {
+    pub fn ports_mut(&mut self) -> Option<&mut dyn PortLink> {
         match self {
             Self::Simulated(_) => None,
-            Self::Ports(link) => Some(link),
+            Self::Ports(link) => Some(link.as_mut()),
         }
     }
 }

@@ -5,18 +5,15 @@ use super::ends::Ends;
 use super::file::{Endpoint, Marks, Transport};
 use super::lock::{PortLock, PortLockError};
 use super::scan::{self, MatchError, Port};
-use crate::link::{InnerLink, Ports, SimulatedLink, StreamLink};
+use crate::buses;
+use crate::link::{InnerLink, Ports};
 use crate::port::{self, OpenError, PortSettings, Wire};
 use crate::scenario::problem::Problems;
-use crate::scenario::simulate;
 use harness_proto::line::Rate;
 use harness_proto::time;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// How long a simulated rig has been switched on when it is opened: the self-tests are over (11.8).
-const WARM: time::Span = time::Span::from_millis(200);
 
 /// Why a rig's ports cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -69,10 +66,8 @@ pub(crate) fn line_rate(rig: &Rig) -> Rate {
 /// Opens a rig's ends; nothing is sent.
 pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, OpenRigError> {
     if rig.is_simulated() {
-        let mut link = simulate::bench(&rig.plan()?);
-        run_until_warm(&mut link);
         return Ok(Opened {
-            ends: Ends::Simulated(link),
+            ends: Ends::Simulated(buses::simulated(&rig.plan()?)),
             locks: Vec::new(),
         });
     }
@@ -106,21 +101,14 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
         let from = interposer.link.from;
         inner.push(inner_link(rig, interposer.ring, from, interposer_ports));
     }
-    let mut link = StreamLink::new(wires, inner, rate, interrupt);
     let tolerance = rig.rings().map(|(_, ring)| ring.time_tolerance.0).max();
     let tolerance = tolerance.map_or(0, |t| u64::try_from(t.as_nanos()).unwrap_or(u64::MAX));
-    link.set_time_tolerance(time::Span::from_nanos(tolerance));
+    let tolerance = time::Span::from_nanos(tolerance);
+    let link = buses::over_ports(wires, inner, (rate, tolerance), interrupt);
     Ok(Opened {
         ends: Ends::Ports(link),
         locks,
     })
-}
-
-fn run_until_warm(link: &mut SimulatedLink) {
-    use crate::link::{Line, Link};
-    let end = link.now() + WARM;
-    link.run_until(end);
-    link.begin();
 }
 
 fn inner_link(rig: &Rig, ring: u8, from: Option<u8>, ports: Ports) -> InnerLink {

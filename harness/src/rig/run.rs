@@ -192,7 +192,7 @@ impl<'s> Run<'s> {
             Err((ring, ill)) => return Err(self.session.ill(ring, ill)),
         };
         let ports = self.session.link().inner_mut().ports_mut();
-        let unplaced = ports.map_or(0, crate::link::StreamLink::take_unplaced);
+        let unplaced = ports.map_or(0, |ports| ports.take_unplaced());
         let all = Conversation::all(&both.events, self.byte_time, simulated);
         let opening = opening(self.session.rig(), &way, &all, self.exactness);
         let (conversations, fresh) = way.compared(all, self.exactness);

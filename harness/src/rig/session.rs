@@ -13,7 +13,7 @@ use super::watchdog::{Alarm, Watchdog};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, SafeState, Watch, blind_stop, safe_state};
-use crate::link::{Line, Link, Octets, StreamLink, Trouble};
+use crate::link::{Line, Link, Octets, PortLink, Trouble};
 use crate::rig::health::{self, Health, Unhealthy, examine};
 use crate::rig::interlock::Interlocks;
 use crate::rig::line_test::{self, Cause};
@@ -290,7 +290,7 @@ impl Session {
     }
 
     /// Its ports' link, if it has ports: for what was measured there.
-    pub fn ports(&mut self) -> Option<&mut StreamLink> {
+    pub fn ports(&mut self) -> Option<&mut dyn PortLink> {
         self.link.inner_mut().ports_mut()
     }
 
@@ -438,7 +438,7 @@ impl Session {
         };
         let bytes = |ring: usize| sizes.get(ring).map_or(Vec::new(), |size| blind_stop(*size));
         let beats = ports.beats();
-        let words = ports.last_words(bytes).map_err(SessionError::Watchdog)?;
+        let words = ports.last_words(&bytes).map_err(SessionError::Watchdog)?;
         let safe_state = &self.rig.file.safe_state;
         let limit = safe_state.watchdog.0;
         let cut = safe_state.order.contains(&file::SafeStep::PowerOff);

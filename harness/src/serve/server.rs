@@ -1,7 +1,8 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
 use super::place::{Inner, Role};
-use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, SimulatedLink, link_name};
+use crate::buses::SimulatedLink;
+use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
 use crate::scenario::plan::Plan;
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};

@@ -1,9 +1,10 @@
 //! What stands beside a bus, and a record that does not show it.
 
+use harness::buses::SimulatedLink;
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::evidence::Line as Written;
 use harness::guard::{Guarded, Limits};
-use harness::link::{Event, Line as _, Link, Recording, Replay, SimulatedLink};
+use harness::link::{Event, Line as _, Link, Recording, Replay};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::properties::Properties;

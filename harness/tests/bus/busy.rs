@@ -1,7 +1,8 @@
 //! The bench's own master on a computer that does something else meanwhile.
 
+use harness::buses::SimulatedLink;
 use harness::library::Entry;
-use harness::link::{Capability, Lead, Line, Link, Moment, PlacedFault, SimulatedLink, Trouble};
+use harness::link::{Capability, Lead, Line, Link, Moment, PlacedFault, Trouble};
 use harness::medium::{Heard, Medium, Out};
 use harness::scenario::run::{AtMismatch, play_over_bus};
 use harness::scenario::simulate::bench;

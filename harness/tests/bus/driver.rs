@@ -1,9 +1,10 @@
 //! The driver over a simulated ring of three ND21 (ND21 chapters 11, 12, 13.2).
 
+use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{
     Axis, Bus, Error, Options, Recovery, Scope, SkStatus, Trigger, count_drives, recover,
 };
-use harness::link::{Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use harness::link::{Line, Link, Moment, Octets, PlacedFault};
 use harness::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;

@@ -2,9 +2,10 @@
 //! the bytes and times at the master, cells with unknown contents, and faults on the master's own link only. The drives are plain ones,
 //! which take a fraction of the time of complete ND21s; deviations behind the bus are left out.
 
+use harness::buses::SimulatedLink;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
-use harness::link::{Capability, Event, Octets, Recording, SimulatedLink};
+use harness::link::{Capability, Event, Octets, Recording};
 use harness::qualify::{
     Answer, Culprit, Meant, Named, Pinned, Seen, Sighting, Whose, agreed, answer, conversations,
     culprit, dumps, exchange, hypotheses, marches, name, probes, questions,

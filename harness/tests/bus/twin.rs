@@ -286,11 +286,11 @@ fn many_cells_are_set_back() {
     assert_eq!(outcome.remarks, Vec::<String>::new());
 }
 
-fn model(lines: &[String]) -> (Plan, harness::link::SimulatedLink) {
+fn model(lines: &[String]) -> (Plan, harness::buses::SimulatedLink) {
     model_of(3, lines)
 }
 
-fn model_of(drives: u8, lines: &[String]) -> (Plan, harness::link::SimulatedLink) {
+fn model_of(drives: u8, lines: &[String]) -> (Plan, harness::buses::SimulatedLink) {
     let entry = entry(&format!(
         "title x\nring {drives}\ndrive 0..last model nd21\n{}\n> 80\n",
         lines.join("\n")

@@ -1,10 +1,10 @@
 //! Taps and interposers on a ring that another process serves, over sockets and pseudo terminals: the same bytes on
 //! the same links as in the simulator.
 
+use harness::buses::{SimulatedLink, StreamLink};
 use harness::library::Entry;
 use harness::link::{
-    InnerLink, Line, Link, LinkFault, Moment, Octets, PlacedFault, Ports, SimulatedLink,
-    StreamLink, Trouble,
+    InnerLink, Line, Link, LinkFault, Moment, Octets, PlacedFault, PortLink as _, Ports, Trouble,
 };
 use harness::port::{Endpoint, PortSettings, Wire, open};
 use harness::scenario::run::{AtMismatch, lacks, play_over_bus, start_anew};

@@ -2,8 +2,9 @@
 //! same verdicts as on the simulator.
 
 use crate::ring::Served;
+use harness::buses::StreamLink;
 use harness::library::{Entry, sources};
-use harness::link::{Line, Octets, StreamLink};
+use harness::link::{Line, Octets, PortLink as _};
 use harness::port::{Endpoint, PortSettings, Wire, open};
 use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, run, start_anew};
 use harness::scenario::simulate::simulated;

@@ -3,8 +3,8 @@
 use super::driver::cell::{Found, find, write};
 use super::driver::{self, Axis, Bus, State};
 use super::rig::sim::all_nd21;
+use crate::buses::SimulatedLink;
 use crate::embed::Error;
-use crate::link::SimulatedLink;
 use crate::rig::{self, Session, Shared};
 use crate::scenario::argument::{assignments, cells, encode};
 use crate::scenario::parse::parse_setup;

@@ -1,10 +1,12 @@
 //! The simulated rings that a plan asks for.
 
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::PlannedSetupKind;
-use crate::link::SimulatedLink;
+use crate::link::{Line, Link};
 use crate::scenario::plan::Plan;
 use harness_proto::nd21::ee;
 use harness_proto::novobus::properties::Properties;
+use harness_proto::time::Span;
 use harness_sim::nd21::{Nd21Drive, Nd21Properties, set_parity};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::deviation::Deviant;
@@ -35,6 +37,18 @@ pub fn bench(plan: &Plan) -> SimulatedLink {
     for (ring, drives, influence) in plan.influences() {
         influence.act(&mut link, ring, drives);
     }
+    link
+}
+
+/// How long the drives of [`warm`] have been switched on: their self-tests are over (11.8).
+const WARM: Span = Span::from_millis(200);
+
+/// The same with drives that have been switched on for some time, at the beginning of a conversation.
+pub(crate) fn warm(plan: &Plan) -> SimulatedLink {
+    let mut link = bench(plan);
+    let end = link.now() + WARM;
+    link.run_until(end);
+    link.begin();
     link
 }
 

@@ -9,7 +9,8 @@ use crate::link::lateness::Lateness;
 use crate::link::ring::{MOST_RECORDED, Ring};
 use crate::link::tamper::Tamper;
 use crate::link::{
-    Capability, HARMLESS, Lead, Line, Link, LinkFault, Moment, PlacedFault, Trouble, link_name,
+    Capability, HARMLESS, Lead, Line, Link, LinkFault, Moment, PlacedFault, PortLink, Trouble,
+    link_name,
 };
 use crate::medium::{Heard, Medium, Out};
 use crate::port::{LastWords, Wire, wake_on_time};
@@ -142,52 +143,9 @@ impl StreamLink {
         self.tolerance = tolerance;
     }
 
-    /// A counter that increases as long as the user of this link keeps calling it; a watchdog reads it.
-    #[must_use]
-    pub fn beats(&self) -> Arc<AtomicU64> {
-        Arc::clone(&self.beats)
-    }
-
-    /// Prepares bytes for each ring that a watchdog can send when the owner of this link hangs.
-    ///
-    /// # Errors
-    /// No file descriptor is left.
-    pub fn last_words(&self, bytes: impl Fn(usize) -> Vec<u8>) -> std::io::Result<Vec<LastWords>> {
-        let rings = self.rings.iter().enumerate();
-        rings
-            .map(|(ring, own)| own.wire.last_words(&bytes(ring)))
-            .collect()
-    }
-
     /// Stops recording what the links carry.
     pub fn stop_recording(&mut self) {
         self.recording = false;
-    }
-
-    /// Allows sending again after an interruption, so that a safe state can be reached. Other trouble stays.
-    pub fn resume(&mut self) {
-        if self.trouble == Some(Trouble::Interrupted) {
-            self.trouble = None;
-            self.interrupt = Arc::default();
-        }
-    }
-
-    /// Number of line errors since the last call that the transport reported without their byte.
-    pub fn take_unplaced(&mut self) -> u64 {
-        let rings = self.rings.iter_mut();
-        rings.map(|ring| std::mem::take(&mut ring.unplaced)).sum()
-    }
-
-    /// How long sending was held up around each byte with a wrong parity bit.
-    pub fn take_gaps(&mut self) -> Vec<time::Duration> {
-        let rings = self.rings.iter_mut();
-        rings.flat_map(|ring| ring.wire.take_gaps()).collect()
-    }
-
-    /// The inner links at which the bench has a port.
-    #[must_use]
-    pub fn inner_links(&self) -> &[InnerLink] {
-        &self.inner
     }
 
     fn at(&self, time: time::Instant) -> Instant {
@@ -471,6 +429,40 @@ impl StreamLink {
         let home = ring.came + taken == ring.sent + given;
         // A byte counts as lost only after a poll later than its time.
         !home && self.looked < ring.free + self.round(ring)
+    }
+}
+
+impl PortLink for StreamLink {
+    fn beats(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.beats)
+    }
+
+    fn last_words(&self, bytes: &dyn Fn(usize) -> Vec<u8>) -> std::io::Result<Vec<LastWords>> {
+        let rings = self.rings.iter().enumerate();
+        rings
+            .map(|(ring, own)| own.wire.last_words(&bytes(ring)))
+            .collect()
+    }
+
+    fn resume(&mut self) {
+        if self.trouble == Some(Trouble::Interrupted) {
+            self.trouble = None;
+            self.interrupt = Arc::default();
+        }
+    }
+
+    fn take_unplaced(&mut self) -> u64 {
+        let rings = self.rings.iter_mut();
+        rings.map(|ring| std::mem::take(&mut ring.unplaced)).sum()
+    }
+
+    fn take_gaps(&mut self) -> Vec<time::Duration> {
+        let rings = self.rings.iter_mut();
+        rings.flat_map(|ring| ring.wire.take_gaps()).collect()
+    }
+
+    fn inner_links(&self) -> &[InnerLink] {
+        &self.inner
     }
 }
 

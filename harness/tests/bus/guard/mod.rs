@@ -6,9 +6,10 @@ mod speed;
 mod traffic;
 mod trouble;
 
+use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{Axis, Bus, Options};
 use harness::guard::{Guarded, Limits};
-use harness::link::{Link, SimulatedLink};
+use harness::link::Link;
 use harness_proto::line::Rate;
 use harness_proto::nd21::io::Input;
 use harness_proto::novobus::address::RingSize;

@@ -1,12 +1,11 @@
 //! The safe state, confirmed and not (ND21 11.8, 14.10).
 
 use super::{axis, bus, guarded, ring, size};
+use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::Bus;
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits, SafeState, Standing, blind_stop, safe_state};
-use harness::link::{
-    DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault, SimulatedLink,
-};
+use harness::link::{DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::{Mode, Position};
 use harness_proto::nd21::ram;

@@ -1,12 +1,11 @@
 //! Ordinary traffic behind the guard: the driver's functions, and the scenarios of the corpus.
 
 use super::{axis, bus, guarded, link, size};
+use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{Bus, Error, count_drives, recover};
 use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
-use harness::link::{
-    Capability, Line, Link, LinkFault, Moment, Octets, PlacedFault, SimulatedLink, Trouble,
-};
+use harness::link::{Capability, Line, Link, LinkFault, Moment, Octets, PlacedFault, Trouble};
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;

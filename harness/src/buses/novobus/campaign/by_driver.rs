@@ -3,10 +3,11 @@
 
 use super::class::{Evidence, Wrong, named};
 use super::sound::{Sound, all_back};
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options};
 use crate::buses::novobus::language::plan::PlannedCall;
 use crate::campaign::fault::Case;
-use crate::link::{Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use crate::link::{Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;

@@ -5,9 +5,10 @@
 use super::class::{Evidence, Wrong};
 use super::conversation::Answers;
 use super::sound::{Sound, all_back};
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
 use crate::campaign::fault::{Case, link_index};
-use crate::link::{Link, Moment, Octets, PlacedFault, SimulatedLink};
+use crate::link::{Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 use harness_proto::novobus::sync::SYNCO;

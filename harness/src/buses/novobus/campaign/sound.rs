@@ -1,7 +1,8 @@
 //! Compares the cells of a ring with those of the same ring without a fault.
 
 use super::class::Wrong;
-use crate::link::{Link, SimulatedLink};
+use crate::buses::SimulatedLink;
+use crate::link::Link;
 use harness_proto::nd21::ram::{BUS_ADDR, ERRORCODE};
 use harness_sim::novobus::cells::Cells;
 use harness_sim::novobus::device::Device;

@@ -4,13 +4,14 @@
 use super::args::RigArguments;
 use super::axes;
 use super::failure::Failure;
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, Bus, Options};
 use crate::buses::novobus::drives;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use crate::counted::counted;
-use crate::link::{Line, SimulatedLink, Trouble};
+use crate::link::{Line, Trouble};
 use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::Plan;

@@ -1,7 +1,8 @@
 //! How far ahead of the line bytes are handed over, in virtual time.
 
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, Bus, Options};
-use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault, SimulatedLink};
+use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;

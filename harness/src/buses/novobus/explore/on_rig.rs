@@ -6,15 +6,14 @@ use super::judge::{Exchange, Judge, prologue};
 use super::oracle::{Difference, sent};
 use super::order::{Command, Order};
 use super::play::Seen;
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin;
 use crate::explore::ExploreError;
 use crate::explore::features;
 use crate::explore::{Rehearsal, Target, Tried};
 use crate::guard::Guarded;
-use crate::link::{
-    Capability, Line as _, Link, Moment, Octets, PlacedFault, SimulatedLink, Trouble,
-};
+use crate::link::{Capability, Line as _, Link, Moment, Octets, PlacedFault, Trouble};
 use crate::rig::{Run, examine};
 use crate::scenario::run::start_anew;
 use crate::scenario::simulate;

@@ -4,10 +4,11 @@ use super::case::Case;
 use super::oracle::{Difference, against_model, against_reference, against_witnesses, beside};
 use super::play::play;
 use super::setup::Setup;
+use crate::buses::SimulatedLink;
 use crate::explore::ExploreError;
 use crate::explore::features;
 use crate::explore::{Rehearsal, Target, Tried};
-use crate::link::{Link, SimulatedLink};
+use crate::link::Link;
 use harness_sim::record::Trace;
 
 /// Compares a simulated ring with its model, and with the reference model if its drives are plain and sound.

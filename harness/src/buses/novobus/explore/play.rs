@@ -1,7 +1,8 @@
 //! A case on simulated rings without the way over its text: thousands a second. A test holds that both ways are one.
 
 use super::case::{Case, What};
-use crate::link::{DriveFault, Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use crate::buses::SimulatedLink;
+use crate::link::{DriveFault, Line, Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 

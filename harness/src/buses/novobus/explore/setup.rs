@@ -2,9 +2,9 @@
 
 use super::case::Case;
 use super::play::{Seen, play};
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::plan_header;
 use crate::buses::novobus::language::syntax::{Drives, Header, Setup as HeaderLine, SetupKind};
-use crate::link::SimulatedLink;
 use crate::rig::Rig;
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::problem::Problems;

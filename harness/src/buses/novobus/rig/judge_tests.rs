@@ -1,9 +1,10 @@
 //! Verdicts of attempts on rings in virtual time that are seen as through a port.
 
 use super::{Heard, judge};
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::{Entry, sources};
-use crate::link::{Capability, Event, Link, Octets, Recording, SimulatedLink};
+use crate::link::{Capability, Event, Link, Octets, Recording};
 use crate::rig::check::parse;
 use crate::rig::run::{Way, known, play_one, twin};
 use crate::scenario::plan::Plan;

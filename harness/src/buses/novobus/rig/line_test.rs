@@ -339,7 +339,7 @@ mod tests {
     }
 
     /// A simulated ring of three drives at a rate.
-    fn ring(line: &str) -> crate::link::SimulatedLink {
+    fn ring(line: &str) -> crate::buses::SimulatedLink {
         let text = format!("title t\nring 3\nline {line}\n> 80\n");
         let entry = Entry::new(source("ring.scn", text), None).expect("a scenario");
         simulate::bench(&entry.plan.expect("a plan"))

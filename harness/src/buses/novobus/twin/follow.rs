@@ -3,8 +3,9 @@
 use super::compare::Comparer;
 use super::comparison::{Comparison, Exactness};
 use super::known::Knowledge;
+use crate::buses::SimulatedLink;
 use crate::buses::novobus::link::BesideTheBus;
-use crate::link::{Event, Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use crate::link::{Event, Line, Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;

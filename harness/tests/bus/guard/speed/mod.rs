@@ -4,10 +4,11 @@ mod attacks;
 mod random;
 
 use super::size;
+use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{Bus, Options};
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits};
-use harness::link::{Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use harness::link::{Line, Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Rate;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::io::Input;
