@@ -6,9 +6,10 @@
 pub(crate) mod inner;
 pub(crate) mod lateness;
 mod octets;
+pub(crate) mod port_end;
+pub(crate) mod pump;
 mod record;
 mod replay;
-pub(crate) mod ring;
 pub(crate) mod stamp;
 pub(crate) mod tamper;
 

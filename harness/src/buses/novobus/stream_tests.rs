@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::link::Octets;
+use crate::link::pump::{SLACK, STAY};
 use crate::port::{Endpoint, PortSettings, open};
 use harness_proto::novobus::sync::SYNCO;
 use std::io::Write as _;
@@ -34,13 +35,13 @@ fn link() -> (StreamLink, TcpStream) {
 #[test]
 fn who_waits_is_awake_for_the_last_byte() {
     let (mut link, _ring) = link();
-    assert_eq!(link.awaited(link.now()), None, "nothing is under way");
+    assert_eq!(link.pump.awaited(link.now()), None, "nothing is under way");
     let free = link.send_octets(0, &[0x88, 0xFF]);
     let home = free + link.byte_time() * u64::from(DRIVES);
-    assert_eq!(link.awaited(Instant::START), Some(home));
-    assert_eq!(link.awaited(home), Some(home));
+    assert_eq!(link.pump.awaited(Instant::START), Some(home));
+    assert_eq!(link.pump.awaited(home), Some(home));
     assert_eq!(
-        link.awaited(home + STAY),
+        link.pump.awaited(home + STAY),
         None,
         "it is late: who knows when it comes"
     );
@@ -54,10 +55,10 @@ fn who_waits_says_for_what() {
     let home = free + link.byte_time() * u64::from(DRIVES);
     let said = home - link.byte_time() * 2;
     link.attend(0, said);
-    assert_eq!(link.awaited(Instant::START), Some(said));
-    assert_eq!(link.awaited(said + STAY), Some(home));
+    assert_eq!(link.pump.awaited(Instant::START), Some(said));
+    assert_eq!(link.pump.awaited(said + STAY), Some(home));
     link.begin();
-    assert_eq!(link.awaited(Instant::START), None);
+    assert_eq!(link.pump.awaited(Instant::START), None);
 }
 
 /// The link does not stay awake for a byte that has arrived.
@@ -69,7 +70,7 @@ fn what_has_come_is_not_waited_for() {
     while link.receive_octet(0).is_none() {
         assert!(link.now() < end && link.wait(end), "{:?}", link.trouble());
     }
-    assert_eq!(link.awaited(Instant::START), None);
+    assert_eq!(link.pump.awaited(Instant::START), None);
 }
 
 /// A byte counts as lost later if the computer was late: the byte may already be in the buffer, or the ring stood still as well.
@@ -77,10 +78,12 @@ fn what_has_come_is_not_waited_for() {
 fn who_was_away_waits_for_lost_bytes_as_much_longer() {
     let (mut link, _ring) = link();
     link.send_octets(0, &[0x80]);
-    let calm = link.round(&link.rings[0]);
+    let calm = link.pump.round(&link.pump.ports[0]);
     let now = time::Instant::now();
-    link.late.woken(now, now + time::Duration::from_secs(8));
-    let away = link.round(&link.rings[0]);
+    link.pump
+        .late
+        .woken(now, now + time::Duration::from_secs(8));
+    let away = link.pump.round(&link.pump.ports[0]);
     assert!(away > calm + SLACK, "{away}, {calm} before");
 }
 
@@ -90,7 +93,7 @@ fn who_was_away_looks_before_a_byte_counts_as_lost() {
     let (mut link, mut ring) = link();
     let free = link.send_octets(0, &[0x80]);
     ring.write_all(&[0x80]).expect("room");
-    let over = free + link.round(&link.rings[0]);
+    let over = free + link.pump.round(&link.pump.ports[0]);
     while link.now() <= over {
         std::thread::sleep(time::Duration::from_millis(5));
     }
@@ -100,7 +103,7 @@ fn who_was_away_looks_before_a_byte_counts_as_lost() {
     assert_eq!(link.receive_octet(0).map(|(_, byte)| byte.byte), Some(0x80));
     // A missing byte counts as lost at the first poll behind its time, without a sleep.
     let free = link.send_octets(0, &[0x80]);
-    let over = free + link.round(&link.rings[0]);
+    let over = free + link.pump.round(&link.pump.ports[0]);
     while link.now() <= over {
         std::thread::sleep(time::Duration::from_millis(5));
     }
@@ -114,16 +117,16 @@ fn who_was_away_looks_before_a_byte_counts_as_lost() {
 fn who_stands_still_while_awake_is_late() {
     let (mut link, _ring) = link();
     let long = Span::from_millis(60_000);
-    while link.awake.is_none() {
+    while link.pump.awake.is_none() {
         // The computer may be late here too: then try again with the next byte.
         let free = link.send_octets(0, &[0x88]);
         let home = free + link.byte_time() * u64::from(DRIVES);
-        while link.awake.is_none() && link.now() < home + STAY {
+        while link.pump.awake.is_none() && link.now() < home + STAY {
             assert!(link.wait(home + long));
         }
     }
     std::thread::sleep(time::Duration::from_millis(20));
     assert!(link.wait(link.now() + long));
-    let late = link.lateness();
+    let late = link.pump.lateness();
     assert!(late > Span::from_millis(15), "{late}");
 }

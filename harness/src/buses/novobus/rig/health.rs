@@ -171,11 +171,12 @@ fn shown(bytes: &[Received]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::SimulatedLink;
     use crate::buses::novobus::driver::{Bus, Options};
     use crate::buses::novobus::link::BesideTheBus as _;
     use crate::guard::{Guarded, Limits};
     use crate::library::Entry;
-    use crate::link::{Line as _, LinkFault, Moment, PlacedFault, SimulatedLink};
+    use crate::link::{Line as _, LinkFault, Moment, PlacedFault};
     use crate::rig::line_test;
     use crate::scenario::simulate;
     use crate::scenario::source::Source;

@@ -1,7 +1,8 @@
 //! Verdicts of attempts on a port whose bytes come late.
 
 use super::tests::{READ, judged_on, link, plan};
-use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault, SimulatedLink};
+use crate::buses::SimulatedLink;
+use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{self, Medium, Out};
 use crate::rig::run::Way;
 use crate::scenario::verdict::Verdict::{Failed, Inconclusive, Marginal, Passed};

@@ -1,4 +1,4 @@
-//! One ring's two ends at the master, over a stream of bytes: what waits for the operating system, and what has come.
+//! One port of the bench's own station, over a stream of octets: what waits for the operating system, and what has come.
 
 use super::Trouble;
 use super::stamp::stamped;
@@ -8,6 +8,7 @@ use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use std::collections::VecDeque;
+use std::fmt;
 
 /// How far ahead of the line bytes are given to the operating system.
 const AHEAD: Span = Span::from_millis(100);
@@ -15,11 +16,35 @@ const AHEAD: Span = Span::from_millis(100);
 /// Bytes of a conversation that are recorded on each link; more are counted only.
 pub(crate) const MOST_RECORDED: usize = 4_000_000;
 
-/// One ring's two ends at the master.
+/// What a bus knows of the octets that are under way at a port.
+pub(crate) trait Accounting: fmt::Debug + Send {
+    /// Nothing is under way.
+    fn rest(&mut self);
+
+    /// An octet leaves.
+    fn sent(&mut self);
+
+    /// An octet has come.
+    fn came(&mut self);
+
+    /// Whether more has left than has come.
+    fn is_owed(&self) -> bool;
+
+    /// Whether all that is to come has come, where interposers have taken and given these numbers of octets meanwhile.
+    fn is_even(&self, taken: u64, given: u64) -> bool;
+
+    /// How long behind an octet its answer comes at the soonest.
+    fn soonest(&self, octet_time: Span) -> Span;
+
+    /// How long behind an octet its answer comes at the latest, where nothing is lost.
+    fn latest(&self, octet_time: Span) -> Span;
+}
+
+/// One port of the bench's own station.
 #[derive(Debug)]
-pub(crate) struct Ring {
+pub(crate) struct PortEnd<A> {
     pub(crate) wire: Wire,
-    pub(crate) drives: u8,
+    pub(crate) accounting: A,
     /// What has not been given to the operating system, with the time at which its start bit is due, and whether
     /// it must not be sooner.
     pub(crate) queue: VecDeque<(Instant, bool, Outgoing)>,
@@ -29,9 +54,6 @@ pub(crate) struct Ring {
     pub(crate) attended: Option<Instant>,
     pub(crate) received: VecDeque<(Instant, Received)>,
     pub(crate) last_arrival: Instant,
-    /// Bytes sent and received since the ring was last at rest.
-    pub(crate) sent: u64,
-    pub(crate) came: u64,
     pub(crate) outgoing: Tamper,
     pub(crate) incoming: Tamper,
     pub(crate) log: [Vec<LineByte>; 2],
@@ -39,18 +61,16 @@ pub(crate) struct Ring {
     pub(crate) unplaced: u64,
 }
 
-impl Ring {
-    pub(crate) fn new(wire: Wire, drives: u8) -> Self {
+impl<A: Accounting> PortEnd<A> {
+    pub(crate) fn new(wire: Wire, accounting: A) -> Self {
         Self {
             wire,
-            drives,
+            accounting,
             queue: VecDeque::new(),
             free: Instant::START,
             attended: None,
             received: VecDeque::new(),
             last_arrival: Instant::START,
-            sent: 0,
-            came: 0,
             outgoing: Tamper::default(),
             incoming: Tamper::default(),
             log: [Vec::new(), Vec::new()],
@@ -67,14 +87,15 @@ impl Ring {
         self.attended = None;
         self.received.clear();
         self.last_arrival = Instant::START;
-        (self.sent, self.came, self.carried) = (0, 0, 0);
+        self.accounting.rest();
+        self.carried = 0;
         self.outgoing = Tamper::default();
         self.incoming = Tamper::default();
         self.log = [Vec::new(), Vec::new()];
     }
 
-    /// Queues a byte of the master's.
-    pub(crate) fn send(&mut self, now: Instant, byte: u8, byte_time: Span, recording: bool) {
+    /// Queues a byte of the bench's.
+    pub(crate) fn send(&mut self, now: Instant, byte: u8, byte_time: Span) {
         let start = self.free.max(now);
         let passed = self.outgoing.pass(Received::good(byte), start);
         let begun = start + passed.delay;
@@ -84,7 +105,7 @@ impl Ring {
             self.queue
                 .push_back((free, std::mem::take(&mut exact), outgoing));
             free += length;
-            self.sent += 1;
+            self.accounting.sent();
         };
         for received in passed.bytes() {
             let outgoing = match received.error {
@@ -99,7 +120,7 @@ impl Ring {
         // A lost byte takes its byte time too.
         self.free = free.max(begun + byte_time);
         self.carried += 1;
-        if recording && self.log[0].len() < MOST_RECORDED {
+        if self.log[0].len() < MOST_RECORDED {
             self.log[0].extend(passed.seen(byte, begun + byte_time, byte_time));
         }
     }
@@ -122,7 +143,6 @@ impl Ring {
         &mut self,
         (told, now): (Instant, Instant),
         byte_time: Span,
-        recording: bool,
     ) -> Result<(), Trouble> {
         let mut bytes = Vec::new();
         let result = self.wire.receive(&mut bytes);
@@ -131,10 +151,10 @@ impl Ring {
         }
         self.unplaced += self.wire.take_unplaced();
         for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
-            self.came += 1;
+            self.accounting.came();
             self.carried += 1;
             let passed = self.incoming.pass(byte, at);
-            let recording = recording && self.log[1].len() < MOST_RECORDED;
+            let recording = self.log[1].len() < MOST_RECORDED;
             for byte in passed.seen(byte.byte, at + passed.delay, byte_time) {
                 let arrival = byte.arrival().map(|received| (byte.at, received));
                 self.received.extend(arrival);
