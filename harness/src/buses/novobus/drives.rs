@@ -48,7 +48,7 @@ pub(crate) fn released_header(sizes: &[u8]) -> Source {
     }
 }
 
-/// Simulated rings with the header that `source` holds, their drives whole ND21 unless it says otherwise. `sizes` replaces the sizes of
+/// Simulated rings with the header that `source` holds, their drives whole ND21 unless it names another model. `sizes` replaces the sizes of
 /// its `ring` lines, ring by ring; where neither says any, there is one ring of three.
 ///
 /// # Errors

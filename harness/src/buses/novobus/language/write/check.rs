@@ -50,6 +50,8 @@ pub(crate) fn drive_check(check: &DriveCheck) -> String {
         Condition::InError(true) => "in error".to_owned(),
         Condition::InError(false) => "normal".to_owned(),
         Condition::Memory(place, bytes) => format!("memory {} = {bytes}", cell::place(place)),
+        // A cell by its address stands behind `memory`; behind it a name is read as well.
+        Condition::Cell(check) if check.mask.is_some() => format!("memory {}", cell::check(check)),
         Condition::Cell(check) => cell::check(check),
         Condition::Shows(showing) => shows(showing),
     };
