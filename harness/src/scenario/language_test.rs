@@ -122,9 +122,9 @@ impl Settle<Frames> for Planner {
 }
 
 impl Language for Frames {
-    const BUS: Bus = Bus::Unitek;
+    const BUS: Bus = Bus::NAMES[1].1;
     const STRICT: bool = true;
-    const SOURCE: &'static str = "unitek 5.4";
+    const SOURCE: &'static str = "frames 5.4";
     const EXAMPLE: &'static str = "`> 201 3D 40 00`: the master asks for a status";
 
     type Header = Vec<u8>;
@@ -297,13 +297,17 @@ fn played(text: &str) -> (Verdict, String) {
     (outcome.verdict, message)
 }
 
-const HEADER: &str = "title   Frames\nsource  unitek 5.4\nbus     unitek\ndrive 1\n\n";
+/// A header of the bus.
+fn header() -> String {
+    let name = Frames::BUS.name();
+    format!("title   Frames\nsource  frames 5.4\nbus     {name}\ndrive 1\n\n")
+}
 
 #[test]
 fn another_bus_is_read_settled_written_and_played() {
     let steps =
         "> 080 80 80\n+0.1ms..20ms < 080 80 xx\nfor k in 1..3\nread 1 SPEED_ACTUAL = 80 80\nend\n";
-    let text = format!("{HEADER}{steps}wait 5ms\n");
+    let text = format!("{}{steps}wait 5ms\n", header());
     let scenario: Scenario<Frames> = parse(&source(&text)).expect("a scenario");
     assert_eq!(write(&scenario), text);
     assert_eq!(played(&text), (Verdict::Passed, String::new()));
@@ -311,11 +315,11 @@ fn another_bus_is_read_settled_written_and_played() {
 
 #[test]
 fn what_is_not_as_a_line_says_fails_in_the_words_of_the_bus() {
-    let wrong = format!("{HEADER}> 080 80 80\n< 080 80 81\n");
+    let wrong = format!("{}> 080 80 80\n< 080 80 81\n", header());
     let message = "the master received 80#8080 where 80#8081 is expected";
     assert_eq!(played(&wrong), (Verdict::Failed, message.to_owned()));
     // Frames that no line asks for are a failure on this bus, also without `strict`.
-    let (verdict, message) = played(&format!("{HEADER}> 080 80 80\n"));
+    let (verdict, message) = played(&format!("{}> 080 80 80\n", header()));
     assert_eq!(verdict, Verdict::Failed);
     assert!(message.starts_with("80#8080 was received"), "{message}");
 }
@@ -323,7 +327,7 @@ fn what_is_not_as_a_line_says_fails_in_the_words_of_the_bus() {
 #[test]
 fn its_mistakes_have_their_places() {
     let mistake = |steps: &str| {
-        let source = source(&format!("{HEADER}{steps}\n"));
+        let source = source(&format!("{}{steps}\n", header()));
         let found = parse::<Frames>(&source).expect_err("a mistake");
         let first = found.all()[0].clone();
         let place = source.text[first.span.start..first.span.end].to_owned();
