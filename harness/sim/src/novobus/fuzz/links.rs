@@ -2,22 +2,38 @@
 
 use super::LONGEST;
 use super::features::{Feature, Notebook};
+use arbitrary::{Arbitrary, Unstructured};
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
 
 type Read = Vec<Result<Received, BadMark>>;
 
-/// The first byte chooses how the stream is cut, the rest is the stream as it is read from a socket or a pseudo terminal
-/// (PARMRK, termios).
+/// A stream as it is read from a socket or a pseudo terminal (PARMRK, termios).
+struct Stream<'a> {
+    /// Where it is cut in two, and the length of its pieces less one.
+    cut: u8,
+    bytes: &'a [u8],
+}
+
+impl<'a> Arbitrary<'a> for Stream<'a> {
+    /// The cut, then the bytes.
+    fn arbitrary(input: &mut Unstructured<'a>) -> arbitrary::Result<Self> {
+        Ok(Self {
+            cut: input.arbitrary()?,
+            bytes: input.bytes(input.len().min(LONGEST))?,
+        })
+    }
+}
+
+/// A stream means the same however it is cut.
 ///
 /// # Panics
 /// Another split gives other bytes; a byte is invented or lost; bytes that are written again with marks are
 /// read differently; a good end is taken for the middle of a mark, or the reverse.
 pub fn links(data: &[u8]) {
-    let Some((&cut, stream)) = data.split_first() else {
+    let Ok(Stream { cut, bytes: stream }) = Unstructured::new(data).arbitrary() else {
         return;
     };
-    let stream = &stream[..stream.len().min(LONGEST)];
     let (whole, boundary) = read([stream]);
     let pieces = stream.chunks(usize::from(cut) + 1);
     assert_eq!(read(pieces), (whole.clone(), boundary), "cut at {cut}");
@@ -47,10 +63,9 @@ pub(super) fn count() -> usize {
 /// As the target.
 pub(super) fn noted(data: &[u8], notes: &mut Notebook<'_>) {
     links(data);
-    let Some((&cut, stream)) = data.split_first() else {
+    let Ok(Stream { cut, bytes: stream }) = Unstructured::new(data).arbitrary() else {
         return;
     };
-    let stream = &stream[..stream.len().min(LONGEST)];
     let mut mark = "between marks";
     let mut note = |mark, what| notes.note(|| Feature::new("", mark, what));
     for (index, byte) in stream.iter().enumerate() {

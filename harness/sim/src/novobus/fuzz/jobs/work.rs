@@ -1,6 +1,7 @@
 //! What a master is to do, and the faults that meet it.
 
 use crate::fault::{Flips, LinkFault};
+use arbitrary::{Arbitrary, Unstructured};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Job, Options, Packing};
 use harness_proto::time::Span;
@@ -16,9 +17,6 @@ pub(super) const CONSTANTS: u16 = 0xFD90;
 
 /// How many of them there are.
 pub(super) const CONSTANT_CELLS: u16 = 0x60;
-
-/// How many bytes of the input are one job or one fault.
-const RECORD: usize = 6;
 
 /// A job, and when it is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,8 +40,31 @@ pub struct Fault {
     pub what: LinkFault,
 }
 
+/// What stands in front of the jobs and faults of an input.
+#[derive(Arbitrary)]
+struct Head {
+    /// How many drives there are, less one; 1 to 6.
+    drives: u8,
+    /// Bits 0 and 1: the packing (all, none, no "next", not cut). Bit 2: process data is exchanged. Bit 3: time-outs are monitored.
+    options: u8,
+}
+
+/// A job or a fault, in six bytes.
+#[derive(Arbitrary)]
+struct Record {
+    /// The low half is 0 to 9 for a job, 10 to 13 for a fault at a byte, 14 for a cut, 15 for another byte on the last link.
+    kind: u8,
+    /// The drive, or the link.
+    place: u8,
+    /// The gap in front of a job, or the number of the byte.
+    at: u8,
+    data: [u8; 2],
+    /// Of a job: bit 0 forbids a second run. Of a fault: how far it goes.
+    last: u8,
+}
+
 /// What a master is to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Work {
     /// How many drives its ring has.
     pub drives: u8,
@@ -59,15 +80,11 @@ pub struct Work {
     pub faults: Vec<Fault>,
 }
 
-impl Work {
-    /// Reads what stands in an input. The first byte says how many drives there are (1 to 6). Of the second the lowest two bits are the
-    /// packing (all, none, no "next", not cut), bit 2 switches the exchange on and bit 3 the monitoring. Then come jobs and faults of six
-    /// bytes each: a kind (its low half: 0 to 9 jobs, 10 to 13 faults at a byte, 14 a cut, 15 another byte on the last link), a drive or
-    /// link, a gap or the number of a byte, two bytes of data, and a last one whose lowest bit forbids a second run.
-    #[must_use]
-    pub fn read(data: &[u8]) -> Self {
-        let head = |i: usize| data.get(i).copied().unwrap_or(0);
-        let packing = match head(1) & 3 {
+impl<'a> Arbitrary<'a> for Work {
+    /// A [`Head`], then [`Record`]s up to the end.
+    fn arbitrary(input: &mut Unstructured<'a>) -> arbitrary::Result<Self> {
+        let head: Head = input.arbitrary()?;
+        let packing = match head.options & 3 {
             0 => Packing::ALL,
             1 => Packing::NONE,
             2 => Packing {
@@ -80,22 +97,23 @@ impl Work {
             },
         };
         let mut work = Self {
-            drives: 1 + head(0) % 6,
+            drives: 1 + head.drives % 6,
             packing,
-            exchange: head(1) & 4 != 0,
-            monitoring: head(1) & 8 != 0,
+            exchange: head.options & 4 != 0,
+            monitoring: head.options & 8 != 0,
             orders: Vec::new(),
             faults: Vec::new(),
         };
         let mut replaced = None;
-        for record in data.get(2..).unwrap_or_default().chunks_exact(RECORD) {
-            let &[kind, place, at, high, low, last] = record else {
-                continue;
-            };
-            match kind & 15 {
-                0..10 => work.order(kind & 15, place, at, [high, low], last),
-                15 => replaced = Some((u64::from(at) + 1 + 256 * u64::from(place & 1), low)),
-                kind => work.fault(kind, place, at, [high, low], last),
+        while !input.is_empty() {
+            let record: Record = input.arbitrary()?;
+            match record.kind & 15 {
+                0..10 => work.order(&record),
+                15 => {
+                    let byte = u64::from(record.at) + 1 + 256 * u64::from(record.place & 1);
+                    replaced = Some((byte, record.data[1]));
+                }
+                _ => work.fault(&record),
             }
         }
         // A replaced byte with good parity can pass the 8-bit check in combination with other faults, so it must be the only fault.
@@ -106,10 +124,25 @@ impl Work {
                 what: LinkFault::Replace(other),
             });
         }
-        work
+        Ok(work)
+    }
+}
+
+impl Work {
+    /// The work of an input. Every input is one: a byte that is missing at its end is 0.
+    #[must_use]
+    pub fn read(input: &[u8]) -> Self {
+        Self::arbitrary(&mut Unstructured::new(input)).unwrap_or_else(|_never| Self::default())
     }
 
-    fn order(&mut self, kind: u8, place: u8, at: u8, data: [u8; 2], last: u8) {
+    fn order(&mut self, record: &Record) {
+        let &Record {
+            kind,
+            place,
+            at,
+            data,
+            last,
+        } = record;
         let number = self.orders.len() as u16;
         if self.orders.len() >= MOST_JOBS {
             return;
@@ -119,7 +152,7 @@ impl Work {
         let bit_cell = 0x40 + number as u8;
         let constant = CONSTANTS + u16::from(data[0]) % (CONSTANT_CELLS - 4);
         let word = u16::from_be_bytes(data);
-        let (command, address) = match kind {
+        let (command, address) = match kind & 15 {
             0 | 1 => (Command::ReadByte { address: constant }, constant),
             2 => (Command::ReadWord { address: constant }, constant),
             3 => (Command::ReadLong { address: constant }, constant),
@@ -140,7 +173,7 @@ impl Work {
             }
             _ => {
                 let (address_low, data) = (bit_cell, data[1]);
-                let command = match kind {
+                let command = match kind & 15 {
                     8 => Command::And { address_low, data },
                     _ => Command::Or { address_low, data },
                 };
@@ -155,7 +188,14 @@ impl Work {
         });
     }
 
-    fn fault(&mut self, kind: u8, place: u8, at: u8, data: [u8; 2], last: u8) {
+    fn fault(&mut self, record: &Record) {
+        let &Record {
+            kind,
+            place,
+            at,
+            data,
+            last,
+        } = record;
         if self.faults.len() >= MOST_FAULTS {
             return;
         }
@@ -165,7 +205,7 @@ impl Work {
                 ..Flips::default()
             })
         };
-        let what = match (kind, data[1] % 8) {
+        let what = match (kind & 15, data[1] % 8) {
             (14, _) => LinkFault::Cut,
             (_, 0..5) => flips(1 << (last % 8)),
             (_, 5) => LinkFault::Drop,
