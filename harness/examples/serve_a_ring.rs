@@ -5,8 +5,9 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut out = std::io::stdout();
     let served = Served::ring(3, "", "127.0.0.1:0")?;
-    println!("the controller connects to {}", served.address());
+    writeln!(out, "the controller connects to {}", served.address())?;
 
     // In place of the controller: the byte 80, SYNCO (ND21 9.2), comes back through all drives as it is.
     let mut controller = TcpStream::connect(served.address())?;

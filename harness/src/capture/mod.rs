@@ -1,7 +1,7 @@
 //! Captures: what the links of a ring carried, read from a file of any program.
 //!
 //! [`read`] takes pcapng of link type 250 and the JSON of `drivebench trace`. A capture can be shown in every form that a run can,
-//! compared with another ([`diff`]), turned into a scenario ([`scenario`]), and so be judged against the model
+//! compared with another ([`diff()`]), turned into a scenario ([`scenario`]), and so be judged against the model
 //! ([`judge`]): what the master sent and what was damaged on the way is done to a simulated ring, and what came back is
 //! compared.
 //!

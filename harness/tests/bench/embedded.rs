@@ -1,4 +1,4 @@
-//! The crate as another program uses it: mistakes are told with their place.
+//! The crate as another program uses it: a mistake names its place.
 
 use harness::{Drives, Error, Scenario};
 

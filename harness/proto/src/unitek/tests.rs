@@ -10,9 +10,9 @@ use super::{ALIASES, DEFAULT_RX, DEFAULT_TX, REGISTERS};
 use crate::can::{BitRate, Frame, Id};
 use crate::time::{Instant, Span};
 use proptest::prelude::*;
+use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
-use std::{format, vec};
 
 const VECTORS: &str = include_str!("../../../../corpora/vectors/unitek.txt");
 
@@ -508,7 +508,7 @@ proptest! {
 
 #[test]
 fn messages_are_sentences() {
-    let texts = vec![
+    let texts = [
         BadName::Unknown.to_string(),
         Denial::Load { permille: 704 }.to_string(),
         Denial::Never { register: 0xB0 }.to_string(),

@@ -1,6 +1,6 @@
 //! Rings over streams of bytes: real ones, or simulated ones in another process.
 //!
-//! The [pump](crate::link::pump) moves the bytes. This file knows what a ring is: each byte that is sent comes back (ND21 8.2), and the
+//! The pump (`link/pump.rs`) moves the bytes. This file knows what a ring is: each byte that is sent comes back (ND21 8.2), and the
 //! master has the first and the last of its links.
 
 use crate::link::inner::InnerLink;

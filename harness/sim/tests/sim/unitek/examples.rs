@@ -9,7 +9,7 @@ fn with(name: &str, word: &str) -> Properties {
     let mut properties = Properties::default();
     assert!(
         Description::of(name)
-            .unwrap()
+            .expect("a property of this name")
             .set(&mut properties, Setting::Word(word)),
         "{name}"
     );

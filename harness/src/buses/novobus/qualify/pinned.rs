@@ -381,7 +381,7 @@ fn kept_by(drives: u8, byte: u8, conversations: &[Conversation]) -> Option<Pinne
 }
 
 /// Twice with other values: each cell gets a byte, upwards, and is read; then the complement, downwards. In between one write and one read
-/// more, so that what is wrong every so many times is wrong at other cells.
+/// more, so that a fault that repeats after a number of accesses meets other cells.
 fn march(drives: u8, drive: u8) -> Option<String> {
     let mut text = header(
         "Each cell of the recording written and read with two values, twice",

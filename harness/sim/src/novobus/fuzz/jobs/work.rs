@@ -81,7 +81,7 @@ pub struct Work {
 }
 
 impl<'a> Arbitrary<'a> for Work {
-    /// A [`Head`], then [`Record`]s up to the end.
+    /// A head of two bytes, then records of six bytes up to the end.
     fn arbitrary(input: &mut Unstructured<'a>) -> arbitrary::Result<Self> {
         let head: Head = input.arbitrary()?;
         let packing = match head.options & 3 {
