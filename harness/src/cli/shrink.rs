@@ -118,7 +118,6 @@ fn on_simulated(subject: &Subject) -> Result<Option<Difference>, ExploreError> {
 /// What a finding of a rig is made into on the simulator first, where a known deviation of a drive shows the same there: runs that
 /// cost nothing. What comes of it is only a proposal; the rig decides.
 fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
-    let kind = finding.difference.kind();
     let drives = 0..finding.case.drives;
     let own = finding.difference.drive;
     let suspects: Vec<u8> = own.map_or_else(|| drives.collect(), |drive| vec![drive]);
@@ -138,7 +137,7 @@ fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
                 },
             };
             let found = on_simulated(&subject).ok().flatten();
-            let Some(difference) = found.filter(|found| found.kind() == kind) else {
+            let Some(difference) = found.filter(|found| found.is_like(&finding.difference)) else {
                 continue;
             };
             // The rig's rings have the sizes that they have.
@@ -186,8 +185,7 @@ fn on_rig(
     if let Some(start) = start {
         spent += 1;
         let found = ask(&start)?;
-        let kind = finding.difference.kind();
-        if let Some(difference) = found.filter(|found| found.kind() == kind) {
+        if let Some(difference) = found.filter(|found| found.is_like(&finding.difference)) {
             let mut small = make_small(start, difference, most.saturating_sub(spent), &mut ask)?;
             small.runs += spent;
             return Ok(small);

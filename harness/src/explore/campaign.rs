@@ -394,13 +394,13 @@ impl Campaign {
             true => (TIMES_LATE, TIMES_LATE),
             false => (self.about.confirm, self.about.of),
         };
-        let kind = finding.difference.kind();
+        let own = finding.difference.clone();
         while finding.of < of && target.over().is_none() {
             target.begin();
             let tried = target.attempt(&finding.case, rehearsal)?;
             self.use_line(tried.took);
             finding.of += 1;
-            let Some(other) = tried.difference.filter(|other| other.kind() == kind) else {
+            let Some(other) = tried.difference.filter(|other| other.is_like(&own)) else {
                 if confirm > finding.seen_again + (of - finding.of) {
                     return Ok(());
                 }

@@ -218,7 +218,7 @@ impl Again {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::twin::What;
+    use crate::buses::twin::Symptom;
     use Verdict::{Failed, Flaky, Inconclusive, Marginal, Passed};
     use harness_proto::line::Received;
     use harness_proto::novobus::role::Role;
@@ -325,7 +325,7 @@ mod tests {
         let divergence = Divergence {
             ring: 0,
             byte: step + 7,
-            what: late.map_or(What::Value, |_| What::Time),
+            what: late.map_or(Symptom::Value, |_| Symptom::Time),
             expected: byte(100),
             received: byte(100 + late.unwrap_or(0)),
             role: Role::Foreign,

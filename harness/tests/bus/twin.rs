@@ -1,6 +1,6 @@
 //! The twin: a ring beside its model, and what explains a ring that differs from it.
 
-use harness::buses::novobus::twin::{Conversation, Exactness, Twin, What};
+use harness::buses::novobus::twin::{Conversation, Exactness, Symptom, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Event, Link, Octets, Recording, Replay};
 use harness::qualify::{
@@ -322,7 +322,7 @@ fn a_divergence_says_where() {
     assert_eq!((found.byte, found.drive), (7, Some(1)));
     let (found, seen) = differs(&[]);
     assert_eq!((found.byte, found.drive), (8, None));
-    assert_eq!(found.what, What::Value);
+    assert_eq!(found.what, Symptom::Value);
     assert!(found.to_string().contains("ND21 10.1"), "{found}");
     let none = Hypothesis {
         name: "as the manual says".to_owned(),

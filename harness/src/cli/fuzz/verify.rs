@@ -87,7 +87,7 @@ fn again(file: &Path, kept: &Kept) -> Result<Option<bool>, ExploreError> {
     let rehearsal = target.rehearse(&finding.case)?;
     let tried = target.attempt(&finding.case, &rehearsal)?;
     let same = tried.difference.is_some_and(|found| {
-        found.kind() == finding.difference.kind() && found.byte == finding.difference.byte
+        found.is_like(&finding.difference) && found.byte == finding.difference.byte
     });
     Ok(Some(same && finding.setup == kept.about.setup))
 }

@@ -42,7 +42,7 @@ fn small(name: &str) -> (Finding, Shrunk) {
         );
         if answer
             .as_ref()
-            .is_some_and(|other| other.kind() == finding.difference.kind())
+            .is_some_and(|other| other.is_like(&finding.difference))
         {
             measures.push(subject.case.measure());
         }

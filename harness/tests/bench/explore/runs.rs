@@ -4,6 +4,7 @@ use super::{
     Campaign, Difference, End, ExploreError, Heard, Rehearsal, Target, Tried, about, bounds,
     explore, planted, repeat, scope, seed,
 };
+use harness::buses::novobus::twin::Symptom;
 use harness::explore::{Case, OnSim, Setup};
 
 /// The ring and the reference model, which share no code, agree on everything that a run comes to.
@@ -69,7 +70,7 @@ impl Target for LateOnce {
         self.tried += 1;
         let mut tried = self.inner.attempt(case, rehearsal)?;
         tried.difference = (self.wrong)(self.tried).then(|| Difference {
-            what: "another time".to_owned(),
+            what: Symptom::Time,
             section: "9.2".to_owned(),
             rule: "sync byte".to_owned(),
             ring: 0,

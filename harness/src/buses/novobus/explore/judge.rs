@@ -54,7 +54,7 @@ impl Exchange {
 #[derive(Clone, Debug)]
 struct Mismatch {
     index: usize,
-    what: twin::What,
+    what: twin::Symptom,
     must: Option<Must>,
     role: Role,
     section: &'static str,
@@ -160,7 +160,7 @@ impl Judge {
                 };
                 if !must.may_be_missing {
                     let what = match what {
-                        twin::What::Value if self.is_shifted(exchange) => twin::What::Surplus,
+                        twin::Symptom::Value if self.is_shifted(exchange) => twin::Symptom::Surplus,
                         other => other,
                     };
                     return Err(self.mismatch(index, what, Some(must), *role));
@@ -171,7 +171,7 @@ impl Judge {
             }
         }
         match index < exchange.received.len() {
-            true => Err(self.mismatch(index, twin::What::Surplus, None, Role::Foreign)),
+            true => Err(self.mismatch(index, twin::Symptom::Surplus, None, Role::Foreign)),
             false => Ok(()),
         }
     }
@@ -181,21 +181,27 @@ impl Judge {
         exchange.harms.is_empty() && exchange.received.len() > exchange.sent.len()
     }
 
-    fn compare(&self, out: Both, must: Must, received: Option<&Received>) -> Option<twin::What> {
+    fn compare(&self, out: Both, must: Must, received: Option<&Received>) -> Option<twin::Symptom> {
         let Some(received) = received else {
-            return Some(twin::What::Missing);
+            return Some(twin::Symptom::Missing);
         };
         let noticed = out[0].is_some_and(|own| own.error.is_some());
         if (received.byte ^ must.byte) & !must.open != 0 {
-            Some(twin::What::Value)
+            Some(twin::Symptom::Value)
         } else if self.line_errors && received.error.is_some() != noticed {
-            Some(twin::What::LineStatus)
+            Some(twin::Symptom::LineStatus)
         } else {
             None
         }
     }
 
-    fn mismatch(&self, index: usize, what: twin::What, must: Option<Must>, role: Role) -> Mismatch {
+    fn mismatch(
+        &self,
+        index: usize,
+        what: twin::Symptom,
+        must: Option<Must>,
+        role: Role,
+    ) -> Mismatch {
         let section = self.model.section(role);
         Mismatch {
             index,
@@ -230,7 +236,7 @@ impl Judge {
         let ring = if self.ring == 0 { "" } else { " of ring 2" };
         let (what, number, section) = (found.what.words(), found.index + 1, found.section);
         Difference {
-            what: what.to_owned(),
+            what: found.what,
             section: section.to_owned(),
             rule: rule.to_owned(),
             ring: self.ring,

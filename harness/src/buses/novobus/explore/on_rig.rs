@@ -141,7 +141,7 @@ impl<'r, 's> OnRig<'r, 's> {
         Some(Difference::from(&twin::Divergence {
             ring: case.ring(),
             byte: index + 1,
-            what: twin::What::Time,
+            what: twin::Symptom::Time,
             expected: Some((due + round, received[index].1)),
             received: Some(received[index]),
             role,

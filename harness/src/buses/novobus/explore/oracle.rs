@@ -7,7 +7,7 @@ use super::play::Seen;
 use super::setup::{drive_name, is_first};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::link::BesideTheBus;
-use crate::buses::novobus::twin;
+use crate::buses::novobus::twin::{self, Symptom};
 use crate::link::{Link, Octets, link_name};
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
@@ -26,8 +26,8 @@ use std::ops::RangeInclusive;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Difference {
-    /// What differs, in a few words.
-    pub what: String,
+    /// What differs.
+    pub what: Symptom,
     /// The section of the ND21 manual with the rule, such as `9.6`.
     pub section: String,
     /// The rule in a few words.
@@ -52,10 +52,18 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Identifies a kind of finding: findings are equal if the same thing differs from the same rule.
+    /// Whether another finding is of the same kind: the same symptom, against the same rule of the same section.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        let kind = |own: &Self| (own.what, own.section.clone(), own.rule.clone());
+        kind(self) == kind(other)
+    }
+
+    /// The kind of the finding in words.
     #[must_use]
     pub fn kind(&self) -> String {
-        format!("{} (ND21 {}, {})", self.what, self.section, self.rule)
+        let what = self.what.words();
+        format!("{what} (ND21 {}, {})", self.section, self.rule)
     }
 
     /// Identifies a finding within a run: the same kind, in telegrams to the same drive.
@@ -91,14 +99,14 @@ impl From<&twin::Divergence> for Difference {
     fn from(found: &twin::Divergence) -> Self {
         let (section, rule) = found.role.rule();
         Self {
-            what: found.what.words().to_owned(),
+            what: found.what,
             section: section.to_owned(),
             rule: rule.to_owned(),
             ring: found.ring,
             drive: None,
             meant: found.role.drive(),
             byte: Some(found.byte),
-            time: found.what == twin::What::Time,
+            time: found.what == Symptom::Time,
             about: found.to_string(),
         }
     }
@@ -122,7 +130,7 @@ pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Differenc
         .or((expected.len() != received.len()).then_some(shorter));
     let (index, what) = match index {
         Some(index) => (index, twin::what_of(expected, received, index)),
-        None => (pairs().position(|(a, b)| a.0 != b.0)?, twin::What::Time),
+        None => (pairs().position(|(a, b)| a.0 != b.0)?, Symptom::Time),
     };
     let sent = sent(case);
     let role = answered(&roles(size, &sent), &sent).nth(index);
@@ -232,7 +240,7 @@ pub fn against_witnesses(
     } = found;
     let at = at.since_start();
     Some(Difference {
-        what: "another drive than that of the manual".to_owned(),
+        what: Symptom::Drive,
         section: found.section.to_owned(),
         rule: found.rule.to_owned(),
         ring,
@@ -259,7 +267,7 @@ fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
         let (number, at) = (place + 1, pair[1].octets()[place].at.since_start());
         let name = drive_name(case.ring(), drive);
         Some(Difference {
-            what: "another time".to_owned(),
+            what: Symptom::Time,
             section: "8.2".to_owned(),
             rule: "answer".to_owned(),
             ring: case.ring(),
@@ -286,7 +294,7 @@ pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
     let place = trace.channels.iter().position(spoke)?;
     let name = link_name(other, trace.stations, place);
     Some(Difference {
-        what: "a byte on the other ring".to_owned(),
+        what: Symptom::OtherRing,
         section: "12.2".to_owned(),
         rule: "two rings".to_owned(),
         ring: other,
@@ -333,7 +341,7 @@ fn on_link(
     };
     let name = link_name(case.ring(), case.drives, place);
     Difference {
-        what: "another byte on a link than in the reference model".to_owned(),
+        what: Symptom::Link,
         section: "9.1".to_owned(),
         rule: "ring".to_owned(),
         ring: case.ring(),
@@ -353,7 +361,7 @@ fn on_link(
 fn beside_bus(ring: usize, drive: u8, rule: &str, section: &str, detail: &str) -> Difference {
     let name = drive_name(ring, drive);
     Difference {
-        what: "another state than in the reference model".to_owned(),
+        what: Symptom::State,
         section: section.to_owned(),
         rule: rule.to_owned(),
         ring,
@@ -388,4 +396,47 @@ fn reference_faults(case: &Case) -> Option<Vec<(usize, usize, reference::Fault)>
         faults.push((usize::from(link), usize::try_from(byte).ok()?, fault));
     }
     Some(faults)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Folders of older versions hold the description in place of the name.
+    #[test]
+    fn old_and_new_findings_are_of_one_kind() {
+        let text = |what: &str| {
+            format!(
+                r#"{{"what":"{what}","section":"9.6","rule":"command","byte":3,"about":"any text"}}"#
+            )
+        };
+        let read = |what: &str| serde_json::from_str::<Difference>(&text(what));
+        let names = [
+            ("value", "another value"),
+            ("line-status", "another line status"),
+            ("missing", "a byte is missing"),
+            ("surplus", "a byte too many"),
+            ("time", "another time"),
+            ("drive", "another drive than that of the manual"),
+            ("other-ring", "a byte on the other ring"),
+            ("link", "another byte on a link than in the reference model"),
+            ("state", "another state than in the reference model"),
+        ];
+        for (name, described) in names {
+            let (new, old) = (read(name).expect(name), read(described).expect(described));
+            assert!(new.is_like(&old), "{name}");
+            assert_eq!(old.what.words(), described);
+            let written = serde_json::to_string(&old).expect("a form");
+            assert!(
+                written.contains(&format!("\"what\":\"{name}\"")),
+                "{written}"
+            );
+        }
+        let other = Difference {
+            section: "9.5".to_owned(),
+            ..read("value").expect("one")
+        };
+        assert!(!other.is_like(&read("value").expect("one")));
+        assert!(read("anything").is_err());
+    }
 }

@@ -49,7 +49,7 @@ pub fn shrink(
 ) -> Result<Shrunk, ExploreError> {
     let mut shrinker = Shrinker {
         best: subject,
-        kind: difference.kind(),
+        first: difference.clone(),
         difference,
         tried: BTreeSet::new(),
         runs: 0,
@@ -78,7 +78,7 @@ const FIRST_CELL: u16 = *RAM.start();
 
 struct Shrinker<'a, 'b> {
     best: Subject,
-    kind: String,
+    first: Difference,
     difference: Difference,
     /// Subjects already run.
     tried: BTreeSet<String>,
@@ -103,7 +103,7 @@ impl Shrinker<'_, '_> {
         }
         self.runs += 1;
         match (self.ask)(&candidate)? {
-            Some(difference) if difference.kind() == self.kind => {
+            Some(difference) if difference.is_like(&self.first) => {
                 self.difference = difference;
                 self.best = candidate;
                 Ok(true)

@@ -1,6 +1,6 @@
 //! Byte for byte: what a ring sent back, and what its twin says.
 
-use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, Unasked, What};
+use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, Symptom, Unasked};
 use super::follow::{Conversation, Expected};
 use super::known::{Knowledge, Place, Reading, writes};
 use super::unasked::Sent;
@@ -57,9 +57,9 @@ impl Rows<'_> {
 
     /// Whether the conversation ended before a byte that is missing could be called late. One that came although the twin does not send it,
     /// not even later, is never excused.
-    fn cut_short(&self, index: usize, what: &What, tail: Instant) -> bool {
+    fn cut_short(&self, index: usize, what: &Symptom, tail: Instant) -> bool {
         match (what, self.expected.get(index), self.received.get(index)) {
-            (What::Missing, Some((at, _)), None) => *at >= tail,
+            (Symptom::Missing, Some((at, _)), None) => *at >= tail,
             _ => false,
         }
     }
@@ -144,7 +144,7 @@ impl Comparer<'_> {
                 let at = at.map(|(at, _)| Unasked { ring, at: *at });
                 self.comparison.unasked.extend(at);
                 if let (None, Some((place, fault))) = (&what, &race.fault) {
-                    (index, what) = (*place, Some(fault.clone()));
+                    (index, what) = (*place, Some(*fault));
                 }
             }
             let Some(what) = what else {
@@ -211,7 +211,7 @@ impl Comparer<'_> {
         rows: &Rows<'_>,
         index: usize,
         step: impl FnOnce() -> Option<usize>,
-    ) -> Option<What> {
+    ) -> Option<Symptom> {
         let Rows {
             ring,
             expected,
@@ -221,8 +221,8 @@ impl Comparer<'_> {
         let role = rows.role(index);
         let (due, wanted, at, found) = match (expected.get(index), received.get(index)) {
             (Some((due, wanted)), Some((at, found))) => (*due, *wanted, *at, *found),
-            (Some(_), None) => return Some(What::Missing),
-            (None, _) => return Some(What::Surplus),
+            (Some(_), None) => return Some(Symptom::Missing),
+            (None, _) => return Some(Symptom::Surplus),
         };
         let found_good = found.error.is_none() || !self.exactness.line_errors;
         let wanted_good = wanted.error.is_none() || !self.exactness.line_errors;
@@ -241,7 +241,7 @@ impl Comparer<'_> {
                 self.time((ring, index), role, step, ((due, wanted), (at, found)));
                 None
             }
-            (true, false) => Some(What::LineStatus),
+            (true, false) => Some(Symptom::LineStatus),
             (false, _) => Some(what_of(expected, received, index)),
         }
     }
@@ -435,7 +435,7 @@ impl Comparer<'_> {
             self.comparison.untimely = Some(Divergence {
                 ring,
                 byte: index + 1,
-                what: What::Time,
+                what: Symptom::Time,
                 expected: Some(expected),
                 received: Some(received),
                 role,
@@ -545,16 +545,16 @@ pub(crate) fn what_of(
     expected: &[(Instant, Received)],
     received: &[(Instant, Received)],
     index: usize,
-) -> What {
+) -> Symptom {
     const ALIKE: usize = 4;
     fn rest(bytes: &[(Instant, Received)], from: usize) -> &[(Instant, Received)] {
         bytes.get(from..).unwrap_or_default()
     }
     match (expected.get(index), received.get(index)) {
-        (_, None) => return What::Missing,
-        (None, _) => return What::Surplus,
+        (_, None) => return Symptom::Missing,
+        (None, _) => return Symptom::Surplus,
         (Some((_, wanted)), Some((_, found))) if wanted.byte == found.byte => {
-            return What::LineStatus;
+            return Symptom::LineStatus;
         }
         _ => {}
     }
@@ -564,11 +564,11 @@ pub(crate) fn what_of(
             && a[..ALIKE].iter().zip(b).all(|(a, b)| a.1.byte == b.1.byte)
     };
     if run(rest(expected, index + 1), rest(received, index)) {
-        What::Missing
+        Symptom::Missing
     } else if run(rest(expected, index), rest(received, index + 1)) {
-        What::Surplus
+        Symptom::Surplus
     } else {
-        What::Value
+        Symptom::Value
     }
 }
 

@@ -3,6 +3,7 @@
 use harness_proto::line::Received;
 use harness_proto::novobus::role::Role;
 use harness_proto::time::{Instant, Span};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// How exact a comparison is.
@@ -27,31 +28,53 @@ pub struct Look {
     pub mask: u8,
 }
 
-/// How two bytes differ.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum What {
+/// How a ring differs from what is expected. In a file it is a name; folders of older versions hold the description.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Symptom {
     /// Another value.
+    #[serde(alias = "another value")]
     Value,
     /// The same value, with or without a line error.
+    #[serde(alias = "another line status")]
     LineStatus,
     /// The model expects a byte that did not come.
+    #[serde(alias = "a byte is missing")]
     Missing,
     /// A byte came that the model does not expect.
+    #[serde(alias = "a byte too many")]
     Surplus,
     /// The right byte, at another time.
+    #[serde(alias = "another time")]
     Time,
+    /// A drive does what that of the manual does not.
+    #[serde(alias = "another drive than that of the manual")]
+    Drive,
+    /// The ring carries a byte although nothing was sent to it.
+    #[serde(alias = "a byte on the other ring")]
+    OtherRing,
+    /// A link carries another byte than in the reference model.
+    #[serde(alias = "another byte on a link than in the reference model")]
+    Link,
+    /// A drive is in another state than in the reference model.
+    #[serde(alias = "another state than in the reference model")]
+    State,
 }
 
-impl What {
+impl Symptom {
     /// A short description.
     #[must_use]
-    pub const fn words(&self) -> &'static str {
+    pub const fn words(self) -> &'static str {
         match self {
             Self::Value => "another value",
             Self::LineStatus => "another line status",
             Self::Missing => "a byte is missing",
             Self::Surplus => "a byte too many",
             Self::Time => "another time",
+            Self::Drive => "another drive than that of the manual",
+            Self::OtherRing => "a byte on the other ring",
+            Self::Link => "another byte on a link than in the reference model",
+            Self::State => "another state than in the reference model",
         }
     }
 }
@@ -64,7 +87,7 @@ pub struct Divergence {
     /// Which byte received in this conversation, counted from 1.
     pub byte: usize,
     /// How it differs.
-    pub what: What,
+    pub what: Symptom,
     /// The byte that the model expects, and its time.
     pub expected: Option<(Instant, Received)>,
     /// The byte received, and its time.

@@ -13,5 +13,5 @@ mod program;
 mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};
-pub use comparison::{Adopted, Comparison, Divergence, Exactness, Look, Own, Unasked, What};
+pub use comparison::{Adopted, Comparison, Divergence, Exactness, Look, Own, Symptom, Unasked};
 pub use follow::{Conversation, Done, Twin};

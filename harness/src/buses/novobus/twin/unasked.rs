@@ -3,7 +3,7 @@
 //! The number of zeros before another byte, and which drive sends the first zero, depend on the clocks of the drives, which no model
 //! knows. From the first unasked byte to the next byte of the master, only properties that hold for every order are checked.
 
-use super::comparison::What;
+use super::comparison::Symptom;
 use super::follow::Expected;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
@@ -20,7 +20,7 @@ pub(crate) struct Race {
     /// Whether it is unasked both in the ring and in the model: then its value and its time are compared.
     pub(crate) in_both: bool,
     /// A byte from there on that no order of the clocks explains, and how it differs.
-    pub(crate) fault: Option<(usize, What)>,
+    pub(crate) fault: Option<(usize, Symptom)>,
 }
 
 /// When the bytes of the master's that are answered were sent, in order, and the other bytes.
@@ -59,13 +59,13 @@ impl Sent<'_> {
         };
         let in_both = model == ring;
         let here = match (expected.get(first), received.get(first)) {
-            (Some(_), None) => Some(What::Missing),
-            (None, Some(_)) => Some(What::Surplus),
+            (Some(_), None) => Some(Symptom::Missing),
+            (None, Some(_)) => Some(Symptom::Surplus),
             // A byte of the master's came first in one of them. Close together, that is chance.
             (Some((due, _)), Some((at, _))) if !in_both && apart(*due, *at) > tolerance => {
                 match model == Some(first) {
-                    true => Some(What::Missing),
-                    false => Some(What::Surplus),
+                    true => Some(Symptom::Missing),
+                    false => Some(Symptom::Surplus),
                 }
             }
             _ => None,
@@ -80,7 +80,7 @@ impl Sent<'_> {
                 before && (byte.error.is_some() || byte.byte >= size.drives())
             };
             let offset = received[first..].iter().position(foreign)?;
-            Some((first + offset, What::Value))
+            Some((first + offset, Symptom::Value))
         };
         Some(Race {
             first,
