@@ -56,6 +56,31 @@ fn have_none(sizes: &[u8], resets: &[bool]) {
     }
 }
 
+/// A simulated rig obeys its `[limits]` and `[retry]`, and evidence changes neither a verdict nor what is skipped.
+#[test]
+fn limits_and_attempts_hold_with_and_without_evidence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let failing = folder.path().join("failing.scn");
+    let text = "title A byte that does not come\nring 3\n> 80\n< 81\n";
+    std::fs::write(&failing, text).expect("room");
+    let failing = failing.to_str().expect("a name");
+    let rig = rig(3, false, "[retry]\nattempts = 2", "");
+    for (name, wanted) in [
+        ("10.5-reset-forgets", "`allow_reset`"),
+        ("9.2-synco", "1 passed"),
+        (failing, "2 attempts: failed, failed"),
+    ] {
+        let plain = run(folder.path(), &rig, &[name]);
+        let kept = folder.path().join(format!("kept-{}", wanted.len()));
+        let kept = kept.to_str().expect("a name");
+        let evidence = run(folder.path(), &rig, &[name, "--evidence", kept]);
+        assert!(said(&plain).contains(wanted), "{}", said(&plain));
+        assert_eq!(plain.status.code(), evidence.status.code(), "{name}");
+        assert_eq!(plain.stdout, evidence.stdout, "{name}");
+        ended(&verify(Path::new(kept)), 0, "0 things wrong");
+    }
+}
+
 /// What a rig's limits do not let be played to its end is not begun, and nothing is wrong with that.
 #[test]
 fn limits_leave_out_what_they_deny() {

@@ -3,7 +3,8 @@
 use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
 use crate::rig::check::Rig;
-use crate::rig::file::{DriveEntry, Hooks, RigFile};
+use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};
+use crate::rig::limits;
 use crate::rig::profile::KnownProfile;
 use crate::scenario::expression::{Expression, Located};
 use crate::scenario::parse::parse_header;
@@ -17,8 +18,8 @@ use harness_sim::novobus::drive::Model;
 const TYPES: [&str; 4] = ["5605", "5610", "5615", "5620"];
 
 impl Rig {
-    /// Whether it is simulated and its file says no more than how large its rings are and which inputs are connected, so that every
-    /// scenario may bring drives of its own.
+    /// Whether it is simulated and its file says no more than how large its rings are and which inputs are connected, and allows
+    /// everything, so that every scenario may bring drives of its own.
     #[must_use]
     pub fn is_bare(&self) -> bool {
         let file = &self.file;
@@ -26,7 +27,12 @@ impl Rig {
             let mut words = line.split_whitespace().skip(2);
             words.next() == Some("input")
         };
+        let limits = limits(self, true);
         self.is_simulated()
+            && limits.allow_everything()
+            && limits.bytes_per_second.is_none()
+            && file.limits.max_run.is_none()
+            && file.retry == Retry::default()
             && file.interlock.is_empty()
             && file.deviation.is_empty()
             && file.power.is_empty()
