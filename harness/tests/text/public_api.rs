@@ -47,7 +47,7 @@ fn names(tree: &UseTree, into: &mut BTreeSet<String>) {
             into.insert(rename.rename.to_string());
         }
         UseTree::Group(group) => group.items.iter().for_each(|tree| names(tree, into)),
-        UseTree::Glob(_) => panic!("a glob exports what nobody has listed"),
+        UseTree::Glob(_) => panic!("a glob cannot be listed: export its items by their names"),
     }
 }
 

@@ -85,6 +85,22 @@ pub(crate) fn released(drives: u8, setup: &str) -> Result<(Plan, SimulatedLink),
     Ok(simulated(&source, Some(&[drives]))?)
 }
 
+/// The values that the scales of a drive's cells depend on: its type, which the plan knows, and its range of speeds, which is read from the
+/// drive (14.3.2).
+///
+/// # Errors
+/// The drive does not answer.
+pub(crate) fn units_of(
+    plan: &Plan,
+    bus: &Bus<'_>,
+    axis: Axis,
+) -> Result<units::Drive, driver::Error> {
+    Ok(units::Drive {
+        range: bus.speed_range(axis)?,
+        ..plan.units(axis.ring(), axis.drive())
+    })
+}
+
 /// The drives of a rig or of a simulated ring, by their axis numbers (ND21 12.2): 0 to 249 on the first ring, 0x100 to 0x1F9 on the
 /// second. A call blocks until the drive has answered, 5 s at most.
 pub struct Drives {
@@ -119,7 +135,8 @@ impl Drives {
     }
 
     /// The drives of a rig: the path of its file, or a name that `drivebench rig list` shows. The rig is locked for other programs until
-    /// this value is dropped. Nothing is sent that the `[limits]` of its file deny; without `allow_motion` no motor may turn.
+    /// this value is dropped. Nothing is sent that the `[limits]` of its file deny; without `allow_motion` no motor may turn. The opening puts
+    /// the drives in error 0504 (ND21 9.8); [`delete_error`](Self::delete_error) confirms it.
     ///
     /// # Errors
     /// There is no such rig, its file has mistakes, it is in use, or its rings do not answer.
@@ -267,10 +284,7 @@ impl Drives {
 
     /// What the scales of a drive's cells depend on (14.3.2).
     fn units(&self, bus: &Bus<'_>, axis: Axis) -> Result<units::Drive, Error> {
-        Ok(units::Drive {
-            range: bus.speed_range(axis)?,
-            ..self.plan.units(axis.ring(), axis.drive())
-        })
+        Ok(units_of(&self.plan, bus, axis)?)
     }
 }
 

@@ -1,12 +1,13 @@
 //! Random frames, inputs and times: the drive and the reference send the same frames in the same milliseconds.
 
+use super::common::property;
 use harness_proto::can::{Frame, Id};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::{Accepts, PROPERTIES, Properties, Setting};
 use harness_sim::unitek::reference::Reference;
 use harness_sim::unitek::{Drive, Inputs};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngSeed, TestRunner};
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[derive(Clone, Debug)]
@@ -172,32 +173,20 @@ fn play(properties: Properties, events: &[Event]) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-fn property(cases: u32) {
-    let seed = std::env::var("DRIVEBENCH_SEED")
-        .ok()
-        .and_then(|s| s.parse().ok())
-        .unwrap_or(500_000);
-    let config = Config {
-        cases,
-        rng_seed: RngSeed::Fixed(seed),
-        failure_persistence: None,
-        ..Config::default()
-    };
+fn agree(cases: u32) {
     let strategy = (properties(), events());
-    if let Err(error) = TestRunner::new(config).run(&strategy, |(p, events)| play(p, &events)) {
-        panic!(
-            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim --test sim against_reference"
-        );
-    }
+    property("against_reference", cases, &strategy, |(p, events)| {
+        play(p, &events)
+    });
 }
 
 #[test]
 fn random_frames_agree_with_the_reference() {
-    property(150);
+    agree(150);
 }
 
 #[test]
 #[ignore = "takes a minute; the nightly run has it"]
 fn many_random_frames_agree_with_the_reference() {
-    property(40_000);
+    agree(40_000);
 }

@@ -5,6 +5,8 @@ use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Properties;
 use harness_sim::segment::{Host, LineFrame, Segment, Station};
 use harness_sim::unitek::{Drive, Inputs};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngSeed, TestRunner};
 
 /// A host or a drive.
 pub(super) enum Member<D = Box<Drive>> {
@@ -130,5 +132,29 @@ impl Desk {
 
     pub(super) fn record(&self) -> &[LineFrame] {
         self.segment.record()
+    }
+}
+
+/// Runs a property; a failure prints the seed and the command that repeats it.
+pub(super) fn property<S: Strategy>(
+    name: &str,
+    cases: u32,
+    strategy: &S,
+    test: impl Fn(S::Value) -> Result<(), TestCaseError>,
+) {
+    let seed = std::env::var("DRIVEBENCH_SEED")
+        .ok()
+        .and_then(|s| s.parse().ok())
+        .unwrap_or(500_000);
+    let config = Config {
+        cases,
+        rng_seed: RngSeed::Fixed(seed),
+        failure_persistence: None,
+        ..Config::default()
+    };
+    if let Err(error) = TestRunner::new(config).run(strategy, test) {
+        panic!(
+            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim --test sim {name}"
+        );
     }
 }

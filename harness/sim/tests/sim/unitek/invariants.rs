@@ -1,6 +1,6 @@
 //! Random traffic of two hosts and two drives on a segment with faults: what always holds, and no drive influences another.
 
-use super::common::Member;
+use super::common::{Member, property};
 use harness_proto::can::{BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Reply;
@@ -8,7 +8,6 @@ use harness_proto::unitek::properties::Properties;
 use harness_sim::segment::{End, FrameFault, Host, LineFrame, Placed, Segment};
 use harness_sim::unitek::{Drive, Inputs};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngSeed, TestRunner};
 
 const FIRST: (u16, u16) = (0x201, 0x181);
 const SECOND: (u16, u16) = (0x202, 0x182);
@@ -121,29 +120,6 @@ fn only_what_was_asked(record: &[LineFrame], identifiers: (u16, u16)) -> Result<
         }
     }
     Ok(())
-}
-
-fn property<S: Strategy>(
-    name: &str,
-    cases: u32,
-    strategy: &S,
-    test: impl Fn(S::Value) -> Result<(), TestCaseError>,
-) {
-    let seed = std::env::var("DRIVEBENCH_SEED")
-        .ok()
-        .and_then(|s| s.parse().ok())
-        .unwrap_or(500_000);
-    let config = Config {
-        cases,
-        rng_seed: RngSeed::Fixed(seed),
-        failure_persistence: None,
-        ..Config::default()
-    };
-    if let Err(error) = TestRunner::new(config).run(strategy, test) {
-        panic!(
-            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim --test sim {name}"
-        );
-    }
 }
 
 #[test]

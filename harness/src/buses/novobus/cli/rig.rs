@@ -87,10 +87,7 @@ impl Bench {
     /// The values that the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds, which is read from
     /// the drive (14.3.2).
     pub(crate) fn units(&self, axis: Axis) -> Result<Drive, Failure> {
-        Ok(Drive {
-            range: self.bus.speed_range(axis)?,
-            ..self.plan.units(axis.ring(), axis.drive())
-        })
+        Ok(drives::units_of(&self.plan, &self.bus, axis)?)
     }
 
     /// The same without asking the drive: `range` is the range of speeds that it reported.

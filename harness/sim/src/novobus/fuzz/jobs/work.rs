@@ -108,12 +108,12 @@ impl<'a> Arbitrary<'a> for Work {
         while !input.is_empty() {
             let record: Record = input.arbitrary()?;
             match record.kind & 15 {
-                0..10 => work.order(&record),
+                0..10 => work.order(record),
                 15 => {
                     let byte = u64::from(record.at) + 1 + 256 * u64::from(record.place & 1);
                     replaced = Some((byte, record.data[1]));
                 }
-                _ => work.fault(&record),
+                _ => work.fault(record),
             }
         }
         // A replaced byte with good parity can pass the 8-bit check in combination with other faults, so it must be the only fault.
@@ -135,14 +135,16 @@ impl Work {
         Self::arbitrary(&mut Unstructured::new(input)).unwrap_or_else(|_never| Self::default())
     }
 
-    fn order(&mut self, record: &Record) {
-        let &Record {
+    fn order(
+        &mut self,
+        Record {
             kind,
             place,
             at,
             data,
             last,
-        } = record;
+        }: Record,
+    ) {
         let number = self.orders.len() as u16;
         if self.orders.len() >= MOST_JOBS {
             return;
@@ -188,14 +190,16 @@ impl Work {
         });
     }
 
-    fn fault(&mut self, record: &Record) {
-        let &Record {
+    fn fault(
+        &mut self,
+        Record {
             kind,
             place,
             at,
             data,
             last,
-        } = record;
+        }: Record,
+    ) {
         if self.faults.len() >= MOST_FAULTS {
             return;
         }
