@@ -85,7 +85,7 @@ fn template(command: &Command) -> StyledStr {
 /// They are wrong, or ask for help or the version; a command that does not exist comes with a suggestion.
 pub(crate) fn parse() -> Result<Arguments, clap::Error> {
     let given: Vec<OsString> = std::env::args_os().collect();
-    let command = command();
+    let command = command().color(super::output::colour_of_usage());
     let matches = command.clone().try_get_matches_from(&given);
     matches
         .and_then(|matches| Arguments::from_arg_matches(&matches))

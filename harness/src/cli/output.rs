@@ -48,6 +48,16 @@ impl Streams {
     }
 }
 
+/// Colours of usage errors and help, which appear before `--color` is known: none by `NO_COLOR` and `TERM=dumb`, even where `CI` is set.
+pub(crate) fn colour_of_usage() -> clap::ColorChoice {
+    let streams = Streams::of_process();
+    if streams.no_color || streams.dumb {
+        clap::ColorChoice::Never
+    } else {
+        clap::ColorChoice::Auto
+    }
+}
+
 impl Output {
     pub(crate) fn new(color: When, progress: Progress) -> Self {
         Self::on(&Streams::of_process(), color, progress)

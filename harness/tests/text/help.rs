@@ -234,6 +234,8 @@ fn on_a_terminal(arguments: &[&str], term: &str) -> String {
         .stdout(slave.try_clone().expect("another"))
         .stderr(slave.try_clone().expect("another"))
         .env("TERM", term)
+        // Where it is set, clap's own rule gives colours to every terminal.
+        .env("CI", "true")
         .env_remove("NO_COLOR");
     let mut child = command.spawn().expect("the program starts");
     drop(command);
