@@ -1,38 +1,27 @@
 //! A line or a link behind a guard.
 
 use super::Watch;
-use crate::buses::novobus::driver::Axis;
-use crate::buses::novobus::language::run::over_bus::read_byte;
-use crate::link::{
-    Capability, DriveFault, Lead, Line, Link, LinkFault, Moment, Octets, PlacedFault, Trouble,
-};
+use super::gate::{Denied, Gate};
+use crate::buses::Setting;
+use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
-use harness_proto::nd21::ram;
-use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
-use harness_proto::novobus::guard::{Cause, Denial, Found, Guard, Limits, Setting};
-use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::Trace;
 use std::any::Any;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Why no frame leaves through this guard.
-const NO_GATE: &str = "frames are not sent: the guard judges the bytes of a ring only";
-
-/// How much SYNCO a [kept](Line::keep) line has ahead. A computer that stands still for half of it leaves no gap.
+/// How far ahead a [kept](Line::keep) line is filled. A computer that stands still for half of this time leaves no gap.
 const KEPT: Span = Span::from_millis(40);
 
-/// A line or a link that sends nothing that the limits do not allow. After a denial it is in
+/// A line or a link that sends nothing that the [gates](Gate) of its ports deny. After a denial it is in
 /// [trouble](Trouble::Denied), and nothing passes before [`Self::reset_after_denial`].
 #[derive(Debug)]
 pub struct Guarded<L> {
     inner: L,
-    rings: Vec<Ring>,
-    limits: Limits,
+    /// One a port.
+    gates: Vec<Box<dyn Gate>>,
     trouble: Option<Trouble>,
     /// The settings that denied what is the trouble.
     denying: Vec<Setting>,
@@ -49,44 +38,15 @@ pub struct Guarded<L> {
     keeps: bool,
 }
 
-#[derive(Debug)]
-struct Ring {
-    guard: Guard,
-    size: RingSize,
-    /// Data bits to be inverted in a byte that is sent damaged, by the number of the byte.
-    damaged: BTreeMap<u64, u8>,
-    /// Bytes handed on, denied ones not counted: the numbers of the link's own.
-    sent: u64,
-}
-
-/// What is to be done about a fault.
-enum Verdict {
-    /// It changes no byte: at most an error is noticed.
-    Harmless,
-    /// A byte that the master sends arrives with these data bits inverted, and with an error.
-    Damages { byte: u64, data: u8 },
-    /// Drives may be out of step after it.
-    Doubt,
-    /// It cannot be judged what drives make of it.
-    Open,
-}
-
 impl<L: Line> Guarded<L> {
-    /// A guarded line with rings of these sizes, in doubt until it was [synchronised](Self::synchronise).
-    pub fn over_line(inner: L, sizes: &[RingSize], limits: Limits) -> Self {
-        let ring = |&size| Ring {
-            guard: Guard::new(size, limits),
-            size,
-            damaged: BTreeMap::new(),
-            sent: 0,
-        };
+    /// A line behind one gate a port. What it can do is `capabilities`: those of the link that the gates do not deny as a whole.
+    pub fn behind(inner: L, gates: Vec<Box<dyn Gate>>, capabilities: Vec<Capability>) -> Self {
         Self {
             inner,
-            rings: sizes.iter().map(ring).collect(),
-            limits,
+            gates,
             trouble: None,
             denying: Vec::new(),
-            capabilities: Vec::new(),
+            capabilities,
             origin: Instant::START,
             refused: 0,
             watch: None,
@@ -96,69 +56,51 @@ impl<L: Line> Guarded<L> {
         }
     }
 
-    /// [Keeps](Line::keep) the lines from now on: a drive has shown that it monitors time-outs (ND21 9.9).
+    /// [Keeps](Line::keep) the lines from now on, where no gate limits the number of pieces: a drive has shown that it monitors
+    /// time-outs.
     pub(crate) fn keep_lines(&mut self) {
-        self.keeps = true;
+        self.keeps = self.gates.iter().all(|gate| gate.may_keep());
     }
 
-    /// Sends 17 zeros and the check sequence on every ring (ND21 9.8), waits until they have come round, and takes what came. Behind
-    /// it commands pass, as far as they are allowed.
-    pub fn synchronise(&mut self) {
-        for (ring, size) in self.sizes().into_iter().enumerate() {
-            let sent = self.send_octets(ring, &CHECK_SEQUENCE);
-            let end = sent + self.byte_time() * (u64::from(size.drives()) + 8);
-            while self.now() < end && self.wait(end) {}
-            while self.receive(ring).is_some() {}
-        }
-    }
-
-    /// Believes that the drives have just been made and have heard nothing; see [`Guard::assume_fresh`].
+    /// Assumes that the drives have just been made and have heard nothing; see [`Gate::assume_fresh`].
     pub fn assume_fresh(&mut self) {
-        for ring in &mut self.rings {
-            ring.guard.assume_fresh();
+        for gate in &mut self.gates {
+            gate.assume_fresh();
         }
     }
 
-    /// Whether every drive waits for a telegram, as far as what was sent tells.
+    /// Whether no drive is in the middle of anything, as far as what was sent tells.
     #[must_use]
     pub fn at_rest(&self) -> bool {
-        self.trouble().is_none() && self.rings.iter().all(|ring| ring.guard.at_rest())
+        self.trouble().is_none() && self.gates.iter().all(|gate| gate.at_rest())
     }
 
-    /// After a denial: lets the recovery pass again, and what is allowed behind it, for the [safe state](super::safe_state).
+    /// After a denial: lets permitted pieces pass again, for the [safe state](super::safe_state).
     pub fn reset_after_denial(&mut self) {
         if !matches!(self.trouble, Some(Trouble::Interlock(_))) {
             self.trouble = None;
         }
-        for ring in &mut self.rings {
-            ring.guard.reset_after_denial();
+        for gate in &mut self.gates {
+            gate.reset_after_denial();
         }
     }
 
-    /// What it allows.
-    pub(crate) const fn limits(&self) -> &Limits {
-        &self.limits
+    /// The gate of a port, by its type; `None` where the port has none of this type.
+    pub(crate) fn gate<G: Gate>(&self, port: usize) -> Option<&G> {
+        let gate: &dyn Any = self.gates.get(port)?.as_ref();
+        gate.downcast_ref()
     }
 
-    /// The rings.
-    pub(crate) fn sizes(&self) -> Vec<RingSize> {
-        self.rings.iter().map(|ring| ring.size).collect()
+    /// The same, to be changed.
+    pub(crate) fn gate_mut<G: Gate>(&mut self, port: usize) -> Option<&mut G> {
+        let gate: &mut dyn Any = self.gates.get_mut(port)?.as_mut();
+        gate.downcast_mut()
     }
 
-    /// Learns what was read of a drive.
-    pub(crate) fn learn_of(&mut self, axis: Axis, found: &Found) {
-        let Some(ring) = self.rings.get_mut(axis.ring()) else {
-            return;
-        };
-        if let Ok(address) = ring.size.address_byte(axis.drive()) {
-            ring.guard.learn(address, found);
-        }
-    }
-
-    /// Knows of the drives what the guard of their likeness knows, for a rehearsal on a model of them.
+    /// Copies what the gates of another line to the same drives know of them, for a rehearsal on a model.
     pub fn know_as<M>(&mut self, other: &Guarded<M>) {
-        for (own, other) in self.rings.iter_mut().zip(&other.rings) {
-            own.guard.know_as(&other.guard);
+        for (own, other) in self.gates.iter_mut().zip(&other.gates) {
+            own.know_as(other.as_ref());
         }
     }
 
@@ -167,7 +109,7 @@ impl<L: Line> Guarded<L> {
         &self.inner
     }
 
-    /// The link behind the guard, for callers that send nothing. Bytes sent past the guard are not checked.
+    /// The link behind the guard, for callers that send nothing. What is sent past the guard is not judged.
     pub(crate) fn inner_mut(&mut self) -> &mut L {
         &mut self.inner
     }
@@ -191,33 +133,21 @@ impl<L: Line> Guarded<L> {
         if self.trouble().is_some() {
             return;
         }
-        let kept: Vec<_> = self.rings.iter().map(|ring| ring.guard.kept()).collect();
+        let before: Vec<_> = self.gates.iter().map(|gate| gate.addressed()).collect();
         if let Err(why) = look(self) {
             self.trouble = Some(Trouble::Interlock(why));
         }
-        for (ring, kept) in kept.into_iter().enumerate() {
-            let changed = |ring: &&Ring| ring.guard.kept() != kept;
-            let Some(size) = self.rings.get(ring).filter(changed).map(|ring| ring.size) else {
-                continue;
-            };
-            let drive = kept.map(|kept| kept.wrapping_add(size.drives()));
-            if let Some(drive) = drive.filter(|drive| *drive < size.drives()) {
-                // A short address goes on from the drive that it went on from before (9.2).
-                let _again = read_byte(self, size.drives(), (ring, drive), ram::STATUS);
+        for (port, before) in before.into_iter().enumerate() {
+            let gate = self.gates.get(port);
+            if let Some(restore) = gate.and_then(|gate| gate.restore(before)) {
+                restore(self);
             }
         }
     }
 
     /// Whether drives can be asked something in between, so that nothing is changed by it.
     fn can_pause(&self) -> bool {
-        let restorable = |ring: &Ring| {
-            let drive = ring
-                .guard
-                .kept()
-                .map(|kept| kept.wrapping_add(ring.size.drives()));
-            drive.is_none_or(|drive| drive < ring.size.drives())
-        };
-        !self.faulty && self.at_rest() && self.rings.iter().all(restorable)
+        !self.faulty && self.at_rest() && self.gates.iter().all(|gate| gate.can_pause())
     }
 
     /// The time on the guard's clock.
@@ -236,81 +166,19 @@ impl<L: Line> Guarded<L> {
         &self.denying
     }
 
-    fn deny(&mut self, text: String, cause: Option<Cause>) {
+    fn deny(&mut self, denied: Denied) {
         if self.trouble.is_none() {
-            self.trouble = Some(Trouble::Denied(text));
-            let denying = cause.map(|cause| self.limits.denying(cause).collect());
-            self.denying = denying.unwrap_or_default();
+            self.trouble = Some(Trouble::Denied(denied.why));
+            self.denying = denied.settings;
         }
     }
 }
 
-impl Ring {
-    /// Judges a byte as it will be, and as it would be if the port did not damage it.
-    fn admit(&mut self, now: Instant, byte: u8) -> Result<(), Denial> {
-        let number = self.sent + 1;
-        match self.damaged.get(&number) {
-            None => self.guard.admit(now, byte, false)?,
-            Some(data) => {
-                self.guard.clone().admit(now, byte, false)?;
-                self.guard.admit(now, byte ^ data, true)?;
-                self.damaged.remove(&number);
-            }
-        }
-        self.sent = number;
-        Ok(())
-    }
-}
-
-impl<L: Link> Guarded<L> {
-    /// A guarded link, in doubt until it was [synchronised](Self::synchronise). What the limits deny is no capability of it.
-    pub fn new(inner: L, limits: Limits) -> Self {
-        // A link has one ring or two; a ring that it does not have has no drives.
-        let sizes: Vec<_> = (0..2)
-            .map_while(|ring| RingSize::new(inner.drives(ring).into()).ok())
-            .collect();
-        let mut guarded = Self::over_line(inner, &sizes, limits);
-        let has = |capability: &Capability| match capability {
-            Capability::Motion => limits.motion,
-            Capability::Eeprom => limits.eeprom,
-            // A reset ends block and stop (ND21 11.8).
-            Capability::Reset => limits.reset && limits.motion,
-            _ => true,
-        };
-        let own = guarded.inner.capabilities().iter().copied();
-        guarded.capabilities = own.filter(has).collect();
-        guarded
-    }
-
-    /// What a fault may do to the bytes that drives hear.
-    fn verdict(&self, ring: usize, fault: PlacedFault, moment: Moment) -> Verdict {
-        let settled = moment == Moment::Now && !self.inner.busy();
-        match fault {
-            PlacedFault::Stimulus(..) | PlacedFault::Drive(_, DriveFault::Off) => Verdict::Harmless,
-            PlacedFault::Link(link, LinkFault::Flip(flips)) if flips.noticed().is_some() => {
-                let sent = self.rings.get(ring).map_or(0, |ring| ring.sent);
-                match moment {
-                    _ if flips.data == 0 => Verdict::Harmless,
-                    Moment::Byte(byte) if link == 0 && byte > sent => {
-                        let data = flips.data;
-                        Verdict::Damages { byte, data }
-                    }
-                    Moment::Now if link == 0 && settled => {
-                        let (byte, data) = (sent + 1, flips.data);
-                        Verdict::Damages { byte, data }
-                    }
-                    _ => Verdict::Open,
-                }
-            }
-            PlacedFault::Link(_, LinkFault::Cut | LinkFault::Delay(_)) => Verdict::Harmless,
-            // Bytes are lost on the way: drives that nothing tells of it are out of step.
-            PlacedFault::Drive(_, DriveFault::On) | PlacedFault::Link(_, LinkFault::Join)
-                if settled =>
-            {
-                Verdict::Doubt
-            }
-            PlacedFault::Link(..) | PlacedFault::Drive(..) => Verdict::Open,
-        }
+/// The denial of what would go through a port that the rig's file does not have.
+fn no_port(port: usize) -> Denied {
+    Denied {
+        why: format!("ring {} is not in the rig's file", port + 1),
+        settings: Vec::new(),
     }
 }
 
@@ -340,57 +208,42 @@ impl<L: Line> Line for Guarded<L> {
         self.inner.now()
     }
 
-    fn send(&mut self, ring: usize, what: Out<'_>) -> Instant {
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
         let now = self.inner.now();
         let guard_time = self.on_guard_clock(now);
-        let Some(state) = self.rings.get_mut(ring) else {
-            self.deny(format!("ring {} is not in the rig's file", ring + 1), None);
+        let Some(gate) = self.gates.get_mut(port) else {
+            self.deny(no_port(port));
             return now;
         };
         self.refused = what.len();
         if self.trouble.is_some() {
             return now;
         }
-        if !what.frames().is_empty() {
-            self.deny(NO_GATE.to_owned(), None);
-            return now;
-        }
-        let mut admitted = 0;
-        let mut denial = None;
-        for &byte in what.octets() {
-            match state.admit(guard_time, byte) {
-                Ok(()) => admitted += 1,
-                Err(why) => {
-                    denial = Some(why);
-                    break;
-                }
-            }
-        }
+        let (admitted, denied) = gate.admit(guard_time, what);
         self.refused = what.len() - admitted;
-        let end = self.inner.send(ring, what.first(admitted));
-        if let Some(denial) = denial {
-            self.deny(format!("ring {}: {denial}", ring + 1), Some(denial.cause));
-        }
+        let end = self.inner.send(port, what.first(admitted));
+        denied.into_iter().for_each(|denied| self.deny(denied));
         end
     }
 
-    fn permits(&self, ring: usize, what: Out<'_>) -> bool {
-        let Some(ring) = self.rings.get(ring) else {
-            return false;
-        };
-        let mut guard = ring.guard.clone();
+    fn permits(&self, port: usize, what: Out<'_>) -> bool {
         let now = self.guard_time();
-        let mut admits = |byte: &u8| guard.admit(now, *byte, false).is_ok();
-        let judged = what.frames().is_empty();
-        self.trouble().is_none() && judged && what.octets().iter().all(&mut admits)
+        let gate = self.gates.get(port);
+        self.trouble().is_none() && gate.is_some_and(|gate| gate.permits(now, what))
     }
 
     fn refused(&self) -> usize {
         self.refused
     }
 
-    fn receive(&mut self, ring: usize) -> Option<(Instant, Heard)> {
-        self.inner.receive(ring)
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+        let (at, heard) = self.inner.receive(port)?;
+        if let Heard::Frame(frame) = &heard
+            && let Some(gate) = self.gates.get_mut(port)
+        {
+            gate.hear(frame);
+        }
+        Some((at, heard))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
@@ -412,9 +265,9 @@ impl<L: Line> Line for Guarded<L> {
         self.inner.lead()
     }
 
-    /// Nothing is added inside a telegram, or where the number of bytes is limited.
+    /// Nothing is added inside a telegram.
     fn keep(&mut self) -> Option<Instant> {
-        if !self.keeps || self.trouble().is_some() || self.limits.bytes_per_second.is_some() {
+        if !self.keeps || self.trouble().is_some() {
             return None;
         }
         let byte_time = self.byte_time();
@@ -424,12 +277,14 @@ impl<L: Line> Line for Guarded<L> {
             _ => KEPT,
         };
         let now = self.inner.now();
-        for ring in 0..self.rings.len() {
-            let free = self.inner.send_octets(ring, &[]).max(now);
+        for port in 0..self.gates.len() {
+            let free = self.inner.send_octets(port, &[]).max(now);
             let missing = (now + ahead).since(free).units() / byte_time.units();
-            if missing > 0 && self.rings[ring].guard.at_rest() {
+            if missing > 0
+                && let Some(filler) = self.gates[port].filler()
+            {
                 let count = usize::try_from(missing).unwrap_or_default();
-                self.send_octets(ring, &vec![SYNCO; count]);
+                self.send_octets(port, &vec![filler; count]);
             }
         }
         Some(now + Span::from_nanos(ahead.as_nanos() / 2))
@@ -445,9 +300,8 @@ impl<L: Link> Link for Guarded<L> {
         self.origin = self.guard_time();
         self.inner.begin();
         self.faulty = false;
-        for ring in &mut self.rings {
-            ring.sent = 0;
-            ring.damaged.clear();
+        for gate in &mut self.gates {
+            gate.begin();
         }
     }
 
@@ -475,58 +329,35 @@ impl<L: Link> Link for Guarded<L> {
         self.inner.time_tolerance()
     }
 
-    fn inject(&mut self, ring: usize, fault: PlacedFault, moment: Moment) {
+    fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
         self.faulty |= !matches!(fault, PlacedFault::Stimulus(..));
-        if !self.limits.allow_everything() {
-            match self.verdict(ring, fault, moment) {
-                Verdict::Harmless => {}
-                Verdict::Damages { byte, data } => {
-                    if let Some(ring) = self.rings.get_mut(ring) {
-                        *ring.damaged.entry(byte).or_default() ^= data;
-                    }
-                }
-                Verdict::Doubt => {
-                    if let Some(ring) = self.rings.get_mut(ring) {
-                        ring.guard.doubt();
-                        ring.guard.forget();
-                    }
-                }
-                Verdict::Open => {
-                    let why = format!(
-                        "ring {}: the fault {fault:?} is not made: what drives take changed or lost bytes for cannot be \
-                         judged, so it needs everything allowed in the rig's [limits], --allow-motion, and no `max_speed`",
-                        ring + 1
-                    );
-                    self.deny(why, Some(Cause::InDoubt));
-                    return;
-                }
-            }
+        let settled = moment == Moment::Now && !self.inner.busy();
+        let gate = self.gates.get_mut(port);
+        let judged = gate.map_or_else(
+            || Err(no_port(port)),
+            |gate| gate.fault(fault, moment, settled),
+        );
+        match judged {
+            Ok(()) => self.inner.inject(port, fault, moment),
+            Err(denied) => self.deny(denied),
         }
-        self.inner.inject(ring, fault, moment);
     }
 
-    fn probe(&mut self, ring: usize, octets: &[u8]) -> Vec<Received> {
+    fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {
         let now = self.guard_time();
-        let Some(state) = self.rings.get_mut(ring) else {
+        let Some(gate) = self.gates.get_mut(port) else {
             return Vec::new();
         };
         if self.trouble.is_some() {
             return Vec::new();
         }
-        let mut guard = state.guard.clone();
-        if let Err(denial) = octets
-            .iter()
-            .try_for_each(|byte| guard.admit(now, *byte, false))
-        {
-            self.deny(format!("ring {}: {denial}", ring + 1), Some(denial.cause));
+        // A simulated link probes a copy of itself.
+        let copy = self.capabilities.contains(&Capability::Simulator);
+        if let Err(denied) = gate.probe(now, octets, copy) {
+            self.deny(denied);
             return Vec::new();
         }
-        // A simulated link probes a copy of itself.
-        if !self.capabilities.contains(&Capability::Simulator) {
-            state.guard = guard;
-            state.sent += octets.len() as u64;
-        }
-        self.inner.probe(ring, octets)
+        self.inner.probe(port, octets)
     }
 
     fn beside(&self) -> Option<&dyn Any> {

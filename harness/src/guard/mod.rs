@@ -1,18 +1,20 @@
-//! What may leave the program: decides byte by byte, below scenarios, driver and fuzzer.
+//! What may leave the program: decided piece by piece, below scenarios, driver and fuzzer.
 //!
 //! This is not a safety function in the sense of machine safety: an emergency stop must be wired.
 //!
-//! [`Guarded`] stands around a line or a link and asks the guard of each ring
-//! ([`harness_proto::novobus::guard`], where the reasoning is) about every byte. [`safe_state`] stops and blocks all drives and
-//! reads back that they stand. Both begin with 17 zeros and the check sequence (ND21 9.8): before them it is not known what drives make
-//! of a byte, and nothing else passes.
+//! [`Guarded`] stands around a line or a link and asks the [`Gate`] of each port about every octet or frame. A gate knows its bus: that
+//! of a ring is [`harness_proto::novobus::guard`], where the reasoning is. [`safe_state`] stops and blocks all drives and reads back that
+//! they stand. Both begin with 17 zeros and the check sequence (ND21 9.8): before them it is not known what drives make of a byte, and
+//! nothing else passes.
 
+mod gate;
 mod guarded;
 mod watch;
 
 pub use crate::buses::novobus::guard::safe_state::{
     NotSafe, SafeState, SafeStep, Standing, blind_stop, safe_state,
 };
+pub use gate::{Denied, Gate, Restore};
 pub use guarded::Guarded;
 pub use harness_proto::novobus::guard::{Denial, Found, Guard, Limits, Need};
 pub use watch::Watch;

@@ -7,6 +7,7 @@ pub mod driver;
 pub mod drives;
 pub mod explore;
 pub mod fuzz;
+pub mod gate;
 pub mod guard;
 pub mod language;
 pub mod link;

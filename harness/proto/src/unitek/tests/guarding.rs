@@ -1,6 +1,6 @@
 //! The guard: classes, the lock, load, new identifiers (what a write may do to a physical drive).
 
-use super::super::guard::{Class, Denial, Gate, Limits, Missing, NAMED, class};
+use super::super::guard::{Class, Denial, Fast, Gate, Limits, MaxSpeed, Missing, NAMED, class};
 use super::*;
 
 fn gate(limits: Limits) -> Gate {
@@ -197,6 +197,88 @@ fn wear_and_ramps() {
             None
         );
     }
+}
+
+/// A highest speed bounds speed commands by their value, and everything else that turns the motor by 34.
+#[test]
+fn the_highest_speed() {
+    let limits = |max_speed| Limits {
+        motion: true,
+        max_speed: Some(max_speed),
+        ..Limits::default()
+    };
+    let fast = |register, fast| Some(Denial::Speed { register, fast });
+    let most = 3277;
+    let above = |register| fast(register, Fast::Above { most });
+    let unknown = |register| fast(register, Fast::LimitUnknown { most });
+    let mut share = gate(limits(MaxSpeed::Raw(most)));
+    // 10 % is 3277 (0CCD), -10 % is F333.
+    assert_eq!(denied(&mut share, "201#31CE0C"), above(0x31));
+    assert_eq!(denied(&mut share, "201#3132F3"), above(0x31));
+    assert_eq!(denied(&mut share, "201#31CE0C00000000"), above(0x31));
+    assert_eq!(denied(&mut share, "201#510000"), unknown(0x51));
+    for (text, register) in [
+        ("201#90FF7F", 0x90),
+        ("201#6E00000000", 0x6E),
+        ("201#780100", 0x78),
+        ("201#8E0000", 0x8E),
+    ] {
+        assert_eq!(denied(&mut share, text), unknown(register), "{text}");
+    }
+    assert_eq!(denied(&mut share, "201#31CD0C"), None);
+    assert_eq!(denied(&mut share, "201#510000"), None, "31 is within it");
+    assert_eq!(denied(&mut share, "201#340080"), above(0x34));
+    assert_eq!(denied(&mut share, "201#34CD0C"), None);
+    for text in ["201#90FF7F", "201#510000", "201#31FF7F", "201#6E00000000"] {
+        assert_eq!(denied(&mut share, text), None, "34 bounds {text}");
+    }
+    share.overhear(&frame("201#34FF7F"));
+    assert_eq!(
+        denied(&mut share, "201#90FF7F"),
+        unknown(0x90),
+        "34 changed"
+    );
+    let mut rpm = gate(limits(MaxSpeed::Rpm(360)));
+    assert_eq!(
+        denied(&mut rpm, "201#310100"),
+        fast(0x31, Fast::FullUnknown)
+    );
+    assert_eq!(denied(&mut rpm, "201#310000"), None);
+    rpm.learn(0x201, 3600, 0x7FFF);
+    assert_eq!(denied(&mut rpm, "201#31CE0C"), above(0x31));
+    assert_eq!(denied(&mut rpm, "201#31CD0C"), None);
+    assert_eq!(
+        denied(&mut rpm, "202#31CC0C"),
+        fast(0x31, Fast::FullUnknown)
+    );
+    rpm.doubt();
+    assert_eq!(
+        denied(&mut rpm, "201#31CD0C"),
+        fast(0x31, Fast::FullUnknown)
+    );
+    let mut scale = gate(Limits {
+        max_speed: Some(MaxSpeed::Rpm(360)),
+        ..Limits::unlimited()
+    });
+    for (text, register) in [("201#C8100E", 0xC8), ("201#830000", 0x83)] {
+        assert_eq!(denied(&mut scale, text), fast(register, Fast::Scale));
+    }
+}
+
+/// Frames that no drive of the rig file receives need a permission of their own.
+#[test]
+fn other_identifiers() {
+    let mut open = gate(Limits {
+        other_identifiers: true,
+        ..Limits::default()
+    });
+    for text in ["203#510000", "00000201#510000", "203#R3"] {
+        assert_eq!(denied(&mut open, text), None, "{text}");
+    }
+    assert_eq!(
+        denied(&mut open, "201#510000"),
+        missing(0x51, Missing::Motion)
+    );
 }
 
 proptest! {

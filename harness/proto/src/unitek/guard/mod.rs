@@ -5,14 +5,21 @@
 //!
 //! The [`Gate`] sees every frame before it is sent, and knows the lock, the identifiers and the cycles from these frames alone.
 
+mod class;
+mod denial;
+mod speed;
+
+pub use class::{Class, NAMED, class};
+pub use denial::{Denial, Fast, Missing};
+
 use super::frame::{Data, Ignored, Request, low};
 use super::properties::Dlc4;
-use super::register::{Access, Register};
-use super::words::{MODE_EVENT, MODE_LOCK};
+use super::words::MODE_LOCK;
 use crate::can::{BitRate, Frame};
 use crate::time::{Instant, Span};
 use alloc::vec::Vec;
-use core::fmt;
+use class::need;
+use speed::Speed;
 
 /// What the rig's file permits.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,8 +34,21 @@ pub struct Limits {
     pub way_back: bool,
     /// The rig's file confirms that new bus settings may be stored in the EEPROM.
     pub store_bus_settings: bool,
+    /// Frames may be sent that no drive of the rig's file receives: other identifiers, 29 bits.
+    pub other_identifiers: bool,
+    /// The highest speed that a drive may be told; any where this is `None`.
+    pub max_speed: Option<MaxSpeed>,
     /// Registers of [`Class::Named`] that the rig's file names.
     pub named: Vec<u8>,
+}
+
+/// The highest speed that a drive may be told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaxSpeed {
+    /// As 31 and 34 count it: 32767 is 100 %.
+    Raw(u16),
+    /// In rpm; C8 says what 100 % is.
+    Rpm(u16),
 }
 
 impl Limits {
@@ -41,127 +61,14 @@ impl Limits {
             bus_settings: true,
             way_back: true,
             store_bus_settings: true,
+            other_identifiers: true,
+            max_speed: None,
             named: NAMED.to_vec(),
         }
     }
 
     fn all(&self) -> bool {
         self.motion && self.eeprom && self.bus_settings
-    }
-}
-
-/// Registers that only a rig file that names them permits.
-pub const NAMED: [u8; 3] = [0x03, 0x1A, 0x85];
-
-/// What a write to a register may do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Class {
-    /// Nothing that needs a permission.
-    Harmless,
-    /// Depends on the value and the lock: 51, 31, 90, 17, 18.
-    ByValue,
-    /// Moves the motor, or changes how it moves.
-    Motion,
-    /// Wears the EEPROM, or changes data of device and motor.
-    Eeprom,
-    /// Device data that changes currents or what 100 % speed is.
-    EepromAndMotion,
-    /// Changes how the drive is reached.
-    BusSettings,
-    /// Needs to be named in the rig's file.
-    Named,
-    /// Is not listed, or cannot be written: needs all permissions.
-    Unlisted,
-    /// Can make the drive unusable.
-    Never,
-}
-
-/// First register, last register, class.
-const CLASSES: &[(u8, u8, Class)] = {
-    use Class::{BusSettings, ByValue, Eeprom, EepromAndMotion, Harmless, Motion, Named, Never};
-    &[
-        (0x10, 0x16, Harmless),
-        (0x52, 0x52, Harmless),
-        (0x17, 0x18, ByValue),
-        (0x31, 0x31, ByValue),
-        (0x51, 0x51, ByValue),
-        (0x90, 0x90, ByValue),
-        (0x1C, 0x2F, Motion),
-        (0x33, 0x36, Motion),
-        (0x3B, 0x3C, Motion),
-        (0x3E, 0x3F, Motion),
-        (0x46, 0x46, Motion),
-        (0x4C, 0x4C, Motion),
-        (0x50, 0x50, Motion),
-        (0x53, 0x53, Motion),
-        (0x58, 0x58, Motion),
-        (0x5B, 0x5B, Motion),
-        (0x5E, 0x5E, Motion),
-        (0x60, 0x60, Motion),
-        (0x6A, 0x6C, Motion),
-        (0x6E, 0x6E, Motion),
-        (0x71, 0x72, Motion),
-        (0x75, 0x7A, Motion),
-        (0x7E, 0x80, Motion),
-        (0x8E, 0x8E, Motion),
-        (0xBE, 0xC3, Motion),
-        (0xC7, 0xC7, Motion),
-        (0xC9, 0xCB, Motion),
-        (0xCD, 0xCD, Motion),
-        (0xCF, 0xCF, Motion),
-        (0xD1, 0xD4, Motion),
-        (0xDA, 0xDB, Motion),
-        (0xED, 0xED, Motion),
-        (0xF0, 0xF1, Motion),
-        (0x05, 0x0F, Eeprom),
-        (0x19, 0x19, Eeprom),
-        (0x3A, 0x3A, Eeprom),
-        (0x44, 0x44, Eeprom),
-        (0x47, 0x47, Eeprom),
-        (0x4D, 0x4F, EepromAndMotion),
-        (0x59, 0x59, Eeprom),
-        (0x64, 0x65, Eeprom),
-        (0x7C, 0x7D, Eeprom),
-        (0x83, 0x84, Eeprom),
-        (0x87, 0x87, Eeprom),
-        (0x8B, 0x8D, Eeprom),
-        (0xA2, 0xA7, Eeprom),
-        (0xB1, 0xB6, Eeprom),
-        (0xBB, 0xBD, Eeprom),
-        (0xC4, 0xC6, Eeprom),
-        (0xC8, 0xC8, EepromAndMotion),
-        (0xD7, 0xD7, Eeprom),
-        (0xEE, 0xEE, Eeprom),
-        (0xF8, 0xFA, Eeprom),
-        (0x68, 0x69, BusSettings),
-        (0x73, 0x73, BusSettings),
-        (0x88, 0x89, BusSettings),
-        (0xD0, 0xD0, BusSettings),
-        (0xDC, 0xDC, BusSettings),
-        (0x03, 0x03, Named),
-        (0x1A, 0x1A, Named),
-        (0x85, 0x85, Named),
-        (0x04, 0x04, Never),
-        (0x5A, 0x5A, Never),
-        (0x62, 0x62, Never),
-        (0x67, 0x67, Never),
-        (0xB0, 0xB0, Never),
-        (0xB7, 0xBA, Never),
-    ]
-};
-
-/// The class of writes to a register.
-#[must_use]
-pub fn class(register: u8) -> Class {
-    let listed = CLASSES
-        .iter()
-        .find(|(first, last, _)| (*first..=*last).contains(&register))
-        .map(|(_, _, class)| *class);
-    match (listed, Register::of(register).access) {
-        (Some(Class::Never), _) | (_, Access::UK) => Class::Never,
-        // One inside a range too.
-        (_, Access::RO) => Class::Unlisted,
-        (listed, _) => listed.unwrap_or(Class::Unlisted),
     }
 }
 
@@ -186,6 +93,7 @@ struct Guarded {
     cycles: Vec<(u8, u8)>,
     /// New bus settings have been written since the last restart.
     moved: bool,
+    speed: Speed,
 }
 
 /// Judges every frame of a bus before it is sent.
@@ -210,6 +118,7 @@ impl Gate {
             locked: false,
             cycles: Vec::new(),
             moved: false,
+            speed: Speed::default(),
         });
         Self {
             limits,
@@ -230,7 +139,10 @@ impl Gate {
             !frame.id().is_extended() && drive.rx.iter().any(|&rx| u32::from(rx) == number)
         };
         if !self.drives.iter().any(meant) {
-            return Err(Denial::Identifier);
+            return match self.limits.other_identifiers {
+                true => Ok(()),
+                false => Err(Denial::Identifier),
+            };
         }
         let Some((request, sure)) = read(frame) else {
             return Ok(());
@@ -266,11 +178,32 @@ impl Gate {
         }
     }
 
-    /// Forgets every lock: the drives were restarted, or frames were lost.
+    /// Forgets every lock and every speed: the drives were restarted, or frames were lost.
     pub fn doubt(&mut self) {
-        self.drives
-            .iter_mut()
-            .for_each(|drive| drive.locked = false);
+        for drive in &mut self.drives {
+            drive.locked = false;
+            drive.speed = Speed::default();
+        }
+    }
+
+    /// Takes notice of C8, the rpm of 100 % speed, and of 34, the limit of the speed, as they were read from the drive that receives
+    /// on `rx`.
+    pub fn learn(&mut self, rx: u16, full: u16, limit: u16) {
+        for drive in self.drives.iter_mut().filter(|own| own.rx.contains(&rx)) {
+            drive.speed.full = Some(full);
+            drive.speed.limit = Some(limit.cast_signed().unsigned_abs());
+        }
+    }
+
+    /// What the rig's file permits.
+    #[must_use]
+    pub const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Copies what another gate to the same drives knows of them.
+    pub fn know_as(&mut self, other: &Self) {
+        self.drives.clone_from(&other.drives);
     }
 
     /// The drives whose identifiers were changed, as identifiers to receive and to send: those of the rig's file, and the latest.
@@ -336,6 +269,10 @@ impl Gate {
         if let Some(missing) = need.iter().find(|need| !need.held(limits)) {
             return denied(*missing);
         }
+        let denies = |max| drive.speed.denies(max, register, low(data.bits()));
+        if let Some(fast) = limits.max_speed.and_then(denies) {
+            return Err(Denial::Speed { register, fast });
+        }
         if matches!((register, data), (0x35 | 0xED, Data::Short(_))) {
             return Err(Denial::HalfRamp { register });
         }
@@ -362,32 +299,6 @@ fn read(frame: &Frame) -> Option<(Request, bool)> {
     Some((request, sure))
 }
 
-/// The permissions that a write needs.
-fn need(class: Class, register: u8, value: u16, locked: bool) -> &'static [Missing] {
-    use Missing::{All, BusSettings, Eeprom, Motion, WayBack};
-    match (class, register) {
-        (Class::Harmless | Class::Named | Class::Never, _) => &[],
-        (Class::ByValue, 0x51) => {
-            let known = value & !(MODE_LOCK | MODE_EVENT) == 0;
-            match (known, value & MODE_LOCK != 0) {
-                (true, true) => &[],
-                (true, false) => &[Motion],
-                (false, _) => &[All],
-            }
-        }
-        (Class::ByValue, 0x31 | 0x90) if value == 0 && locked => &[],
-        (Class::ByValue, 0x17 | 0x18) if locked => &[],
-        (Class::ByValue | Class::Motion, _) => &[Motion],
-        // 83 brings a stored speed command back, which moves a drive that is not locked (our choice).
-        (Class::Eeprom, 0x83) if !locked => &[Eeprom, Motion],
-        (Class::Eeprom, _) => &[Eeprom],
-        (Class::EepromAndMotion, _) => &[Eeprom, Motion],
-        (Class::BusSettings, 0x73) => &[BusSettings, Eeprom, WayBack],
-        (Class::BusSettings, _) => &[BusSettings],
-        (Class::Unlisted, _) => &[All],
-    }
-}
-
 impl Guarded {
     /// Keeps the state that an admitted frame leads to. `sure`: every drive reads the frame so.
     fn follow(&mut self, request: Request, sure: bool) {
@@ -412,6 +323,7 @@ impl Guarded {
 
     fn written(&mut self, register: u8, data: Data, sure: bool) {
         let value = low(data.bits());
+        self.speed.written(register, value, sure);
         let remember = |list: &mut Vec<u16>| {
             list.retain(|id| *id != value);
             list.push(value);
@@ -426,120 +338,3 @@ impl Guarded {
         self.moved |= matches!(register, 0x68 | 0x69 | 0x73);
     }
 }
-
-/// A permission that is missing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Missing {
-    /// [`Limits::motion`].
-    Motion,
-    /// [`Limits::eeprom`].
-    Eeprom,
-    /// [`Limits::bus_settings`].
-    BusSettings,
-    /// [`Limits::way_back`].
-    WayBack,
-    /// [`Limits::motion`], [`Limits::eeprom`] and [`Limits::bus_settings`].
-    All,
-    /// [`Limits::named`].
-    Named,
-}
-
-impl Missing {
-    fn held(self, limits: &Limits) -> bool {
-        match self {
-            Self::Motion => limits.motion,
-            Self::Eeprom => limits.eeprom,
-            Self::BusSettings => limits.bus_settings,
-            Self::WayBack => limits.way_back,
-            Self::All => limits.all(),
-            Self::Named => false,
-        }
-    }
-
-    /// What the rig's file has to say.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Motion => "allow_motion",
-            Self::Eeprom => "allow_eeprom",
-            Self::BusSettings => "allow_bus_settings",
-            Self::WayBack => "a stated way back from another bit rate",
-            Self::All => "allow_motion, allow_eeprom and allow_bus_settings",
-            Self::Named => "the register in its list of named registers",
-        }
-    }
-}
-
-/// Why a frame is not sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Denial {
-    /// No drive of the rig's file receives on its identifier.
-    Identifier,
-    /// The rig's file does not permit it.
-    NotPermitted {
-        /// The register.
-        register: u8,
-        /// What is missing.
-        missing: Missing,
-    },
-    /// No rig file can permit it.
-    Never {
-        /// The register.
-        register: u8,
-    },
-    /// 16 bits to 35 or ED: the upper half, the torque ramp, would become 0.
-    HalfRamp {
-        /// The register.
-        register: u8,
-    },
-    /// The replies of all cycles would take more than half of the bit rate.
-    Load {
-        /// Thousandths of the bit rate.
-        permille: u64,
-    },
-    /// 84 was written less than a minute ago.
-    EepromWear,
-    /// New bus settings would be stored, after which the drive may be reachable by RS232 only.
-    LostDrive,
-}
-
-impl fmt::Display for Denial {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |register: u8| Register::of(register).name;
-        match *self {
-            Self::Identifier => f.write_str(
-                "no drive of the rig file receives on this identifier: add the drive to the rig file",
-            ),
-            Self::NotPermitted { register, missing } => write!(
-                f,
-                "a write to register {register:02X} ({}) needs {} in the rig file",
-                name(register),
-                missing.name()
-            ),
-            Self::Never { register } => write!(
-                f,
-                "a write to register {register:02X} ({}) can make the drive unusable; no rig file permits it",
-                name(register)
-            ),
-            Self::HalfRamp { register } => write!(
-                f,
-                "16 bits for register {register:02X} ({}) also set its upper half to 0: read it first, then write all 32 bits",
-                name(register)
-            ),
-            Self::Load { permille } => write!(
-                f,
-                "the cyclic replies would take {}.{} % of the bit rate, at most 50 % are permitted: stop a cycle, or ask less often",
-                permille / 10,
-                permille % 10
-            ),
-            Self::EepromWear => {
-                f.write_str("the EEPROM was written less than a minute ago: wait before the next write of 84")
-            }
-            Self::LostDrive => f.write_str(
-                "new identifiers or a new bit rate would be stored, and the drive may then answer on RS232 only: confirm it in the rig file",
-            ),
-        }
-    }
-}
-
-impl core::error::Error for Denial {}
