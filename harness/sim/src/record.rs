@@ -49,7 +49,7 @@ impl LineByte {
 /// A frame on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineFrame {
-    /// The station that sent it; `None` for the bench's own.
+    /// The station that sent it; `None` for the bench itself.
     pub from: Option<u8>,
     /// When its start bit began.
     pub start: Instant,

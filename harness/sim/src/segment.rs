@@ -6,9 +6,11 @@
 //!
 //! A segment on which no station has anything to do costs nothing.
 
+use crate::record::{FrameEnd, LineFrame};
 use harness_proto::can::{BitRate, BusError, ERROR_FRAME_BITS, Frame, Heard};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
+use std::fmt;
 
 /// Bits that a passive station waits behind its own frame.
 const SUSPEND_BITS: u32 = 8;
@@ -81,41 +83,28 @@ pub enum FrameFault {
     BusOff,
 }
 
+impl fmt::Display for FrameFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lost => f.write_str("lost"),
+            Self::Doubled => f.write_str("doubled"),
+            Self::Late(span) => write!(f, "delay {span}"),
+            Self::Corrupt => f.write_str("corrupt"),
+            Self::NoAcknowledge => f.write_str("no-acknowledge"),
+            Self::BusOff => f.write_str("bus-off"),
+        }
+    }
+}
+
 /// A fault and the frame that it happens to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Placed {
-    /// The sender.
-    pub station: usize,
-    /// Which of its frames, counted from 1; a repetition is no frame of its own.
+    /// The sender whose frames are counted; `None` where the frames of all stations are.
+    pub station: Option<usize>,
+    /// Which frame, counted from 1 in the order in which they first win the bus; a repetition is no frame of its own.
     pub frame: u64,
     /// The fault.
     pub fault: FrameFault,
-}
-
-/// How a frame on the wire ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// All other stations have it.
-    Good,
-    /// No other station has it, though it was acknowledged.
-    Lost,
-    /// An error frame ended it.
-    Error(BusError),
-}
-
-/// A frame on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LineFrame {
-    /// The station that sent it; the first of them where several sent the same frame.
-    pub from: usize,
-    /// The start bit.
-    pub start: Instant,
-    /// The end of the last bit of the frame, or of the error frame, in front of the intermission.
-    pub end: Instant,
-    /// The frame.
-    pub frame: Frame,
-    /// How it ended.
-    pub outcome: End,
 }
 
 /// What the segment keeps of a station.
@@ -126,8 +115,8 @@ struct Member {
     off: bool,
     /// Frames sent, the present one included.
     frames: u64,
-    /// The frame under way was counted.
-    counted: bool,
+    /// The number on the segment of the frame under way, once it was counted.
+    counted: Option<u64>,
     /// Not before.
     held_until: Instant,
 }
@@ -150,6 +139,8 @@ pub struct Segment<S> {
     stations: Vec<S>,
     members: Vec<Member>,
     faults: Vec<Placed>,
+    /// Frames of all stations so far.
+    frames: u64,
     /// From when on the next frame may begin.
     free_at: Instant,
     now: Instant,
@@ -168,6 +159,7 @@ impl<S: Station> Segment<S> {
             members: vec![Member::default(); stations.len()],
             stations,
             faults: Vec::new(),
+            frames: 0,
             free_at: Instant::START,
             now: Instant::START,
             busy_bits: 0,
@@ -181,7 +173,8 @@ impl<S: Station> Segment<S> {
         self.record = None;
     }
 
-    /// The frames on the wire so far, in order of time.
+    /// The frames on the wire so far, in order of time. Their senders are the places of stations, from 0 on; of several that sent the
+    /// same frame the first.
     #[must_use]
     pub fn record(&self) -> &[LineFrame] {
         self.record.as_deref().unwrap_or_default()
@@ -232,16 +225,60 @@ impl<S: Station> Segment<S> {
         &self.faults
     }
 
+    /// How many frames have won the bus so far; a repetition is no frame of its own.
+    #[must_use]
+    pub const fn frames(&self) -> u64 {
+        self.frames
+    }
+
     /// Whether a station takes no part any more.
     #[must_use]
     pub fn is_off(&self, place: usize) -> bool {
         self.members[place].off
     }
 
+    /// The controller of a station goes to bus-off: it neither hears nor sends until [`Segment::restart`].
+    pub fn switch_off(&mut self, place: usize) {
+        self.members[place].off = true;
+        self.stations[place].notice(self.now, BusError::BusOff);
+    }
+
     /// Restarts the controller of a station after bus-off.
     pub fn restart(&mut self, place: usize) {
-        self.members[place].errors = 0;
-        self.members[place].off = false;
+        let member = &mut self.members[place];
+        member.errors = 0;
+        member.off = false;
+        member.held_until = member.held_until.max(self.now);
+    }
+
+    /// Whether a station repeats a frame that no other station acknowledges.
+    #[must_use]
+    pub fn is_unheard(&self, place: usize) -> bool {
+        self.members[place].errors >= PASSIVE
+    }
+
+    /// From when on the bus is free, as far as is known: the end of the last frame.
+    #[must_use]
+    pub const fn free_at(&self) -> Instant {
+        self.free_at
+    }
+
+    /// Forgets the record, planned faults and the count of frames: the next frame is the first one.
+    pub fn begin(&mut self) {
+        self.take_record();
+        self.faults.clear();
+        self.frames = 0;
+        for member in &mut self.members {
+            member.frames = 0;
+            member.counted = None;
+        }
+    }
+
+    /// When something happens next: a frame begins, or a station does something by itself. `None` while all stations wait.
+    #[must_use]
+    pub fn next_event(&self) -> Option<Instant> {
+        let act = self.stations.iter().filter_map(S::next_action).min();
+        self.next_start().into_iter().chain(act).min()
     }
 
     /// Runs up to and including `to`. A frame that has begun by then is carried to its end.
@@ -365,7 +402,7 @@ impl<S: Station> Segment<S> {
         if error == BusError::ErrorFrame {
             self.all_but(places, |station| station.notice(end, error));
         }
-        self.keep(start, end, frame, places[0], End::Error(error));
+        self.keep(start, end, frame, places[0], FrameEnd::Error(error));
     }
 
     fn complete(
@@ -381,7 +418,7 @@ impl<S: Station> Segment<S> {
         if !lost {
             self.all_but(places, |station| station.hear(end, &frame));
         }
-        let outcome = if lost { End::Lost } else { End::Good };
+        let outcome = if lost { FrameEnd::Lost } else { FrameEnd::Good };
         self.keep(start, end, frame, places[0], outcome);
         if fault == Some(FrameFault::Doubled) {
             // The sender repeats it: it still wants to send it, and counts it as the same frame.
@@ -390,7 +427,7 @@ impl<S: Station> Segment<S> {
         for &place in places {
             let member = &mut self.members[place];
             member.errors = member.errors.saturating_sub(1);
-            member.counted = false;
+            member.counted = None;
             self.suspend(place);
             self.stations[place].sent(end);
         }
@@ -431,26 +468,27 @@ impl<S: Station> Segment<S> {
     /// Counts the frame that a station begins, and takes out the fault that was planned for it.
     fn fault_of(&mut self, place: usize) -> Option<FrameFault> {
         let member = &mut self.members[place];
-        if !member.counted {
-            member.counted = true;
+        let number = *member.counted.get_or_insert_with(|| {
             member.frames += 1;
-        }
-        let frames = member.frames;
-        let found = self
-            .faults
-            .iter()
-            .position(|p| p.station == place && p.frame == frames)?;
+            self.frames += 1;
+            self.frames
+        });
+        let own = member.frames;
+        let found = self.faults.iter().position(|p| match p.station {
+            Some(station) => station == place && p.frame == own,
+            None => p.frame == number,
+        })?;
         Some(self.faults.remove(found).fault)
     }
 
-    fn keep(&mut self, start: Instant, end: Instant, frame: Frame, from: usize, outcome: End) {
+    fn keep(&mut self, start: Instant, at: Instant, frame: Frame, from: usize, ended: FrameEnd) {
         if let Some(record) = &mut self.record {
             record.push(LineFrame {
-                from,
+                from: u8::try_from(from).ok(),
                 start,
-                end,
+                at,
                 frame,
-                outcome,
+                ended,
             });
         }
     }
@@ -501,6 +539,18 @@ impl Host {
     /// When its next frame that was sent had ended.
     pub fn confirmation(&mut self) -> Option<Instant> {
         self.sent.pop_front()
+    }
+
+    /// When the oldest of what it has heard had ended.
+    #[must_use]
+    pub fn heard_at(&self) -> Option<Instant> {
+        self.heard.front().map(|(at, _)| *at)
+    }
+
+    /// Forgets what it has heard.
+    pub fn forget(&mut self) {
+        self.heard.clear();
+        self.sent.clear();
     }
 
     /// Frames that wait.

@@ -1,6 +1,7 @@
 //! The buses: one folder each. Only this file names them all.
 
 pub mod novobus;
+pub mod unitek;
 
 pub use novobus::language::{argument, plan, syntax};
 pub use novobus::link::SimulatedLink;
@@ -63,6 +64,8 @@ pub(crate) fn over_ports(
 pub enum Stimulus {
     /// To an ND21.
     Novobus(harness_sim::nd21::Stimulus),
+    /// To a UNITEK drive.
+    Unitek(harness_sim::unitek::Stimulus),
 }
 
 /// The buses of the product.

@@ -15,6 +15,7 @@ pub(crate) mod tamper;
 
 pub use crate::trouble::Trouble;
 pub use harness_sim::fault::{DriveFault, LinkFault};
+pub use harness_sim::segment::FrameFault;
 pub use inner::{Delay, InnerLink, Ports};
 pub use octets::Octets;
 pub use record::{Event, Look, Recording, Sink};
@@ -88,6 +89,8 @@ impl Capability {
 pub enum PlacedFault {
     /// On a link of the ring: 0 is the master's outgoing one, N the one that ends at the master.
     Link(usize, LinkFault),
+    /// On a frame of a shared segment.
+    Frame(FrameFault),
     /// In a drive.
     Drive(u8, DriveFault),
     /// To a drive, from outside the bus; at a time only.
@@ -110,7 +113,7 @@ pub fn link_name(ring: usize, drives: u8, place: usize) -> String {
 pub enum Moment {
     /// Now; what needs a byte takes the next one.
     Now,
-    /// At the n-th byte since the start, counted from 1.
+    /// At the n-th piece since the start, counted from 1: a byte of a link, a frame of a segment.
     Byte(u64),
     /// At this time.
     At(Instant),

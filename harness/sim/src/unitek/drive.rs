@@ -93,7 +93,7 @@ impl Drive {
 
     /// Sets registers before the drive is used, as its manufacturer or NDrive does: contents and EEPROM.
     ///
-    /// Bits that a register has not are dropped.
+    /// Bits that a register has not are dropped. 6D is where the axis stands.
     #[must_use]
     pub fn with_setup(mut self, setup: &[(u8, u32)]) -> Self {
         for &(number, raw) in setup {
@@ -103,7 +103,16 @@ impl Drive {
             }
             self.cells[usize::from(number)] = raw;
         }
+        self.plant.preset(self.cells[0x6D].cast_signed());
         self.identifiers = (self.cell16(0x68), self.cell16(0x69));
+        self.last_status = self.status();
+        self
+    }
+
+    /// The drive with what it controls at the first power-up, whatever its properties say.
+    #[must_use]
+    pub fn with_control(mut self, control: Control) -> Self {
+        self.control = control;
         self.last_status = self.status();
         self
     }
@@ -203,6 +212,11 @@ impl Drive {
     /// Overwrites the contents of a register from outside the bus, as a test or a deviation does.
     pub fn poke(&mut self, number: u8, raw: u32) {
         self.cells[usize::from(number)] = raw & Register::of(number).mask();
+        match number {
+            0x6D => self.plant.preset(raw.cast_signed()),
+            0x68 | 0x69 => self.use_identifiers(),
+            _ => {}
+        }
         self.next = self.powered.then_some(self.scans + 1);
     }
 

@@ -29,6 +29,12 @@ pub struct Inputs {
     pub voltage: u16,
     /// Bits of 8F that are there as long as they are set here.
     pub faults: u32,
+    /// Bit 13 of STATUS and F4, in place of what the drive finds.
+    pub tolerance: Option<bool>,
+    /// Bit 12 of STATUS, in place of what the drive finds.
+    pub calibrated: Option<bool>,
+    /// The speed that the drive measures, in place of the motor's: 30, 32, A8, F5 and bit 9 of STATUS.
+    pub speed: Option<i16>,
 }
 
 impl Default for Inputs {
@@ -48,6 +54,9 @@ impl Default for Inputs {
             air_temperature: 8_000,
             voltage: 10_000,
             faults: 0,
+            tolerance: None,
+            calibrated: None,
+            speed: None,
         }
     }
 }
@@ -79,4 +88,50 @@ impl Inputs {
             _ => return None,
         })
     }
+
+    /// The names of what can be overruled by [`Inputs::force`].
+    pub const FORCED: [&'static str; 8] = [
+        "tol",
+        "cal",
+        "speed",
+        "errors",
+        "motor-temperature",
+        "igbt-temperature",
+        "air-temperature",
+        "bus-voltage",
+    ];
+
+    /// Overrules a value of plant or sensors by a raw number, or lets it be what it is by itself. `false` if there is none with this name.
+    #[must_use]
+    pub fn force(&mut self, name: &str, raw: Option<u32>) -> bool {
+        let usual = Self::default();
+        let low = raw.map(|raw| (raw & 0xFFFF) as u16);
+        match name {
+            "tol" => self.tolerance = raw.map(|raw| raw != 0),
+            "cal" => self.calibrated = raw.map(|raw| raw != 0),
+            "speed" => self.speed = low.map(u16::cast_signed),
+            "errors" => self.faults = raw.unwrap_or(usual.faults),
+            "motor-temperature" => {
+                self.motor_temperature = low.unwrap_or(usual.motor_temperature);
+            }
+            "igbt-temperature" => self.igbt_temperature = low.unwrap_or(usual.igbt_temperature),
+            "air-temperature" => self.air_temperature = low.unwrap_or(usual.air_temperature),
+            "bus-voltage" => self.voltage = low.unwrap_or(usual.voltage),
+            _ => return false,
+        }
+        true
+    }
+}
+
+/// What happens to a drive from outside the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stimulus {
+    /// The input with this name, one of [`Inputs::SWITCHES`], is switched.
+    Input(&'static str, bool),
+    /// What has this name, one of [`Inputs::FORCED`], is overruled by a raw number, or no longer.
+    Force(&'static str, Option<u32>),
+    /// The contents of a register are changed, as NDrive does over RS232.
+    Register(u8, u32),
+    /// Its CAN controller goes to bus-off.
+    BusOff,
 }

@@ -12,6 +12,7 @@ pub mod reference;
 mod station;
 
 pub use drive::Drive;
-pub use inputs::Inputs;
+pub use inputs::{Inputs, Stimulus};
 pub use outbox::{Cause, Waiting};
 pub use plant::Control;
+pub use station::Member;

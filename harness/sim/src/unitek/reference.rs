@@ -123,7 +123,12 @@ impl Reference {
 
     fn tolerance(&self) -> bool {
         let away = (i32_of(self.at(0x6E)) - self.position).abs();
-        self.mode == 'p' && self.homing == 0 && away <= i128::from(self.at(0x79))
+        let found = self.mode == 'p' && self.homing == 0 && away <= i128::from(self.at(0x79));
+        self.inputs.tolerance.unwrap_or(found)
+    }
+
+    fn measured(&self) -> i128 {
+        self.inputs.speed.map_or(self.speed, i128::from)
     }
 
     /// What a read gives.
@@ -132,7 +137,7 @@ impl Reference {
         let i = &self.inputs;
         let bit = |place: u32, on: bool| if on { 1 << place } else { 0 };
         let follows = self.mode == 'p' && number != 0x8F && self.enabled();
-        let slow = self.speed.abs() < 328;
+        let slow = self.measured().abs() < 328;
         let raw = match number {
             0x20 | 0x27 | 0x5F if self.mode == 't' && self.enabled() => {
                 let torque = i16_of(self.at(0x90));
@@ -140,7 +145,7 @@ impl Reference {
                 raw_of(if torque < 0 { -size } else { size })
             }
             0x20 | 0x27 | 0x5F => 0,
-            0x30 | 0x32 | 0xA8 => raw_of(self.speed),
+            0x30 | 0x32 | 0xA8 => raw_of(self.measured()),
             0x40 => {
                 let f = self.p.status_bits.word() == "full";
                 bit(0, self.enabled())
@@ -153,7 +158,7 @@ impl Reference {
                     + bit(8, self.mode != 't')
                     + bit(9, f && slow)
                     + bit(11, f && self.homing > 0)
-                    + bit(12, self.cal)
+                    + bit(12, self.inputs.calibrated.unwrap_or(self.cal))
                     + bit(13, self.tolerance())
                     + bit(14, f && self.ready())
             }

@@ -108,7 +108,7 @@ impl RingGate {
             {
                 Verdict::Doubt
             }
-            PlacedFault::Link(..) | PlacedFault::Drive(..) => Verdict::Open,
+            PlacedFault::Link(..) | PlacedFault::Frame(_) | PlacedFault::Drive(..) => Verdict::Open,
         }
     }
 }

@@ -240,6 +240,7 @@ impl SimulatedLink {
     fn place(&self, ring: usize, fault: PlacedFault) -> String {
         match fault {
             PlacedFault::Link(link, _) => link_name(ring, self.drives(ring), link),
+            PlacedFault::Frame(_) => "frame".to_owned(),
             PlacedFault::Drive(drive, _) | PlacedFault::Stimulus(drive, _) => {
                 let prefix = if ring == 0 { "" } else { "2:" };
                 format!("drive {prefix}{drive}")
@@ -260,6 +261,8 @@ impl SimulatedLink {
                     let _happened = drive.stimulate(stimulus);
                 }
             }
+            // Of another bus.
+            PlacedFault::Frame(_) | PlacedFault::Stimulus(..) => {}
         }
     }
 }
@@ -345,7 +348,7 @@ impl Link for SimulatedLink {
                     PlacedFault::Link(link, fault) => ring.arm_link(link, byte, fault),
                     PlacedFault::Drive(drive, fault) => ring.arm_drive(drive, byte, fault),
                     // It has no byte; planning has refused one.
-                    PlacedFault::Stimulus(..) => {}
+                    PlacedFault::Stimulus(..) | PlacedFault::Frame(_) => {}
                 }
             }
         }
@@ -389,10 +392,11 @@ impl Link for SimulatedLink {
             unused.push(match fault {
                 PlacedFault::Link(_, fault) => format!("{place} at {at}: {fault}"),
                 PlacedFault::Drive(_, fault) => format!("{place} at {at}: {fault}"),
-                PlacedFault::Stimulus(_, buses::Stimulus::Novobus(stimulus)) => match stimulus {
-                    Stimulus::Error(error) => format!("{place} at {at}: error {error}"),
-                    stimulus => format!("{place} at {at}: {stimulus:?}"),
-                },
+                PlacedFault::Frame(fault) => format!("{place} at {at}: {fault}"),
+                PlacedFault::Stimulus(_, buses::Stimulus::Novobus(Stimulus::Error(error))) => {
+                    format!("{place} at {at}: error {error}")
+                }
+                PlacedFault::Stimulus(_, stimulus) => format!("{place} at {at}: {stimulus:?}"),
             });
         }
         unused

@@ -22,7 +22,7 @@ impl Drive {
         let inputs = &self.inputs;
         let raw = match number {
             0x20 | 0x27 | 0x5F => self.current(),
-            0x30 | 0x32 | 0xA8 => (self.plant.speed() & 0xFFFF) as u32,
+            0x30 | 0x32 | 0xA8 => (self.speed() & 0xFFFF) as u32,
             0x40 => self.status(),
             0x49 => inputs.motor_temperature.into(),
             0x4A => inputs.igbt_temperature.into(),
@@ -75,11 +75,25 @@ impl Drive {
         self.inputs.run && self.inputs.rfe && self.is_ready() && !locked
     }
 
+    /// The speed that it measures.
+    fn speed(&self) -> i64 {
+        self.inputs
+            .speed
+            .map_or_else(|| self.plant.speed(), i64::from)
+    }
+
     fn is_standing(&self) -> bool {
-        self.plant.speed().abs() < STANDING
+        self.speed().abs() < STANDING
+    }
+
+    fn is_calibrated(&self) -> bool {
+        self.inputs.calibrated.unwrap_or(self.calibrated)
     }
 
     fn in_tolerance(&self) -> bool {
+        if let Some(forced) = self.inputs.tolerance {
+            return forced;
+        }
         let destination = i64::from(self.cells[0x6E].cast_signed());
         let away = (destination - i64::from(self.plant.position())).abs();
         self.control == Control::Position
@@ -96,7 +110,7 @@ impl Drive {
             (status::CONTINUOUS, self.inputs.icns),
             (status::POSITION, self.control == Control::Position),
             (status::SPEED, self.control != Control::Torque),
-            (status::CALIBRATED, self.calibrated),
+            (status::CALIBRATED, self.is_calibrated()),
             (status::TOLERANCE, self.in_tolerance()),
         ];
         let full = [

@@ -60,7 +60,7 @@ impl Drive {
         }
     }
 
-    fn use_identifiers(&mut self) {
+    pub(super) fn use_identifiers(&mut self) {
         if self.properties.id_change == IdChange::Immediate {
             self.identifiers = (self.cell16(0x68), self.cell16(0x69));
         }

@@ -1,58 +1,16 @@
 //! A desk: a host and a drive on one segment at 500 kbit/s.
 
-use harness_proto::can::{BitRate, Frame, Heard};
+use harness_proto::can::{BitRate, Heard};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Properties;
-use harness_sim::segment::{Host, LineFrame, Segment, Station};
+use harness_sim::record::LineFrame;
+use harness_sim::segment::{Host, Segment};
 use harness_sim::unitek::{Drive, Inputs};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 
 /// A host or a drive.
-pub(super) enum Member<D = Box<Drive>> {
-    Host(Host),
-    Drive(D),
-}
-
-impl<D: Station> Member<D> {
-    fn station(&self) -> &dyn Station {
-        match self {
-            Self::Host(host) => host,
-            Self::Drive(drive) => drive,
-        }
-    }
-
-    fn station_mut(&mut self) -> &mut dyn Station {
-        match self {
-            Self::Host(host) => host,
-            Self::Drive(drive) => drive,
-        }
-    }
-}
-
-impl<D: Station> Station for Member<D> {
-    fn hear(&mut self, at: Instant, frame: &Frame) {
-        self.station_mut().hear(at, frame);
-    }
-    fn wants(&self) -> Option<(Instant, Frame)> {
-        self.station().wants()
-    }
-    fn sent(&mut self, at: Instant) {
-        self.station_mut().sent(at);
-    }
-    fn notice(&mut self, at: Instant, error: harness_proto::can::BusError) {
-        self.station_mut().notice(at, error);
-    }
-    fn next_action(&self) -> Option<Instant> {
-        self.station().next_action()
-    }
-    fn advance(&mut self, to: Instant) {
-        self.station_mut().advance(to);
-    }
-    fn acknowledges(&self) -> bool {
-        self.station().acknowledges()
-    }
-}
+pub(super) type Member<D = Box<Drive>> = harness_sim::unitek::Member<D>;
 
 /// Station 0 is the host, station 1 the drive.
 pub(super) struct Desk {

@@ -59,7 +59,7 @@ fn conversation<S: Station>(drive: S, set: fn(&mut S, Instant, &str)) -> Vec<(u6
         now += Span::from_millis(wait);
         segment.run_until(now);
     }
-    let of_drive = segment.record().iter().filter(|line| line.from == 1);
+    let of_drive = segment.record().iter().filter(|line| line.from == Some(1));
     of_drive
         .map(|line| (line.start.since_start().as_nanos() / 1_000_000, line.frame))
         .collect()
@@ -187,7 +187,7 @@ fn jobs(deviation: Option<&'static MasterDeviation>) -> Left {
             _ => None,
         }));
     }
-    let of_drive = segment.record().iter().filter(|line| line.from == 1);
+    let of_drive = segment.record().iter().filter(|line| line.from == Some(1));
     let frames = of_drive
         .map(|line| (line.start.since_start().as_nanos() / 1_000_000, line.frame))
         .collect();

@@ -5,7 +5,8 @@ use harness_proto::can::{BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::Reply;
 use harness_proto::unitek::properties::Properties;
-use harness_sim::segment::{End, FrameFault, Host, LineFrame, Placed, Segment};
+use harness_sim::record::{FrameEnd, LineFrame};
+use harness_sim::segment::{FrameFault, Host, Placed, Segment};
 use harness_sim::unitek::{Drive, Inputs};
 use proptest::prelude::*;
 
@@ -51,7 +52,7 @@ fn faults() -> impl Strategy<Value = Vec<Placed>> {
         (0..5_000u64).prop_map(|micros| FrameFault::Late(Span::from_micros(micros))),
     ];
     let placed = (0..4usize, 1..20u64, fault).prop_map(|(station, frame, fault)| Placed {
-        station,
+        station: Some(station),
         frame,
         fault,
     });
@@ -86,19 +87,19 @@ fn check(record: &[LineFrame], doubled: bool) -> Result<(), TestCaseError> {
     let mut free = Instant::START;
     for line in record {
         prop_assert!(line.start >= free, "{line:?} begins on a busy bus");
-        free = line.end + BitRate::K500.time_of(3);
+        free = line.at + BitRate::K500.time_of(3);
         let tx = match line.from {
-            2 => FIRST.1,
-            3 => SECOND.1,
+            Some(2) => FIRST.1,
+            Some(3) => SECOND.1,
             _ => continue,
         };
         let reply = Reply::decode(&line.frame, tx);
         prop_assert!(reply.is_ok(), "{line:?}");
-        if line.outcome == End::Good {
+        if line.ended == FrameEnd::Good {
             // One that is doubled has an error frame (17 bits) in place of its intermission (3).
             let lasts = BitRate::K500.time_of(line.frame.wire_bits() - 3);
             let longer = lasts + BitRate::K500.time_of(17 - 3);
-            let passed = line.end.since(line.start);
+            let passed = line.at.since(line.start);
             prop_assert!(passed == lasts || (doubled && passed == longer), "{line:?}");
         }
     }
@@ -115,7 +116,7 @@ fn only_what_was_asked(record: &[LineFrame], identifiers: (u16, u16)) -> Result<
             if let [0x3D, register, ..] = *line.frame.data() {
                 asked[usize::from(register)] = true;
             }
-        } else if number == u32::from(identifiers.1) && line.from > 1 {
+        } else if number == u32::from(identifiers.1) && line.from > Some(1) {
             prop_assert!(asked[usize::from(line.frame.data()[0])], "{line:?}");
         }
     }
@@ -172,7 +173,7 @@ fn drives_do_not_influence_each_other() {
         let alone = play(&[FIRST], &frames, &[]);
         let both = play(&[FIRST, SECOND], &frames, &[]);
         let of_first = |segment: &Segment<Member>| -> Vec<(Instant, Frame)> {
-            let lines = segment.record().iter().filter(|line| line.from == 2);
+            let lines = segment.record().iter().filter(|line| line.from == Some(2));
             lines.map(|line| (line.start, line.frame)).collect()
         };
         prop_assert_eq!(of_first(&alone), of_first(&both));

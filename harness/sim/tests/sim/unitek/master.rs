@@ -76,7 +76,7 @@ impl Bench {
 
     fn fault(&mut self, station: usize, frame: u64, fault: FrameFault) {
         self.desk.segment.inject(Placed {
-            station,
+            station: Some(station),
             frame,
             fault,
         });
@@ -224,7 +224,7 @@ fn cycles_are_supervised() {
         .desk
         .record()
         .iter()
-        .filter(|line| line.from == 1)
+        .filter(|line| line.from == Some(1))
         .count() as u64;
     bench.fault(1, sent + 3, FrameFault::Lost);
     bench.run(100);

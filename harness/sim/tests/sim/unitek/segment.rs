@@ -4,7 +4,8 @@ use super::common::Desk;
 use harness_proto::can::{BitRate, BusError, Frame, Heard};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::properties::Properties;
-use harness_sim::segment::{End, FrameFault, Host, Placed, Segment};
+use harness_sim::record::FrameEnd;
+use harness_sim::segment::{FrameFault, Host, Placed, Segment};
 use harness_sim::unitek::{Drive, Inputs};
 
 fn frame(text: &str) -> Frame {
@@ -47,10 +48,10 @@ fn arbitration() {
     for line in segment.record() {
         assert_eq!(line.start, start);
         assert_eq!(
-            line.end + BitRate::K500.time_of(3),
+            line.at + BitRate::K500.time_of(3),
             start + BitRate::K500.time_of(line.frame.wire_bits())
         );
-        start = line.end + BitRate::K500.time_of(3);
+        start = line.at + BitRate::K500.time_of(3);
     }
 }
 
@@ -75,11 +76,11 @@ fn without_acknowledge() {
     let mut segment = hosts(1);
     segment.station_mut(0).send(at(0), frame("201#3D4000"));
     segment.run_until(at(50_000));
-    let ends: Vec<_> = segment.record().iter().map(|f| f.outcome).collect();
+    let ends: Vec<_> = segment.record().iter().map(|f| f.ended).collect();
     assert!(ends.len() > 200, "{}", ends.len());
     assert!(
         ends.iter()
-            .all(|end| *end == End::Error(BusError::NoAcknowledge))
+            .all(|end| *end == FrameEnd::Error(BusError::NoAcknowledge))
     );
     assert!(!segment.is_off(0));
     // 66 bits to the acknowledge slot, 17 of the error frame; passive, 8 more.
@@ -165,7 +166,7 @@ fn faults() {
             segment.station_mut(1).send(at(1_000), frame("200#00"));
         }
         segment.inject(Placed {
-            station: 0,
+            station: Some(0),
             frame: 2,
             fault,
         });
@@ -177,7 +178,7 @@ fn faults() {
     }
     let mut unused = hosts(2);
     unused.inject(Placed {
-        station: 0,
+        station: Some(0),
         frame: 1,
         fault: FrameFault::Lost,
     });
@@ -256,4 +257,35 @@ fn overfull_bus() {
     desk.restart();
     desk.wait(5);
     assert_eq!(desk.host().waiting(), 0);
+}
+
+/// A fault can be placed by the count over all stations, and `begin` resets that count.
+#[test]
+fn faults_are_counted_over_the_segment() {
+    let mut segment = hosts(3);
+    let placed = |frame, fault| Placed {
+        station: None,
+        frame,
+        fault,
+    };
+    segment.station_mut(0).send(at(0), frame("201#R"));
+    segment.run_until(at(500));
+    segment.begin();
+    segment.inject(placed(2, FrameFault::Lost));
+    segment.inject(placed(3, FrameFault::Corrupt));
+    for (place, text) in [(0, "203#R"), (1, "202#R"), (2, "201#R")] {
+        segment.station_mut(place).send(at(1_000), frame(text));
+    }
+    segment.run_until(at(5_000));
+    let ends: Vec<_> = segment.record().iter().map(|f| (f.from, f.ended)).collect();
+    assert_eq!(
+        ends,
+        [
+            (Some(2), FrameEnd::Good),
+            (Some(1), FrameEnd::Lost),
+            (Some(0), FrameEnd::Error(BusError::ErrorFrame)),
+            (Some(0), FrameEnd::Good),
+        ]
+    );
+    assert_eq!((segment.frames(), segment.next_event()), (3, None));
 }

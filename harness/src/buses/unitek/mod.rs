@@ -1,0 +1,3 @@
+//! UNITEK DS/BAMOCAR on CAN: what the bench knows of this bus alone.
+
+pub mod simulate;
