@@ -56,6 +56,8 @@ pub mod explore;
 #[doc(hidden)]
 pub mod file;
 #[doc(hidden)]
+pub mod frames;
+#[doc(hidden)]
 pub mod fuzz;
 #[doc(hidden)]
 pub mod guard;
