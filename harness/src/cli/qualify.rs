@@ -9,6 +9,7 @@ use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run::{details, line, select};
 use super::run_rig::{Job, Stop, over, play, work};
+use crate::buses::syntax::Header;
 use crate::evidence::Folder;
 use crate::library::Entry;
 use crate::link::Link as _;
@@ -111,7 +112,7 @@ pub(crate) fn settle(
         }
     }
     let (profile, settled) = match ill {
-        true => (None, Vec::new()),
+        true => (None, Header::default()),
         false => {
             let (profile, settled) = profile(run, findings, folder.as_deref_mut(), output)?;
             (Some(profile), settled)
@@ -251,12 +252,12 @@ fn exchange_roles(
     Ok(())
 }
 
-/// The deviations that explain every byte, and what was compared. The drives of the model have the properties of the bus that these header
-/// lines settle; `None` where the run ended early, and no deviation is looked for.
+/// The deviations that explain every byte, and what was compared. The drives of the model have the properties of the bus that this header
+/// settles; `None` where the run ended early, and no deviation is looked for.
 fn name_drives(
     run: &mut Run<'_>,
     findings: &Findings,
-    settled: Option<&Vec<String>>,
+    settled: Option<&Header>,
     output: &mut Output,
 ) -> Result<String, Stop> {
     let rig = run.session().rig();
@@ -266,20 +267,20 @@ fn name_drives(
     let seen = findings.seen(drives, run.exactness());
     let settled = settled.filter(|_| findings.differ());
     let named = settled.map(|settled| {
-        let twin = |lines: &[String]| run.twin_with(&[settled, lines].concat());
+        let twin = |header: &Header| run.twin_with(&settled.and(header));
         name(&seen, &twin)
     });
     Ok(findings.tell(named.as_deref(), &known, output)?)
 }
 
 /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus is part of every later
-/// question and is the second value, as lines of a header; a time of a drive is the middle of a span, and no later answer rests on it.
+/// question and is the second value; a time of a drive is the middle of a span, and no later answer rests on it.
 fn profile(
     run: &mut Run<'_>,
     findings: &mut Findings,
     mut folder: Option<&mut Folder>,
     output: &mut Output,
-) -> Result<(Profile, Vec<String>), Stop> {
+) -> Result<(Profile, Header), Stop> {
     let rings: Vec<u8> = run.session().rings().iter().map(|r| r.drives()).collect();
     let drives = rings.first().copied().unwrap_or(1);
     let mut profile = Profile {
@@ -290,7 +291,7 @@ fn profile(
         property: BTreeMap::new(),
         open: BTreeMap::new(),
     };
-    let mut known = Vec::new();
+    let mut known = Header::default();
     let mut ended = false;
     for probe in probes(drives).unwrap_or_default() {
         ended = ended || over(run, output);
@@ -305,13 +306,13 @@ fn profile(
             Asked::Ring => (String::new(), String::new()),
         };
         let why = match ask(run, findings, &probe, &known, folder.as_deref_mut(), output)? {
-            Asking::Answer(Answer::Settled { value, lines }) => {
+            Asking::Answer(Answer::Settled { value, header }) => {
                 findings.note_probe();
                 output.result(&format!("{property} ({section}): {whose}{value}\n"))?;
                 if probe.asked == Asked::Ring {
-                    known.extend(lines.iter().cloned());
+                    known = known.and(&header);
                 }
-                profile.settle(property, &section, &format!("{whose}{value}"), lines);
+                profile.settle(property, &section, &format!("{whose}{value}"), &header);
                 continue;
             }
             Asking::Answer(Answer::NoDifference) => {
@@ -348,7 +349,7 @@ fn ask(
     run: &mut Run<'_>,
     findings: &mut Findings,
     probe: &Probe,
-    known: &[String],
+    known: &Header,
     mut folder: Option<&mut Folder>,
     output: &mut Output,
 ) -> Result<Asking, Stop> {
@@ -372,7 +373,7 @@ fn ask(
             conversations.push(attempt.conversations.clone());
             last.push((entry.short_name(), played));
         }
-        let twin = |lines: &[String]| run.twin_with(&[known, lines].concat());
+        let twin = |header: &Header| run.twin_with(&known.and(header));
         match answer(probe, drives, &conversations, exactness, &twin) {
             Ok(Answer::Unexplained) => {}
             Ok(answer) => return Ok(Asking::Answer(answer)),

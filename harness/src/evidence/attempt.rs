@@ -10,8 +10,9 @@ use crate::link::{
     Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,
     link_name,
 };
+use crate::rig::judge::known;
 use crate::rig::judge::{Heard, judge};
-use crate::rig::run::{Way, known, opening, twin};
+use crate::rig::run::{Way, opening, twin};
 use crate::rig::{Driven, Rig, SessionError, play_one};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtMismatch, Outcome, play};

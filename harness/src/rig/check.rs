@@ -3,6 +3,7 @@
 use super::file::schema;
 use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
 use super::profile::KnownProfile;
+use crate::buses::syntax::Header;
 use crate::file::schema::{Step, compare, place, syntax};
 use crate::file::values::{ValueError, Wire};
 use crate::scenario::problem::{Problem, Problems, Span};
@@ -31,6 +32,8 @@ pub struct Rig {
     pub file: RigFile,
     /// The profile that it names, read.
     pub profile: Option<KnownProfile>,
+    /// The lines of its `[sim]`, read.
+    pub setup: Header,
 }
 
 impl Rig {
@@ -98,7 +101,7 @@ pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, P
         file: &file,
         problems: Vec::new(),
     };
-    let profile = check.all(source, profile);
+    let (profile, setup) = check.all(source, profile);
     if !check.problems.is_empty() {
         return Err(problems(check.problems));
     }
@@ -107,6 +110,7 @@ pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, P
         text: source.text.clone(),
         file,
         profile,
+        setup,
     })
 }
 
@@ -157,7 +161,11 @@ impl Check<'_> {
         self.problems.push(problem);
     }
 
-    fn all(&mut self, source: &Source, find_profile: &FindProfile<'_>) -> Option<KnownProfile> {
+    fn all(
+        &mut self,
+        source: &Source,
+        find_profile: &FindProfile<'_>,
+    ) -> (Option<KnownProfile>, Header) {
         let file = self.file;
         debug_assert_eq!(file.schema, SCHEMA);
         self.id();
@@ -195,8 +203,8 @@ impl Check<'_> {
         self.programs();
         self.quarantine();
         let profile = self.profile(find_profile);
-        self.setup(source, profile.as_ref());
-        profile
+        let setup = self.setup(source, profile.as_ref());
+        (profile, setup)
     }
 
     fn id(&mut self) {

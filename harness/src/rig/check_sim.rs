@@ -3,10 +3,12 @@
 use super::check::{Check, FindProfile};
 use super::file::Sim;
 use super::profile::{KnownProfile, Profile};
+use crate::buses::header::{for_other_rings, parse_lines};
+use crate::buses::syntax::Header;
 use crate::file::schema::Step;
-use crate::rig::sim::{lines, settle};
-use crate::scenario::problem::Problem;
-use crate::scenario::source::Source;
+use crate::rig::sim::{mistakes, sizes};
+use crate::scenario::problem::{Problem, Span};
+use crate::scenario::source::{Source, line_number};
 
 impl Check<'_> {
     /// The profile that the rig's file names.
@@ -16,7 +18,7 @@ impl Check<'_> {
             let profile = Profile::parse(&source.text);
             let profile = profile.map_err(|error| format!("{}: {error}", source.name))?;
             Ok(KnownProfile {
-                lines: profile.lines().map(str::to_owned).collect(),
+                header: profile.header(),
                 text: source.text.to_string(),
             })
         });
@@ -30,36 +32,54 @@ impl Check<'_> {
         }
     }
 
-    /// The lines of `[sim]` make drives, together with what stands in front of them.
-    pub(crate) fn setup(&mut self, source: &Source, profile: Option<&KnownProfile>) {
+    /// Reads the lines of `[sim]`, and settles them behind the profile for the rig's rings.
+    pub(crate) fn setup(&mut self, source: &Source, profile: Option<&KnownProfile>) -> Header {
         let none = Sim::default();
-        let sim = self.file.sim.as_ref().unwrap_or(&none);
-        let (lines, before) = lines(self.file, profile, &[]);
-        let at = |index: usize| [Step::Key("sim"), Step::Key("setup"), Step::Index(index)];
-        if let Some(index) = sim
-            .setup
-            .iter()
-            .position(|line| line.contains(['\n', '\r']))
-        {
+        let lines = &self.file.sim.as_ref().unwrap_or(&none).setup;
+        let line = |index: usize| [Step::Key("sim"), Step::Key("setup"), Step::Index(index)];
+        let long = |line: &String| line.contains(['\n', '\r']);
+        if let Some(index) = lines.iter().position(long) {
             self.wrong(
-                &at(index),
+                &line(index),
                 "this is more than one line",
                 "one line expected here",
             );
-        } else if let Err(problems) = settle(&source.name, self.file, &lines) {
-            let text = lines.join("\n");
-            for problem in problems.all() {
-                let text = text.get(..problem.span.start).unwrap_or(&text);
-                let line = text.matches('\n').count();
-                let span = match line.checked_sub(before) {
-                    Some(index) => self.place(&at(index)),
-                    None => self.place(&["rig".into(), "profile".into()]),
-                };
-                self.problems.push(Problem {
-                    span,
-                    ..problem.clone()
-                });
+            return Header::default();
+        }
+        let text = lines.join("\n");
+        let place = |span: Span| line(line_number(&text, span.start) - 1);
+        let read = parse_lines(&Source {
+            name: source.name.clone(),
+            text: text.as_str().into(),
+        });
+        let own = match read {
+            Ok(own) => own,
+            Err(problems) => {
+                for problem in problems.all() {
+                    self.add(&place(problem.span), problem);
+                }
+                return Header::default();
+            }
+        };
+        if let Some(problem) = for_other_rings(&own, &sizes(self.file)) {
+            self.add(&place(problem.span), &problem);
+            return own;
+        }
+        for (setup, problem) in mistakes(&source.name, self.file, profile, &own) {
+            match setup {
+                Some(setup) => self.add(&place(setup.span), &problem),
+                None => self.add(&["rig".into(), "profile".into()], &problem),
             }
         }
+        own
+    }
+
+    /// Adds a mistake at a value of the rig's file.
+    fn add(&mut self, path: &[Step<'_>], problem: &Problem) {
+        let span = self.place(path);
+        self.problems.push(Problem {
+            span,
+            ..problem.clone()
+        });
     }
 }

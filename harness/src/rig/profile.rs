@@ -1,5 +1,6 @@
 //! A profile: what is known about the drives of a rig, as a file that the simulator can load.
 
+use crate::buses::syntax::Header;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -31,8 +32,8 @@ pub struct Settled {
     pub value: String,
     /// The section that leaves it open.
     pub section: String,
-    /// The header lines of the scenario language that make a simulated drive behave so.
-    pub setup: Vec<String>,
+    /// What makes a simulated drive behave so; in a file, a list of header lines of the scenario language.
+    pub setup: Header,
 }
 
 /// A profile that a rig's file names.
@@ -40,8 +41,8 @@ pub struct Settled {
 pub struct KnownProfile {
     /// Its text.
     pub text: String,
-    /// The header lines that make drives behave so.
-    pub lines: Vec<String>,
+    /// What makes simulated drives behave so.
+    pub header: Header,
 }
 
 /// Why a text is not a profile.
@@ -69,15 +70,15 @@ impl Profile {
     }
 
     /// Notes what was found of a property, of one drive after another.
-    pub fn settle(&mut self, property: &str, section: &str, value: &str, lines: Vec<String>) {
+    pub fn settle(&mut self, property: &str, section: &str, value: &str, header: &Header) {
         let settled = self.property.entry(property.to_owned());
         let settled = settled.or_insert_with(|| Settled {
             value: String::new(),
             section: section.to_owned(),
-            setup: Vec::new(),
+            setup: Header::default(),
         });
         add(&mut settled.value, value);
-        settled.setup.extend(lines);
+        settled.setup = settled.setup.and(header);
     }
 
     /// Notes why a property is not known, of one drive after another.
@@ -85,10 +86,11 @@ impl Profile {
         add(self.open.entry(property.to_owned()).or_default(), why);
     }
 
-    /// The header lines that make simulated drives behave as was found.
-    pub fn lines(&self) -> impl Iterator<Item = &str> + '_ {
+    /// What makes simulated drives behave as was found.
+    #[must_use]
+    pub fn header(&self) -> Header {
         let settled = self.property.values();
-        settled.flat_map(|settled| settled.setup.iter().map(String::as_str))
+        settled.fold(Header::default(), |all, own| all.and(&own.setup))
     }
 }
 

@@ -6,11 +6,12 @@ use super::driven::Driven;
 use super::played::{Again, Attempt, Played};
 use super::session::Session;
 use super::session_error::SessionError;
+use crate::buses::syntax::Header;
 use crate::buses::twin::{Comparison, Conversation, Exactness, Twin};
 use crate::guard::Guarded;
 use crate::link::{Capability, Event, Line, Link, Octets, Recording, Sink, Trouble};
 use crate::rig::health::{Unhealthy, examine};
-use crate::rig::judge::{Heard, by_hand, judge};
+use crate::rig::judge::{Heard, judge, known};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{
@@ -104,13 +105,13 @@ impl<'s> Run<'s> {
         self.session
     }
 
-    /// A fresh twin. Its drives are set up as the rig's file and these header `lines` say.
+    /// A fresh twin. Its drives are set up as the rig's file and this header say.
     ///
     /// # Errors
-    /// The lines have mistakes.
-    pub fn twin_with(&self, lines: &[String]) -> Result<Twin, Problems> {
+    /// The header has mistakes.
+    pub fn twin_with(&self, header: &Header) -> Result<Twin, Problems> {
         self.alive();
-        twin(self.session.rig(), lines)
+        twin(self.session.rig(), header)
     }
 
     /// Tells the session's watchdog that the program works.
@@ -460,28 +461,12 @@ impl Sink for Both<'_> {
     }
 }
 
-/// The known deviations of a rig that the simulator has, as lines of a header.
-pub(crate) fn known(rig: &Rig) -> Vec<String> {
-    let mut lines = Vec::new();
-    for entry in rig.file.deviation.iter().filter(|entry| !by_hand(entry)) {
-        let ring = if entry.ring == 2 { "2:" } else { "" };
-        if entry.drives.is_empty() {
-            lines.push(format!("drive {ring}0..last deviates {}", entry.name));
-        }
-        for drive in &entry.drives {
-            lines.push(format!("drive {ring}{drive} deviates {}", entry.name));
-        }
-    }
-    lines
-}
-
-pub(crate) fn twin(rig: &Rig, lines: &[String]) -> Result<Twin, Problems> {
+/// A fresh twin of a rig's drives, set up as its file and this header say.
+pub(crate) fn twin(rig: &Rig, header: &Header) -> Result<Twin, Problems> {
     let mut model = rig.clone();
-    if let Some(sim) = &mut model.file.sim {
-        // A simulated drive that is wrong on purpose is compared with one that is not.
-        sim.setup.retain(|line| !line.contains(" deviates "));
-    }
-    let plan = model.plan_with(lines)?;
+    // A simulated drive that is wrong on purpose is compared with one that is not.
+    model.setup = model.setup.without_deviations();
+    let plan = model.plan_with(header)?;
     let mut twin = Twin::new(simulate::bench(&plan), &plan.rings);
     twin.rest_through_self_tests();
     Ok(twin)

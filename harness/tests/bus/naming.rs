@@ -3,6 +3,7 @@
 //! which take a fraction of the time of complete ND21s; deviations behind the bus are left out.
 
 use harness::buses::SimulatedLink;
+use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Capability, Event, Octets, Recording};
@@ -49,6 +50,11 @@ fn ring(lines: &[String]) -> Result<(Plan, SimulatedLink), ()> {
     let plan = entry.plan.expect("novobus");
     let link = bench(&plan);
     Ok((plan, link))
+}
+
+/// A twin with this header.
+fn twin_of(header: &Header) -> Result<Twin, ()> {
+    twin(&header.lines())
 }
 
 /// A twin with more lines in its header. There are many of them, and each is asked for often.
@@ -202,7 +208,7 @@ fn verdict(lines: &[String]) -> Verdict {
         exactness: THROUGH_A_PORT,
     };
     let culprit = culprit(DRIVES, &seen, &trials.expect("no errors"), &pinned);
-    let (_, named) = agreed(culprit, &name(&seen_all, &twin));
+    let (_, named) = agreed(culprit, &name(&seen_all, &twin_of));
     Verdict {
         differs: !play.differing.is_empty(),
         named,
@@ -348,7 +354,7 @@ fn what_is_right_refutes_a_name() {
         alike: &play.alike,
         exactness: THROUGH_A_PORT,
     };
-    let twin = |lines: &[String]| twin(&[&wrong[..1], lines].concat());
+    let twin = |header: &Header| twin(&[&wrong[..1], &header.lines()].concat());
     let named = name(&seen, &twin);
     let names: Vec<_> = named.iter().map(|own| own.deviation.name).collect();
     assert!(!names.contains(&"writes-ignored"), "{names:?}");
@@ -515,10 +521,10 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
         {
             let entries = probe.entries.iter().filter_map(|entry| entry.plan.as_ref());
             let seen: Vec<_> = entries.map(|plan| played(plan, &link)).collect();
-            let found = answer(probe, DRIVES, &seen, THROUGH_A_PORT, &twin).expect("rings");
+            let found = answer(probe, DRIVES, &seen, THROUGH_A_PORT, &twin_of).expect("rings");
             let manual = &hypotheses(probe.property, DRIVES)[0];
             let is_manual =
-                matches!(&found, Answer::Settled { lines, .. } if *lines == manual.lines);
+                matches!(&found, Answer::Settled { header, .. } if *header == manual.header);
             assert!(is_manual, "{lines:?}: {}: {found:?}", probe.property);
         }
     }

@@ -1,5 +1,6 @@
 //! The twin: a ring beside its model, and what explains a ring that differs from it.
 
+use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::twin::{Conversation, Exactness, Symptom, Twin};
 use harness::library::{Entry, sources};
 use harness::link::{Event, Link, Octets, Recording, Replay};
@@ -114,12 +115,12 @@ fn probes_tell_properties() {
         if probe.asked != Asked::Ring {
             continue;
         }
-        let alike = |h: &Hypothesis| h.lines.len() == 1;
+        let alike = |h: &Hypothesis| h.header.setups.len() == 1;
         for hypothesis in hypotheses(probe.property, 3).into_iter().filter(alike) {
             let value = hypothesis.name.clone();
-            let lines = hypothesis.lines.clone();
-            let settled = Answer::Settled { value, lines };
-            let answer = answered(3, &probe, EXACT, &hypothesis.lines);
+            let header = hypothesis.header.clone();
+            let answer = answered(3, &probe, EXACT, &header);
+            let settled = Answer::Settled { value, header };
             assert_eq!(answer, settled, "{}", probe.property);
         }
     }
@@ -136,7 +137,7 @@ fn a_time_out_is_told_from_the_wait_behind_it() {
             lines.extend(silent.then_some(answered_not));
             let probes = probes(3).expect("no mistakes");
             let mut own = probes.iter().filter(|probe| probe.property == "time-out");
-            let found = answered(3, own.next().expect("a probe"), EXACT, &lines);
+            let found = answered(3, own.next().expect("a probe"), EXACT, &header(&lines));
             // Silences of 12.5, 15.5 and 18.5 ms were tried: it is known between which, and exactly when the zeros came.
             let same = |ms: u64| [13, 16, 19].map(|gap| ms < gap);
             let found_is = |time_out: u64, wait: u64| {
@@ -144,7 +145,8 @@ fn a_time_out_is_told_from_the_wait_behind_it() {
                 lines[0] = all("time-out", time_out);
                 lines[1] = all("time-out-wait", wait);
                 let value = format!("{time_out}ms");
-                found == Answer::Settled { value, lines }
+                let header = header(&lines);
+                found == Answer::Settled { value, header }
             };
             let alike = (10..=20).filter(|ms| same(*ms) == same(time_out));
             let sum = time_out + wait;
@@ -168,22 +170,27 @@ fn a_long_ring_is_asked_for_its_time_outs() {
     let probes = probes(40).expect("no mistakes");
     for (property, value) in time_outs {
         let own = probes.iter().find(|probe| probe.property == property);
-        let lines = vec![format!("drive 0..last property {property} = {value}")];
-        let answer = answered(40, own.expect("a probe"), EXACT, &lines);
-        let is_it = matches!(&answer, Answer::Settled { lines: found, .. } if *found == lines);
+        let own_header = header(&[format!("drive 0..last property {property} = {value}")]);
+        let answer = answered(40, own.expect("a probe"), EXACT, &own_header);
+        let is_it = matches!(&answer, Answer::Settled { header, .. } if *header == own_header);
         assert!(is_it, "{property} = {value}: {answer:?}");
     }
 }
 
-/// The answer to a probe of a ring of `drives` drives with these lines in its header.
-fn answered(drives: u8, probe: &Probe, exactness: Exactness, lines: &[String]) -> Answer {
+/// These lines of a header.
+fn header(lines: &[String]) -> Header {
+    lines.join("\n").parse().expect("a header")
+}
+
+/// The answer to a probe of a ring of `drives` drives with this header.
+fn answered(drives: u8, probe: &Probe, exactness: Exactness, header: &Header) -> Answer {
     let entries = probe.entries.iter();
     let seen = entries.map(|entry| {
-        let (_, mut link) = model_of(drives, lines);
+        let (_, mut link) = model_of(drives, &header.lines());
         conversations(entry.plan.as_ref().expect("novobus"), &mut link)
     });
-    let twin = |lines: &[String]| -> Result<Twin, ()> {
-        let (plan, link) = model_of(drives, lines);
+    let twin = |header: &Header| -> Result<Twin, ()> {
+        let (plan, link) = model_of(drives, &header.lines());
         Ok(Twin::new(link, &plan.rings))
     };
     answer(probe, drives, &seen.collect::<Vec<_>>(), exactness, &twin).expect("rings")
@@ -207,7 +214,7 @@ fn what_a_drive_leaves_open_is_settled() {
         ("i2t-time", 15_000, 14_990, 15_010),
     ];
     for (property, is, from, to) in times {
-        let Answer::Settled { value, lines } = asked(property, &format!("{is}ms"), READY) else {
+        let Answer::Settled { value, header } = asked(property, &format!("{is}ms"), READY) else {
             panic!("{property} = {is} is not settled");
         };
         let (low, high) = value.split_once(" to ").expect("a span");
@@ -223,7 +230,7 @@ fn what_a_drive_leaves_open_is_settled() {
             low >= f64::from(from) && high <= f64::from(to),
             "{property}: {value}"
         );
-        assert!(lines[0].starts_with(&format!("drive 1 property {property} = ")));
+        assert!(header.lines()[0].starts_with(&format!("drive 1 property {property} = ")));
     }
     let words = [
         ("ps-position", "mode-bit"),
@@ -269,7 +276,7 @@ fn asked(property: &str, value: &str, lines: &str) -> Answer {
         knows_cells: false,
         ..EXACT
     };
-    answered(3, &probe, real, &[lines.to_owned(), so])
+    answered(3, &probe, real, &header(&[lines.to_owned(), so]))
 }
 
 /// What a rig's drives held before is set back, however long all the telegrams take.
@@ -326,9 +333,9 @@ fn a_divergence_says_where() {
     assert!(found.to_string().contains("ND21 10.1"), "{found}");
     let none = Hypothesis {
         name: "as the manual says".to_owned(),
-        lines: Vec::new(),
+        header: Header::default(),
     };
-    let twin = |_: &[String]| -> Result<Twin, ()> {
+    let twin = |_: &Header| -> Result<Twin, ()> {
         let (plan, link) = model(&[]);
         Ok(Twin::new(link, &plan.rings))
     };
@@ -384,8 +391,8 @@ fn what_the_right_drive_explains_names_no_deviation() {
             tolerance: Span::from_millis(20),
             ..EXACT
         };
-        let twin = |lines: &[String]| -> Result<Twin, ()> {
-            let (plan, link) = model(lines);
+        let twin = |header: &Header| -> Result<Twin, ()> {
+            let (plan, link) = model(&header.lines());
             Ok(Twin::new(link, &plan.rings))
         };
         let seen = Seen {

@@ -2,7 +2,6 @@
 
 use super::driver::cell::{Found, find, write};
 use super::driver::{self, Axis, Bus, State};
-use super::rig::sim::all_nd21;
 use crate::buses::SimulatedLink;
 use crate::embed::Error;
 use crate::rig::{self, Session, Shared};
@@ -66,7 +65,8 @@ pub(crate) fn simulated(
     {
         range.default = *size;
     }
-    all_nd21(&mut scenario);
+    let rings = scenario.header.rings.len();
+    scenario.header = scenario.header.nd21_by_default(rings);
     let plan = plan(&scenario, source, None)?;
     let mut link = simulate::bench(&plan);
     link.stop_recording();

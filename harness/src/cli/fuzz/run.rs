@@ -148,9 +148,9 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
     if !behind_port {
         return on_simulated(arguments, before.as_ref(), &rig, output);
     }
-    if let Some(sim) = &mut rig.file.sim {
-        sim.setup
-            .extend(arguments.deviates.iter().map(Planted::line));
+    if rig.is_simulated() {
+        let planted = arguments.deviates.iter().filter_map(Planted::setup);
+        rig.setup.setups.extend(planted);
     } else if !arguments.deviates.is_empty() || arguments.whole {
         output.complain("--deviates and --whole are only for simulated rings; this rig has ports");
         return Ok(Exit::Usage);

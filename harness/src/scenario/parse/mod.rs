@@ -4,6 +4,6 @@ pub(crate) mod header;
 pub(crate) mod step;
 pub(crate) mod words;
 
-pub use crate::buses::header::{parse_header, parse_setup};
+pub use crate::buses::header::parse_setup;
 pub(crate) use header::bus;
 pub use header::{parse, parse_step};

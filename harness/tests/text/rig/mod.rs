@@ -521,3 +521,43 @@ fn the_commands_say_what_they_do_and_end_with_the_right_code() {
     check(&["unlock", "lab"], 75, "rig lab is reserved by anna");
     check(&["unlock", "lab", "--force"], 0, "it was reserved by anna");
 }
+
+/// What a profile and `[sim]` say of drives is one header. A mistake is placed at its line of `[sim]`, or at the profile's name.
+#[test]
+fn a_mistake_in_a_setup_has_its_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let profile = |line: &str| {
+        let text = format!(
+            "schema = 1\nrig = \"lab\"\ndate = \"2026-03-14\"\nrings = [3]\n\
+             [property.self-test-time]\nvalue = \"50ms\"\nsection = \"nd21 11.8\"\nsetup = [{line:?}]\n"
+        );
+        std::fs::write(folder.path().join("profile.toml"), text).expect("written");
+    };
+    let path = folder.path().join("lab.toml");
+    let text = "schema = 1\n[rig]\nid = \"lab\"\nprofile = \"profile.toml\"\n[ring.1]\ndrives = 3\ntransport = \"sim\"\n[sim]\n\
+                setup = [\n\"line 19200\",\n\"drive 0 model plain\",\n\"drive 3 input GPIN3 high\",\n]\n";
+    let wrong = || {
+        let source = Source {
+            name: path.display().to_string(),
+            text: text.into(),
+        };
+        let problems = parse(&source).expect_err("mistakes");
+        let placed = problems.all().iter().map(|problem| {
+            let line = text[..problem.span.start].matches('\n').count() + 1;
+            (line, problem.message.clone())
+        });
+        placed.collect::<Vec<_>>()
+    };
+    profile("drive 0 property self-test-time = 50ms");
+    let found = wrong();
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert_eq!(found[0].0, 4, "{found:?}");
+    assert!(found[0].1.contains("its model is `plain`"), "{found:?}");
+    assert_eq!(found[1].0, 12, "{found:?}");
+    assert!(found[1].1.contains("drive 3"), "{found:?}");
+    // A line that is none is placed in the profile itself.
+    profile("drive 0 property self-test = 50ms");
+    let found = wrong();
+    assert_eq!(found[0].0, 4, "{found:?}");
+    assert!(found[0].1.contains("line 8, column"), "{found:?}");
+}

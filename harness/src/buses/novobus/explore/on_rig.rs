@@ -7,6 +7,7 @@ use super::oracle::{Difference, sent};
 use super::order::{Command, Order};
 use super::play::Seen;
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin;
 use crate::explore::ExploreError;
@@ -58,10 +59,8 @@ impl<'r, 's> OnRig<'r, 's> {
         let session = run.session();
         let mut rig = session.rig().clone();
         // The setup describes the simulated drives themselves; the model must follow the manual.
-        if let Some(sim) = &mut rig.file.sim {
-            sim.setup.clear();
-        }
-        let plan = rig.plan_with(&[]).map_err(Box::new)?;
+        rig.setup = Header::default();
+        let plan = rig.plan().map_err(Box::new)?;
         let mut model = simulate::bench(&plan);
         model.run_until(Instant::START + WARM);
         model.begin();

@@ -70,7 +70,7 @@ impl Setup {
     /// which the reference model knows too, unless a deviation needs a whole ND21 or `whole` asks for it.
     #[must_use]
     pub fn of_rig(rig: &Rig, more: &[Planted], whole: bool) -> Self {
-        let own = rig.header();
+        let own = &rig.setup;
         let mut header = own.only(|setup| planted_by(setup, rig).is_empty());
         let mut deviates: Vec<_> = own
             .setups
@@ -82,12 +82,10 @@ impl Setup {
             deviation::deviation(&planted.name).is_some_and(|known| known.behind_the_bus)
         };
         let nothing_said = rig.is_simulated() && rig.id().starts_with("sim-");
-        if !header.names_a_model() {
-            if nothing_said && !whole && !deviates.iter().any(behind) {
-                header = Header::default();
-            } else {
-                header = Header::whole(rig.rings().count()).and(&header);
-            }
+        if !header.names_a_model() && nothing_said && !whole && !deviates.iter().any(behind) {
+            header = Header::default();
+        } else {
+            header = header.nd21_by_default(rig.rings().count());
         }
         Self { header, deviates }
     }

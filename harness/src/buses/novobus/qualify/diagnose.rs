@@ -1,6 +1,7 @@
 //! Which known deviation explains how a ring differed from the model; and which one of the master does, where the bench's own master is wrong.
 
 use super::hypothesis::{Evidence, judge};
+use crate::buses::novobus::language::syntax::{Drives, Header, Setup};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::rig::Driven;
 use harness_sim::novobus::deviation::{
@@ -96,21 +97,22 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// The header lines of the scenario language that make it so.
-    fn lines(&self) -> Vec<String> {
-        let drives = self.drive.map_or("0..last".to_owned(), |k| k.to_string());
-        vec![format!("drive {drives} deviates {}", self.deviation.name)]
+    /// What makes simulated drives behave so.
+    fn header(&self) -> Header {
+        let whom = self.drive.map(|drive| Drives::one(0, drive));
+        let whom = whom.unwrap_or_else(|| Drives::all(0));
+        Setup::deviates(whom, self.deviation).into()
     }
 }
 
 /// The deviations that explain every byte of every attempt, including attempts in which nothing differed. `twin` returns a ring with
-/// additional header lines. A deviation of one drive is simpler than one of all drives, which is returned only if no single drive
+/// this header behind its own. A deviation of one drive is simpler than one of all drives, which is returned only if no single drive
 /// explains everything. An attempt that the model of the manual explains from its power-up on can refute a deviation, but not prove it.
 ///
 /// Simulated drives keep their state from earlier scenarios, which a fresh twin does not have, so no twin may give every byte. For them
 /// the deviation that explains the most attempts is named. Relatives of deviations with other numbers are tried only if no other
 /// deviation explains everything.
-pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&[String]) -> Result<Twin, E>) -> Vec<Named> {
+pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&Header) -> Result<Twin, E>) -> Vec<Named> {
     let named = name_among(seen, candidates(seen, deviations()), twin);
     match named.is_empty() {
         true => name_among(seen, candidates(seen, relatives()), twin),
@@ -121,11 +123,12 @@ pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&[String]) -> Result<Twin, E>) -> 
 fn name_among<E>(
     seen: &Seen<'_>,
     mut candidates: Vec<Candidate>,
-    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+    twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Vec<Named> {
-    let explains = |lines: &[String], attempt: &[Conversation]| -> Option<Evidence> {
-        judge(twin(lines).ok()?, attempt, seen.exactness)
+    let explains = |header: &Header, attempt: &[Conversation]| -> Option<Evidence> {
+        judge(twin(header).ok()?, attempt, seen.exactness)
     };
+    let manual = Header::default();
     let (simulated, mut differed) = (seen.exactness.knows_cells, 0);
     // The shortest first: it refutes most, and costs least.
     let mut differing: Vec<_> = seen.differing.iter().collect();
@@ -134,14 +137,14 @@ fn name_among<E>(
         if simulated && differed == MOST_SIMULATED {
             break;
         }
-        let right = explains(&[], attempt);
+        let right = explains(&manual, attempt);
         let better = |own: &Evidence| right.is_none_or(|right| own.timely && !right.timely);
         if right.is_some_and(|right| right.timely) {
             continue;
         }
         differed += 1;
         candidates.retain_mut(|candidate| {
-            let own = explains(&candidate.lines(), attempt).filter(better);
+            let own = explains(&candidate.header(), attempt).filter(better);
             candidate.timely &= own.is_none_or(|own| own.timely);
             candidate.explained += usize::from(own.is_some());
             candidate.explained == differed || simulated
@@ -154,10 +157,10 @@ fn name_among<E>(
     let most = candidates.iter().map(|own| own.explained).max();
     candidates.retain(|own| own.explained > 0 && Some(own.explained) == most);
     for attempt in seen.alike {
-        let right = explains(&[], attempt).filter(|_| !simulated && !candidates.is_empty());
+        let right = explains(&manual, attempt).filter(|_| !simulated && !candidates.is_empty());
         let Some(right) = right else { continue };
         candidates.retain(|candidate| {
-            let own = explains(&candidate.lines(), attempt);
+            let own = explains(&candidate.header(), attempt);
             own.is_some_and(|own| own.against <= right.against + MOST_AGAINST)
         });
     }

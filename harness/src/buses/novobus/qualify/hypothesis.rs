@@ -1,5 +1,6 @@
 //! Hypotheses, judged by what their twins answer.
 
+use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness_proto::time::Span;
 
@@ -8,8 +9,8 @@ use harness_proto::time::Span;
 pub struct Hypothesis {
     /// The assumption, as text for people.
     pub name: String,
-    /// The header lines of the scenario language that make it so.
-    pub lines: Vec<String>,
+    /// What makes simulated drives behave so.
+    pub header: Header,
 }
 
 /// How well a hypothesis explains the bytes received.
@@ -27,16 +28,16 @@ pub struct Evidence {
 /// times, those that do not are left out.
 ///
 /// # Errors
-/// The error of `twin` for lines that do not describe a ring.
+/// The error of `twin` for a header that does not describe a ring.
 pub fn explaining<'h, E>(
     hypotheses: &'h [Hypothesis],
     conversations: &[Conversation],
     exactness: Exactness,
-    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+    twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Result<Vec<(&'h Hypothesis, Evidence)>, E> {
     let mut explaining = Vec::new();
     for hypothesis in hypotheses {
-        let twin = twin(&hypothesis.lines)?;
+        let twin = twin(&hypothesis.header)?;
         if let Some(evidence) = judge(twin, conversations, exactness) {
             explaining.push((hypothesis, evidence));
         }

@@ -2,16 +2,19 @@
 
 use super::hypothesis::Hypothesis;
 use crate::buses::novobus::language::plan::Exchange;
+use crate::buses::novobus::language::syntax::{Drives, Header, Influence, Setup, SetupKind};
 use crate::buses::novobus::twin::Look;
 use crate::library::Entry;
 use crate::link::link_name;
 use crate::scenario::problem::Problems;
 use crate::scenario::source::Source;
+use crate::scenario::times::Duration;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
+use harness_proto::nd21::io::Input;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::nd21::PROPERTIES as OF_THE_DRIVE;
+use harness_sim::nd21::{PROPERTIES as OF_THE_DRIVE, Stimulus};
 use include_dir::{Dir, include_dir};
 use std::collections::BTreeSet;
 
@@ -55,8 +58,8 @@ pub struct Probe {
     pub about: &'static str,
     /// What the probe asks.
     pub asked: Asked,
-    /// The assumptions, as header lines of the scenario language.
-    pub assumed: Vec<String>,
+    /// What is assumed of the drive.
+    pub assumed: Header,
     /// The conversations.
     pub entries: Vec<Entry>,
 }
@@ -141,7 +144,7 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
             section: property.section,
             about: property.about,
             asked: Asked::Ring,
-            assumed: Vec::new(),
+            assumed: Header::default(),
             entries,
         });
     }
@@ -158,13 +161,19 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
                 section: property.section,
                 about: property.about,
                 asked: Asked::Drive(drive, looks),
-                // 5.3.3: the two inputs that release and start a drive, of which the bus shows nothing.
-                assumed: vec![format!("drive {drive} input GPIN3 GPIN5 high")],
+                assumed: released(drive).into(),
                 entries: vec![probe(&name, &text, drives)?],
             });
         }
     }
     Ok(probes)
+}
+
+/// The two inputs that release and start a drive, of which the bus shows nothing (ND21 5.3.3).
+fn released(drive: u8) -> Setup {
+    let high = |input| Stimulus::Input(input, true);
+    let inputs = Influence::Stimuli(vec![high(Input::Gpin3), high(Input::Gpin5)]);
+    Setup::new(Drives::one(0, drive), SetupKind::Influence(inputs))
 }
 
 fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
@@ -282,37 +291,45 @@ pub fn thorough(drives: u8) -> Result<Vec<Entry>, Box<Problems>> {
 #[must_use]
 pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
     let known = PROPERTIES.iter().find(|known| known.name == property);
-    let values: Vec<String> = match (property, known.map(|known| known.values)) {
+    let values: Vec<SetupKind> = match (property, known.map(|known| known.values)) {
         (_, None) => return Vec::new(),
         ("time-out", _) => return time_outs(),
-        ("time-out-wait", _) => WAITS.iter().map(|ms| format!("{ms}ms")).collect(),
-        (_, Some(words)) => words.iter().map(|&word| word.to_owned()).collect(),
+        ("time-out-wait", _) => WAITS.map(|ms| time(property, ms)).to_vec(),
+        (_, Some(words)) => {
+            let words = words.iter();
+            words.map(|word| SetupKind::word(property, word)).collect()
+        }
     };
-    let mut hypotheses: Vec<_> = values.iter().map(|value| alike(property, value)).collect();
-    let differing = values.iter().flat_map(|value| {
-        let others = values.iter().filter(move |other| *other != value);
-        others.flat_map(move |other| {
-            (0..drives).map(move |drive| (value.clone(), other.clone(), drive))
-        })
+    let mut hypotheses: Vec<_> = values.iter().map(alike).collect();
+    let places = (0..values.len()).flat_map(|value| {
+        let others = (0..values.len()).filter(move |other| *other != value);
+        others.flat_map(move |other| (0..drives).map(move |drive| (value, other, drive)))
     });
     // More hypotheses would not help a reader.
     let times = values.len() > 2;
-    let differing = differing.take(if drives > 1 && !times { 1_000 } else { 0 });
-    hypotheses.extend(differing.map(|(value, other, drive)| Hypothesis {
-        name: format!("{value}, but drive {drive} {other}"),
-        lines: vec![
-            format!("drive 0..last property {property} = {value}"),
-            format!("drive {drive} property {property} = {other}"),
-        ],
+    let places = places.take(if drives > 1 && !times { 1_000 } else { 0 });
+    hypotheses.extend(places.map(|(value, other, drive)| {
+        let (value, other) = (alike(&values[value]), &values[other]);
+        let own = Setup::new(Drives::one(0, drive), other.clone());
+        Hypothesis {
+            name: format!("{}, but drive {drive} {}", value.name, other.value()),
+            header: value.header.and(&own.into()),
+        }
     }));
     hypotheses
 }
 
-fn alike(property: &str, value: &str) -> Hypothesis {
+/// Every drive has this value of a property.
+fn alike(value: &SetupKind) -> Hypothesis {
     Hypothesis {
-        name: value.to_owned(),
-        lines: vec![format!("drive 0..last property {property} = {value}")],
+        name: value.value(),
+        header: Setup::new(Drives::all(0), value.clone()).into(),
     }
+}
+
+/// A property that is a time.
+fn time(property: &str, milliseconds: u64) -> SetupKind {
+    SetupKind::time(property, Duration::millis(milliseconds))
 }
 
 /// Hypotheses for the time-out: first with the manual's wait and answer, then combined with the other values of these two properties,
@@ -325,11 +342,11 @@ fn time_outs() -> Vec<Hypothesis> {
         for silent in [false, true] {
             let longest = LONGEST_SILENCE - wait.unwrap_or(10);
             for ms in TIME_OUTS.filter(|ms| *ms <= longest) {
-                let mut hypothesis = alike("time-out", &format!("{ms}ms"));
-                let wait = wait.map(|ms| alike("time-out-wait", &format!("{ms}ms")));
-                let silent = silent.then(|| alike("time-out-answer", "silent"));
+                let mut hypothesis = alike(&time("time-out", ms));
+                let wait = wait.map(|ms| time("time-out-wait", ms));
+                let silent = silent.then(|| SetupKind::word("time-out-answer", "silent"));
                 for more in wait.into_iter().chain(silent) {
-                    hypothesis.lines.extend(more.lines);
+                    hypothesis.header = hypothesis.header.and(&alike(&more).header);
                 }
                 hypotheses.push(hypothesis);
             }

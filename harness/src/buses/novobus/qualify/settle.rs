@@ -2,13 +2,15 @@
 
 use super::hypothesis::{Evidence, Hypothesis, explaining};
 use super::probes::{Asked, Probe, hypotheses};
+use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
+use crate::scenario::times::Duration;
 use harness_proto::novobus::role::Role;
 use harness_proto::time::Span;
 use harness_sim::nd21::PROPERTIES;
 
-/// Maximum number of header lines of a hypothesis of the bus.
-const MOST_LINES: usize = 3;
+/// Maximum number of settings in a hypothesis about the bus.
+const MOST_SETTINGS: usize = 3;
 
 /// How late the bench sees the first unasked byte of a drive (ND21 9.9) in real time: its clock and the drive's differ, and the computer
 /// may be busy.
@@ -21,8 +23,8 @@ pub enum Answer {
     Settled {
         /// It, for people.
         value: String,
-        /// The header lines of the scenario language that make a simulated drive behave so.
-        lines: Vec<String>,
+        /// What makes a simulated drive behave so.
+        header: Header,
     },
     /// Every value explains every byte.
     NoDifference,
@@ -33,16 +35,16 @@ pub enum Answer {
 }
 
 /// What the conversations of a probe in a ring of `drives` say, those of each of its entries by themselves. `twin` gives a ring
-/// with more lines in its header.
+/// with this header behind its own.
 ///
 /// # Errors
-/// What `twin` says of lines that make no ring.
+/// What `twin` says of a header that makes no ring.
 pub fn answer<E>(
     probe: &Probe,
     drives: u8,
     conversations: &[Vec<Conversation>],
     exactness: Exactness,
-    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+    twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Result<Answer, E> {
     let Asked::Drive(drive, looks) = probe.asked else {
         let all = hypotheses(probe.property, drives);
@@ -51,13 +53,16 @@ pub fn answer<E>(
             _ => LATENESS * probe.entries.len() as u64,
         };
         // The simplest ones first.
-        for lines in 1..=MOST_LINES {
-            let own = all.iter().filter(|h| h.lines.len() == lines).cloned();
+        for settings in 1..=MOST_SETTINGS {
+            let simple = |h: &&Hypothesis| h.header.setups.len() == settings;
+            let own = all.iter().filter(simple).cloned();
             let own: Vec<_> = own.collect();
             let found = explaining_all(own, conversations, exactness, twin)?;
             if let Some(hypothesis) = best(&found, lateness) {
-                let value = hypothesis.name.clone();
-                return Ok(Answer::settled(value, &hypothesis.lines));
+                return Ok(Answer::Settled {
+                    value: hypothesis.name.clone(),
+                    header: hypothesis.header.clone(),
+                });
             }
         }
         return Ok(Answer::Unexplained);
@@ -66,8 +71,8 @@ pub fn answer<E>(
         looks: Some((drive, looks)),
         ..exactness
     };
-    let asked = |assumed: &[String]| {
-        let twin = |lines: &[String]| twin(&[assumed, lines].concat());
+    let asked = |assumed: &Header| {
+        let twin = |header: &Header| twin(&assumed.and(header));
         of_the_drive(
             probe.property,
             drive,
@@ -77,7 +82,7 @@ pub fn answer<E>(
         )
     };
     match asked(&probe.assumed)? {
-        Answer::Unexplained if !probe.assumed.is_empty() => asked(&[]),
+        Answer::Unexplained if !probe.assumed.is_empty() => asked(&Header::default()),
         answer => Ok(answer),
     }
 }
@@ -88,43 +93,43 @@ fn of_the_drive<E>(
     drive: u8,
     conversations: &[Conversation],
     exactness: Exactness,
-    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+    twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Result<Answer, E> {
-    let line = |value: &str| vec![format!("drive {drive} property {property} = {value}")];
+    let header = |what: SetupKind| Header::from(Setup::new(Drives::one(0, drive), what));
     let known = PROPERTIES.iter().find(|known| known.name == property);
-    let explained = |value: &str| -> Result<Explained, E> {
-        Ok(explained(twin(&line(value))?, conversations, exactness))
+    let explained = |what: SetupKind| -> Result<Explained, E> {
+        Ok(explained(twin(&header(what))?, conversations, exactness))
     };
     if let Some(longest) = known.and_then(|property| property.longest()) {
-        let explained = |tenths: u64| explained(&written(tenths));
+        let time = |tenths: u64| SetupKind::time(property, written(tenths));
+        let explained = |tenths: u64| explained(time(tenths));
         return Ok(match bracket(tenths(longest), &explained)? {
-            Bracket::Between(from, to) if to == tenths(longest) => Answer::NotDone(written(from)),
-            Bracket::Between(from, to) => {
-                let value = format!("{} to {}", written(from), written(to));
-                Answer::settled(value, &line(&written(from.midpoint(to))))
+            Bracket::Between(from, to) if to == tenths(longest) => {
+                Answer::NotDone(written(from).to_string())
             }
+            Bracket::Between(from, to) => Answer::Settled {
+                value: format!("{} to {}", written(from), written(to)),
+                header: header(time(from.midpoint(to))),
+            },
             Bracket::Anything => Answer::NoDifference,
             Bracket::Nothing => Answer::Unexplained,
         });
     }
     let mut explaining = Vec::new();
     for word in known.into_iter().flat_map(|property| property.words()) {
-        if explained(word)? == Explained::Whole {
-            explaining.push(word);
+        let what = SetupKind::word(property, word);
+        if explained(what.clone())? == Explained::Whole {
+            explaining.push(what);
         }
     }
     Ok(match explaining.as_slice() {
         [] => Answer::Unexplained,
-        [word] => Answer::settled((*word).to_owned(), &line(word)),
+        [what] => Answer::Settled {
+            value: what.value(),
+            header: header(what.clone()),
+        },
         _ => Answer::NoDifference,
     })
-}
-
-impl Answer {
-    fn settled(value: String, lines: &[String]) -> Self {
-        let lines = lines.to_vec();
-        Self::Settled { value, lines }
-    }
 }
 
 /// The hypotheses that explain each of several sets of conversations.
@@ -132,7 +137,7 @@ fn explaining_all<E>(
     hypotheses: Vec<Hypothesis>,
     sets: &[Vec<Conversation>],
     exactness: Exactness,
-    twin: &dyn Fn(&[String]) -> Result<Twin, E>,
+    twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Result<Vec<(Hypothesis, Evidence)>, E> {
     let mut found: Vec<_> = hypotheses
         .into_iter()
@@ -166,11 +171,11 @@ fn tenths(time: Span) -> u64 {
     time.as_nanos() / 100_000
 }
 
-/// A time in tenths of a millisecond as the scenario language writes it.
-fn written(tenths: u64) -> String {
+/// A time in tenths of a millisecond, without a zero behind the point.
+fn written(tenths: u64) -> Duration {
     match tenths % 10 {
-        0 => format!("{}ms", tenths / 10),
-        tenth => format!("{}.{tenth}ms", tenths / 10),
+        0 => Duration::millis(tenths / 10),
+        _ => Duration::millis(tenths).tenth(),
     }
 }
 
@@ -277,6 +282,7 @@ mod tests {
 
     #[test]
     fn times_are_written_as_a_header_reads_them() {
+        let written = |tenths| written(tenths).to_string();
         assert_eq!(written(tenths(Span::from_millis(12))), "12ms");
         assert_eq!(written(17), "1.7ms");
         assert_eq!(written(0), "0ms");

@@ -1,11 +1,12 @@
 //! The verdict of an attempt, compared with its twin.
 
 use super::left_open;
+use crate::buses::novobus::language::syntax::{Drives, Header, Setup};
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
 use crate::link::{Event, Recording};
 use crate::rig::check::Rig;
 use crate::rig::file::Deviation;
-use crate::rig::run::{Way, known, play_one, twin};
+use crate::rig::run::{Way, play_one, twin};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{Difference, Mismatch, Outcome};
@@ -187,8 +188,8 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
 }
 
 /// The outcome of the scenario on a rig's model with drives that have just been switched on and have these known deviations.
-fn switched_on(rig: &Rig, lines: &[String], heard: &Heard<'_>) -> Option<Outcome> {
-    let mut link = twin(rig, lines).ok()?.into_link();
+fn switched_on(rig: &Rig, header: &Header, heard: &Heard<'_>) -> Option<Outcome> {
+    let mut link = twin(rig, header).ok()?.into_link();
     let mut forgotten: Vec<Event> = Vec::new();
     let mut recording = Recording::new(&mut link, &mut forgotten);
     play_one(&mut recording, heard.plan, heard.way).ok()
@@ -202,13 +203,10 @@ fn passes(rig: &Rig, heard: &Heard<'_>) -> bool {
 /// Whether the rig's file or its profile settles properties that the manual leaves open, and the scenario passes without them but not with
 /// them, on drives that have just been switched on: what was played before explains nothing here.
 fn passes_with_defaults(heard: &Heard<'_>) -> bool {
-    let settles = |line: &String| line.contains(" property ");
+    let settles = |own: &Setup| own.sets().is_some();
     let mut rig = heard.rig.clone();
-    let mut settled = rig.profile.take().is_some();
-    if let Some(sim) = &mut rig.file.sim {
-        settled |= sim.setup.iter().any(settles);
-        sim.setup.retain(|line| !settles(line));
-    }
+    let settled = rig.profile.take().is_some() | rig.setup.setups.iter().any(settles);
+    rig.setup = rig.setup.only(|own| !settles(own));
     settled && !passes(heard.rig, heard) && passes(&rig, heard)
 }
 
@@ -220,7 +218,8 @@ fn explained_by_known(finding: &Mismatch, heard: &Heard<'_>) -> bool {
         found.is_some_and(|found| found.span == finding.span)
     };
     !deviations.is_empty()
-        && switched_on(heard.rig, &[], heard).is_some_and(|right| right.verdict == Verdict::Passed)
+        && switched_on(heard.rig, &Header::default(), heard)
+            .is_some_and(|right| right.verdict == Verdict::Passed)
         && switched_on(heard.rig, &deviations, heard).is_some_and(fails_alike)
 }
 
@@ -269,6 +268,23 @@ fn of_the_drive<'h>(finding: &Mismatch, heard: &Heard<'h>) -> Option<&'h Own> {
     });
     let found = all.find(|(conversation, own)| about(conversation, own) && !set(own));
     found.map(|(_, own)| own)
+}
+
+/// The known deviations of a rig that the simulator has.
+pub(crate) fn known(rig: &Rig) -> Header {
+    let of_entry = |entry: &Deviation| -> Vec<Setup> {
+        let Some(deviation) = deviation::deviation(&entry.name) else {
+            return Vec::new();
+        };
+        let ring = usize::from(entry.ring - 1);
+        let whom = match entry.drives.as_slice() {
+            [] => vec![Drives::all(ring)],
+            some => some.iter().map(|drive| Drives::one(ring, *drive)).collect(),
+        };
+        let deviates = |whom| Setup::deviates(whom, deviation);
+        whom.into_iter().map(deviates).collect()
+    };
+    rig.file.deviation.iter().flat_map(of_entry).collect()
 }
 
 /// Whether a known deviation is none that the simulator has.

@@ -1,12 +1,12 @@
 //! Verdicts of attempts on rings in virtual time that are seen as through a port.
 
-use super::{Heard, judge};
+use super::{Heard, judge, known};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::{Entry, sources};
 use crate::link::{Capability, Event, Link, Octets, Recording};
 use crate::rig::check::parse;
-use crate::rig::run::{Way, known, play_one, twin};
+use crate::rig::run::{Way, play_one, twin};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{Outcome, lacks};
 use crate::scenario::simulate::bench;

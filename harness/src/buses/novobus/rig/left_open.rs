@@ -2,10 +2,13 @@
 //!
 //! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
 
-use super::judge::Heard;
+use super::judge::{Heard, known};
+use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
+use crate::buses::novobus::language::write::ring_prefix;
 use crate::buses::novobus::twin::Divergence;
 use crate::rig::check::Rig;
-use crate::rig::run::{known, twin};
+use crate::rig::run::twin;
+use crate::scenario::times::Duration;
 use harness_proto::novobus::properties;
 use harness_proto::time::Span;
 use harness_sim::nd21;
@@ -18,12 +21,12 @@ const SMALL: u8 = 16;
 const TIME_OUTS: std::ops::RangeInclusive<u64> = 11..=20;
 
 /// A value of an open property that is not the model's default.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 struct Choice {
     /// The property.
     property: &'static str,
-    /// The value, as the scenario language writes it.
-    value: String,
+    /// It with its value.
+    setting: SetupKind,
     /// The section of the ND21 manual that leaves it open.
     section: &'static str,
 }
@@ -32,11 +35,10 @@ impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             property,
-            value,
+            setting,
             section,
-            ..
         } = self;
-        write!(f, "{property} = {value} (ND21 {section})")
+        write!(f, "{property} = {} (ND21 {section})", setting.value())
     }
 }
 
@@ -47,15 +49,15 @@ pub(crate) fn explanation(heard: &Heard<'_>) -> Option<String> {
     if !real {
         return None;
     }
-    let (mut first, monitored) = differs(&[], heard)?;
+    let (mut first, monitored) = differs(&Header::default(), heard)?;
     let mut open = choices(heard.rig);
     open.retain(|choice| choice.property != "time-out" || monitored);
-    let (mut lines, mut chosen) = (Vec::new(), Vec::new());
+    let (mut header, mut chosen) = (Header::default(), Vec::new());
     // Each choice explains more bytes than those before it.
     loop {
         let mut further = None;
-        for (choice, whose, more) in candidates(&open, &first, &lines, heard) {
-            let all = [lines.as_slice(), &more].concat();
+        for (choice, whose, more) in candidates(&open, &first, &header, heard) {
+            let all = header.and(&more);
             match differs(&all, heard) {
                 None => {
                     chosen.push(format!("{choice}{whose}"));
@@ -70,7 +72,7 @@ pub(crate) fn explanation(heard: &Heard<'_>) -> Option<String> {
         let (place, words, all, property) = further?;
         open.retain(|choice| choice.property != property);
         chosen.push(words);
-        (first, lines) = (place, all);
+        (first, header) = (place, all);
     }
 }
 
@@ -91,16 +93,17 @@ impl Place {
     }
 }
 
-/// What is tried beside `lines`: each choice in every drive, and in single drives those that change where or how the attempt differs.
+/// What is tried behind `header`: each choice in every drive, and in single drives those that change where or how the attempt differs.
 fn candidates<'c>(
     open: &'c [Choice],
     first: &Place,
-    lines: &[String],
+    header: &Header,
     heard: &Heard<'_>,
-) -> Vec<(&'c Choice, String, Vec<String>)> {
-    let rings = || ["", "2:"].into_iter().zip(&heard.way.rings);
-    let every = |choice: &Choice| -> Vec<String> {
-        let all = rings().map(|(ring, _)| line(&format!("{ring}0..last"), choice));
+) -> Vec<(&'c Choice, String, Header)> {
+    let rings = || heard.way.rings.iter().enumerate();
+    let setup = |whom: Drives, choice: &Choice| Setup::new(whom, choice.setting.clone());
+    let every = |choice: &Choice| -> Header {
+        let all = rings().map(|(ring, _)| setup(Drives::all(ring), choice));
         all.collect()
     };
     let mut all: Vec<_> = open
@@ -108,16 +111,16 @@ fn candidates<'c>(
         .map(|choice| (choice, String::new(), every(choice)))
         .collect();
     for choice in open {
-        let whole = [lines, &every(choice)].concat();
+        let whole = header.and(&every(choice));
         let same = |(place, _): (Place, bool)| place == *first;
         if differs(&whole, heard).is_none_or(same) {
             continue;
         }
         for (ring, size) in rings().filter(|(_, size)| (2..=SMALL).contains(&size.drives())) {
             let single = (0..size.drives()).map(|drive| {
-                let drive = format!("{ring}{drive}");
-                let line = line(&drive, choice);
-                (choice, format!(" in drive {drive}"), vec![line])
+                let own = setup(Drives::one(ring, drive), choice);
+                let words = format!(" in drive {}{drive}", ring_prefix(ring));
+                (choice, words, own.into())
             });
             all.extend(single);
         }
@@ -127,21 +130,24 @@ fn candidates<'c>(
 
 /// The choices that the rig's file and its profile do not settle.
 fn choices(rig: &Rig) -> Vec<Choice> {
-    let profile = rig.profile.iter().flat_map(|profile| &profile.lines);
-    let setup = rig.file.sim.iter().flat_map(|sim| &sim.setup);
-    let lines: Vec<_> = profile.chain(setup).collect();
+    let profile = rig.profile.iter().map(|profile| &profile.header);
+    let headers = profile.chain([&rig.setup]);
+    let settings: Vec<_> = headers.flat_map(|own| &own.setups).collect();
     let of_the_bus = properties::PROPERTIES.iter().flat_map(|property| {
-        let values: Vec<String> = match property.name {
-            "time-out" => TIME_OUTS.map(|ms| format!("{ms}ms")).collect(),
+        let name = property.name;
+        let settings: Vec<_> = match name {
+            "time-out" => TIME_OUTS
+                .map(|ms| SetupKind::time(name, Duration::millis(ms)))
+                .collect(),
             "time-out-wait" => Vec::new(),
             _ => property.values[1..]
                 .iter()
-                .map(ToString::to_string)
+                .map(|word| SetupKind::word(name, word))
                 .collect(),
         };
-        values.into_iter().map(move |value| Choice {
-            property: property.name,
-            value,
+        settings.into_iter().map(move |setting| Choice {
+            property: name,
+            setting,
             section: property.section,
         })
     });
@@ -149,13 +155,13 @@ fn choices(rig: &Rig) -> Vec<Choice> {
         let values = property.words().skip(1);
         values.map(|value| Choice {
             property: property.name,
-            value: value.to_owned(),
+            setting: SetupKind::word(property.name, value),
             section: property.section,
         })
     });
     let settled = |choice: &Choice| {
-        let setting = format!(" property {} = ", choice.property);
-        lines.iter().any(|line| line.contains(&setting))
+        let mut all = settings.iter();
+        all.any(|own| own.sets() == Some(choice.property))
     };
     of_the_bus
         .chain(of_drives)
@@ -163,19 +169,11 @@ fn choices(rig: &Rig) -> Vec<Choice> {
         .collect()
 }
 
-fn line(drives: &str, choice: &Choice) -> String {
-    format!(
-        "drive {drives} property {} = {}",
-        choice.property, choice.value
-    )
-}
-
-/// Where an attempt first differs from drives with these header lines that have just been switched on, and whether one of them monitors
+/// Where an attempt first differs from drives with this header that have just been switched on, and whether one of them monitors
 /// time-outs; `None` where every byte is the same.
-fn differs(lines: &[String], heard: &Heard<'_>) -> Option<(Place, bool)> {
+fn differs(header: &Header, heard: &Heard<'_>) -> Option<(Place, bool)> {
     (heard.alive)();
-    let lines = [known(heard.rig).as_slice(), lines].concat();
-    let Ok(mut twin) = twin(heard.rig, &lines) else {
+    let Ok(mut twin) = twin(heard.rig, &known(heard.rig).and(header)) else {
         let nowhere = Place {
             conversation: 0,
             divergence: None,

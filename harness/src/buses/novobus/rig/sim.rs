@@ -1,21 +1,16 @@
 //! Simulated rigs: what their drives are before anything is sent.
 
-use crate::buses::novobus::language::parse::header::parse_lines;
-use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
+use crate::buses::novobus::language::parse::drive::DEVICES;
+use crate::buses::novobus::language::plan::plan_header;
+use crate::buses::novobus::language::syntax::{Drives, Header, Influence, Setup, SetupKind};
 use crate::rig::check::Rig;
 use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};
 use crate::rig::limits;
 use crate::rig::profile::KnownProfile;
-use crate::scenario::expression::{Expression, Located};
-use crate::scenario::parse::parse_header;
-use crate::scenario::plan::{Plan, plan};
-use crate::scenario::problem::{Problems, Span};
-use crate::scenario::source::Source;
-use crate::scenario::syntax::Scenario;
-use harness_sim::novobus::drive::Model;
-
-/// The types of the device that a header knows, and a model of a rig's file begins with behind `ND21-`.
-const TYPES: [&str; 4] = ["5605", "5610", "5615", "5620"];
+use crate::scenario::plan::Plan;
+use crate::scenario::problem::{Problem, Problems};
+use crate::scenario::source::line_number;
+use harness_sim::nd21::Stimulus;
 
 impl Rig {
     /// Whether it is simulated and its file says no more than how large its rings are and which inputs are connected, and allows
@@ -23,9 +18,11 @@ impl Rig {
     #[must_use]
     pub fn is_bare(&self) -> bool {
         let file = &self.file;
-        let is_input = |line: &String| {
-            let mut words = line.split_whitespace().skip(2);
-            words.next() == Some("input")
+        let is_input = |own: &Setup| match &own.what {
+            SetupKind::Influence(Influence::Stimuli(all)) => {
+                all.iter().all(|own| matches!(own, Stimulus::Input(..)))
+            }
+            _ => false,
         };
         let limits = limits(self, true);
         self.is_simulated()
@@ -38,7 +35,7 @@ impl Rig {
             && file.power.is_empty()
             && file.hooks == Hooks::default()
             && self.profile.is_none()
-            && file.sim.iter().flat_map(|sim| &sim.setup).all(is_input)
+            && self.setup.only(|own| !is_input(own)).is_empty()
     }
 
     /// The setup of a simulated rig, as `scenario::simulate::bench` takes it: whole ND21s where its file names
@@ -47,91 +44,60 @@ impl Rig {
     /// # Errors
     /// None of a rig that was read: its lines were settled then.
     pub fn plan(&self) -> Result<Plan, Problems> {
-        self.plan_with(&[])
+        self.plan_with(&Header::default())
     }
 
-    /// The header that `[sim]` gives the drives.
-    #[must_use]
-    pub fn header(&self) -> Header {
-        let lines = self.file.sim.iter().flat_map(|sim| &sim.setup);
-        let source = Source {
-            name: self.origin.clone(),
-            text: lines.cloned().collect::<Vec<_>>().join("\n").into(),
-        };
-        // The lines were read when the rig was.
-        parse_lines(&source).unwrap_or_default()
-    }
-
-    /// The same with more lines of a header behind those of the file.
+    /// The same with another header behind that of the file.
     ///
     /// # Errors
-    /// The lines have mistakes.
-    pub fn plan_with(&self, more: &[String]) -> Result<Plan, Problems> {
-        let (lines, _) = lines(&self.file, self.profile.as_ref(), more);
-        settle(&self.origin, &self.file, &lines)
+    /// The other header has mistakes.
+    pub fn plan_with(&self, more: &Header) -> Result<Plan, Problems> {
+        let own = header(&self.file, self.profile.as_ref(), &self.setup);
+        plan_header(&self.origin, &own.and(more), &sizes(&self.file))
     }
 }
 
-/// The header lines of a rig: the types of its devices, its profile, those of `[sim]`, and more; and how many stand in front of those
-/// of `[sim]`.
-pub(crate) fn lines(
+/// How many drives each ring of a rig has.
+pub(crate) fn sizes(file: &RigFile) -> Vec<u8> {
+    let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
+    rings.map(|ring| ring.drives).collect()
+}
+
+/// What the drives of a rig are: the types of its devices, its profile, and the lines of its `[sim]`.
+fn header(file: &RigFile, profile: Option<&KnownProfile>, own: &Header) -> Header {
+    let types: Header = file.drive.iter().filter_map(device).collect();
+    let profile = profile.map(|profile| &profile.header);
+    let known = profile.map_or_else(|| types.clone(), |profile| types.and(profile));
+    known.and(own).nd21_by_default(sizes(file).len())
+}
+
+/// What makes no drives of a rig, each with the line of `[sim]` that it is in; `None` where it is in the profile.
+pub(crate) fn mistakes(
+    name: &str,
     file: &RigFile,
     profile: Option<&KnownProfile>,
-    more: &[String],
-) -> (Vec<String>, usize) {
-    let mut lines: Vec<_> = file.drive.iter().filter_map(type_line).collect();
-    lines.extend(
-        profile
-            .into_iter()
-            .flat_map(|profile| profile.lines.clone()),
-    );
-    let before = lines.len();
-    lines.extend(file.sim.iter().flat_map(|sim| sim.setup.clone()));
-    lines.extend_from_slice(more);
-    (lines, before)
-}
-
-/// Settles header lines for a rig's rings. The places of mistakes are in the lines joined by line ends.
-pub(crate) fn settle(name: &str, file: &RigFile, lines: &[String]) -> Result<Plan, Problems> {
-    let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
-    let sizes: Vec<_> = rings.map(|ring| ring.drives).collect();
-    let source = Source {
-        name: name.to_owned(),
-        text: lines.join("\n").into(),
+    own: &Header,
+) -> Vec<(Option<Setup>, Problem)> {
+    let whole = header(file, profile, own);
+    let Err(problems) = plan_header(name, &whole, &sizes(file)) else {
+        return Vec::new();
     };
-    let mut scenario = parse_header(&source, &sizes)?;
-    all_nd21(&mut scenario);
-    plan(&scenario, &source, None)
+    // The lines about drives stand in front of that about the master, and those of `[sim]` behind all others.
+    let lines = whole.lines();
+    let first = lines.len() - usize::from(whole.master.is_some()) - own.setups.len();
+    let text = lines.join("\n");
+    let placed = problems.all().iter().map(|problem| {
+        let line = line_number(&text, problem.span.start) - 1;
+        let setup = line.checked_sub(first).and_then(|at| own.setups.get(at));
+        (setup.cloned(), problem.clone())
+    });
+    placed.collect()
 }
 
-/// The line of a header with the type of the device that a rig's file names (ND21 2.1): the scales of its currents depend
-/// on it.
-fn type_line(drive: &DriveEntry) -> Option<String> {
+/// The type of the device that a rig's file names (ND21 2.1): the scales of its currents depend on it.
+fn device(drive: &DriveEntry) -> Option<Setup> {
     let model = drive.model.as_deref()?.strip_prefix("ND21-")?;
-    let known = TYPES.iter().find(|known| model.starts_with(*known))?;
-    let ring = if drive.ring == 2 { "2:" } else { "" };
-    Some(format!("drive {ring}{} type {known}", drive.address))
-}
-
-/// Makes every drive a whole ND21, where the header names no model at all.
-pub(crate) fn all_nd21(scenario: &mut Scenario) {
-    let says_model = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
-    if scenario.header.setups.iter().any(says_model) {
-        return;
-    }
-    for ring in 0..scenario.header.rings.len() {
-        let last = Located {
-            expression: Expression::Last,
-            ..Located::number(0)
-        };
-        scenario.header.setups.push(Setup {
-            drives: Drives {
-                ring,
-                from: Located::number(0),
-                to: Some(last),
-            },
-            what: SetupKind::Model(Model::Nd21),
-            span: Span::default(),
-        });
-    }
+    let (_, device) = DEVICES.iter().find(|(name, _)| model.starts_with(name))?;
+    let whom = Drives::one(usize::from(drive.ring - 1), drive.address);
+    Some(Setup::new(whom, SetupKind::Type(*device)))
 }

@@ -135,33 +135,17 @@ fn no_header_line(step: &Step) -> Problem {
     Problem::new(step.span, what, expected)
 }
 
-/// Reads the header of rings of these sizes, where no step may stand.
-///
-/// # Errors
-/// Every line that cannot be understood, every step, and a `ring` line for other sizes.
-pub fn parse_header(source: &Source, rings: &[u8]) -> Result<Scenario, Problems> {
-    let mut scenario: Scenario = read(source, Part::Header)?;
-    let own = &mut scenario.header.rings;
-    if own.is_empty() {
-        *own = rings.iter().copied().map(RingRange::of).collect();
-    }
-    let steps = scenario.steps.drain(..);
-    let mut problems: Vec<_> = steps.map(|step| no_header_line(&step)).collect();
+/// The mistake in the `ring` line of a header that is not for rings of these sizes.
+pub(crate) fn for_other_rings(header: &Header, rings: &[u8]) -> Option<Problem> {
+    let own = &header.rings;
     let fits = |(range, size): (&RingRange, &u8)| (range.smallest..=range.largest).contains(size);
-    if own.len() != rings.len() || !own.iter().zip(rings).all(fits) {
-        let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();
-        let what = format!("the rig has {} drives", sizes.join(" and "));
-        let span = own.first().map_or(Span::default(), |range| range.span);
-        let expected = "no `ring` line, or its sizes, expected here";
-        problems.push(Problem::new(span, what, expected));
+    if own.is_empty() || own.len() == rings.len() && own.iter().zip(rings).all(fits) {
+        return None;
     }
-    if !problems.is_empty() {
-        return Err(Problems::new(&source.name, source.text.clone(), problems));
-    }
-    for (range, size) in own.iter_mut().zip(rings) {
-        range.default = *size;
-    }
-    Ok(scenario)
+    let sizes: Vec<_> = rings.iter().map(u8::to_string).collect();
+    let what = format!("the rig has {} drives", sizes.join(" and "));
+    let expected = "no `ring` line, or its sizes, expected here";
+    Some(Problem::new(own[0].span, what, expected))
 }
 
 /// `100`, `3..250 default 100`, and a second ring behind a comma.

@@ -5,7 +5,7 @@ use super::setup::model_unless_said;
 use super::types::{Bench, PlannedCheck, RingAct};
 use crate::buses::Stimulus;
 use crate::buses::novobus::language::Novobus;
-use crate::buses::novobus::language::parse::header::parse_header;
+use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::syntax::{
     Check, Drives, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
 };
@@ -38,14 +38,15 @@ pub fn plan_header(name: &str, header: &Header, sizes: &[u8]) -> Result<Plan, Pr
         name: name.to_owned(),
         text: header.lines().join("\n").into(),
     };
-    let whole = header.and(&Header::of_rings(sizes));
-    let settled = plan(&Scenario::new("", whole), &source, None);
-    settled.map_err(|mistakes: Problems| {
+    let settle = |header: &Header| {
+        let whole = header.and(&Header::of_rings(sizes));
+        plan(&Scenario::new("", whole), &source, None)
+    };
+    settle(header).map_err(|mistakes: Problems| {
         // What was put together from several texts has its places in none of them.
-        let placed = parse_header(&source, sizes).map(|own| plan(&own, &source, None));
-        match placed {
-            Err(placed) | Ok(Err(placed)) => placed,
-            Ok(Ok(_)) => mistakes,
+        match parse_lines(&source).and_then(|own| settle(&own)) {
+            Err(placed) => placed,
+            Ok(_) => mistakes,
         }
     })
 }

@@ -4,7 +4,7 @@ use super::cell::{CellPlace, Written};
 use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::write;
 use crate::scenario::expression::{Expression, Located};
-use crate::scenario::problem::{Span, Spanned};
+use crate::scenario::problem::{Problems, Span, Spanned};
 use crate::scenario::source::Source;
 use crate::scenario::times::Duration;
 use harness_proto::line::Rate;
@@ -15,6 +15,7 @@ use harness_sim::novobus::drive::Model;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
+use std::str::FromStr;
 
 /// The header lines of a scenario that belong to this bus.
 #[derive(Clone, Debug, Default)]
@@ -48,18 +49,33 @@ impl Serialize for Header {
 impl<'de> Deserialize<'de> for Header {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let lines = Vec::<String>::deserialize(deserializer)?;
-        let source = Source {
+        let read = lines.join("\n").parse::<Self>();
+        read.map_err(|problems| D::Error::custom(problems.lines()))
+    }
+}
+
+impl FromStr for Header {
+    type Err = Problems;
+
+    /// Reads the lines of a header. They need no `ring` line.
+    fn from_str(lines: &str) -> Result<Self, Problems> {
+        parse_lines(&Source {
             name: "the header".to_owned(),
-            text: lines.join("\n").into(),
-        };
-        parse_lines(&source).map_err(|problems| D::Error::custom(problems.lines()))
+            text: lines.into(),
+        })
     }
 }
 
 impl From<Setup> for Header {
     fn from(setup: Setup) -> Self {
+        [setup].into_iter().collect()
+    }
+}
+
+impl FromIterator<Setup> for Header {
+    fn from_iter<I: IntoIterator<Item = Setup>>(setups: I) -> Self {
         Self {
-            setups: vec![setup],
+            setups: setups.into_iter().collect(),
             ..Self::default()
         }
     }
@@ -78,12 +94,8 @@ impl Header {
     /// Every drive of this number of rings is a whole ND21.
     #[must_use]
     pub fn whole(rings: usize) -> Self {
-        let setups =
-            (0..rings).map(|ring| Setup::new(Drives::all(ring), SetupKind::Model(Model::Nd21)));
-        Self {
-            setups: setups.collect(),
-            ..Self::default()
-        }
+        let setup = |ring| Setup::new(Drives::all(ring), SetupKind::Model(Model::Nd21));
+        (0..rings).map(setup).collect()
     }
 
     /// The same with the lines of another header behind its own. A later line about the same thing of the same drive holds, as in a
@@ -112,6 +124,15 @@ impl Header {
         }
     }
 
+    /// The same with drives, and a master, that follow the manual.
+    #[must_use]
+    pub fn without_deviations(&self) -> Self {
+        Self {
+            master: None,
+            ..self.only(|own| !matches!(own.what, SetupKind::Deviates(_)))
+        }
+    }
+
     /// Whether it says nothing.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -123,6 +144,15 @@ impl Header {
     pub fn names_a_model(&self) -> bool {
         let names = |setup: &Setup| matches!(setup.what, SetupKind::Model(_));
         self.setups.iter().any(names)
+    }
+
+    /// The same with a whole ND21 for every drive of this number of rings, unless a line names a model.
+    #[must_use]
+    pub fn nd21_by_default(self, rings: usize) -> Self {
+        match self.names_a_model() {
+            true => self,
+            false => Self::whole(rings).and(&self),
+        }
     }
 
     /// Its lines, as a scenario has them.
@@ -220,26 +250,6 @@ impl Setup {
         Self { drives, what, span }
     }
 
-    /// `property NAME = WORD`
-    #[must_use]
-    pub fn property(drives: Drives, name: &str, word: &str) -> Self {
-        let spanned = |value: &str| Spanned {
-            value: value.to_owned(),
-            span: Span::default(),
-        };
-        Self::new(drives, SetupKind::Word(spanned(name), spanned(word)))
-    }
-
-    /// `property NAME = TIME`
-    #[must_use]
-    pub fn timed(drives: Drives, name: &str, time: Duration) -> Self {
-        let name = Spanned {
-            value: name.to_owned(),
-            span: Span::default(),
-        };
-        Self::new(drives, SetupKind::Time(name, time))
-    }
-
     /// `deviates NAME`
     #[must_use]
     pub fn deviates(drives: Drives, deviation: &'static Deviation) -> Self {
@@ -275,6 +285,37 @@ pub enum SetupKind {
     Time(Spanned<String>, Duration),
     /// `deviates NAME`
     Deviates(&'static Deviation),
+}
+
+impl SetupKind {
+    /// `property NAME = WORD`
+    #[must_use]
+    pub fn word(name: &str, word: &str) -> Self {
+        Self::Word(unplaced(name), unplaced(word))
+    }
+
+    /// `property NAME = TIME`
+    #[must_use]
+    pub fn time(name: &str, time: Duration) -> Self {
+        Self::Time(unplaced(name), time)
+    }
+
+    /// The value of the property that it sets, as a scenario has it; empty where it sets none.
+    #[must_use]
+    pub fn value(&self) -> String {
+        match self {
+            Self::Word(_, word) => word.value.clone(),
+            Self::Time(_, time) => time.to_string(),
+            _ => String::new(),
+        }
+    }
+}
+
+fn unplaced(text: &str) -> Spanned<String> {
+    Spanned {
+        value: text.to_owned(),
+        span: Span::default(),
+    }
 }
 
 /// What happens to drives from outside the bus: `input GPIN5 high`, `power off`.
