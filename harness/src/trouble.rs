@@ -19,6 +19,12 @@ pub enum Trouble {
 }
 
 impl Trouble {
+    /// Whether nothing more is played on a rig behind it.
+    #[must_use]
+    pub fn ends_a_run(&self) -> bool {
+        !matches!(self, Self::Denied(_))
+    }
+
     /// Whether nothing arrives any more. After a denial or a failed interlock, what was sent before still comes round.
     #[must_use]
     pub fn stops_the_line(&self) -> bool {

@@ -5,7 +5,6 @@ mod campaign;
 mod check;
 mod complete;
 pub(crate) mod exit;
-mod findings;
 pub(crate) mod fuzz;
 mod help;
 mod import;

@@ -1,11 +1,10 @@
 //! Work on a rig in use: `run --rig` on a rig with ports, and `qualify`.
 
 use super::exit::Exit;
-use super::findings::Findings;
 use super::junit::Cases;
 use super::output::Output;
 use super::page::{Page, write};
-use super::qualify::{DEVIATIONS, ENDED, settle};
+use super::qualify::{Live, facts, settle};
 use super::rig_failure::{alarm, exit_of, give_back};
 use super::run::{details, drives, line, progress_bar};
 use super::tally::Tally;
@@ -13,11 +12,11 @@ use crate::counted::counted;
 use crate::evidence::{About, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
 use crate::link::{Line, Octets, Trouble};
+use crate::qualify::Qualification;
 use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Options, Played, Rig, Run, Session, SessionError};
 use crate::scenario::run::{Outcome, Skip, Why};
-use crate::scenario::verdict::Verdict;
 use crate::signals::interrupt_flag;
 use harness_proto::line::Rate;
 use std::path::PathBuf;
@@ -173,15 +172,19 @@ fn all(
         *folder = Some(Folder::create(path, &about(&mut run, job, entries))?);
     }
     let bar = progress_bar(entries.len(), output.progress);
-    let mut findings = Findings::new(&mut run);
+    let mut course = job.qualify.then(|| {
+        let began = folder
+            .as_ref()
+            .map_or_else(String::new, |own| own.began().to_owned());
+        Qualification::new(facts(&mut run, began, job.thorough))
+    });
     let name = run.session().rig().id().to_owned();
     let mut cases = Cases::new(&name, job.junit.as_deref());
     let mut tally = Tally::default();
-    let mut ill = false;
     let mut left = entries.iter();
     for entry in left.by_ref() {
         bar.set_message(entry.short_name().to_owned());
-        let played = match play(&mut run, entry, folder.as_mut()) {
+        let (name, played) = match play(&mut run, entry, folder.as_mut()) {
             Err(Stop::Session(error)) => {
                 cases.note(entry, &Outcome::rig_error(error.to_string()), &[]);
                 cases.write(Exit::RigError, output);
@@ -204,13 +207,11 @@ fn all(
             page.add(entry, outcome, traces);
         }
         bar.inc(1);
-        findings.note(entry.short_name(), &played);
-        ill = played.outcome.verdict == Verdict::RigError
-            && played
-                .attempts
-                .last()
-                .is_none_or(|last| last.master_is_right);
-        if ill || over(&mut run, output) {
+        // Those for another bus are no part of a qualification of this one.
+        if let Some(course) = course.as_mut().filter(|_| entry.plan.is_some()) {
+            course.note(&name, &played);
+        }
+        if played.shows_an_ill_rig() || over(&mut run, output) {
             break;
         }
     }
@@ -222,20 +223,13 @@ fn all(
     }
     output.result(&tally.summary())?;
     let mut exit = cases.write(tally.exit(job.require_all), output);
-    if job.qualify && over(&mut run, output) {
-        findings.note_open(ENDED.to_owned());
-        let told = findings.tell(None, &[], output)?;
-        if let Some(folder) = folder.as_mut() {
-            folder.add(DEVIATIONS, &told)?;
-        }
-    } else if job.qualify {
-        match settle(
-            &mut run,
-            &mut findings,
-            (ill, job.thorough),
-            folder.as_mut(),
+    if let Some(course) = course {
+        let live = Live {
+            run: &mut run,
+            folder: folder.as_mut(),
             output,
-        )? {
+        };
+        match settle(course, live)? {
             // What a drive does wrong is the drive's fault, whatever the outcome.
             Exit::Failed => exit = Exit::Failed,
             // What is not settled takes no failure back.
@@ -249,20 +243,20 @@ fn all(
     Ok(exit)
 }
 
-/// Plays a scenario, into the folder where there is one.
-pub(crate) fn play(
+/// Plays a scenario, into the folder where there is one, and returns its name there.
+pub(super) fn play(
     run: &mut Run<'_>,
     entry: &Entry,
     folder: Option<&mut Folder>,
-) -> Result<Played, Stop> {
+) -> Result<(String, Played), Stop> {
+    let own = || entry.short_name().to_owned();
     let Some(plan) = &entry.plan else {
-        return Ok(Played {
-            outcome: Outcome::skipped(Skip::not_on_rig(entry.scenario.bus)),
-            attempts: Vec::new(),
-        });
+        let outcome = Outcome::skipped(Skip::not_on_rig(entry.scenario.bus));
+        let attempts = Vec::new();
+        return Ok((own(), Played { outcome, attempts }));
     };
     let Some(folder) = folder else {
-        return Ok(run.play(plan, None)?);
+        return Ok((own(), run.play(plan, None)?));
     };
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
     let played = run.play(plan, Some(&mut kept));
@@ -276,7 +270,7 @@ pub(crate) fn play(
         }
     };
     folder.done(&name, &drives(entry), &entry.scenario.title, outcome);
-    Ok(played?)
+    Ok((name, played?))
 }
 
 /// Whether nothing more can or may be played.
@@ -286,10 +280,7 @@ pub(crate) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
         output.complain("the run reached `max_run` of the rig's file");
         return true;
     }
-    matches!(
-        session.link().trouble(),
-        Some(Trouble::Lost(_) | Trouble::Garbled(_) | Trouble::Interlock(_) | Trouble::Interrupted)
-    )
+    session.link().trouble().is_some_and(Trouble::ends_a_run)
 }
 
 /// What a record begins with.

@@ -13,7 +13,7 @@ use crate::link::{
 use crate::rig::judge::known;
 use crate::rig::judge::{Heard, judge};
 use crate::rig::run::{Way, opening, twin};
-use crate::rig::{Driven, Rig, SessionError, play_one};
+use crate::rig::{Attempt, Driven, Rig, SessionError, play_one};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtMismatch, Outcome, play};
 use crate::scenario::simulate::simulated;
@@ -58,7 +58,8 @@ impl Recalled {
 
 /// The outcome of an attempt that was played again.
 pub(super) struct Again {
-    pub(super) outcome: Outcome,
+    /// Its outcome, and in a qualification its conversations and how they compare with the twin's.
+    pub(super) attempt: Attempt,
     /// The twin found something.
     pub(super) stale: bool,
     /// What the record holds behind the end of the attempt.
@@ -69,8 +70,6 @@ pub(super) struct Again {
     pub(super) capture: Option<String>,
     /// Whether the outcome must be the same to the last remark and moment.
     exact: bool,
-    /// How what came before the drives were reset compares with a ring at rest.
-    opening: Option<String>,
     /// Whether the record ends in trouble.
     pub(super) trouble: bool,
     ended: Ended,
@@ -140,9 +139,8 @@ pub(super) fn again(
         .map_or(0, |recalled| recalled.unplaced);
     let capabilities = (header.exactness.tolerance, header.capabilities.as_slice());
     let driven = Driven::new(&plan, &recorded.events, way, capabilities, &outcome);
-    if let Some(driven) = driven.filter(|_| header.simulated) {
-        driven.judge(&mut outcome);
-    }
+    let driven = driven.filter(|_| header.simulated);
+    let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
     let heard = Heard {
         rig,
         plan: &plan,
@@ -154,14 +152,24 @@ pub(super) fn again(
         alive: &|| {},
     };
     judge(&mut outcome, &heard);
+    let mut attempt = Attempt::on_own_rings(outcome, Vec::new());
+    (attempt.opening, attempt.unplaced) = (opening, unplaced);
+    if header.qualified {
+        attempt = Attempt {
+            conversations,
+            comparisons,
+            driven,
+            master_is_right,
+            ..attempt
+        };
+    }
     Again {
-        outcome,
+        attempt,
         stale,
         left: replay.left(),
         other: None,
         capture: None,
         exact,
-        opening,
         trouble: replay.trouble().is_some(),
         ended: Ended::of(&recorded.events),
     }
@@ -184,9 +192,8 @@ fn simulated_again(recorded: &Recorded, plan: &Plan) -> Again {
     Again {
         capture: Some(capture(&traces, &outcome)),
         exact: true,
-        opening: None,
         trouble: false,
-        outcome,
+        attempt: Attempt::on_own_rings(outcome, traces),
         stale: false,
         left: None,
         other: differs.map(|at| {
@@ -205,13 +212,12 @@ impl Again {
     /// Nothing could be played.
     fn impossible(why: String) -> Self {
         Self {
-            outcome: Outcome::rig_error(why),
+            attempt: Attempt::on_own_rings(Outcome::rig_error(why), Vec::new()),
             stale: false,
             left: None,
             other: None,
             capture: None,
             exact: false,
-            opening: None,
             trouble: false,
             ended: Ended::of(&[]),
         }
@@ -301,7 +307,7 @@ impl Recalled {
         if let Some(other) = &again.other {
             return Some(other.clone());
         }
-        let outcome = &again.outcome;
+        let outcome = &again.attempt.outcome;
         let judged = outcome.verdict.name();
         let found = outcome.finding.as_ref().map(|found| found.message.clone());
         if self.verdict != judged {
@@ -328,7 +334,10 @@ impl Recalled {
             let kept = remarks.filter(|own| again.capture.is_some() || !own.starts_with(UNUSED));
             kept.cloned().collect()
         };
-        let (stated, own) = (settled(&self.remarks), settled(&again.outcome.remarks));
+        let (stated, own) = (
+            settled(&self.remarks),
+            settled(&again.attempt.outcome.remarks),
+        );
         if stated != own {
             return Some(format!(
                 "the record remarks \"{}\", its bytes give \"{}\"",
@@ -336,19 +345,20 @@ impl Recalled {
                 own.join("; ")
             ));
         }
-        let differs = again.exact && self.opening != again.opening;
+        let opening = again.attempt.opening.as_deref();
+        let differs = again.exact && self.opening.as_deref() != opening;
         differs.then(|| {
             format!(
                 "the record says of what came before the reset \"{}\", its bytes say \"{}\"",
                 self.opening.as_deref().unwrap_or("nothing"),
-                again.opening.as_deref().unwrap_or("nothing")
+                opening.unwrap_or("nothing")
             )
         })
     }
 
     /// What is left over, and the time.
     fn rest_differs(&self, again: &Again, header: &Header) -> Option<String> {
-        let outcome = &again.outcome;
+        let outcome = &again.attempt.outcome;
         // Without looks, an attempt that was given up may have been so at any byte, and shows nothing.
         let given_up = outcome.unready.is_some()
             || matches!(outcome.verdict, Verdict::Skipped | Verdict::RigError);

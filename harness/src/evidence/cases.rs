@@ -4,7 +4,7 @@ use super::files::{SCENARIOS, sum};
 use super::record::Line;
 use super::verify::{Judged, Opened};
 use crate::library::Entry;
-use crate::link::Replay;
+use crate::link::{Event, Replay};
 use crate::rig::run::not_played;
 use crate::rig::{Again as Retries, Attempt, Played, Rig};
 use crate::scenario::run::{DENIED, Outcome, Skip, Why};
@@ -173,22 +173,41 @@ impl Settling<'_> {
     }
 }
 
-/// Attempts as they were judged again, with faults that never happened, which only the run knows.
+/// The outcomes of attempts as they were judged again.
 fn settled(attempts: &[Judged]) -> Vec<Attempt> {
-    let outcome = |own: &Judged| {
-        let (_, again) = own.again.as_ref().ok()?;
-        let stated = own.recorded.verdict.as_ref()?;
+    let outcomes = attempts.iter().filter_map(Judged::outcome);
+    outcomes
+        .map(|outcome| Attempt::on_own_rings(outcome, Vec::new()))
+        .collect()
+}
+
+impl Judged {
+    /// The outcome as it was judged again, with faults that never happened, which only the run knows.
+    fn outcome(&self) -> Option<Outcome> {
+        let (_, again) = self.again.as_ref().ok()?;
+        let stated = self.recorded.verdict.as_ref()?;
         Some(Outcome {
             remarks: stated.remarks.clone(),
             // On a simulated rig the record lacks the time of bytes that were not fetched; playing it again shows it.
             took: stated.took,
-            ..again.outcome.clone()
+            ..again.attempt.outcome.clone()
         })
-    };
-    let outcomes = attempts.iter().filter_map(outcome);
-    outcomes
-        .map(|outcome| Attempt::on_own_rings(outcome, Vec::new()))
-        .collect()
+    }
+
+    /// Whether the rig's line was lost in it, or the like: nothing is played behind it.
+    pub(super) fn ends_the_run(&self) -> bool {
+        let mut events = self.recorded.events.iter();
+        events.any(|own| matches!(own, Event::Trouble(trouble) if trouble.ends_a_run()))
+    }
+
+    /// The attempt as it was judged again.
+    pub(super) fn attempt(&self) -> Option<Attempt> {
+        let (_, again) = self.again.as_ref().ok()?;
+        Some(Attempt {
+            outcome: self.outcome()?,
+            ..again.attempt.clone()
+        })
+    }
 }
 
 impl Opened {

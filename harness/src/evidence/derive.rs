@@ -56,7 +56,7 @@ pub(super) fn derived(
         let attempt = Attempt {
             number: own.recorded.attempt,
             text: again.map_or_else(String::new, |(text, _)| text.clone()),
-            outcome: again.map(|(_, again)| again.outcome.clone()),
+            outcome: again.map(|(_, again)| again.attempt.outcome.clone()),
         };
         attempts.insert(own.recorded.name.clone(), attempt);
     }

@@ -32,6 +32,11 @@ pub(super) const SCENARIOS: &str = "scenarios";
 /// The folder of captures.
 pub(super) const CAPTURES: &str = "captures";
 
+/// The file of a qualification with what the drives do where the manual leaves it open.
+pub const PROFILE: &str = "profile.toml";
+/// The file of a qualification that says what was compared and which deviations explain it.
+pub const DEVIATIONS: &str = "deviations.txt";
+
 /// The largest file of a folder, in bytes.
 const LARGEST: u64 = 1 << 31;
 

@@ -100,6 +100,8 @@ pub struct Folder {
     names: BTreeSet<String>,
     cases: Vec<Settled>,
     rig: String,
+    /// When the run began, in UTC.
+    began: String,
     /// The sum of the text of the last scenario.
     text: Option<String>,
     /// The key to sign it with.
@@ -131,6 +133,7 @@ impl Folder {
             names: BTreeSet::new(),
             cases: Vec::new(),
             rig: about.rig.id().to_owned(),
+            began: started.clone(),
             text: None,
             sign: about.sign.map(Path::to_owned),
         };
@@ -167,6 +170,12 @@ impl Folder {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// When the run began, as a date and time of day in UTC.
+    #[must_use]
+    pub fn began(&self) -> &str {
+        &self.began
     }
 
     /// Keeps the attempts at a scenario of this name and text.

@@ -8,6 +8,7 @@
 //! | `scenarios/*.scn` | the scenarios as they were |
 //! | `captures/*.json` | what each link carried, in the form of `drivebench trace --format json` |
 //! | `junit.xml`, `report.txt` | the verdicts, for programs and for people |
+//! | `profile.toml`, `deviations.txt` | of a qualification: what the drives do where the manual leaves it open, and which deviations they have |
 //! | `report.html` | all of it as a page with pictures; `drivebench report` makes it again |
 //! | `versions.json` | program, system and date |
 //! | `SHA256SUMS` | the sums of all of them, written last: where it is missing, the run did not end |
@@ -24,6 +25,7 @@ mod folder;
 pub mod fuzz;
 mod header;
 mod junit;
+mod qualified;
 mod read;
 mod record;
 mod reports;
@@ -35,7 +37,7 @@ mod verify;
 
 pub use cases::too_large;
 pub use derive::{Derived, derive};
-pub use files::{PAGE, RIG};
+pub use files::{DEVIATIONS, PAGE, PROFILE, RIG};
 pub use folder::{About, EvidenceError, Folder, Kept};
 pub use junit::{Case, junit};
 pub use read::{MAX_SIZE, MAX_TIME, RecordError, read};

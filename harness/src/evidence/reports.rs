@@ -3,7 +3,8 @@
 use super::attempt::Recorded;
 use super::derive::{Derived, Settled, plain};
 use super::files::{
-    self, CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS,
+    self, CAPTURES, DEVIATIONS, JUNIT, KNOWN_PROFILE, PAGE, PROFILE, RECORD, REPORT, RIG,
+    SCENARIOS, SUMS, VERSIONS,
 };
 use super::folder::capture;
 use super::record::Line;
@@ -114,7 +115,7 @@ fn of_attempt(path: &Path, opened: &Opened, own: &Judged) -> Option<String> {
         Ok(read) => read,
         Err(error) => return Some(format!("{name}: {error}")),
     };
-    if capture(&capture_read.traces, &again.outcome) != text {
+    if capture(&capture_read.traces, &again.attempt.outcome) != text {
         return Some(format!(
             "{name} is not in the form in which this program writes it"
         ));
@@ -240,7 +241,7 @@ fn foreign(path: &Path, opened: &Opened, judged: &[Judged]) -> Vec<String> {
             .then(|| KNOWN_PROFILE.to_owned()),
     );
     if opened.header.qualified {
-        known.extend(["profile.toml", "deviations.txt"].map(str::to_owned));
+        known.extend([PROFILE, DEVIATIONS].map(str::to_owned));
     }
     for own in judged {
         let Recorded { name, attempt, .. } = &own.recorded;

@@ -4,10 +4,12 @@ use super::attempt::{Again, Recalled, Recorded, UNUSED, again};
 use super::cases;
 use super::derive::derived;
 use super::files::{
-    self, KNOWN_PROFILE, RECORD, RIG, SCENARIOS, SIGNATURE, SUMS, compare_sums, read_text, sum,
+    self, DEVIATIONS, KNOWN_PROFILE, PROFILE, RECORD, RIG, SCENARIOS, SIGNATURE, SUMS,
+    compare_sums, read_text, sum,
 };
 use super::folder::EvidenceError;
 use super::header::{Header, header};
+use super::qualified;
 use super::read::{RecordError, read};
 use super::record::Line;
 use super::reports;
@@ -49,6 +51,13 @@ pub struct Verified {
     pub complete: bool,
     /// What nothing in the folder confirms, in sentences.
     pub unconfirmed: Vec<String>,
+}
+
+impl Verified {
+    /// Whether nothing is wrong.
+    fn is_right(&self) -> bool {
+        self.files.is_empty() && self.attempts.iter().all(|own| own.differs.is_none())
+    }
 }
 
 /// What a record is judged by.
@@ -100,11 +109,19 @@ pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, Evide
             opened.header.program,
             env!("CARGO_PKG_VERSION")
         ));
-    } else if verified.complete {
+    } else if path.join(SUMS).exists() && opened.is_ended(&judged) {
         let made = derived(path, &opened, &judged)?;
         let wrong = reports::differences(path, &opened, &judged, &made);
         verified.files.extend(wrong);
         verified.files.extend(rerun(path, &opened, &scenario));
+        if opened.header.qualified && verified.is_right() {
+            let wrong = qualified::differences(path, &opened, &judged);
+            verified.files.extend(wrong);
+        } else if opened.header.qualified {
+            verified.unconfirmed.push(format!(
+                "{PROFILE} and {DEVIATIONS}: they are compared where nothing else is wrong"
+            ));
+        }
     }
     Ok(verified)
 }
@@ -219,6 +236,13 @@ impl Opened {
         Ok(all)
     }
 
+    /// Whether the record has its last line and the verdict of every attempt.
+    fn is_ended(&self, judged: &[Judged]) -> bool {
+        self.whole
+            && matches!(self.lines.last(), Some(Line::End { .. }))
+            && judged.iter().all(|own| own.recorded.verdict.is_some())
+    }
+
     /// What the record is worth.
     fn verified(
         &self,
@@ -229,9 +253,7 @@ impl Opened {
             files: self.files.clone(),
             attempts: judged.iter().map(Judged::finding).collect(),
             // The ring may have been lost in the middle of an attempt.
-            complete: self.whole
-                && matches!(self.lines.last(), Some(Line::End { .. }))
-                && judged.iter().all(|own| own.recorded.verdict.is_some()),
+            complete: self.is_ended(judged),
             unconfirmed: self.unconfirmed(),
         };
         verified
@@ -261,8 +283,8 @@ impl Opened {
                 "which faults on links never happened, line errors without their bytes, bytes on inner links, why a port was lost, and the safe state",
             );
         }
-        if header.qualified {
-            all.push("profile.toml and deviations.txt, and on a ring with ports which scenarios the limits left out");
+        if header.qualified && !header.simulated {
+            all.push("on a ring with ports which scenarios the limits left out");
         }
         all.into_iter().map(str::to_owned).collect()
     }
@@ -295,7 +317,7 @@ impl Judged {
             name: self.recorded.title(),
             recorded: own.map(|own| own.verdict.clone()),
             judged: judged
-                .map_or("aborted", |(_, again)| again.outcome.verdict.name())
+                .map_or("aborted", |(_, again)| again.attempt.outcome.verdict.name())
                 .to_owned(),
             differs: self.differs.clone(),
             unused: unused

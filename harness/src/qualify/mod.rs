@@ -8,4 +8,5 @@ pub use crate::buses::novobus::qualify::{
     Sighting, Trial, Whose, agreed, answer, conversations, culprit, deviating_masters, dumps,
     exchange, explaining, hypotheses, marches, name, probes, questions, thorough,
 };
+pub(crate) use crate::buses::novobus::qualify::{Bench, Facts, Qualification};
 pub use crate::rig::{Profile, ProfileError, Settled};

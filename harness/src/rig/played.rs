@@ -145,6 +145,13 @@ impl Played {
         (!divergences.is_empty()).then_some((last, divergences))
     }
 
+    /// Whether the rig failed, and not the bench's own master: nothing more can be played.
+    #[must_use]
+    pub fn shows_an_ill_rig(&self) -> bool {
+        let last = self.attempts.last();
+        self.outcome.verdict == Verdict::RigError && last.is_none_or(|own| own.master_is_right)
+    }
+
     /// The last attempt that was played; the last one at all where none was.
     #[must_use]
     pub fn last_played(&self) -> Option<&Attempt> {

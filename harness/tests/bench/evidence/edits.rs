@@ -40,6 +40,49 @@ fn of_a_qualification() {
     check(&kept(Desk::new(OWN), "qualify", false));
 }
 
+/// What a qualification has found is made again from its record, and an edited finding is refused with the line that was edited.
+#[test]
+fn findings_of_a_qualification() {
+    let desk = Desk::limited(OWN, "");
+    let fixed = ["qualify", "--rig", "desk.toml", "--filter", "9.2-synco"];
+    ended(
+        &desk.run(&[&fixed[..], &["--evidence", "kept"]].concat()),
+        0,
+        "deviations: none",
+    );
+    let verify = || desk.run(&["verify", "kept"]);
+    ended(&verify(), 0, "0 things wrong");
+    for (file, from, to) in [
+        ("deviations.txt", "deviations: none", "deviations: some"),
+        ("deviations.txt", "were skipped", "were left out"),
+        ("profile.toml", "accepted", "refused"),
+        ("profile.toml", "date = \"2", "date = \"3"),
+    ] {
+        let path = desk.path(&format!("kept/{file}"));
+        let text = fs::read_to_string(&path).expect("a file");
+        let edited = text.replacen(from, to, 1);
+        assert_ne!(text, edited, "{from} is not in {text}");
+        fs::write(&path, &edited).expect("room");
+        fit(&desk.path("kept"));
+        let line = edited
+            .lines()
+            .zip(text.lines())
+            .find(|(own, other)| own != other);
+        let (stated, made) = line.expect("a line");
+        ended(
+            &verify(),
+            1,
+            &format!("the file has \"{stated}\", the record gives \"{made}\""),
+        );
+        fs::remove_file(&path).expect("a file");
+        fit(&desk.path("kept"));
+        ended(&verify(), 1, file);
+        fs::write(&path, text).expect("room");
+        fit(&desk.path("kept"));
+    }
+    ended(&verify(), 0, "0 things wrong");
+}
+
 /// A scenario that failed is not made to have passed by changing all that tells of it.
 #[test]
 fn a_deleted_failure() {

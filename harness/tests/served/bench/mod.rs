@@ -5,6 +5,7 @@ mod commands;
 mod taps;
 mod ways_out;
 
+use crate::edits::fit;
 use crate::program::{ended, said, verify};
 use crate::ring::Served;
 use harness::port::Endpoint;
@@ -135,6 +136,19 @@ fn is_qualified(desk: &Desk, more: &[&str]) {
         "2 drives are stopped, standing and blocked",
     );
     ended(&verify(&folder), 0, "0 things wrong");
+    // What was found is made again from the record.
+    for (file, from) in [
+        ("profile.toml", "four-data"),
+        ("deviations.txt", "compared"),
+    ] {
+        let path = folder.join(file);
+        let text = std::fs::read_to_string(&path).expect("a file");
+        std::fs::write(&path, text.replace(from, "other")).expect("room");
+        fit(&folder);
+        ended(&verify(&folder), 1, &format!("{file}, line "));
+        std::fs::write(&path, text).expect("room");
+    }
+    fit(&folder);
     // Another byte in the record is another verdict, and the sums tell of it.
     let record = folder.join("run.jsonl");
     let text = std::fs::read_to_string(&record).expect("a record");
@@ -166,6 +180,7 @@ fn a_wrong_drive_behind_a_socket_is_named() {
     let output = desk.run(&["qualify", "9.2-synco", "--evidence", evidence]);
     let said = said(&output);
     assert!(said.contains("drive 1: checksum-wrong"), "{said}");
+    ended(&verify(&folder), 0, "0 things wrong");
 }
 
 #[test]

@@ -4,9 +4,11 @@ mod blame;
 mod diagnose;
 mod eeprom;
 mod exchange;
+mod findings;
 mod hypothesis;
 mod pinned;
 mod probes;
+mod qualification;
 mod settle;
 
 pub use blame::{Culprit, Meant, Sighting, Trial, agreed, culprit, exchange};
@@ -15,6 +17,7 @@ pub use eeprom::{dumps, marches};
 pub use hypothesis::{Evidence, Hypothesis, explaining};
 pub use pinned::{Pinned, Question, questions};
 pub use probes::{Asked, Probe, conversations, hypotheses, probes, thorough};
+pub(crate) use qualification::{Bench, Facts, Qualification, Qualified};
 pub use settle::{Answer, answer};
 
 /// What the names of scenarios begin with that a qualification makes from what it has heard: the roles of drives exchanged, questions to the

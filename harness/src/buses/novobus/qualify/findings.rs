@@ -1,12 +1,11 @@
 //! What a qualification compared with the model, and what differed.
 
-use super::exit::Exit;
-use super::output::Output;
-use crate::buses::twin::{Conversation, Exactness};
+use super::blame::{Culprit, Meant, Sighting, Trial, agreed, culprit};
+use super::diagnose::{Named, Seen};
+use super::pinned::Pinned;
+use crate::buses::novobus::twin::{Conversation, Exactness};
 use crate::counted::counted;
-use crate::link::Octets;
-use crate::qualify::{Culprit, Meant, Named, Pinned, Seen, Sighting, Trial, agreed, culprit};
-use crate::rig::{Attempt, Driven, Played, Run};
+use crate::rig::{Attempt, Driven, Played};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use std::fmt::Write as _;
@@ -22,7 +21,7 @@ const MOST_SECTIONS: usize = 3;
 
 /// What was played, and what of it differed from the model.
 #[derive(Default)]
-pub(crate) struct Findings {
+pub(super) struct Findings {
     /// How many drives the ring has, the time of a byte, and how far times may be apart.
     drives: u8,
     byte_time: Span,
@@ -42,8 +41,8 @@ pub(crate) struct Findings {
     /// The drives that the telegrams around a difference name.
     suspects: Vec<u8>,
     /// What the bench's own master did, and whether it was ever wrong.
-    pub(crate) driven: Vec<Driven>,
-    pub(crate) master_is_wrong: bool,
+    pub(super) driven: Vec<Driven>,
+    pub(super) master_is_wrong: bool,
     /// Scenarios and conversations that were played, and that were compared to their end and equal.
     played: usize,
     equal: usize,
@@ -61,18 +60,18 @@ pub(crate) struct Findings {
 }
 
 impl Findings {
-    /// Those of a rig on which nothing was played yet.
-    pub(crate) fn new(run: &mut Run<'_>) -> Self {
+    /// Those of a ring of `drives` on which nothing was played yet.
+    pub(super) fn new(drives: u8, byte_time: Span, tolerance: Span) -> Self {
         Self {
-            drives: run.session().rig().file.ring.first.drives,
-            byte_time: run.session().link().byte_time(),
-            tolerance: run.exactness().tolerance,
+            drives,
+            byte_time,
+            tolerance,
             ..Self::default()
         }
     }
 
     /// Notes the outcome of a scenario.
-    pub(crate) fn note(&mut self, name: &str, played: &Played) {
+    pub(super) fn note(&mut self, name: &str, played: &Played) {
         let verdict = played.outcome.verdict;
         let Some(last) = played.last_played() else {
             self.skipped += 1;
@@ -115,7 +114,7 @@ impl Findings {
     }
 
     /// Notes the attempts at a scenario or a probe, for the deviations that explain them.
-    pub(crate) fn note_attempts(&mut self, name: &str, played: &Played) {
+    pub(super) fn note_attempts(&mut self, name: &str, played: &Played) {
         self.failed |= played.outcome.verdict == Verdict::Failed;
         for attempt in &played.attempts {
             self.driven.extend(attempt.driven.clone());
@@ -150,13 +149,13 @@ impl Findings {
     }
 
     /// Where attempts differed, each with the name of its scenario.
-    pub(crate) fn sightings(&self) -> &[(String, Sighting)] {
+    pub(super) fn sightings(&self) -> &[(String, Sighting)] {
         &self.sightings
     }
 
     /// Notes an attempt with the drives' roles exchanged: to whom the byte belonged at which it differed, if it did. `None` where it says
     /// nothing.
-    pub(crate) fn note_exchanged(&mut self, played: &Played) -> Option<Option<Meant>> {
+    pub(super) fn note_exchanged(&mut self, played: &Played) -> Option<Option<Meant>> {
         let last = played.last_played().filter(|own| own.was_played())?;
         let differs = |attempt: &Attempt| {
             let mut comparisons = attempt.comparisons.iter();
@@ -177,12 +176,12 @@ impl Findings {
     }
 
     /// Notes the outcomes of sightings that were tried with the roles exchanged.
-    pub(crate) fn note_trials(&mut self, trials: Vec<Trial>) {
+    pub(super) fn note_trials(&mut self, trials: Vec<Trial>) {
         self.trials.extend(trials);
     }
 
     /// Notes what a question to the ring has shown.
-    pub(crate) fn note_pinned(&mut self, pinned: Pinned) {
+    pub(super) fn note_pinned(&mut self, pinned: Pinned) {
         self.pinned.push(pinned);
     }
 
@@ -195,37 +194,37 @@ impl Findings {
     }
 
     /// Notes a probe that was asked.
-    pub(crate) fn note_probe(&mut self) {
+    pub(super) fn note_probe(&mut self) {
         self.probes += 1;
     }
 
     /// Notes something that was not compared, or not equal.
-    pub(crate) fn note_open(&mut self, why: String) {
+    pub(super) fn note_open(&mut self, why: String) {
         self.open.push(why);
     }
 
     /// Whether something differed that a drive is to blame for.
-    pub(crate) fn differ(&self) -> bool {
+    pub(super) fn differ(&self) -> bool {
         !self.differing.is_empty() || !self.with_driver.is_empty() || self.culprit().is_some()
     }
 
-    /// The exit code that the findings stand for: a drive has failed only where a scenario or a probe has.
-    pub(crate) fn exit(&self) -> Exit {
+    /// The verdict of the findings: a drive has failed only where a scenario or a probe has.
+    pub(super) fn judged(&self) -> Verdict {
         match self.master_is_wrong {
-            true => Exit::RigError,
-            false if self.differ() && self.failed => Exit::Failed,
-            false if self.differ() || self.is_open() => Exit::Incomplete,
-            false => Exit::Passed,
+            true => Verdict::RigError,
+            false if self.differ() && self.failed => Verdict::Failed,
+            false if self.differ() || self.is_open() => Verdict::Inconclusive,
+            false => Verdict::Passed,
         }
     }
 
     /// Whether something was not compared, or not equal.
-    pub(crate) fn is_open(&self) -> bool {
+    pub(super) fn is_open(&self) -> bool {
         !self.open.is_empty()
     }
 
     /// What is to be explained. Where the driver's part shows nothing new it is left out.
-    pub(crate) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
+    pub(super) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
         Seen {
             drives,
             suspects: &self.suspects,
@@ -238,20 +237,9 @@ impl Findings {
         }
     }
 
-    /// Prints the deviations that explain what differed, none where they were not looked for, and what was compared; `known` are those
-    /// that the rig's file names.
-    pub(crate) fn tell(
-        &self,
-        named: Option<&[Named]>,
-        known: &[String],
-        output: &mut Output,
-    ) -> std::io::Result<String> {
-        let text = self.text(named, known);
-        output.result(&text)?;
-        Ok(text)
-    }
-
-    fn text(&self, named: Option<&[Named]>, known: &[String]) -> String {
+    /// The deviations that explain what differed, `None` where they were not looked for, and what was compared; `known` are those that the
+    /// rig's file names.
+    pub(super) fn text(&self, named: Option<&[Named]>, known: &[String]) -> String {
         let mut text = self.verdict(named, known);
         if self.is_open() {
             text.push_str("not compared, or not equal:\n");
@@ -387,11 +375,11 @@ mod tests {
     #[test]
     fn a_drive_has_failed_only_where_a_scenario_has() {
         let mut differs = played();
-        assert_eq!(differs.exit(), Exit::Passed);
+        assert_eq!(differs.judged(), Verdict::Passed);
         differs.differing.push(Vec::new());
-        assert_eq!(differs.exit(), Exit::Incomplete);
+        assert_eq!(differs.judged(), Verdict::Inconclusive);
         differs.failed = true;
-        assert_eq!(differs.exit(), Exit::Failed);
+        assert_eq!(differs.judged(), Verdict::Failed);
     }
 
     #[test]

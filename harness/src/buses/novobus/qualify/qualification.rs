@@ -1,0 +1,409 @@
+//! A qualification: what it plays behind the selected scenarios, and what it makes of all of it.
+//!
+//! It runs twice: on a rig in use, and on the record of that run, from which `verify` makes `profile.toml` and `deviations.txt` again.
+
+use super::blame::exchange;
+use super::diagnose::{deviating_masters, name};
+use super::eeprom::{dumps, marches};
+use super::findings::Findings;
+use super::pinned::questions;
+use super::probes::{Asked, Probe, conversations, probes, thorough};
+use super::settle::{Answer, answer};
+use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::twin::{Exactness, Twin};
+use crate::library::Entry;
+use crate::rig::{Played, Profile, Rig};
+use crate::scenario::problem::Problems;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+use std::collections::BTreeMap;
+
+/// The most deviations of the master that are listed.
+const MOST_TOLD: usize = 8;
+
+/// The message if a run ended early.
+const ENDED: &str = "the run ended before everything was played";
+
+/// How often a probe is played until a value explains it: a busy computer is late sometimes.
+const PROBED: usize = 3;
+
+/// What plays the scenarios of a qualification: a rig in use, or the record of one.
+pub(crate) trait Bench {
+    /// Why nothing more is played.
+    type Stop;
+
+    /// Plays a scenario.
+    ///
+    /// # Errors
+    /// Nothing more can be played.
+    fn play(&mut self, entry: &Entry) -> Result<Played, Self::Stop>;
+
+    /// Whether nothing more may be played.
+    fn over(&mut self) -> bool;
+
+    /// A fresh twin of the drives, set up as the rig's file and this header say.
+    ///
+    /// # Errors
+    /// The header has mistakes.
+    fn twin(&self, header: &Header) -> Result<Twin, Problems>;
+
+    /// Reports a result.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    fn tell(&mut self, text: &str) -> Result<(), Self::Stop>;
+
+    /// Reports the outcome of a conversation.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    fn show(&mut self, entry: &Entry, played: &Played) -> Result<(), Self::Stop>;
+}
+
+/// What is known of a qualification before anything is played.
+#[derive(Clone, Debug)]
+pub(crate) struct Facts {
+    /// The rig.
+    pub(crate) rig: Rig,
+    /// How long a byte takes.
+    pub(crate) byte_time: Span,
+    /// How exactly the twin is compared.
+    pub(crate) exactness: Exactness,
+    /// Whether every drive is reset before a scenario.
+    pub(crate) resets: bool,
+    /// On which links of the first ring faults can be put, counted from the master's outgoing one.
+    pub(crate) reached: Vec<usize>,
+    /// When it began, as a date and time of day in UTC.
+    pub(crate) began: String,
+    /// Whether the long conversations are played too.
+    pub(crate) thorough: bool,
+}
+
+/// What a qualification comes to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Qualified {
+    /// The text of `profile.toml`; `None` where the drives were not asked.
+    pub(crate) profile: Option<String>,
+    /// The text of `deviations.txt`: which deviations there are, and what was compared.
+    pub(crate) deviations: String,
+    /// The verdict on the drives.
+    pub(crate) verdict: Verdict,
+}
+
+/// A qualification in progress.
+pub(crate) struct Qualification {
+    facts: Facts,
+    drives: u8,
+    findings: Findings,
+    ill: bool,
+}
+
+impl Qualification {
+    /// One of which nothing was played yet.
+    pub(crate) fn new(facts: Facts) -> Self {
+        let drives = facts.rig.file.ring.first.drives;
+        Self {
+            drives,
+            findings: Findings::new(drives, facts.byte_time, facts.exactness.tolerance),
+            ill: false,
+            facts,
+        }
+    }
+
+    /// Notes the outcome of a selected scenario.
+    pub(crate) fn note(&mut self, name: &str, played: &Played) {
+        self.findings.note(name, played);
+        self.ill = played.shows_an_ill_rig();
+    }
+
+    /// Plays what is judged by the model alone, settles what the manual leaves open, and names the deviations of drives.
+    ///
+    /// # Errors
+    /// Those of the bench.
+    pub(crate) fn settle<B: Bench>(mut self, bench: &mut B) -> Result<Qualified, B::Stop> {
+        if bench.over() {
+            self.findings.note_open(ENDED.to_owned());
+            return Ok(self.qualified(None, self.findings.text(None, &[])));
+        }
+        if self.ill {
+            let why = "the ring is ill: nothing more was played";
+            self.findings.note_open(why.to_owned());
+            let deviations = self.deviations(bench, Some(&Header::default()));
+            return Ok(self.qualified(None, deviations));
+        }
+        let mut ended = self.converse(bench)?;
+        let (profile, settled) = self.profile(bench)?;
+        if !ended {
+            self.ask_ring(bench)?;
+            self.exchange_roles(bench)?;
+        }
+        ended |= bench.over();
+        if ended {
+            self.findings.note_open(ENDED.to_owned());
+        }
+        let deviations = self.deviations(bench, (!ended).then_some(&settled));
+        Ok(self.qualified(Some(profile), deviations))
+    }
+
+    fn qualified(&self, profile: Option<Profile>, deviations: String) -> Qualified {
+        Qualified {
+            profile: profile.map(|profile| toml::to_string(&profile).unwrap_or_default()),
+            deviations,
+            verdict: self.findings.judged(),
+        }
+    }
+
+    /// Plays the conversations that the model alone judges. Whether nothing more can or may be played.
+    fn converse<B: Bench>(&mut self, bench: &mut B) -> Result<bool, B::Stop> {
+        let drives = self.drives;
+        let reaches = |place: usize| place == 0 || self.facts.reached.contains(&place);
+        let mut entries = conversations(drives, &reaches).unwrap_or_default();
+        let mut read = Vec::new();
+        if self.facts.thorough {
+            entries.extend(thorough(drives).unwrap_or_default());
+            read = dumps(drives);
+        }
+        for entry in entries {
+            if self.compare(bench, &entry)?.is_none() {
+                return Ok(true);
+            }
+        }
+        for (drive, entry) in read {
+            if self.march(bench, drive, &entry)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Plays a conversation that is judged by the model; `None` where nothing more can or may be played.
+    fn compare<B: Bench>(
+        &mut self,
+        bench: &mut B,
+        entry: &Entry,
+    ) -> Result<Option<Played>, B::Stop> {
+        let played = bench.play(entry)?;
+        bench.show(entry, &played)?;
+        self.findings.note(entry.short_name(), &played);
+        Ok((!bench.over()).then_some(played))
+    }
+
+    /// Reads the EEPROM of a drive, and writes and restores its cells one by one. Whether nothing more can or may be played.
+    fn march<B: Bench>(&mut self, bench: &mut B, drive: u8, read: &Entry) -> Result<bool, B::Stop> {
+        let Some(played) = self.compare(bench, read)? else {
+            return Ok(true);
+        };
+        let right = played.outcome.verdict == Verdict::Passed;
+        let Some(last) = played.last_played().filter(|_| right) else {
+            return Ok(false);
+        };
+        for entry in marches(self.drives, drive, &last.conversations) {
+            if self.compare(bench, &entry)?.is_none() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Asks the ring about what differed, so that it shows which drive it was.
+    fn ask_ring<B: Bench>(&mut self, bench: &mut B) -> Result<(), B::Stop> {
+        if !self.facts.resets {
+            return Ok(());
+        }
+        let sightings = self.findings.sightings().to_vec();
+        for question in questions(self.drives, &sightings) {
+            if bench.over() {
+                break;
+            }
+            let played = bench.play(&question.entry)?;
+            let last = played.last_played().filter(|own| own.was_played());
+            let shown = last.and_then(|own| question.answer(&own.conversations));
+            shown
+                .into_iter()
+                .for_each(|own| self.findings.note_pinned(own));
+        }
+        Ok(())
+    }
+
+    /// Plays again what differed, with the drives' roles exchanged, so that it shows which drive it was. Only where every drive is reset
+    /// before: what was written to one must not stay.
+    fn exchange_roles<B: Bench>(&mut self, bench: &mut B) -> Result<(), B::Stop> {
+        if !self.facts.resets || self.drives < 2 {
+            return Ok(());
+        }
+        let sightings = self.findings.sightings().to_vec();
+        let trials = exchange(self.drives, sightings, &mut |entry: &Entry| {
+            if bench.over() {
+                return Ok(None);
+            }
+            let played = bench.play(entry)?;
+            Ok(self.findings.note_exchanged(&played))
+        })?;
+        self.findings.note_trials(trials);
+        Ok(())
+    }
+
+    /// The deviations that explain every byte, and what was compared. The drives of the model have the properties of the bus that this
+    /// header settles; `None` where the run ended early, and no deviation is looked for.
+    fn deviations<B: Bench>(&self, bench: &B, settled: Option<&Header>) -> String {
+        let known = self.facts.rig.file.deviation.iter();
+        let known: Vec<_> = known.map(|entry| entry.name.clone()).collect();
+        let seen = self.findings.seen(self.drives, self.facts.exactness);
+        let settled = settled.filter(|_| self.findings.differ());
+        let named = settled.map(|settled| {
+            let twin = |header: &Header| bench.twin(&settled.and(header));
+            name(&seen, &twin)
+        });
+        self.master() + &self.findings.text(named.as_deref(), &known)
+    }
+
+    /// The deviation of the bench's own master, if it is wrong.
+    fn master(&self) -> String {
+        if !self.findings.master_is_wrong {
+            return String::new();
+        }
+        let mut text = String::new();
+        for deviation in deviating_masters(&self.findings.driven)
+            .iter()
+            .take(MOST_TOLD)
+        {
+            text.push_str(&format!(
+                "the master: {} (ND21 {}): {}\n",
+                deviation.name, deviation.section, deviation.about
+            ));
+        }
+        if text.is_empty() {
+            text.push_str("the bench's master differs from the master of the manual, and no single known deviation explains it\n");
+        }
+        text.push_str(
+            "the bench is wrong, not a drive: its own master deviates, so nothing follows for the drives\n",
+        );
+        text
+    }
+
+    /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus is part of every later
+    /// question and is the second value; a time of a drive is the middle of a span, and no later answer rests on it.
+    fn profile<B: Bench>(&mut self, bench: &mut B) -> Result<(Profile, Header), B::Stop> {
+        let rings: Vec<u8> = self.facts.rig.rings().map(|(_, own)| own.drives).collect();
+        let mut profile = Profile {
+            schema: 1,
+            rig: self.facts.rig.id().to_owned(),
+            date: self.facts.began.clone(),
+            rings,
+            property: BTreeMap::new(),
+            open: BTreeMap::new(),
+        };
+        let mut known = Header::default();
+        let mut ended = false;
+        for probe in probes(self.drives).unwrap_or_default() {
+            ended = ended || bench.over();
+            if ended {
+                profile.leave_open(probe.property, "not asked: the run ended before");
+                continue;
+            }
+            let section = format!("nd21 {}", probe.section);
+            let property = probe.property;
+            let whose = match probe.asked {
+                Asked::Drive(drive, _) => format!("drive {drive}: "),
+                Asked::Ring => String::new(),
+            };
+            match self.ask(bench, &probe, &known)? {
+                Asking::Settled { value, header } => {
+                    bench.tell(&format!("{property} ({section}): {whose}{value}\n"))?;
+                    if probe.asked == Asked::Ring {
+                        known = known.and(&header);
+                    }
+                    profile.settle(property, &section, &format!("{whose}{value}"), &header);
+                }
+                Asking::Open(why) => {
+                    bench.tell(&format!("{property} ({section}): {whose}{why}\n"))?;
+                    profile.leave_open(property, &format!("{whose}{why}"));
+                }
+            }
+        }
+        Ok((profile, known))
+    }
+
+    /// Asks a probe, and notes that it was asked.
+    fn ask<B: Bench>(
+        &mut self,
+        bench: &mut B,
+        probe: &Probe,
+        known: &Header,
+    ) -> Result<Asking, B::Stop> {
+        let answer = match self.answer(bench, probe, known)? {
+            Ok(answer) => answer,
+            Err(why) => return Ok(Asking::Open(format!("not asked: {why}"))),
+        };
+        self.findings.note_probe();
+        Ok(Asking::Open(match answer {
+            Answer::Settled { value, header } => return Ok(Asking::Settled { value, header }),
+            Answer::NoDifference => {
+                "every value of it gives the bytes that came: the drive was not in a state that shows it".to_owned()
+            }
+            Answer::NotDone(time) => {
+                format!("longer than {time}: not finished when asked for the last time")
+            }
+            Answer::Unexplained => {
+                let why = "no value of it gives the bytes that came";
+                let of = match probe.asked {
+                    Asked::Drive(drive, _) => format!(" of drive {drive}"),
+                    Asked::Ring => String::new(),
+                };
+                self.findings
+                    .note_open(format!("the probe of {}{of}: {why}", probe.property));
+                why.to_owned()
+            }
+        }))
+    }
+
+    /// Plays a probe, and again where no value explains it. The inner error says why it cannot be asked.
+    fn answer<B: Bench>(
+        &mut self,
+        bench: &mut B,
+        probe: &Probe,
+        known: &Header,
+    ) -> Result<Result<Answer, String>, B::Stop> {
+        let exactness = self.facts.exactness;
+        // Simulated drives answer alike each time.
+        let most = match exactness.tolerance {
+            Span::ZERO => 1,
+            _ => PROBED,
+        };
+        let mut last = Vec::new();
+        for _ in 0..most {
+            let mut conversations = Vec::new();
+            last.clear();
+            for entry in &probe.entries {
+                let played = bench.play(entry)?;
+                let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
+                    self.findings.note_attempts(entry.short_name(), &played);
+                    return Ok(Err(played.outcome.remarks.join("; ")));
+                };
+                conversations.push(attempt.conversations.clone());
+                last.push((entry.short_name(), played));
+            }
+            let twin = |header: &Header| bench.twin(&known.and(header));
+            match answer(probe, self.drives, &conversations, exactness, &twin) {
+                Ok(Answer::Unexplained) => {}
+                Ok(answer) => return Ok(Ok(answer)),
+                Err(problems) => return Ok(Err(problems.to_string())),
+            }
+            if bench.over() {
+                break;
+            }
+        }
+        for (name, played) in &last {
+            self.findings.note_attempts(name, played);
+        }
+        Ok(Ok(Answer::Unexplained))
+    }
+}
+
+/// What came of asking a probe.
+enum Asking {
+    /// A value, and the header that makes it.
+    Settled { value: String, header: Header },
+    /// None, and why.
+    Open(String),
+}
