@@ -29,6 +29,7 @@ pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_
 
 use crate::link::{InnerLink, Link, PortLink};
 use crate::port::Wire;
+use crate::rig::port_file::Node;
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
@@ -36,6 +37,8 @@ use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -57,6 +60,45 @@ pub(crate) fn over_ports(
     let mut link = StreamLink::new(wires, inner, rate, interrupt);
     link.set_time_tolerance(tolerance);
     Box::new(link)
+}
+
+/// The buses of `[port.1]` in a rig's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum PortBus {
+    /// UNITEK DS/BAMOCAR on CAN.
+    Unitek,
+}
+
+impl PortBus {
+    /// All of them.
+    pub const ALL: [Self; 1] = [Self::Unitek];
+
+    /// The name in a rig's file.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unitek => Bus::Unitek.name(),
+        }
+    }
+
+    /// The drive at a place of a port's list: its number, and its identifiers to receive and to send.
+    #[must_use]
+    pub fn drive(self, index: usize, node: Node) -> (u8, (u16, u16)) {
+        match self {
+            Self::Unitek => unitek::rig::drive(index, node),
+        }
+    }
+
+    /// The register of `allow_registers`.
+    ///
+    /// # Errors
+    /// What is wrong, and what was expected.
+    pub(crate) fn special_register(self, text: &str) -> Result<u8, (String, String)> {
+        match self {
+            Self::Unitek => unitek::rig::special_register(text),
+        }
+    }
 }
 
 /// What happens to a drive from outside the bus, by the bus that it is on.

@@ -24,7 +24,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
     let Some(rig) = find_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };
-    let size = rig.file.ring.first.drives;
+    let size = rig.ring_size();
     let entries = match select(&arguments.selection, Some(size)) {
         Ok(entries) => entries,
         Err(errors) => {
@@ -94,7 +94,7 @@ impl Bench for Live<'_, '_> {
 /// What is known of a qualification that begins.
 pub(super) fn facts(run: &mut Run<'_>, began: String, thorough: bool) -> Facts {
     let rig = run.session().rig().clone();
-    let links = 0..usize::from(rig.file.ring.first.drives);
+    let links = 0..usize::from(rig.ring_size());
     Facts {
         rig,
         byte_time: run.session().link().byte_time(),

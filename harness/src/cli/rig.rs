@@ -261,7 +261,9 @@ fn row(name: &str, place: &RigPlace, folder: &Path) -> Value {
             ("held", format!("by {who}"), holder)
         }
     };
-    let drives: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    let rings = rig.rings().map(|(_, ring)| usize::from(ring.drives));
+    let port = rig.port().map(|port| port.drives.len());
+    let drives: Vec<_> = rings.chain(port).collect();
     json!({
         "name": name, "id": rig.id(), "state": state, "about": about, "holder": holder, "file": source,
         "drives": drives, "labels": rig.file.rig.labels,

@@ -11,8 +11,20 @@ use crate::top::screen;
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-/// Finds the rig of this name; reports what is wrong with it.
+/// Finds the rig of this name, for a command that serves rings only; reports what is wrong with it.
 pub(crate) fn find_rig(name: &str, output: &mut Output) -> Option<Rig> {
+    let rig = find_any_rig(name, output)?;
+    match rig.of_rings() {
+        Ok(()) => Some(rig),
+        Err(error) => {
+            output.complain(&error.to_string());
+            None
+        }
+    }
+}
+
+/// Finds the rig of this name, whatever its bus; reports what is wrong with it.
+pub(crate) fn find_any_rig(name: &str, output: &mut Output) -> Option<Rig> {
     match find(name, &folder()) {
         Ok(rig) => Some(rig),
         Err(FindError::Mistakes(problems)) => {
@@ -46,6 +58,7 @@ pub(crate) fn alarm() -> Alarm {
 /// The exit code for a rig that cannot be used.
 pub(crate) fn exit_of(error: &SessionError) -> Exit {
     match error {
+        SessionError::OtherBus { .. } => Exit::Usage,
         SessionError::Lock(LockError::Busy { .. }) => Exit::Busy,
         SessionError::Interrupted { end: Some(end), .. } if end.is_unsafe() => Exit::NotSafe,
         SessionError::Interrupted { .. } => Exit::Interrupted,

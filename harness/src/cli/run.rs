@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         Some(Some(rig)) => Some(rig),
         Some(None) => return Ok(Exit::Usage),
     };
-    let own = rig.as_ref().map(|rig| rig.file.ring.first.drives);
+    let own = rig.as_ref().map(|rig| rig.ring_size());
     let size = own.or(arguments.ring);
     let entries = match select(&arguments.selection, size) {
         Ok(entries) => entries,

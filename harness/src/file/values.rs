@@ -118,6 +118,43 @@ impl fmt::Display for Speed {
     }
 }
 
+/// A highest speed: in rpm, or as a share of the speed that drives call 100 %.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum MaxSpeed {
+    /// In rpm.
+    Rpm(Speed),
+    /// In per cent, above 0 and up to 100.
+    Percent(f64),
+}
+
+impl FromStr for MaxSpeed {
+    type Err = ValueError;
+
+    fn from_str(text: &str) -> Result<Self, ValueError> {
+        let Some(number) = text.trim().strip_suffix('%') else {
+            return text.parse().map(Self::Rpm);
+        };
+        let percent = number.trim().parse::<f64>().ok();
+        let fits = |percent: &f64| *percent > 0.0 && *percent <= 100.0;
+        percent.filter(fits).map(Self::Percent).ok_or_else(|| {
+            wrong(
+                format!("`{text}` is not possible here"),
+                "a share above 0% and up to 100% expected here",
+            )
+        })
+    }
+}
+
+impl fmt::Display for MaxSpeed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rpm(speed) => speed.fmt(f),
+            Self::Percent(percent) => write!(f, "{percent}%"),
+        }
+    }
+}
+
 /// One wire of a ring by its ends, as a scenario writes it: `98->97`, `master->99`, `0->master`. An end that
 /// is `None` is the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
@@ -216,5 +253,6 @@ macro_rules! text_values {
 text_values! {
     Time "drivebench-time" "a time above 0 with its unit: 100ms, 5s, 1h";
     Speed "drivebench-speed" "a speed above 0 with its unit: 300rpm";
+    MaxSpeed "drivebench-max-speed" "a speed above 0 with its unit: 300rpm, 10%";
     Wire "drivebench-link" "a link by its ends: 98->97, master->99, 0->master";
 }

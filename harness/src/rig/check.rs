@@ -2,7 +2,9 @@
 
 use super::file::schema;
 use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
+use super::port_file::Port;
 use super::profile::KnownProfile;
+use super::session_error::SessionError;
 use crate::buses::syntax::Header;
 use crate::file::schema::{Step, compare, place, syntax};
 use crate::file::values::{ValueError, Wire};
@@ -45,10 +47,35 @@ impl Rig {
 
     /// Its rings with their numbers, 1 and 2.
     pub fn rings(&self) -> impl Iterator<Item = (u8, &Ring)> {
-        std::iter::once(&self.file.ring.first)
-            .chain(&self.file.ring.second)
+        self.file
+            .rings()
             .zip(1..)
             .map(|(ring, number)| (number, ring))
+    }
+
+    /// How many drives its first ring has; 0 of a bench without rings.
+    #[must_use]
+    pub fn ring_size(&self) -> u8 {
+        self.file.rings().next().map_or(0, |ring| ring.drives)
+    }
+
+    /// Refuses a bench without rings.
+    ///
+    /// # Errors
+    /// [`SessionError::OtherBus`].
+    pub fn of_rings(&self) -> Result<(), SessionError> {
+        self.port().map_or(Ok(()), |port| {
+            Err(SessionError::OtherBus {
+                rig: self.id().to_owned(),
+                bus: port.bus.name(),
+            })
+        })
+    }
+
+    /// Its port on a bus whose stations share one segment, in place of rings.
+    #[must_use]
+    pub fn port(&self) -> Option<&Port> {
+        self.file.port.as_ref().map(|ports| &ports.first)
     }
 
     /// How often a ring is examined before a scenario until it counts as ill; `None` where its file asks for no examination. An interlock
@@ -58,10 +85,13 @@ impl Rig {
         wanted.then_some(self.file.health.attempts)
     }
 
-    /// Whether its rings are simulated in the program. Such a rig needs no lock: everyone has a copy.
+    /// Whether its drives are simulated in the program. Such a rig needs no lock: everyone has a copy.
     #[must_use]
     pub fn is_simulated(&self) -> bool {
-        self.file.ring.first.endpoint.transport == Transport::Sim
+        match self.file.rings().next() {
+            Some(ring) => ring.endpoint.transport == Transport::Sim,
+            None => self.file.sim.as_ref().is_some_and(|sim| sim.bus.is_some()),
+        }
     }
 }
 
@@ -114,6 +144,13 @@ pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, P
     })
 }
 
+/// Whether a text is an address of the form host:port.
+pub(crate) fn is_address(text: &str) -> bool {
+    text.rsplit_once(':').is_some_and(|(host, number)| {
+        !host.is_empty() && number.parse::<u16>().is_ok_and(|number| number > 0)
+    })
+}
+
 /// A bound of an interlock, in the unit of its cell's scale.
 pub(crate) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     let wrong = |message: String, expected: &str| ValueError {
@@ -140,7 +177,7 @@ pub(crate) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
 }
 
 pub(crate) struct Check<'a> {
-    table: &'a Spanned<DeTable<'a>>,
+    pub(crate) table: &'a Spanned<DeTable<'a>>,
     pub(crate) file: &'a RigFile,
     pub(crate) problems: Vec<Problem>,
 }
@@ -167,10 +204,15 @@ impl Check<'_> {
         find_profile: &FindProfile<'_>,
     ) -> (Option<KnownProfile>, Header) {
         let file = self.file;
-        debug_assert_eq!(file.schema, SCHEMA);
+        debug_assert!(file.schema <= SCHEMA);
         self.id();
-        let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
-        for (ring, number) in rings.zip(["1", "2"]) {
+        if self.has_port() {
+            self.safe_state();
+            self.programs();
+            self.quarantine();
+            return (None, Header::default());
+        }
+        for (ring, number) in file.rings().zip(["1", "2"]) {
             let path = [Step::Key("ring"), Step::Key(number)];
             self.endpoint(&path, &ring.endpoint);
         }
@@ -288,10 +330,7 @@ impl Check<'_> {
             ),
             (Transport::Pty, ..) => {}
             (Transport::Tcp | Transport::Rfc2217, Some(port), _) => {
-                let fits = port.rsplit_once(':').is_some_and(|(host, number)| {
-                    !host.is_empty() && number.parse::<u16>().is_ok_and(|number| number > 0)
-                });
-                if !fits {
+                if !is_address(port) {
                     let message = format!("`{port}` is not an address");
                     self.wrong(
                         &at("port"),
@@ -336,14 +375,9 @@ impl Check<'_> {
 
     /// Rings are all simulated or all outside the program: one clock for all.
     fn one_world(&mut self) {
-        let rings = &self.file.ring;
         let sim = |ring: &Ring| ring.endpoint.transport == Transport::Sim;
-        let first = sim(&rings.first);
-        if rings
-            .second
-            .as_ref()
-            .is_some_and(|second| sim(second) != first)
-        {
+        let first = self.file.rings().next().is_some_and(sim);
+        if self.file.rings().any(|ring| sim(ring) != first) {
             self.wrong(
                 &["ring".into(), "2".into(), "transport".into()],
                 "one ring is simulated and the other is not",
@@ -361,11 +395,7 @@ impl Check<'_> {
 
     /// How many drives the ring has; `None`, and a mistake, where there is no such ring.
     fn ring(&mut self, path: &[Step<'_>], ring: u8) -> Option<u8> {
-        let rings = &self.file.ring;
-        let found = match ring {
-            1 => Some(&rings.first),
-            _ => rings.second.as_ref(),
-        };
+        let found = self.file.rings().nth(usize::from(ring.saturating_sub(1)));
         if found.is_none() {
             let path = [path, &["ring".into()]].concat();
             self.wrong(
@@ -398,9 +428,8 @@ impl Check<'_> {
     /// No port is named twice.
     fn ports(&mut self) {
         let file = self.file;
-        let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
         let mut all: Vec<(Vec<Step<'_>>, &Endpoint)> = Vec::new();
-        for (ring, key) in rings.zip(["1", "2"]) {
+        for (ring, key) in file.rings().zip(["1", "2"]) {
             all.push((vec!["ring".into(), key.into()], &ring.endpoint));
         }
         for (index, tap) in file.tap.iter().enumerate() {

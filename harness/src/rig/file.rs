@@ -1,7 +1,8 @@
 //! The content of a rig file. The JSON schema is derived from these types, and every file is checked against it; `drivebench rig
 //! schema` prints these doc comments.
 
-use crate::file::values::{Speed, Time, Wire};
+use super::port_file::{PortBus, PortLimits, Ports};
+use crate::file::values::{MaxSpeed, Speed, Time, Wire};
 use harness_proto::nd21::cells::{Cell, cell};
 use harness_proto::nd21::io::Input;
 use schemars::JsonSchema;
@@ -14,20 +15,24 @@ pub fn schema() -> serde_json::Value {
     schemars::schema_for!(RigFile).to_value()
 }
 
-/// The version of the schema.
-pub const SCHEMA: u32 = 1;
+/// The newest version of the schema. Version 1 knows rings only.
+pub const SCHEMA: u32 = 2;
 
 /// A rig file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RigFile {
-    /// The version of this schema: 1.
-    #[schemars(range(min = 1, max = 1))]
+    /// The version of this schema: 1, or 2 for a file with `[port.1]`.
+    #[schemars(range(min = 1, max = 2))]
     pub schema: u32,
     /// Which bench this is.
     pub rig: About,
     /// Its rings: `[ring.1]`, and `[ring.2]` where there are two (ND21 12.2).
-    pub ring: Rings,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ring: Option<Rings>,
+    /// In place of rings, a port of a bus whose stations share one segment: `[port.1]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub port: Option<Ports>,
     /// Ports that listen on a link.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 500))]
@@ -73,6 +78,14 @@ pub struct RigFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 100))]
     pub deviation: Vec<Deviation>,
+}
+
+impl RigFile {
+    /// Its rings, in order; none of a bench with `[port.1]`.
+    pub fn rings(&self) -> impl Iterator<Item = &Ring> {
+        let rings = self.ring.iter();
+        rings.flat_map(|rings| std::iter::once(&rings.first).chain(&rings.second))
+    }
 }
 
 /// Which bench this is.
@@ -282,6 +295,9 @@ pub struct DriveEntry {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sim {
+    /// The bus that is simulated at `[port.1]`; rings say so by their `transport`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bus: Option<PortBus>,
     /// Lines of a scenario's header, such as `drive 0..last input GPIN3 GPIN5 high`.
     #[serde(default)]
     #[schemars(length(max = 1000))]
@@ -516,7 +532,8 @@ pub struct HookEntry {
 
 /// What may be sent to the rig.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
 pub struct Limits {
     /// Whether a motor may turn (and --allow-motion is needed beside it); default false.
     pub allow_motion: bool,
@@ -528,10 +545,10 @@ pub struct Limits {
     pub allow_outputs: bool,
     /// Whether the watch over silences may be switched on (ND21 14.10.2), behind which a pause of 10 ms stops a ring; default false.
     pub allow_monitoring: bool,
-    /// The highest speed at which a motor may turn by what the bus says; default no limit but the drives' own. Cells through which
-    /// a motor could turn faster than the speeds written cannot be written then.
+    /// The highest speed at which a motor may turn by what the bus says, such as `300rpm`, or `10%` at `[port.1]`; default no limit but
+    /// the drives' own. Cells through which a motor could turn faster than the speeds written cannot be written then.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_speed: Option<Speed>,
+    pub max_speed: Option<MaxSpeed>,
     /// The most bytes that are sent in a second, 1 to 100000; default what the line carries.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100_000))]
@@ -539,6 +556,9 @@ pub struct Limits {
     /// The longest run; default no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_run: Option<Time>,
+    /// What only benches with `[port.1]` permit.
+    #[serde(flatten)]
+    pub port: PortLimits,
 }
 
 /// A known deviation of this rig's drives from the manual.

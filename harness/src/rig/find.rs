@@ -1,6 +1,7 @@
 //! A rig by its name: `sim:3`, a file, a file of a folder of rigs, or one that the program carries.
 
 use super::check::{Rig, parse};
+use super::port_file::{CONFIRMATION, PortBus};
 use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::source::{Source, SourceError};
 use harness_proto::novobus::address::RingSize;
@@ -51,14 +52,18 @@ pub fn folder() -> PathBuf {
         .map_or_else(|| PathBuf::from("rigs"), PathBuf::from)
 }
 
-/// Finds and reads a rig: `sim:N` and `sim:N,M`, the path of a file, the name of a file of `folder`, or
+/// Finds and reads a rig: `sim:N`, `sim:N,M` and `sim:BUS:N`, the path of a file, the name of a file of `folder`, or
 /// the name of a built-in one, in this order.
 ///
 /// # Errors
 /// There is no such rig, or its file has mistakes.
 pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
     if let Some(sizes) = name.strip_prefix("sim:") {
-        let text = simulated(sizes).map_err(|reason| FindError::Simulated {
+        let text = match simulated_port(sizes) {
+            Some((bus, drives)) => drives.map(|drives| simulated_bus(bus, drives)),
+            None => simulated(sizes),
+        };
+        let text = text.map_err(|reason| FindError::Simulated {
             name: name.to_owned(),
             reason,
         })?;
@@ -163,6 +168,31 @@ pub fn all(folder: &Path) -> Vec<(String, RigPlace)> {
 fn rig_name(path: &Path) -> Option<String> {
     path.extension().filter(|ending| *ending == "toml")?;
     Some(path.file_stem()?.to_str()?.to_owned())
+}
+
+/// The number of drives of `sim:BUS` and `sim:BUS:N` for a bus of [`Port`](super::port_file::Port), given what stands behind `sim:`; `None`
+/// where no bus is named.
+#[must_use]
+pub fn simulated_port(text: &str) -> Option<(PortBus, Result<u8, String>)> {
+    let (bus, number) = text.split_once(':').unwrap_or((text, "1"));
+    let bus = PortBus::ALL.into_iter().find(|own| own.name() == bus)?;
+    let drives = number.parse().ok().filter(|own| (1..=127).contains(own));
+    let wrong = || format!("`{number}` is not a number of drives: 1 to 127 expected");
+    Some((bus, drives.ok_or_else(wrong)))
+}
+
+/// The file of a simulated bench with a port. All is permitted.
+fn simulated_bus(bus: PortBus, drives: u8) -> String {
+    let nodes: Vec<_> = (1..=drives)
+        .map(|node| format!("{{ node = {node} }}"))
+        .collect();
+    let name = bus.name();
+    format!(
+        "schema = 2\n[rig]\nid = \"sim-{name}-{drives}\"\n[port.1]\nbus = \"{name}\"\ndrives = [{}]\n[sim]\nbus = \"{name}\"\n\
+         [limits]\nallow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\nallow_other_identifiers = true\n\
+         bit_rate_way_back = \"it is simulated\"\nstore_bus_settings = \"{CONFIRMATION}\"\n",
+        nodes.join(", ")
+    )
 }
 
 /// The sizes of the rings of `sim:N` and `sim:N,M`, given what stands behind the colon.

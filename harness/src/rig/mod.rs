@@ -6,6 +6,7 @@
 
 mod around;
 pub(crate) mod check;
+mod check_port;
 mod check_sim;
 mod driven;
 mod ends;
@@ -16,6 +17,7 @@ pub mod lock;
 mod open;
 mod permitted;
 mod played;
+pub mod port_file;
 pub(crate) mod profile;
 pub(crate) mod run;
 pub mod scan;
@@ -33,7 +35,7 @@ pub use ends::Ends;
 pub use file::schema;
 pub use find::{FindError, find};
 pub use open::OpenRigError;
-pub(crate) use open::line_rate;
+pub(crate) use open::{line_rate, stated_rate};
 pub(crate) use permitted::limits;
 pub(crate) use played::Again;
 pub use played::{Attempt, Played};

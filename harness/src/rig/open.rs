@@ -57,10 +57,13 @@ pub(crate) struct Opened {
 /// The rate of a rig's line.
 pub(crate) fn line_rate(rig: &Rig) -> Rate {
     let simulated = rig.is_simulated().then(|| rig.plan().ok()).flatten();
-    simulated.map_or_else(
-        || Rate::from(rig.file.ring.first.endpoint.line),
-        |plan| plan.rate,
-    )
+    simulated.map_or_else(|| stated_rate(rig), |plan| plan.rate)
+}
+
+/// The rate in a rig's file.
+pub(crate) fn stated_rate(rig: &Rig) -> Rate {
+    let first = rig.file.rings().next();
+    first.map_or_else(Rate::default, |ring| ring.endpoint.line.into())
 }
 
 /// Opens a rig's ends; nothing is sent.
@@ -73,7 +76,7 @@ pub(crate) fn open(rig: &Rig, interrupt: Arc<AtomicBool>) -> Result<Opened, Open
     }
     let ports = scan::scan(Path::new("/"));
     let mut locks = Vec::new();
-    let rate = Rate::from(rig.file.ring.first.endpoint.line);
+    let rate = stated_rate(rig);
     let mut wires = Vec::new();
     for (_, ring) in rig.rings() {
         let own = Rate::from(ring.endpoint.line);

@@ -1,6 +1,7 @@
 //! What a rig's file permits and wants: the guard's limits, and the safe state of the drives.
 
 use super::{Rig, file};
+use crate::file::values::MaxSpeed;
 use crate::guard::{Limits, SafeStep, Standing};
 use harness_proto::time::Span;
 
@@ -24,7 +25,11 @@ pub(crate) fn limits(rig: &Rig, allow_motion: bool) -> Limits {
     let motion = own.allow_motion && (allow_motion || rig.is_simulated());
     let speeds = rig.file.drive.iter().filter_map(|drive| drive.max_speed);
     let slowest = speeds
-        .chain(own.max_speed)
+        .chain(own.max_speed.and_then(|most| match most {
+            MaxSpeed::Rpm(speed) => Some(speed),
+            // Refused in the file of a ring.
+            MaxSpeed::Percent(_) => None,
+        }))
         .map(|speed| speed.0)
         .reduce(f64::min);
     Limits {

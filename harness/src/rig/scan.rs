@@ -3,6 +3,7 @@
 //! Linux tells it in files: `/sys/class/tty/*` has the ports, `/run/udev/data/c4:64` the keys of the port with
 //! these numbers. Nothing is opened, so that no port is disturbed.
 
+use super::port_file::PortBus;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -148,7 +149,7 @@ fn port(root: &Path, folder: &Path) -> Option<Port> {
     })
 }
 
-/// A block of a rig file for each port, to choose from: each is made for ring 1.
+/// A block of a rig file for each port, to choose from: each is made for ring 1, and as a comment for an SLCAN adapter.
 #[must_use]
 pub fn propose(ports: &[Port]) -> String {
     let mut text = String::new();
@@ -175,6 +176,14 @@ pub fn propose(ports: &[Port]) -> String {
             "{gap}# {device}{model}\n[ring.1]\ndrives = 1                      # how many there are\n\
              transport = \"serial\"\n{place}\nline = \"38400 8O1\"\n"
         );
+        for bus in PortBus::ALL {
+            let _infallible = write!(
+                text,
+                "# Or, if it is an SLCAN adapter, in a file with schema = 2:\n# [port.1]\n# bus = {}\n# slcan = {}\n# drives = [{{ node = 1 }}]\n",
+                quoted(bus.name()),
+                quoted(&device)
+            );
+        }
     }
     text
 }

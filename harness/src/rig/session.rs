@@ -5,7 +5,7 @@ use super::around::{self, Around};
 use super::ends::Ends;
 use super::file;
 use super::lock::{PortLock, RigLock};
-use super::open::open;
+use super::open::{open, stated_rate};
 use super::permitted::{limits, standing};
 use super::session_error::SessionError;
 use super::state;
@@ -163,6 +163,7 @@ impl Session {
 
     /// Takes a rig as its file describes it.
     fn open_as_stated(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+        rig.of_rings()?;
         let own = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
             rig: rig.id().to_owned(),
             since: quarantine.since.clone(),
@@ -427,7 +428,7 @@ impl Session {
     }
 
     fn rate(&self) -> Rate {
-        self.rig.file.ring.first.endpoint.line.into()
+        stated_rate(&self.rig)
     }
 
     /// Lets a thread watch that the program lives.

@@ -10,6 +10,16 @@ use crate::rig::line_test::Cause;
 /// Why a rig cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
+    /// Its drives are on another bus.
+    #[error(
+        "rig {rig} has drives on the bus {bus}, and this command serves rings only; `drivebench help` names the commands of each bus"
+    )]
+    OtherBus {
+        /// Which.
+        rig: String,
+        /// Their bus.
+        bus: &'static str,
+    },
     /// It is held or reserved, or its lock cannot be used.
     #[error(transparent)]
     Lock(#[from] LockError),

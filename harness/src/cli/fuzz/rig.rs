@@ -94,9 +94,8 @@ pub(crate) fn rings(
     rig: &Rig,
     reaches: impl Fn(usize, u8) -> bool,
 ) -> (RingScope, Option<RingScope>) {
-    let file = &rig.file.ring;
-    let second = file.second.as_ref().map(|ring| ring.drives);
-    RingScope::both(file.first.drives, second, reaches)
+    let second = rig.file.rings().nth(1).map(|ring| ring.drives);
+    RingScope::both(rig.ring_size(), second, reaches)
 }
 
 /// What cases may have on simulated rings; plain drives have nothing behind their bus.

@@ -1,5 +1,6 @@
 //! Rig files, locks, quarantine, hooks and the commands for them.
 
+use harness::file::values::{MaxSpeed, Speed};
 use harness::rig::file::{Condition, Level, LineFormat, Transport};
 use harness::rig::hook::{self, HookError};
 use harness::rig::lock::{self, RigLock};
@@ -12,6 +13,7 @@ use std::process::{Command, Output};
 use std::time::Duration;
 
 mod locks;
+mod port;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -85,7 +87,7 @@ fn every_rig_file_parses_and_its_name_is_its_id() {
 fn what_a_file_says_is_what_is_read() {
     let rig =
         good(&std::fs::read_to_string(root().join("rigs/examples/serial.toml")).expect("text"));
-    let ring = &rig.file.ring.first;
+    let ring = rig.file.rings().next().expect("a ring");
     assert_eq!(
         (ring.drives, ring.endpoint.transport),
         (3, Transport::Serial)
@@ -100,7 +102,8 @@ fn what_a_file_says_is_what_is_read() {
     assert!(
         limits.allow_motion && !limits.allow_eeprom && !limits.allow_reset && !limits.allow_outputs
     );
-    assert_eq!(limits.max_speed.map(|speed| speed.0), Some(300.0));
+    let most = MaxSpeed::Rpm(Speed(300.0));
+    assert_eq!(limits.max_speed, Some(most));
     assert_eq!(
         limits.max_run.map(|time| time.0),
         Some(Duration::from_secs(3600))
@@ -143,7 +146,7 @@ fn mistakes_are_shown_with_line_and_column() {
         ("an empty file", String::new()),
         (
             "another schema",
-            serial("").replace("schema = 1", "schema = 2"),
+            serial("").replace("schema = 1", "schema = 3"),
         ),
         ("a key that is not known", serial("baud = 9600")),
         ("a key nearly right", serial("tranport = \"tcp\"")),
@@ -283,16 +286,21 @@ fn mistakes_are_shown_with_line_and_column() {
             serial("[quarantine]\nsince = \"yesterday\"\nreason = \"it smells\""),
         ),
     ];
+    kept("mistakes.txt", &mistakes(&cases));
+}
+
+/// A page with the mistakes of each text.
+fn mistakes(cases: &[(&str, String)]) -> String {
     let mut page = String::new();
     for (what, text) in cases {
-        let problems = read(&text).expect_err(what);
+        let problems = read(text).expect_err(what);
         assert!(!problems.is_empty(), "{what}");
         writeln!(page, "{what}").expect("a String");
         for problem in problems {
             writeln!(page, "    {problem}").expect("a String");
         }
     }
-    kept("mistakes.txt", &page);
+    page
 }
 
 #[test]
@@ -311,7 +319,7 @@ proptest! {
         let at = at % text.len();
         text.replace_range(at..(at + new.len()).min(text.len()), &new);
         if let Ok(rig) = read(&text) {
-            prop_assert!(rig.file.ring.first.drives > 0);
+            prop_assert!(rig.ring_size() > 0);
         }
     }
 }
@@ -432,7 +440,14 @@ fn scan_finds_ports_and_what_udev_says_of_them() {
     let text = scan::propose(&ports);
     for block in text.split("\n\n") {
         let rig = good(&format!("schema = 1\n[rig]\nid = \"new\"\n{block}"));
-        let udev = &rig.file.ring.first.endpoint.udev;
+        let lines = block.lines().skip_while(|line| *line != "# [port.1]");
+        let port: Vec<_> = lines.map(|line| line.trim_start_matches("# ")).collect();
+        let can = good(&format!(
+            "schema = 2\n[rig]\nid = \"new\"\n{}",
+            port.join("\n")
+        ));
+        assert!(can.port().is_some_and(|port| port.slcan.is_some()));
+        let udev = &rig.file.rings().next().expect("a ring").endpoint.udev;
         if let Some(serial) = udev.get("ID_SERIAL_SHORT") {
             let device = scan::resolve(&ports, udev).expect("one");
             assert_eq!(

@@ -101,7 +101,7 @@ pub(crate) struct Qualification {
 impl Qualification {
     /// One of which nothing was played yet.
     pub(crate) fn new(facts: Facts) -> Self {
-        let drives = facts.rig.file.ring.first.drives;
+        let drives = facts.rig.ring_size();
         Self {
             drives,
             findings: Findings::new(drives, facts.byte_time, facts.exactness.tolerance),

@@ -6,6 +6,7 @@ use crate::link::Octets;
 use crate::rig::Rig;
 use crate::rig::session::{End, Session};
 use crate::rig::shared::Shared;
+use crate::rig::stated_rate;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::sync::SYNCO;
@@ -104,7 +105,7 @@ pub fn measure(
 /// Sends telegrams without a gap and times the first byte of each.
 fn round(session: &mut Session, ring: usize, size: RingSize) -> RingFigures {
     let simulated = session.rig().is_simulated();
-    let stated = session.rig().file.ring.first.endpoint.line.into();
+    let stated = stated_rate(session.rig());
     let link = session.link();
     let rate = line_test::slower(link, ring, stated).unwrap_or(stated);
     let nominal = link.byte_time() * u64::from(size.drives());

@@ -285,7 +285,9 @@ pub(crate) fn unasked(bytes: &[Received]) -> Cause {
 /// Rigs that differ from this one in one setting of its line, each with the cause that it proves when it opens. None where power
 /// would be switched.
 pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
-    let first = &rig.file.ring.first.endpoint;
+    let Some(first) = rig.file.rings().next().map(|ring| &ring.endpoint) else {
+        return Vec::new();
+    };
     if rig.is_simulated() || !rig.file.power.is_empty() {
         return Vec::new();
     }
@@ -293,9 +295,10 @@ pub(crate) fn neighbours(rig: &Rig) -> Vec<(Cause, Rig)> {
         let mut other = rig.clone();
         // The hooks of the rig have run.
         other.file.hooks = Hooks::default();
-        let rings = &mut other.file.ring;
-        for ring in std::iter::once(&mut rings.first).chain(&mut rings.second) {
-            change(&mut ring.endpoint);
+        if let Some(rings) = &mut other.file.ring {
+            for ring in std::iter::once(&mut rings.first).chain(&mut rings.second) {
+                change(&mut ring.endpoint);
+            }
         }
         other
     };
@@ -470,12 +473,25 @@ mod tests {
         let right = Marks::InBand;
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].0, Cause::Marks { right });
-        assert_eq!(found[0].1.file.ring.first.endpoint.marks, right);
+        assert_eq!(
+            found[0]
+                .1
+                .file
+                .rings()
+                .next()
+                .map(|ring| ring.endpoint.marks),
+            Some(right)
+        );
         assert_eq!(found[0].1.file.hooks, Hooks::default());
         let serial = "transport = \"serial\"\nport = \"/dev/ttyUSB0\"\nline = \"19200 8O1\"";
         let lines: Vec<_> = neighbours(&rig(serial, ""))
             .iter()
-            .map(|(_, rig)| rig.file.ring.first.endpoint.line)
+            .flat_map(|(_, rig)| {
+                rig.file
+                    .rings()
+                    .map(|ring| ring.endpoint.line)
+                    .collect::<Vec<_>>()
+            })
             .collect();
         assert_eq!(lines, [LineFormat::Baud38400, LineFormat::Baud9600]);
         let power = "[power.main]\non = [\"true\"]\noff = [\"true\"]\n";

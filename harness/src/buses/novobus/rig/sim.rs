@@ -8,7 +8,7 @@ use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};
 use crate::rig::limits;
 use crate::rig::profile::KnownProfile;
 use crate::scenario::plan::Plan;
-use crate::scenario::problem::{Problem, Problems};
+use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::line_number;
 use harness_sim::nd21::Stimulus;
 
@@ -52,6 +52,15 @@ impl Rig {
     /// # Errors
     /// The other header has mistakes.
     pub fn plan_with(&self, more: &Header) -> Result<Plan, Problems> {
+        if self.port().is_some() {
+            let message = "the rig has no rings";
+            let problem = Problem::new(Span::default(), message, "a table [ring.1] expected");
+            return Err(Problems::new(
+                &self.origin,
+                self.text.clone(),
+                vec![problem],
+            ));
+        }
         let own = header(&self.file, self.profile.as_ref(), &self.setup);
         plan_header(&self.origin, &own.and(more), &sizes(&self.file))
     }
@@ -59,8 +68,7 @@ impl Rig {
 
 /// How many drives each ring of a rig has.
 pub(crate) fn sizes(file: &RigFile) -> Vec<u8> {
-    let rings = std::iter::once(&file.ring.first).chain(&file.ring.second);
-    rings.map(|ring| ring.drives).collect()
+    file.rings().map(|ring| ring.drives).collect()
 }
 
 /// What the drives of a rig are: the types of its devices, its profile, and the lines of its `[sim]`.

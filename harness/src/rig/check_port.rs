@@ -1,0 +1,263 @@
+//! The part of the check that is about `[port.1]`.
+
+use super::check::{Check, is_address};
+use super::file::SCHEMA;
+use super::port_file::{CONFIRMATION, Port};
+use crate::file::schema::Step;
+use crate::file::values::MaxSpeed;
+use harness_proto::can::BitRate;
+
+const PORT: [Step<'static>; 2] = [Step::Key("port"), Step::Key("1")];
+
+impl Check<'_> {
+    /// Checks whether the file has rings or a port, and what it says of the port. Returns whether it has a port in place of rings.
+    pub(crate) fn has_port(&mut self) -> bool {
+        let (rings, ports) = (&self.file.ring, &self.file.port);
+        let port = match (rings, ports) {
+            (Some(_), None) => {
+                self.of_rings();
+                return false;
+            }
+            (None, Some(ports)) => &ports.first,
+            (Some(_), Some(_)) => {
+                let expected = "either [ring.1] or [port.1] expected";
+                self.wrong(&["port".into()], "the file has rings and a port", expected);
+                return true;
+            }
+            (None, None) => {
+                let expected = "a table [ring.1], or [port.1] for drives on a CAN bus, expected";
+                self.wrong(&[], "the file has no drives", expected);
+                return true;
+            }
+        };
+        if self.file.schema < SCHEMA {
+            let message = format!("schema {} has no `port`", self.file.schema);
+            self.wrong(&["schema".into()], message, "2 expected here");
+        }
+        self.only_of_rings();
+        self.adapter(port);
+        self.nodes(port);
+        self.port_limits(port);
+        true
+    }
+
+    /// What only a port has is no part of a file with rings.
+    fn of_rings(&mut self) {
+        let limits = &self.file.limits;
+        let own = [
+            ("allow_bus_settings", limits.port.allow_bus_settings),
+            (
+                "allow_other_identifiers",
+                limits.port.allow_other_identifiers,
+            ),
+            ("allow_registers", !limits.port.allow_registers.is_empty()),
+            ("bit_rate_way_back", limits.port.bit_rate_way_back.is_some()),
+            (
+                "store_bus_settings",
+                limits.port.store_bus_settings.is_some(),
+            ),
+        ];
+        for (key, _) in own.into_iter().filter(|(_, given)| *given) {
+            let message = format!("`{key}` is for benches with [port.1]");
+            self.wrong(
+                &["limits".into(), key.into()],
+                message,
+                "nothing expected here",
+            );
+        }
+        if matches!(limits.max_speed, Some(MaxSpeed::Percent(_))) {
+            let path = ["limits".into(), "max_speed".into()];
+            let message = "drives of a ring have no speed of 100 %";
+            self.wrong(&path, message, "a speed such as \"300rpm\" expected here");
+        }
+        if self.file.sim.as_ref().is_some_and(|sim| sim.bus.is_some()) {
+            let message = "`bus` is for a simulated [port.1]";
+            self.wrong(
+                &["sim".into(), "bus".into()],
+                message,
+                "nothing expected here",
+            );
+        }
+    }
+
+    /// What only rings have is no part of a file with a port.
+    fn only_of_rings(&mut self) {
+        let file = self.file;
+        let tables = [
+            ("tap", !file.tap.is_empty()),
+            ("interposer", !file.interposer.is_empty()),
+            ("drive", !file.drive.is_empty()),
+            ("interlock", !file.interlock.is_empty()),
+            ("deviation", !file.deviation.is_empty()),
+        ];
+        for (key, _) in tables.into_iter().filter(|(_, given)| *given) {
+            let message = format!("[[{key}]] is for benches with rings");
+            self.wrong(
+                &[key.into()],
+                message,
+                "no such table expected in a file with [port.1]",
+            );
+        }
+        let limits = &file.limits;
+        let keys = [
+            ("allow_reset", limits.allow_reset),
+            ("allow_outputs", limits.allow_outputs),
+            ("allow_monitoring", limits.allow_monitoring),
+            (
+                "max_bytes_per_second",
+                limits.max_bytes_per_second.is_some(),
+            ),
+        ];
+        for (key, _) in keys.into_iter().filter(|(_, given)| *given) {
+            let message = format!("`{key}` is for benches with rings");
+            self.wrong(
+                &["limits".into(), key.into()],
+                message,
+                "nothing expected here",
+            );
+        }
+        if file.rig.profile.is_some() {
+            let message = "profiles are for benches with rings";
+            self.wrong(
+                &["rig".into(), "profile".into()],
+                message,
+                "nothing expected here",
+            );
+        }
+    }
+
+    /// One adapter, or simulated drives.
+    fn adapter(&mut self, port: &Port) {
+        let at = |key| [PORT[0], PORT[1], Step::Key(key)];
+        let sim = self.file.sim.as_ref();
+        match (&port.slcan, &port.socketcand, sim) {
+            (Some(_), Some(_), _) => self.wrong(
+                &at("socketcand"),
+                "two adapters are given",
+                "one of `slcan` and `socketcand` expected",
+            ),
+            (None, None, None) => self.wrong(
+                &PORT,
+                "the port has no adapter",
+                "`slcan`, `socketcand`, or a table [sim] with `bus` for simulated drives, expected",
+            ),
+            (None, None, Some(sim)) if sim.bus != Some(port.bus) => {
+                let expected = format!("`bus = \"{}\"` expected in [sim]", port.bus.name());
+                self.wrong(&["sim".into()], "the simulated bus is missing", expected);
+            }
+            (None, None, Some(sim)) if !sim.setup.is_empty() => {
+                let path = ["sim".into(), "setup".into()];
+                let message = "the lines of `setup` are for benches with rings";
+                self.wrong(&path, message, "no `setup` expected here");
+            }
+            (None, None, Some(_)) => {}
+            (_, _, Some(_)) => self.wrong(
+                &["sim".into()],
+                "[sim] is only for simulated drives; this port has an adapter",
+                "no [sim] expected here",
+            ),
+            (_, _, None) => {}
+        }
+        if let Some(place) = &port.slcan
+            && !place.starts_with('/')
+            && !is_address(place)
+        {
+            let message = format!("`{place}` is neither a device nor an address");
+            let expected = "a device such as \"/dev/ttyACM0\", or host:port, expected here";
+            self.wrong(&at("slcan"), message, expected);
+        }
+        if let Some(place) = port.socketcand.as_ref().filter(|place| !is_address(place)) {
+            let message = format!("`{place}` is not an address");
+            let expected = "host:port such as \"127.0.0.1:29536\" expected here";
+            self.wrong(&at("socketcand"), message, expected);
+        }
+        let name = |name: &&String| {
+            let fits = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
+            name.is_empty() || name.len() > 15 || !name.chars().all(fits)
+        };
+        if let Some(channel) = port.channel.as_ref().filter(name) {
+            let message = format!("`{channel}` is not the name of a bus");
+            let expected =
+                "1 to 15 letters, digits, `.`, `_` or `-` expected here, such as \"can0\"";
+            self.wrong(&at("channel"), message, expected);
+        } else if port.channel.is_some() && port.socketcand.is_none() {
+            let expected = "`channel` only beside `socketcand` expected";
+            self.wrong(&at("channel"), "this adapter has one bus", expected);
+        }
+        if BitRate::from_bits_per_second(port.rate.saturating_mul(1000)).is_none() {
+            let message = format!("no bus runs at {} kbit/s", port.rate);
+            self.wrong(&at("rate"), message, "such as 500 expected here");
+        }
+    }
+
+    /// Every drive has identifiers of its own.
+    fn nodes(&mut self, port: &Port) {
+        let mut seen: Vec<(u16, usize)> = Vec::new();
+        let mut numbers: Vec<u8> = Vec::new();
+        for (index, node) in port.drives.iter().enumerate() {
+            let path = [PORT[0], PORT[1], Step::Key("drives"), Step::Index(index)];
+            let named = match (node.rx, node.tx) {
+                (Some(_), Some(_)) => true,
+                (None, None) => node.node.is_some(),
+                _ => false,
+            };
+            if !named {
+                let expected = "`node`, or `rx` and `tx`, expected";
+                self.wrong(
+                    &path,
+                    "a drive needs its number or both identifiers",
+                    expected,
+                );
+                continue;
+            }
+            let (number, identifiers) = port.bus.drive(index, *node);
+            if numbers.contains(&number) {
+                let message = format!("drive {number} is listed twice");
+                self.wrong(&path, message, "another `node` expected here");
+            }
+            numbers.push(number);
+            for identifier in [identifiers.0, identifiers.1] {
+                if let Some((_, other)) = seen.iter().find(|(own, _)| *own == identifier) {
+                    let message = format!(
+                        "identifier {identifier:03X} is used twice, first by the drive in place {}",
+                        other + 1
+                    );
+                    self.wrong(&path, message, "other identifiers expected here");
+                } else {
+                    seen.push((identifier, index));
+                }
+            }
+        }
+    }
+
+    fn port_limits(&mut self, port: &Port) {
+        let limits = &self.file.limits.port;
+        let at = |key| [Step::Key("limits"), Step::Key(key)];
+        for (index, name) in limits.allow_registers.iter().enumerate() {
+            if let Err((message, expected)) = port.bus.special_register(name) {
+                let path = [at("allow_registers").as_slice(), &[index.into()]].concat();
+                self.wrong(&path, message, expected);
+            }
+        }
+        if limits
+            .bit_rate_way_back
+            .as_ref()
+            .is_some_and(|way| way.trim().is_empty())
+        {
+            let expected = "a sentence that says how the drive is reached again expected here";
+            self.wrong(&at("bit_rate_way_back"), "this says nothing", expected);
+        }
+        if limits
+            .store_bus_settings
+            .as_ref()
+            .is_some_and(|text| text != CONFIRMATION)
+        {
+            let expected = format!("\"{CONFIRMATION}\" expected here");
+            self.wrong(
+                &at("store_bus_settings"),
+                "this is no confirmation",
+                expected,
+            );
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Rig files with a port of drives on CAN.
+
+use super::*;
+
+/// A rig of a UNITEK drive, with more behind it.
+fn port(more: &str) -> String {
+    format!(
+        "schema = 2\n[rig]\nid = \"lab\"\n[port.1]\nbus = \"unitek\"\ndrives = [{{ node = 1 }}]\n{more}\n"
+    )
+}
+
+/// A port of a CAN bus: its adapter, its drives by number or identifiers, and what may be sent.
+#[test]
+fn a_port_of_drives_on_can() {
+    let rig = good(
+        &port(
+            "socketcand = \"lab:29536\"\nchannel = \"can1\"\nrate = 250\n[limits]\nallow_motion = true\nmax_speed = \"10%\"\nallow_registers = [\"0x85\"]",
+        )
+        .replace("{ node = 1 }", "{ node = 3 }, { rx = 0x210, tx = 0x190 }"),
+    );
+    let port = rig.port().expect("a port");
+    let drives: Vec<_> = (0..)
+        .zip(&port.drives)
+        .map(|(index, node)| port.bus.drive(index, *node))
+        .collect();
+    assert_eq!(drives, [(3, (0x203, 0x183)), (2, (0x210, 0x190))]);
+    assert!(!rig.is_simulated() && rig.rings().count() == 0);
+    let printed = toml::to_string(&rig.file).expect("a text");
+    assert_eq!(good(&printed).file, rig.file);
+    let simulated = find("sim:unitek:2", Path::new("nowhere")).expect("a rig");
+    assert!(
+        simulated.is_simulated() && simulated.port().is_some_and(|port| port.drives.len() == 2)
+    );
+    assert!(find("sim:unitek:0", Path::new("nowhere")).is_err());
+}
+
+#[test]
+fn mistakes_of_ports_are_shown_with_line_and_column() {
+    let cases = [
+        (
+            "no drives at all",
+            "schema = 2\n[rig]\nid = \"x\"\n".to_owned(),
+        ),
+        (
+            "rings and a port",
+            serial("[port.1]\nbus = \"unitek\"\ndrives = [{ node = 1 }]\nslcan = \"/dev/ttyACM0\""),
+        ),
+        (
+            "a port of the first schema",
+            port("slcan = \"/dev/ttyACM0\"").replace("schema = 2", "schema = 1"),
+        ),
+        (
+            "a bus that is not there",
+            port("").replace("unitek", "unitec"),
+        ),
+        ("a port without an adapter", port("")),
+        (
+            "a simulated port without its bus",
+            port("[sim]\nsetup = []"),
+        ),
+        (
+            "two adapters",
+            port("slcan = \"/dev/ttyACM0\"\nsocketcand = \"lab:29536\""),
+        ),
+        ("an adapter nowhere", port("slcan = \"ttyACM0\"")),
+        ("a server without a port", port("socketcand = \"lab\"")),
+        (
+            "a channel of an adapter with one",
+            port("slcan = \"/dev/ttyACM0\"\nchannel = \"can0\""),
+        ),
+        (
+            "a bit rate that no bus has",
+            port("rate = 501\nslcan = \"/dev/ttyACM0\""),
+        ),
+        (
+            "drives without identifiers",
+            port("slcan = \"/dev/ttyACM0\"")
+                .replace("{ node = 1 }", "{ node = 1, rx = 0x210 }, {}"),
+        ),
+        (
+            "drives with the same identifiers",
+            port("slcan = \"/dev/ttyACM0\"").replace(
+                "{ node = 1 }",
+                "{ node = 1 }, { node = 1 }, { rx = 0x201, tx = 0x201 }",
+            ),
+        ),
+        (
+            "what only rings have",
+            port(
+                "slcan = \"/dev/ttyACM0\"\n[limits]\nallow_reset = true\n[[interlock]]\ndrive = 0",
+            ),
+        ),
+        (
+            "what only ports have",
+            serial("[limits]\nallow_bus_settings = true\nmax_speed = \"10%\""),
+        ),
+        (
+            "limits that mean nothing",
+            port(
+                "slcan = \"/dev/ttyACM0\"\n[limits]\nallow_registers = [\"B0\", \"FUN_SPEZIA\"]\nbit_rate_way_back = \"\"\nstore_bus_settings = \"yes\"",
+            ),
+        ),
+        (
+            "a drive beyond the last",
+            port("slcan = \"/dev/ttyACM0\"").replace("{ node = 1 }", "{ node = 200 }"),
+        ),
+        (
+            "a highest speed above all",
+            port("slcan = \"/dev/ttyACM0\"\n[limits]\nmax_speed = \"120%\""),
+        ),
+    ];
+    kept("port-mistakes.txt", &mistakes(&cases));
+}
