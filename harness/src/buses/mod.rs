@@ -35,6 +35,8 @@ use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
+use crate::serve::frames::FrameJob;
+use crate::serve::{End, Host, ServeError};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use schemars::JsonSchema;
@@ -111,7 +113,7 @@ pub enum Stimulus {
 }
 
 /// The buses of the product.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Bus {
     /// The ND21's ring.
     Novobus,
@@ -140,6 +142,22 @@ impl Bus {
             Self::Unitek => "unitek",
             Self::Nordac => "nordac",
         }
+    }
+}
+
+/// Serves simulated drives of a bus of frames; `None` if the bus carries no frames, or is not built.
+pub(crate) fn serve_frames(
+    bus: Bus,
+    drives: u8,
+    job: &FrameJob,
+    host: &mut dyn Host,
+) -> Option<Result<End, ServeError>> {
+    match bus {
+        Bus::Unitek => {
+            let setup = unitek::simulate::Setup::of(drives);
+            Some(unitek::serve::serve(&setup, job, host))
+        }
+        Bus::Novobus | Bus::Nordac => None,
     }
 }
 

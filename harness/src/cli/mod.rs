@@ -5,6 +5,7 @@ mod campaign;
 mod check;
 mod complete;
 pub(crate) mod exit;
+pub(crate) mod frames;
 pub(crate) mod fuzz;
 mod help;
 mod import;

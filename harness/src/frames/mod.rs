@@ -19,6 +19,11 @@ pub struct BadMessage {
 const SHOWN: usize = 40;
 
 impl BadMessage {
+    /// Whether the message begins with these characters.
+    pub(crate) fn concerns(&self, beginning: &str) -> bool {
+        self.received.starts_with(beginning)
+    }
+
     fn new(received: &[u8], expected: &'static str) -> Self {
         let shown = received.get(..SHOWN).unwrap_or(received);
         let dots = if shown.len() < received.len() {

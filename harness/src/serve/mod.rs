@@ -6,6 +6,8 @@
 mod arrival;
 mod clock;
 mod control;
+mod control_stream;
+pub mod frames;
 mod lines;
 mod place;
 mod pty;

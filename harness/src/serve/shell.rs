@@ -1,8 +1,7 @@
 //! The shell around a [`Server`]: one thread that waits for sockets, pseudo terminals, signals and the next deadline.
 
 use super::clock::Clock;
-use super::control::Answer;
-use super::lines::{Lines, ReadLine};
+use super::control_stream::ControlStream;
 use super::place::{ControlPlace, ServedAt};
 use super::pty::{Change, Pty};
 use super::server::Server;
@@ -22,9 +21,6 @@ const CHUNK: usize = 4096;
 
 /// How long before an awaited byte is due the server stops sleeping and polls: waking up takes longer than handing the byte over.
 const AWAKE: Span = Span::from_micros(60);
-
-/// Maximum bytes of control answers that the client has not read yet; while they are reached, no further line is read.
-const UNREAD: usize = 64 << 10;
 
 /// What is served where, and for how long.
 #[derive(Clone, Debug, Default)]
@@ -152,14 +148,10 @@ pub(crate) fn serve_until(
             ServedAt::Pty(path) => Seat::Pty(Pty::open(path)?),
         });
     }
-    let control = match &job.control {
-        None => None,
-        Some(ControlPlace::Standard) => Some(Control::new(Source::Standard)),
-        Some(ControlPlace::Tcp(address)) => {
-            let tcp = Tcp::listen(address, job.allow_remote)?;
-            Some(Control::new(Source::Tcp(tcp)))
-        }
-    };
+    let control = job.control.as_ref();
+    let control = control
+        .map(|place| ControlStream::open(place, job.allow_remote))
+        .transpose()?;
     let mut shell = Shell {
         garbled: vec![false; ends.len()],
         losing: vec![false; ends.len()],
@@ -185,7 +177,7 @@ pub(crate) struct Ending {
 
 impl Ending {
     /// The signals that end the program.
-    fn by_signals() -> io::Result<Self> {
+    pub(super) fn by_signals() -> io::Result<Self> {
         let (read, write) = UnixStream::pair()?;
         read.set_nonblocking(true)?;
         let mut ids = Vec::new();
@@ -206,6 +198,16 @@ impl Ending {
         let ids = Vec::new();
         Ok((write, Self { read, ids }))
     }
+
+    /// What to wait for.
+    pub(super) fn poll(&self) -> PollFd<'_> {
+        PollFd::new(&self.read, PollFlags::IN)
+    }
+
+    /// Whether it has come. A handle that was dropped reads as the end of the stream.
+    pub(super) fn has_come(&mut self) -> bool {
+        self.read.read(&mut [0]).is_ok()
+    }
 }
 
 impl Drop for Ending {
@@ -222,34 +224,10 @@ enum Seat {
     Pty(Pty),
 }
 
-/// Where lines of control come from, what of them has come, and what of the answers has not gone.
-struct Control {
-    source: Source,
-    lines: Lines,
-    answers: Vec<u8>,
-}
-
-enum Source {
-    Standard,
-    Tcp(Tcp),
-    /// Standard input has ended.
-    Ended,
-}
-
-impl Control {
-    fn new(source: Source) -> Self {
-        Self {
-            source,
-            lines: Lines::default(),
-            answers: Vec::new(),
-        }
-    }
-}
-
 struct Shell<'a> {
     server: Server,
     ends: Vec<Seat>,
-    control: Option<Control>,
+    control: Option<ControlStream>,
     host: &'a mut dyn Host,
     ending: Ending,
     clock: Clock,
@@ -281,13 +259,8 @@ impl Shell<'_> {
                 drives => format!("{name}: {} at {place}", counted(drives, "drive")),
             });
         }
-        if let Some(Control {
-            source: Source::Tcp(tcp),
-            ..
-        }) = &self.control
-        {
-            lines.push(format!("control at {}", tcp.address()));
-        }
+        let control = self.control.as_ref().and_then(ControlStream::address);
+        lines.extend(control.map(|address| format!("control at {address}")));
         for line in lines {
             self.host.tell(&line).map_err(ServeError::Output)?;
         }
@@ -303,7 +276,7 @@ impl Shell<'_> {
             }
             let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
             let ready = self.wait(until).map_err(ServeError::Wait)?;
-            if ready && self.interrupted() {
+            if ready && self.ending.has_come() {
                 return Ok(End::Interrupted);
             }
             let seats = 0..self.ends.len();
@@ -316,8 +289,10 @@ impl Shell<'_> {
                     self.fail(seat, &error);
                 }
             }
-            if ready {
-                self.obey().map_err(ServeError::Output)?;
+            if ready && let Some(control) = &mut self.control {
+                let server = &mut self.server;
+                let obeyed = control.obey(self.host, &mut |line| server.control(line));
+                obeyed.map_err(ServeError::Output)?;
             }
             if job.once && self.gone {
                 return Ok(End::ClientsGone);
@@ -329,7 +304,7 @@ impl Shell<'_> {
     /// [`AWAKE`] before an awaited byte is due it polls without sleeping, so that the byte is handed over on time.
     fn wait(&mut self, until: Instant) -> io::Result<bool> {
         let awaited = self.server.awaited();
-        let mut fds = vec![PollFd::new(&self.ending.read, PollFlags::IN)];
+        let mut fds = vec![self.ending.poll()];
         for (seat, end) in self.ends.iter().enumerate() {
             let mut stream = PollFlags::empty();
             stream.set(PollFlags::IN, self.server.room(seat) > 0);
@@ -343,22 +318,7 @@ impl Shell<'_> {
                 Seat::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
             }
         }
-        if let Some(control) = &self.control {
-            let mut stream = PollFlags::empty();
-            stream.set(PollFlags::IN, control.answers.len() < UNREAD);
-            stream.set(PollFlags::OUT, !control.answers.is_empty());
-            match &control.source {
-                Source::Standard => {
-                    fds.push(PollFd::from_borrowed_fd(rustix::stdio::stdin(), stream));
-                }
-                Source::Tcp(tcp) => {
-                    let (door, client) = tcp.polls(stream);
-                    fds.push(door);
-                    fds.extend(client);
-                }
-                Source::Ended => {}
-            }
-        }
+        fds.extend(self.control.iter().flat_map(ControlStream::polls));
         loop {
             let now = self.clock.now();
             let wake = awaited.map_or(until, |home| until.min(home - AWAKE));
@@ -374,12 +334,6 @@ impl Shell<'_> {
                 Err(error) => return Err(error.into()),
             }
         }
-    }
-
-    fn interrupted(&mut self) -> bool {
-        let mut byte = [0];
-        // A handle that was dropped reads as the end of the stream.
-        self.ending.read.read(&mut byte).is_ok()
     }
 
     /// Lets clients come, speak and go.
@@ -529,84 +483,4 @@ impl Shell<'_> {
             }
         }
     }
-
-    /// Does the lines of control that have come, and answers them.
-    fn obey(&mut self) -> io::Result<()> {
-        let Some(mut control) = self.control.take() else {
-            return Ok(());
-        };
-        if let Source::Tcp(tcp) = &mut control.source {
-            // A second client is turned away here too.
-            let _visitors = tcp.accept();
-        }
-        let mut buffer = [0; CHUNK];
-        while control.answers.len() < UNREAD {
-            let read = match &mut control.source {
-                Source::Standard => standard(&mut buffer),
-                Source::Tcp(tcp) => tcp.read(&mut buffer).map(|(read, _)| read),
-                Source::Ended => break,
-            };
-            let (lines, ended) = match read {
-                Ok(read @ 1..) => (control.lines.push(&buffer[..read]), false),
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Ok(0) | Err(_) => (control.lines.end().into_iter().collect(), true),
-            };
-            for line in lines {
-                let Some(answer) = self.answer(line) else {
-                    continue;
-                };
-                if matches!(control.source, Source::Standard) {
-                    self.host.tell(&answer.to_string())?;
-                } else {
-                    control.answers.extend(format!("{answer}\n").bytes());
-                }
-            }
-            pass_on(&mut control);
-            if ended {
-                match &mut control.source {
-                    Source::Tcp(tcp) => tcp.close(),
-                    other => *other = Source::Ended,
-                }
-                control.answers.clear();
-                break;
-            }
-        }
-        pass_on(&mut control);
-        self.control = Some(control);
-        Ok(())
-    }
-
-    fn answer(&mut self, line: ReadLine) -> Option<Answer> {
-        match line {
-            Ok(line) => self.server.control(&line),
-            Err(length) => Some(Answer::Error(format!(
-                "a line of {length} bytes is too long for a line of control"
-            ))),
-        }
-    }
-}
-
-/// Writes answers as far as they are taken.
-fn pass_on(control: &mut Control) {
-    let Source::Tcp(tcp) = &mut control.source else {
-        return;
-    };
-    while !control.answers.is_empty() {
-        // A connection that is broken shows when it is read.
-        let Ok(written) = tcp.write(&control.answers) else {
-            return;
-        };
-        control.answers.drain(..written);
-    }
-}
-
-/// Reads standard input if input is available. Other processes may share it, so it is not made nonblocking.
-fn standard(buffer: &mut [u8]) -> io::Result<usize> {
-    let stdin = rustix::stdio::stdin();
-    let mut fds = [PollFd::from_borrowed_fd(stdin, PollFlags::IN)];
-    if poll(&mut fds, Some(&Timespec::default()))? == 0 {
-        return Err(io::ErrorKind::WouldBlock.into());
-    }
-    Ok(rustix::io::read(stdin, buffer)?)
 }

@@ -1,4 +1,4 @@
-//! A socket that listens for one client at a time.
+//! Sockets that listen: for several clients, or for one at a time.
 
 use super::arrival::{Client, ask};
 use super::shell::ServeError;
@@ -8,15 +8,69 @@ use std::io;
 use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
 use std::time::Instant;
 
-/// Second clients taken at a time, and turned away.
-const TURNED_AWAY: usize = 16;
+/// Connections taken at a time.
+const TAKEN: usize = 16;
+
+/// A socket that listens.
+#[derive(Debug)]
+pub(super) struct Listener {
+    socket: TcpListener,
+    address: SocketAddr,
+    since: Instant,
+}
+
+impl Listener {
+    /// Listens at an address of this machine's own, unless another one is allowed.
+    pub(super) fn open(text: &str, allow_remote: bool) -> Result<Self, ServeError> {
+        let failed = |error| ServeError::Listen {
+            address: text.to_owned(),
+            error,
+        };
+        let mut addresses = text.to_socket_addrs().map_err(failed)?;
+        let address = addresses.next().ok_or_else(|| {
+            let error = "the name has no address";
+            failed(io::Error::new(io::ErrorKind::NotFound, error))
+        })?;
+        if !address.ip().is_loopback() && !allow_remote {
+            return Err(ServeError::Remote { address });
+        }
+        let since = Instant::now();
+        let socket = TcpListener::bind(address).map_err(failed)?;
+        ask(&socket);
+        socket.set_nonblocking(true).map_err(failed)?;
+        let address = socket.local_addr().map_err(failed)?;
+        Ok(Self {
+            socket,
+            address,
+            since,
+        })
+    }
+
+    pub(super) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    pub(super) fn poll(&self) -> PollFd<'_> {
+        PollFd::new(&self.socket, PollFlags::IN)
+    }
+
+    /// Accepts waiting connections, a bounded number at a time.
+    pub(super) fn accept(&self) -> impl Iterator<Item = (Client, SocketAddr)> {
+        // A connection that fails here has closed again or will be accepted later.
+        let waiting = std::iter::from_fn(|| self.socket.accept().ok()).take(TAKEN);
+        waiting.filter_map(|(stream, address)| {
+            stream.set_nonblocking(true).ok()?;
+            // Bytes are to be sent at once. If this fails, they arrive later, but they arrive.
+            let _late = stream.set_nodelay(true);
+            Some((Client::new(stream, self.since), address))
+        })
+    }
+}
 
 /// A socket, and the client that has come.
 #[derive(Debug)]
 pub(super) struct Tcp {
-    listener: TcpListener,
-    address: SocketAddr,
-    since: Instant,
+    listener: Listener,
     client: Option<Client>,
 }
 
@@ -31,33 +85,14 @@ pub(super) enum Visitor {
 impl Tcp {
     /// Listens at an address of this machine's own, unless another one is allowed.
     pub(super) fn listen(text: &str, allow_remote: bool) -> Result<Self, ServeError> {
-        let failed = |error| ServeError::Listen {
-            address: text.to_owned(),
-            error,
-        };
-        let mut addresses = text.to_socket_addrs().map_err(failed)?;
-        let address = addresses.next().ok_or_else(|| {
-            let error = "the name has no address";
-            failed(io::Error::new(io::ErrorKind::NotFound, error))
-        })?;
-        if !address.ip().is_loopback() && !allow_remote {
-            return Err(ServeError::Remote { address });
-        }
-        let since = Instant::now();
-        let listener = TcpListener::bind(address).map_err(failed)?;
-        ask(&listener);
-        listener.set_nonblocking(true).map_err(failed)?;
-        let address = listener.local_addr().map_err(failed)?;
         Ok(Self {
-            listener,
-            address,
-            since,
+            listener: Listener::open(text, allow_remote)?,
             client: None,
         })
     }
 
     pub(super) fn address(&self) -> SocketAddr {
-        self.address
+        self.listener.address()
     }
 
     pub(super) fn taken(&self) -> bool {
@@ -67,17 +102,11 @@ impl Tcp {
     /// Accepts waiting connections.
     pub(super) fn accept(&mut self) -> Vec<Visitor> {
         let mut visitors = Vec::new();
-        for _ in 0..TURNED_AWAY {
-            // A connection that fails here has closed again or will be accepted later.
-            let Ok((stream, address)) = self.listener.accept() else {
-                break;
-            };
+        for (client, address) in self.listener.accept() {
             if self.client.is_some() {
                 visitors.push(Visitor::TurnedAway(address));
-            } else if stream.set_nonblocking(true).is_ok() {
-                // Bytes are to be sent at once. If this fails, they arrive later, but they arrive.
-                let _late = stream.set_nodelay(true);
-                self.client = Some(Client::new(stream, self.since));
+            } else {
+                self.client = Some(client);
                 visitors.push(Visitor::Came(address));
             }
         }
@@ -106,7 +135,7 @@ impl Tcp {
 
     /// What to wait for: the listener, and the client if any events of it are wanted.
     pub(super) fn polls(&self, events: PollFlags) -> (PollFd<'_>, Option<PollFd<'_>>) {
-        let door = PollFd::new(&self.listener, PollFlags::IN);
+        let door = self.listener.poll();
         let client = self.client.as_ref().filter(|_| !events.is_empty());
         (door, client.map(|client| PollFd::new(client, events)))
     }

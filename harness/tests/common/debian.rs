@@ -7,6 +7,11 @@ use std::io::Write as _;
 pub(crate) fn has(program: &str, who: &str) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let there = std::env::split_paths(&path).any(|folder| folder.join(program).is_file());
+    told(there, program, who)
+}
+
+/// Says that a test is skipped, or fails where nothing may be skipped.
+pub(crate) fn told(there: bool, program: &str, who: &str) -> bool {
     let required = std::env::var("DRIVEBENCH_TOOLS").is_ok_and(|value| value == "required");
     assert!(
         there || !required,

@@ -8,6 +8,7 @@ mod edits;
 mod embedded;
 mod evidence;
 mod explore;
+mod frames;
 mod inner;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;

@@ -19,14 +19,14 @@ const ANSWER: [u8; 6] = [0x88, 0x00, 0xC0, 0x13, 0x00, 0x2D];
 const LONG: Duration = Duration::from_secs(60);
 
 /// The program at work; it ends with the test.
-struct Sim {
+pub(crate) struct Sim {
     child: Child,
     out: BufReader<ChildStdout>,
     err: BufReader<ChildStderr>,
 }
 
 impl Sim {
-    fn start(arguments: &[&str]) -> Self {
+    pub(crate) fn start(arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_drivebench"))
             .arg("sim")
             .args(arguments)
@@ -43,33 +43,33 @@ impl Sim {
     }
 
     /// The next line of standard output.
-    fn line(&mut self) -> String {
+    pub(crate) fn line(&mut self) -> String {
         let mut line = String::new();
         self.out.read_line(&mut line).expect("a line");
         line.trim_end().to_owned()
     }
 
     /// The next line for people.
-    fn said(&mut self) -> String {
+    pub(crate) fn said(&mut self) -> String {
         let mut line = String::new();
         self.err.read_line(&mut line).expect("a line");
         line.trim_end().to_owned()
     }
 
     /// The address at the end of the next line.
-    fn address(&mut self) -> String {
+    pub(crate) fn address(&mut self) -> String {
         let line = self.line();
         let word = line.split(' ').next_back().expect("a word");
         word.to_owned()
     }
 
-    fn signal(&self, signal: &str) {
+    pub(crate) fn signal(&self, signal: &str) {
         let id = self.child.id().to_string();
         let status = Command::new("kill").args([signal, &id]).status();
         assert!(status.expect("kill").success());
     }
 
-    fn code(&mut self) -> Option<i32> {
+    pub(crate) fn code(&mut self) -> Option<i32> {
         let end = Instant::now() + LONG;
         while Instant::now() < end {
             if let Some(status) = self.child.try_wait().expect("a child") {
@@ -88,7 +88,7 @@ impl Drop for Sim {
     }
 }
 
-fn connect(address: &str) -> TcpStream {
+pub(crate) fn connect(address: &str) -> TcpStream {
     let stream = TcpStream::connect(address).expect("the server listens");
     stream.set_read_timeout(Some(LONG)).expect("a time-out");
     stream
@@ -103,7 +103,7 @@ fn read_byte(stream: &mut (impl Read + Write)) -> [u8; 6] {
 }
 
 /// A path of this test's own where nothing stands.
-fn path(name: &str) -> PathBuf {
+pub(crate) fn path(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("serve-{name}"));
     let _fresh = std::fs::remove_file(&path);
     path

@@ -2,4 +2,7 @@
 
 pub mod gate;
 pub mod rig;
+pub(crate) mod serve;
+#[cfg(test)]
+mod serve_tests;
 pub mod simulate;

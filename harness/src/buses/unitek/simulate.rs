@@ -88,30 +88,30 @@ impl Setup {
         }
     }
 
-    /// A segment with `hosts` hosts, and behind them the drives in their order.
+    /// A segment with the bench's host, behind it the drives in their order, and behind them hosts for `guests`.
     #[must_use]
-    pub fn segment(&self, hosts: usize) -> Segment<Station> {
-        let hosts = (0..hosts).map(|_| Member::Host(Host::default()));
+    pub fn segment(&self, guests: usize) -> Segment<Station> {
+        let host = || Member::Host(Host::default());
         let drive = |own: &DriveSetup| Member::Drive(Box::new(own.drive(Instant::START)));
-        Segment::new(
-            self.rate,
-            hosts.chain(self.drives.iter().map(drive)).collect(),
-        )
+        let drives = self.drives.iter().map(drive);
+        let guests = (0..guests).map(|_| host());
+        let stations = std::iter::once(host()).chain(drives).chain(guests);
+        Segment::new(self.rate, stations.collect())
     }
 }
 
 /// A bench on a segment of simulated drives. Its own host has one port.
 #[derive(Debug)]
 pub struct Bench {
-    segment: Segment<Station>,
+    pub(super) segment: Segment<Station>,
     /// Place `k` is that of the `k`-th drive, counted from 1.
-    nodes: Vec<u8>,
-    now: Instant,
+    pub(super) nodes: Vec<u8>,
+    pub(super) now: Instant,
     /// The start of the conversation.
     origin: Instant,
     /// When the last frame that the bench has sent will have left, as far as it knows.
     left: Instant,
-    scheduled: VecDeque<(Instant, PlacedFault)>,
+    pub(super) scheduled: VecDeque<(Instant, PlacedFault)>,
 }
 
 impl Bench {
@@ -130,8 +130,14 @@ impl Bench {
     /// A bench with the drives of a setup, all just switched on.
     #[must_use]
     pub fn new(setup: &Setup) -> Self {
+        Self::with_guests(setup, 0)
+    }
+
+    /// The same with hosts for `guests` on the segment.
+    #[must_use]
+    pub fn with_guests(setup: &Setup, guests: usize) -> Self {
         Self {
-            segment: setup.segment(1),
+            segment: setup.segment(guests),
             nodes: setup.drives.iter().map(|own| own.node).collect(),
             now: Instant::START,
             origin: Instant::START,
@@ -152,7 +158,7 @@ impl Bench {
         Some(place + 1)
     }
 
-    fn host(&mut self) -> Option<&mut Host> {
+    pub(super) fn host(&mut self) -> Option<&mut Host> {
         self.segment.station_mut(BENCH).host_mut()
     }
 
@@ -254,7 +260,7 @@ impl Bench {
         !self.segment.is_off(place) && waiting.is_some_and(|own| own.cause == Cause::Asked)
     }
 
-    fn run_to(&mut self, at: Instant) {
+    pub(super) fn run_to(&mut self, at: Instant) {
         self.segment.run_until(at);
         self.now = self.now.max(at);
         self.suffer_what_is_due();

@@ -3,10 +3,13 @@
 use super::args::RigArguments;
 use super::failure::Failure;
 use super::rig;
+use crate::buses::{self, Bus};
 use crate::cli::exit::Exit;
+use crate::cli::frames::FrameArguments;
 use crate::cli::output::Output;
 use crate::file::values::Wire;
 use crate::scenario::argument::duration;
+use crate::serve::frames::FrameJob;
 use crate::serve::{
     ControlPlace, End, Host, Inner, Job, Marks, Pace, Role, ServeError, ServedAt, Server, serve,
 };
@@ -16,9 +19,13 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 pub(crate) const SIM_HELP: &str = "\
-Once all rings are ready, standard output has one line per ring, such as `ring 1: 3 drives at 127.0.0.1:40123`, and with
---control ADDRESS a line `control at 127.0.0.1:40124`; with --control - the answers follow. Standard error reports what
-clients do.
+Once all places are ready, standard output has one line per ring, such as `ring 1: 3 drives at 127.0.0.1:40123`, or per
+place of a CAN bus, such as `slcan: 1 drive, 500 kbit/s at 127.0.0.1:40123`, and with --control ADDRESS a line
+`control at 127.0.0.1:40124`; with --control - the answers follow. Standard error reports what clients do.
+
+Drives on CAN: `sim --bus unitek --drives 2 --slcan 127.0.0.1:4100 --socketcand 127.0.0.1:29536`. All clients share the
+bus: each frame goes through the arbitration and reaches the other clients. With SLCAN a client opens its channel with
+the rate of the bus (S6 is 500 kbit/s) or none; with socketcand any name of a bus is taken.
 
 A control line is a line of the scenario language that sends no byte of the master. It takes effect at once:
   ! 1->0: flip 0                  a fault; `byte n` and times count from the start; if that byte has passed, the
@@ -38,7 +45,7 @@ Ends on SIGINT, SIGTERM, SIGHUP or SIGQUIT (exit code 130), after --for, or with
 
 /// For `sim`.
 #[derive(Debug, Args)]
-#[command(group(ArgGroup::new("place").required(true)))]
+#[command(group(ArgGroup::new("place").required(true).multiple(true)))]
 pub struct SimArguments {
     /// Serve a ring on a socket: HOST:PORT, port 0 for a free one. Only one client at a time. Give it twice for two rings, in their
     /// order.
@@ -72,6 +79,9 @@ pub struct SimArguments {
     /// Time after which it ends.
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     pub length: Option<Span>,
+    /// Drives on CAN.
+    #[command(flatten)]
+    pub frames: FrameArguments,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
@@ -175,8 +185,80 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)
     Ok(all)
 }
 
-/// Serves the rings of a simulated bench.
+/// Serves simulated drives.
 pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
+    let end = match arguments.frames.bus {
+        Bus::Novobus => rings(arguments, output)?,
+        bus => frames(bus, arguments, output)?,
+    };
+    let end = end.map_err(|error| match error {
+        ServeError::Output(error) => Failure::Output(error),
+        ServeError::Wait(_) => Failure::Said(Exit::RigError, error.to_string()),
+        error => Failure::refused(error.to_string()),
+    })?;
+    Ok(match end {
+        End::Interrupted => Exit::Interrupted,
+        End::TimeOver | End::ClientsGone => Exit::Passed,
+    })
+}
+
+/// Where lines of control come from.
+fn control(arguments: &SimArguments) -> Option<ControlPlace> {
+    arguments.control.as_deref().map(|place| match place {
+        "-" => ControlPlace::Standard,
+        address => ControlPlace::Tcp(address.to_owned()),
+    })
+}
+
+/// Serves the drives of a bus of frames.
+fn frames(
+    bus: Bus,
+    arguments: &SimArguments,
+    output: &mut Output,
+) -> Result<Result<End, ServeError>, Failure> {
+    let rings = [
+        ("--tcp", !arguments.tcp.is_empty()),
+        ("--pty", !arguments.pty.is_empty()),
+        ("--tap", !arguments.tap.is_empty()),
+        ("--cut", !arguments.cut.is_empty()),
+        ("--pace", arguments.pace != Speed::Line),
+        ("--marks", arguments.marks != MarksForm::None),
+        ("--rig", arguments.rig.rig.is_some()),
+        ("--setup", arguments.rig.setup.is_some()),
+        ("--control", arguments.control.is_some()),
+    ];
+    if let Some((option, _)) = rings.iter().find(|(_, given)| *given) {
+        return Err(Failure::refused(format!(
+            "{option} is for a ring; with --bus {}, --slcan, --slcan-pty or --socketcand, and --drives expected",
+            bus.name()
+        )));
+    }
+    let job = FrameJob {
+        places: arguments.frames.places(),
+        control: control(arguments),
+        allow_remote: arguments.allow_remote,
+        once: arguments.once,
+        length: arguments.length,
+    };
+    let served = buses::serve_frames(bus, arguments.frames.drives, &job, output);
+    served.ok_or_else(|| {
+        Failure::refused(format!(
+            "the bus {} is not built yet; novobus or unitek expected",
+            bus.name()
+        ))
+    })
+}
+
+/// Serves the rings of a simulated bench.
+fn rings(
+    arguments: &SimArguments,
+    output: &mut Output,
+) -> Result<Result<End, ServeError>, Failure> {
+    if !arguments.frames.places().is_empty() {
+        return Err(Failure::refused(
+            "--slcan, --slcan-pty and --socketcand serve a CAN bus; --bus unitek expected with them",
+        ));
+    }
     let (plan, link) = rig::link(&arguments.rig, output)?;
     let pace = match arguments.pace {
         Speed::Line => Pace::Line,
@@ -195,23 +277,12 @@ pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit,
     let places = inner.into_iter().map(|(_, place)| place);
     let job = Job {
         places: tcp.chain(pty).chain(places).collect(),
-        control: arguments.control.as_deref().map(|place| match place {
-            "-" => ControlPlace::Standard,
-            address => ControlPlace::Tcp(address.to_owned()),
-        }),
+        control: control(arguments),
         allow_remote: arguments.allow_remote,
         once: arguments.once,
         length: arguments.length,
     };
-    let end = serve(server, &job, output).map_err(|error| match error {
-        ServeError::Output(error) => Failure::Output(error),
-        ServeError::Wait(_) => Failure::Said(Exit::RigError, error.to_string()),
-        error => Failure::refused(error.to_string()),
-    })?;
-    Ok(match end {
-        End::Interrupted => Exit::Interrupted,
-        End::TimeOver | End::ClientsGone => Exit::Passed,
-    })
+    Ok(serve(server, &job, output))
 }
 
 impl Host for Output {

@@ -1,0 +1,231 @@
+//! Clients of a simulated bus in virtual time: nothing here depends on the speed of a machine.
+
+use super::serve::shared;
+use super::simulate::{Bench, Setup};
+use crate::link::{DriveFault, Link, Moment, PlacedFault};
+use crate::serve::frames::{FrameServer, MOST_CLIENTS, Protocol, SharedBus};
+use harness_proto::time::{Instant, Span};
+use std::time::Duration;
+
+fn at(micros: u64) -> Instant {
+    Instant::START + Span::from_micros(micros)
+}
+
+/// A server with drives as delivered; its time began 1000.5 s after 1970.
+fn server(drives: u8) -> FrameServer<Bench> {
+    let started = Duration::from_millis(1_000_500);
+    FrameServer::new(shared(&Setup::of(drives)), started)
+}
+
+/// A client that has opened its channel.
+fn slcan(server: &mut FrameServer<Bench>, opening: &str) -> usize {
+    let client = server.come(Protocol::Slcan).expect("a place");
+    assert_eq!(server.receive(client, opening.as_bytes()), [""; 0]);
+    took(server, client);
+    client
+}
+
+fn socketcand(server: &mut FrameServer<Bench>) -> usize {
+    let client = server.come(Protocol::Socketcand).expect("a place");
+    assert_eq!(took(server, client), "< hi >");
+    assert_eq!(
+        server.receive(client, b"< open vcan0 >< rawmode >"),
+        [""; 0]
+    );
+    assert_eq!(took(server, client), "< ok >< ok >");
+    client
+}
+
+/// What the client reads now.
+fn took(server: &mut FrameServer<Bench>, client: usize) -> String {
+    let text = String::from_utf8_lossy(server.transmit(client)).into_owned();
+    server.transmitted(client, text.len());
+    text
+}
+
+/// Lets time pass as the shell does: from deadline to deadline.
+fn run(server: &mut FrameServer<Bench>, until: Instant) {
+    server.advance(server.deadline().min(until));
+    while server.deadline() < until {
+        server.advance(server.deadline());
+    }
+    server.advance(until);
+}
+
+/// The lower identifier wins, each client hears the other and not itself, and the drive answers behind both.
+#[test]
+fn frames_of_clients_go_through_the_arbitration() {
+    let mut server = server(1);
+    let [one, two] = [slcan(&mut server, "S6\rO\r"), slcan(&mut server, "O\r")];
+    server.advance(at(1_500));
+    server.receive(one, b"t20133D1B00\r");
+    server.receive(two, b"t1000\r");
+    run(&mut server, at(10_000));
+    assert_eq!(took(&mut server, one), "z\rt1000\rt18141BD80100\r");
+    assert_eq!(took(&mut server, two), "z\rt20133D1B00\rt18141BD80100\r");
+}
+
+/// A frame is handed over when its last bit has passed, and not before.
+#[test]
+fn frames_come_when_they_have_ended() {
+    let mut server = server(1);
+    let one = slcan(&mut server, "Z1\rO\r");
+    let two = socketcand(&mut server);
+    server.advance(at(2_000));
+    server.receive(one, b"t20133D1B00\r");
+    // 77 bits of request, of which 3 are the intermission: see the test of the simulated bench.
+    let bits = |text: &str| {
+        text.parse::<harness_proto::can::Frame>()
+            .expect("a frame")
+            .wire_bits()
+    };
+    let request = u64::from(bits("201#3D1B00"));
+    let reply = u64::from(bits("181#1BD80100"));
+    run(&mut server, at(2_000 + 2 * (request - 3) - 1));
+    assert_eq!(took(&mut server, two), "");
+    assert_eq!(server.deadline(), at(2_000 + 2 * (request - 3)));
+    run(&mut server, at(2_000 + 2 * (request - 3)));
+    let stamp = 502_000 + 2 * (request - 3);
+    assert_eq!(
+        took(&mut server, two),
+        format!("< frame 201 1000.{stamp} 3D1B00 >")
+    );
+    run(&mut server, at(2_000 + 2 * (request + reply - 3)));
+    assert_eq!(took(&mut server, one), "z\rt18141BD801000002\r");
+}
+
+/// Without a drive that listens nothing is acknowledged: a listener does not do it either. An error that repeats is reported once.
+#[test]
+fn a_frame_that_nobody_acknowledges() {
+    let mut server = server(1);
+    let one = slcan(&mut server, "O\r");
+    let listener = slcan(&mut server, "L\r");
+    let off = PlacedFault::Drive(1, DriveFault::Off);
+    server.bus().inject(0, off, Moment::Now);
+    server.receive(one, b"t20133D1B00\r");
+    run(&mut server, at(50_000));
+    assert_eq!(took(&mut server, one), "z\r");
+    server.receive(one, b"F\rF\r");
+    assert_eq!(took(&mut server, one), "FA0\rF00\r");
+    assert_eq!(took(&mut server, listener), "");
+    assert_eq!(server.receive(listener, b"t2010\r"), [""; 0]);
+    assert_eq!(took(&mut server, listener), "\x07");
+    // A station that acknowledges: the frame is sent after all.
+    let daemon = socketcand(&mut server);
+    run(&mut server, at(60_000));
+    assert!(took(&mut server, daemon).contains("< frame 201 "));
+    // And again without one: the daemon's client is told once.
+    server.receive(one, b"C\r");
+    run(&mut server, at(70_000));
+    server.receive(daemon, b"< send 100 0 >");
+    run(&mut server, at(90_000));
+    let told = took(&mut server, daemon);
+    assert_eq!(told.matches("< error 020 1000.5").count(), 1, "{told}");
+}
+
+/// A client that does not read costs bounded memory, and the others lose nothing.
+#[test]
+fn a_client_that_does_not_read_loses_frames() {
+    let mut server = server(1);
+    let [slow, quick] = [slcan(&mut server, "O\r"), slcan(&mut server, "O\r")];
+    server.receive(quick, b"t20133D3001\r");
+    let mut came = 0;
+    for second in 1..=10 {
+        run(&mut server, at(second * 1_000_000));
+        came += took(&mut server, quick).matches("t181").count();
+    }
+    assert_eq!((came, server.lost(quick)), (9_999, 0));
+    assert!(server.transmit(slow).len() <= 64 << 10);
+    assert!(server.lost(slow) > 4_000, "{}", server.lost(slow));
+    // It is read again only when there is room for its answers.
+    assert!(server.room(slow) < 64);
+}
+
+/// A client that sends faster than the bus is not read meanwhile; nothing is lost.
+#[test]
+fn a_client_that_sends_fast_waits() {
+    let mut server = server(1);
+    let [fast, other] = [slcan(&mut server, "O\r"), slcan(&mut server, "O\r")];
+    let mut left = "t1000\r".repeat(2_000).into_bytes();
+    let mut heard = 0;
+    let mut time = 0;
+    while heard < 2_000 {
+        let count = server.room(fast).min(left.len()).min(4_096);
+        let part: Vec<u8> = left.drain(..count).collect();
+        server.receive(fast, &part);
+        let waiting = SharedBus::host(server.bus(), fast)
+            .expect("a place")
+            .waiting();
+        assert!(waiting < 64 + 4_096 / 6 + 1, "{waiting}");
+        time += 1_000;
+        assert!(time < 1_000_000, "{heard} heard");
+        run(&mut server, at(time));
+        took(&mut server, fast);
+        heard += took(&mut server, other).matches("t1000").count();
+    }
+    assert_eq!(heard, 2_000);
+}
+
+#[test]
+fn a_client_at_another_rate_hears_nothing_and_is_told() {
+    let mut server = server(1);
+    let right = slcan(&mut server, "O\r");
+    let wrong = server.come(Protocol::Slcan).expect("a place");
+    let said = server.receive(wrong, b"S5\rO\rt20133D1B00\r").join("");
+    assert!(
+        said.contains("250 kbit/s, and the bus runs at 500 kbit/s"),
+        "{said}"
+    );
+    server.receive(right, b"t20133D1B00\r");
+    run(&mut server, at(10_000));
+    assert_eq!(took(&mut server, right), "z\rt18141BD80100\r");
+    assert_eq!(took(&mut server, wrong), "\r\rz\r");
+    server.receive(wrong, b"F\rC\rS6\rO\r");
+    server.receive(wrong, b"t20133D1B00\r");
+    run(&mut server, at(20_000));
+    assert_eq!(took(&mut server, wrong), "FA0\r\r\r\rz\rt18141BD80100\r");
+    let said = server.receive(wrong, b"C\rs0000\r").join("");
+    assert!(said.contains("SJA1000"), "{said}");
+}
+
+/// A channel that is open cannot be opened, set up or timed again; a closed one sends nothing.
+#[test]
+fn commands_out_of_place_are_refused() {
+    let mut server = server(1);
+    let one = server.come(Protocol::Slcan).expect("a place");
+    server.receive(one, b"t2010\rF\rC\rN\rO\rO\rL\rS6\rZ1\rC\rC\r\r");
+    assert_eq!(
+        took(&mut server, one),
+        "\x07\x07\x07NSIM1\r\r\x07\x07\x07\x07\r\x07\r"
+    );
+}
+
+#[test]
+fn places_are_limited_and_used_again() {
+    let mut server = server(1);
+    let all: Vec<_> = (0..MOST_CLIENTS)
+        .map(|_| slcan(&mut server, "O\r"))
+        .collect();
+    assert_eq!(server.come(Protocol::Slcan), None);
+    server.receive(all[3], b"t1230\r");
+    server.go(all[3]);
+    run(&mut server, at(10_000));
+    assert!(
+        took(&mut server, all[0]).contains("t1230"),
+        "it goes its way"
+    );
+    assert_eq!(server.come(Protocol::Socketcand), Some(all[3]));
+}
+
+/// A bus on which nothing happens is looked at once a second; a program that was stopped resumes where it was.
+#[test]
+fn an_idle_bus_rests_and_a_late_server_resumes() {
+    let mut server = server(1);
+    let one = slcan(&mut server, "O\r");
+    run(&mut server, at(10_000));
+    assert_eq!(server.deadline(), at(1_010_000));
+    server.receive(one, b"t20133D3064\r");
+    server.advance(at(3_600_000_000));
+    let came = took(&mut server, one).matches("t181").count();
+    assert!((9..=10).contains(&came), "a second was made up for: {came}");
+}

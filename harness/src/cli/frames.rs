@@ -1,0 +1,41 @@
+//! Where `sim` serves drives on a bus of frames.
+
+use crate::buses::Bus;
+use crate::serve::ServedAt;
+use crate::serve::frames::{FramePlace, Protocol};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Options of `sim` for drives on CAN.
+#[derive(Clone, Debug, Args)]
+pub struct FrameArguments {
+    /// The bus and its drives.
+    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
+    pub bus: Bus,
+    /// How many drives are on the CAN bus: nodes 1 to N.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=127))]
+    pub drives: u8,
+    /// Serve a CAN bus as a serial CAN adapter (SLCAN) behind a socket: HOST:PORT, port 0 for a free one. Several clients share the bus.
+    #[arg(long, value_name = "ADDRESS", group = "place")]
+    pub slcan: Vec<String>,
+    /// Serve a CAN bus as a serial CAN adapter on a pseudo terminal; this path is a symbolic link to it.
+    #[arg(long, value_name = "PATH", group = "place")]
+    pub slcan_pty: Vec<PathBuf>,
+    /// Serve a CAN bus by the protocol of socketcand: HOST:PORT, port 0 for a free one. Several clients share the bus.
+    #[arg(long, value_name = "ADDRESS", group = "place")]
+    pub socketcand: Vec<String>,
+}
+
+impl FrameArguments {
+    /// Where the bus is served.
+    pub(crate) fn places(&self) -> Vec<FramePlace> {
+        let place = |protocol, at| FramePlace { protocol, at };
+        let slcan = self.slcan.iter().cloned().map(ServedAt::Tcp);
+        let pty = self.slcan_pty.iter().cloned().map(ServedAt::Pty);
+        let socketcand = self.socketcand.iter().cloned().map(ServedAt::Tcp);
+        let slcan = slcan.chain(pty).map(|at| place(Protocol::Slcan, at));
+        slcan
+            .chain(socketcand.map(|at| place(Protocol::Socketcand, at)))
+            .collect()
+    }
+}

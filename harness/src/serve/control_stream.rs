@@ -1,0 +1,148 @@
+//! A stream of lines of control and their answers: standard input, or a client of a socket.
+
+use super::control::Answer;
+use super::lines::Lines;
+use super::place::ControlPlace;
+use super::shell::{Host, ServeError};
+use super::tcp::Tcp;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use std::io;
+use std::net::SocketAddr;
+
+/// Bytes read at a time.
+const CHUNK: usize = 4096;
+
+/// Maximum bytes of answers that the client has not read yet; while they are reached, no further line is read.
+const UNREAD: usize = 64 << 10;
+
+/// Where lines of control come from, what of them has come, and what of the answers has not gone.
+pub(super) struct ControlStream {
+    source: Source,
+    lines: Lines,
+    answers: Vec<u8>,
+}
+
+enum Source {
+    Standard,
+    Tcp(Tcp),
+    /// Standard input has ended.
+    Ended,
+}
+
+impl ControlStream {
+    /// Listens, if it is a socket.
+    pub(super) fn open(place: &ControlPlace, allow_remote: bool) -> Result<Self, ServeError> {
+        let source = match place {
+            ControlPlace::Standard => Source::Standard,
+            ControlPlace::Tcp(address) => Source::Tcp(Tcp::listen(address, allow_remote)?),
+        };
+        Ok(Self {
+            source,
+            lines: Lines::default(),
+            answers: Vec::new(),
+        })
+    }
+
+    /// The address at which it listens, if it is a socket.
+    pub(super) fn address(&self) -> Option<SocketAddr> {
+        match &self.source {
+            Source::Tcp(tcp) => Some(tcp.address()),
+            Source::Standard | Source::Ended => None,
+        }
+    }
+
+    /// What to wait for.
+    pub(super) fn polls(&self) -> Vec<PollFd<'_>> {
+        let mut stream = PollFlags::empty();
+        stream.set(PollFlags::IN, self.answers.len() < UNREAD);
+        stream.set(PollFlags::OUT, !self.answers.is_empty());
+        match &self.source {
+            Source::Standard => vec![PollFd::from_borrowed_fd(rustix::stdio::stdin(), stream)],
+            Source::Tcp(tcp) => {
+                let (door, client) = tcp.polls(stream);
+                std::iter::once(door).chain(client).collect()
+            }
+            Source::Ended => Vec::new(),
+        }
+    }
+
+    /// Does the lines that have come, and answers them.
+    ///
+    /// # Errors
+    /// An answer cannot be written to standard output.
+    pub(super) fn obey(
+        &mut self,
+        host: &mut dyn Host,
+        answer: &mut dyn FnMut(&str) -> Option<Answer>,
+    ) -> io::Result<()> {
+        if let Source::Tcp(tcp) = &mut self.source {
+            // A second client is turned away here too.
+            let _visitors = tcp.accept();
+        }
+        let mut buffer = [0; CHUNK];
+        while self.answers.len() < UNREAD {
+            let read = match &mut self.source {
+                Source::Standard => standard(&mut buffer),
+                Source::Tcp(tcp) => tcp.read(&mut buffer).map(|(read, _)| read),
+                Source::Ended => break,
+            };
+            let (lines, ended) = match read {
+                Ok(read @ 1..) => (self.lines.push(&buffer[..read]), false),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Ok(0) | Err(_) => (self.lines.end().into_iter().collect(), true),
+            };
+            for line in lines {
+                let answer = match line {
+                    Ok(line) => answer(&line),
+                    Err(length) => Some(Answer::Error(format!(
+                        "a line of {length} bytes is too long for a line of control"
+                    ))),
+                };
+                let Some(answer) = answer else {
+                    continue;
+                };
+                if matches!(self.source, Source::Standard) {
+                    host.tell(&answer.to_string())?;
+                } else {
+                    self.answers.extend(format!("{answer}\n").bytes());
+                }
+            }
+            self.pass_on();
+            if ended {
+                match &mut self.source {
+                    Source::Tcp(tcp) => tcp.close(),
+                    other => *other = Source::Ended,
+                }
+                self.answers.clear();
+                break;
+            }
+        }
+        self.pass_on();
+        Ok(())
+    }
+
+    /// Writes answers as far as they are taken.
+    fn pass_on(&mut self) {
+        let Source::Tcp(tcp) = &mut self.source else {
+            return;
+        };
+        while !self.answers.is_empty() {
+            // A connection that is broken shows when it is read.
+            let Ok(written) = tcp.write(&self.answers) else {
+                return;
+            };
+            self.answers.drain(..written);
+        }
+    }
+}
+
+/// Reads standard input if input is available. Other processes may share it, so it is not made nonblocking.
+fn standard(buffer: &mut [u8]) -> io::Result<usize> {
+    let stdin = rustix::stdio::stdin();
+    let mut fds = [PollFd::from_borrowed_fd(stdin, PollFlags::IN)];
+    if poll(&mut fds, Some(&Timespec::default()))? == 0 {
+        return Err(io::ErrorKind::WouldBlock.into());
+    }
+    Ok(rustix::io::read(stdin, buffer)?)
+}

@@ -1,0 +1,333 @@
+//! A conversation with a client, without I/O: requests in; answers, and what the client's station hears, out.
+
+use crate::frames::slcan::{self, BitTiming, Command, Report, flags, rate_of};
+use crate::frames::socketcand::{Answer, Messages, Request, Stamp, class};
+use harness_proto::can::{BitRate, BusError, Frame, Heard};
+use harness_proto::time::Instant;
+use std::time::Duration;
+
+/// The version that an SLCAN client reads: hardware 1.0, software 1.0.
+const VERSION: &str = "1010";
+
+/// The serial number that an SLCAN client reads.
+const SERIAL_NUMBER: &str = "SIM1";
+
+/// Frames that an adapter takes which runs at another rate than the bus, and so never sends them.
+const STUCK: usize = 64;
+
+/// The language of a client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Protocol {
+    /// Lines of a serial CAN adapter.
+    Slcan,
+    /// Messages of the daemon socketcand.
+    Socketcand,
+}
+
+impl Protocol {
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Slcan => "slcan",
+            Self::Socketcand => "socketcand",
+        }
+    }
+}
+
+/// What a client wants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Act {
+    /// To be a station of the bus.
+    Join { listen_only: bool },
+    /// To be none any more, once its frames are sent.
+    Leave,
+    /// To send a frame.
+    Send(Frame),
+    /// Nothing: a mistake, for people.
+    Say(String),
+}
+
+/// A conversation.
+#[derive(Clone, Debug)]
+pub(super) enum Session {
+    Slcan(Adapter),
+    Socketcand(Daemon),
+}
+
+impl Session {
+    /// A conversation about a bus with this rate. `started` is when its time began, since 1970.
+    pub(super) fn new(protocol: Protocol, rate: BitRate, started: Duration) -> Self {
+        match protocol {
+            Protocol::Slcan => Self::Slcan(Adapter::new(rate)),
+            Protocol::Socketcand => Self::Socketcand(Daemon::new(started)),
+        }
+    }
+
+    /// What the client receives before it has said anything.
+    pub(super) fn greet(&self, out: &mut Vec<u8>) {
+        if let Self::Socketcand(_) = self {
+            Answer::Hi.write(out);
+        }
+    }
+
+    /// Takes bytes of the client, and writes the answers.
+    pub(super) fn receive(&mut self, bytes: &[u8], out: &mut Vec<u8>) -> Vec<Act> {
+        let mut acts = Vec::new();
+        for &byte in bytes {
+            match self {
+                Self::Slcan(adapter) => adapter.receive(byte, out, &mut acts),
+                Self::Socketcand(daemon) => daemon.receive(byte, out, &mut acts),
+            }
+        }
+        acts
+    }
+
+    /// The client's station has heard something that ended at `at`.
+    pub(super) fn hear(&mut self, at: Instant, heard: Heard, out: &mut Vec<u8>) {
+        match self {
+            Self::Slcan(adapter) => adapter.hear(at, heard, out),
+            Self::Socketcand(daemon) => daemon.hear(at, heard, out),
+        }
+    }
+}
+
+/// A serial CAN adapter.
+#[derive(Clone, Debug)]
+pub(super) struct Adapter {
+    lines: slcan::Lines,
+    bus: BitRate,
+    /// The rate that the client has chosen; `None` takes that of the bus.
+    rate: Option<BitRate>,
+    channel: Channel,
+    stamps: bool,
+    flags: u8,
+}
+
+/// The state of an adapter's channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Channel {
+    Closed,
+    Open,
+    Listening,
+    /// Open at another rate than the bus, with this number of frames that are never sent.
+    OffRate(usize),
+}
+
+impl Adapter {
+    fn new(bus: BitRate) -> Self {
+        Self {
+            lines: slcan::Lines::default(),
+            bus,
+            rate: None,
+            channel: Channel::Closed,
+            stamps: false,
+            flags: 0,
+        }
+    }
+
+    fn receive(&mut self, byte: u8, out: &mut Vec<u8>, acts: &mut Vec<Act>) {
+        let Some(line) = self.lines.push(byte) else {
+            return;
+        };
+        let command = line.and_then(|(line, end)| match end {
+            slcan::CR => Command::parse(&line),
+            // No host ends a command with BEL.
+            _ => Command::parse(&[&line[..], &[end]].concat()),
+        });
+        let report = match command {
+            Ok(command) => self.obey(command, acts),
+            Err(error) => {
+                acts.push(Act::Say(error.to_string()));
+                Report::Refused
+            }
+        };
+        report.write(out);
+    }
+
+    fn obey(&mut self, command: Command, acts: &mut Vec<Act>) -> Report {
+        let closed = self.channel == Channel::Closed;
+        match command {
+            Command::Nothing | Command::ReportAll => Report::Done,
+            Command::Version => Report::Version(VERSION.to_owned()),
+            Command::SerialNumber => Report::SerialNumber(SERIAL_NUMBER.to_owned()),
+            Command::Flags if !closed => Report::Flags(std::mem::take(&mut self.flags)),
+            Command::Send(frame) => self.send(frame, acts),
+            Command::Rate(code) if closed => self.choose(rate_of(code), acts),
+            Command::Timing(timing) if closed => self.choose(BitTiming::rate(timing), acts),
+            Command::TimeStamps(on) if closed => {
+                self.stamps = on;
+                Report::Done
+            }
+            Command::Open if closed => self.open(false, acts),
+            Command::Listen if closed => self.open(true, acts),
+            Command::Close if !closed => {
+                self.channel = Channel::Closed;
+                self.flags = 0;
+                acts.push(Act::Leave);
+                Report::Done
+            }
+            // As adapters do: the rate and the stamps of an open channel stay, and what is open or closed cannot be that again.
+            Command::Rate(_)
+            | Command::Timing(_)
+            | Command::TimeStamps(_)
+            | Command::Open
+            | Command::Listen
+            | Command::Close
+            | Command::Flags => Report::Refused,
+        }
+    }
+
+    fn choose(&mut self, rate: Option<BitRate>, acts: &mut Vec<Act>) -> Report {
+        if rate.is_none() {
+            let text = "received a bit timing above 1 Mbit/s or without a whole number of bits a second; S0 to S8, or s with \
+                        BTR0 and BTR1 of an SJA1000 at 16 MHz expected";
+            acts.push(Act::Say(text.to_owned()));
+            return Report::Refused;
+        }
+        self.rate = rate;
+        Report::Done
+    }
+
+    fn open(&mut self, listen_only: bool, acts: &mut Vec<Act>) -> Report {
+        let bus = self.bus;
+        match self.rate.filter(|own| *own != bus) {
+            Some(own) => {
+                self.channel = Channel::OffRate(0);
+                acts.push(Act::Say(format!(
+                    "the client has opened its channel at {own}, and the bus runs at {bus}: it hears nothing and its frames are \
+                     not sent; choose the rate of the bus"
+                )));
+            }
+            None => {
+                self.channel = match listen_only {
+                    true => Channel::Listening,
+                    false => Channel::Open,
+                };
+                acts.push(Act::Join { listen_only });
+            }
+        }
+        Report::Done
+    }
+
+    fn send(&mut self, frame: Frame, acts: &mut Vec<Act>) -> Report {
+        let extended = frame.id().is_extended();
+        match &mut self.channel {
+            Channel::Open => acts.push(Act::Send(frame)),
+            Channel::OffRate(stuck) if *stuck < STUCK => {
+                *stuck += 1;
+                self.flags |= flags::BUS_ERROR | flags::PASSIVE;
+            }
+            Channel::OffRate(_) => {
+                self.flags |= flags::BUS_ERROR | flags::PASSIVE | flags::TRANSMIT_FULL;
+                return Report::Refused;
+            }
+            Channel::Closed | Channel::Listening => return Report::Refused,
+        }
+        Report::Taken { extended }
+    }
+
+    fn hear(&mut self, at: Instant, heard: Heard, out: &mut Vec<u8>) {
+        if !matches!(self.channel, Channel::Open | Channel::Listening) {
+            return;
+        }
+        match heard {
+            Heard::Frame(frame) => {
+                let millis = at.since_start().as_nanos() / 1_000_000;
+                let stamp = (millis % u64::from(slcan::STAMP_PERIOD)) as u16;
+                Report::Frame(frame, self.stamps.then_some(stamp)).write(out);
+            }
+            Heard::Error(BusError::ErrorFrame) => self.flags |= flags::BUS_ERROR,
+            Heard::Error(BusError::NoAcknowledge | BusError::BusOff) => {
+                self.flags |= flags::BUS_ERROR | flags::PASSIVE;
+            }
+        }
+    }
+}
+
+/// The daemon socketcand.
+#[derive(Clone, Debug)]
+pub(super) struct Daemon {
+    messages: Messages,
+    mode: Mode,
+    started: Duration,
+}
+
+/// Modes of the protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    NoBus,
+    Bcm,
+    Raw,
+}
+
+impl Daemon {
+    fn new(started: Duration) -> Self {
+        Self {
+            messages: Messages::default(),
+            mode: Mode::NoBus,
+            started,
+        }
+    }
+
+    fn receive(&mut self, byte: u8, out: &mut Vec<u8>, acts: &mut Vec<Act>) {
+        let Some(message) = self.messages.push(byte) else {
+            return;
+        };
+        let request = match message.and_then(|message| Request::parse(&message)) {
+            Ok(request) => request,
+            Err(error) => {
+                // The daemon answers no `send`, not even one with a mistake, and clients expect no answer to it.
+                if !error.concerns("< send ") {
+                    Answer::Error(error.to_string()).write(out);
+                }
+                acts.push(Act::Say(error.to_string()));
+                return;
+            }
+        };
+        let refusal = match (self.mode, request) {
+            (_, Request::Echo) => return Answer::Echo.write(out),
+            (Mode::NoBus, Request::Open(_)) => {
+                self.mode = Mode::Bcm;
+                acts.push(Act::Join { listen_only: false });
+                return Answer::Ok.write(out);
+            }
+            (Mode::NoBus, _) => "no bus is open; < open can0 > expected first",
+            (_, Request::RawMode) => {
+                self.mode = Mode::Raw;
+                return Answer::Ok.write(out);
+            }
+            (_, Request::BcmMode) => {
+                self.mode = Mode::Bcm;
+                return Answer::Ok.write(out);
+            }
+            (_, Request::Send(frame)) => return acts.push(Act::Send(frame)),
+            (_, Request::Open(_)) => "a bus is open already; connect again for another one",
+        };
+        Answer::Error(refusal.to_owned()).write(out);
+        acts.push(Act::Say(refusal.to_owned()));
+    }
+
+    fn hear(&mut self, at: Instant, heard: Heard, out: &mut Vec<u8>) {
+        if self.mode != Mode::Raw {
+            return;
+        }
+        let time = self.started + Duration::from_nanos(at.since_start().as_nanos());
+        let stamp = Stamp {
+            seconds: time.as_secs(),
+            micros: time.subsec_micros(),
+        };
+        let answer = match heard {
+            Heard::Frame(frame) => Answer::Frame(frame, stamp),
+            Heard::Error(error) => {
+                let class = match error {
+                    BusError::ErrorFrame => class::PROTOCOL | class::BUS_ERROR,
+                    BusError::NoAcknowledge => class::NO_ACKNOWLEDGE,
+                    BusError::BusOff => class::BUS_OFF,
+                };
+                Answer::ErrorFrame(class, stamp)
+            }
+        };
+        answer.write(out);
+    }
+}

@@ -1,0 +1,392 @@
+//! The shell around a [`FrameServer`]: one thread that waits for sockets, pseudo terminals, signals and the next deadline.
+
+use super::{FrameServer, MOST_CLIENTS, Protocol, SharedBus};
+use crate::counted::counted;
+use crate::port::wake_on_time;
+use crate::serve::arrival::Client;
+use crate::serve::clock::Clock;
+use crate::serve::control_stream::ControlStream;
+use crate::serve::pty::{Change, Pty};
+use crate::serve::shell::{End, Ending, Host, ServeError};
+use crate::serve::tcp::Listener;
+use crate::serve::{ControlPlace, ServedAt};
+use harness_proto::time::{Instant, Span};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use std::io;
+
+/// Bytes read at a time.
+const CHUNK: usize = 4096;
+
+/// Where a bus is served, and in which language.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FramePlace {
+    /// The language.
+    pub protocol: Protocol,
+    /// A socket for several clients, or a pseudo terminal for one.
+    pub at: ServedAt,
+}
+
+/// What is served where, and for how long.
+#[derive(Clone, Debug, Default)]
+pub struct FrameJob {
+    /// Where the bus is served.
+    pub places: Vec<FramePlace>,
+    /// Where lines of control come from, if there are any.
+    pub control: Option<ControlPlace>,
+    /// Whether sockets may listen at addresses that other machines reach.
+    pub allow_remote: bool,
+    /// Whether the end comes when the clients have gone.
+    pub once: bool,
+    /// How long it goes on, if not until a signal comes.
+    pub length: Option<Span>,
+}
+
+/// Serves a bus until the job is done. Links to pseudo terminals are removed on every way out.
+///
+/// # Errors
+/// A place cannot be opened, or the system fails. Nothing is left behind then.
+pub fn serve_frames<B: SharedBus>(
+    bus: B,
+    job: &FrameJob,
+    host: &mut dyn Host,
+) -> Result<End, ServeError> {
+    let ending = Ending::by_signals().map_err(ServeError::Wait)?;
+    let mut doors = Vec::new();
+    let mut seats = Vec::new();
+    for FramePlace { protocol, at } in &job.places {
+        match at {
+            ServedAt::Tcp(address) => {
+                doors.push((*protocol, Listener::open(address, job.allow_remote)?));
+            }
+            ServedAt::Pty(path) => seats.push(Seat {
+                protocol: *protocol,
+                end: Stream::Pty(Pty::open(path)?),
+                client: None,
+                name: String::new(),
+                wrong: false,
+                losing: false,
+            }),
+        }
+    }
+    let control = job.control.as_ref();
+    let control = control
+        .map(|place| ControlStream::open(place, job.allow_remote))
+        .transpose()?;
+    let started = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
+    let mut shell = Shell {
+        clock: Clock::start(),
+        server: FrameServer::new(bus, started),
+        doors,
+        seats,
+        control,
+        host,
+        ending,
+        here: 0,
+        gone: false,
+    };
+    shell.announce()?;
+    shell.run(job)
+}
+
+/// A place for a client: a pseudo terminal, or an accepted connection.
+struct Seat {
+    protocol: Protocol,
+    end: Stream,
+    /// Its number with the server, while a client is here.
+    client: Option<usize>,
+    /// What the client is called.
+    name: String,
+    /// Whether it has sent something wrong; reported once per client.
+    wrong: bool,
+    /// Whether it has lost frames; reported once per client.
+    losing: bool,
+}
+
+enum Stream {
+    Tcp(Client),
+    Pty(Pty),
+}
+
+struct Shell<'a, B> {
+    server: FrameServer<B>,
+    doors: Vec<(Protocol, Listener)>,
+    seats: Vec<Seat>,
+    control: Option<ControlStream>,
+    host: &'a mut dyn Host,
+    ending: Ending,
+    clock: Clock,
+    /// Clients there are.
+    here: usize,
+    /// A client was there, and none is left.
+    gone: bool,
+}
+
+impl<B: SharedBus> Shell<'_, B> {
+    /// One line for each place, once all of them are ready.
+    fn announce(&mut self) -> Result<(), ServeError> {
+        let about = self.server.about();
+        let mut lines = Vec::new();
+        for (protocol, door) in &self.doors {
+            self.host.listens(door.address());
+            let address = door.address();
+            lines.push(format!("{}: {about} at {address}", protocol.name()));
+        }
+        for seat in &self.seats {
+            if let Stream::Pty(pty) = &seat.end {
+                let place = pty.link().display();
+                lines.push(format!("{}: {about} at {place}", seat.protocol.name()));
+            }
+        }
+        let control = self.control.as_ref().and_then(ControlStream::address);
+        lines.extend(control.map(|address| format!("control at {address}")));
+        for line in lines {
+            self.host.tell(&line).map_err(ServeError::Output)?;
+        }
+        Ok(())
+    }
+
+    fn run(&mut self, job: &FrameJob) -> Result<End, ServeError> {
+        wake_on_time();
+        let end = job.length.map(|length| Instant::START + length);
+        loop {
+            if end.is_some_and(|end| end <= self.clock.now()) {
+                return Ok(End::TimeOver);
+            }
+            let until = self.server.deadline().min(end.unwrap_or(Instant::NEVER));
+            let ready = self.wait(until).map_err(ServeError::Wait)?;
+            if ready && self.ending.has_come() {
+                return Ok(End::Interrupted);
+            }
+            if ready {
+                self.accept();
+                (0..self.seats.len()).for_each(|seat| self.attend(seat));
+            }
+            self.server.advance(self.clock.now());
+            for seat in 0..self.seats.len() {
+                if let Err(error) = self.speak(seat) {
+                    self.fail(seat, &error);
+                }
+            }
+            // A connection that has ended leaves its place.
+            let stays = |seat: &Seat| seat.client.is_some() || matches!(seat.end, Stream::Pty(_));
+            self.seats.retain(stays);
+            if ready && let Some(control) = &mut self.control {
+                let bus = self.server.bus();
+                let obeyed = control.obey(self.host, &mut |line| bus.control(line));
+                obeyed.map_err(ServeError::Output)?;
+            }
+            if job.once && self.gone {
+                return Ok(End::ClientsGone);
+            }
+        }
+    }
+
+    /// Waits until something can be read or written, at most until `until`, and returns whether something can.
+    fn wait(&mut self, until: Instant) -> io::Result<bool> {
+        let mut fds = vec![self.ending.poll()];
+        fds.extend(self.doors.iter().map(|(_, door)| door.poll()));
+        for seat in &self.seats {
+            let mut stream = PollFlags::empty();
+            // A pseudo terminal without a client is read: that shows when one comes.
+            let room = seat.client.is_none_or(|own| self.server.room(own) > 0);
+            let waits = seat
+                .client
+                .is_some_and(|own| !self.server.transmit(own).is_empty());
+            stream.set(PollFlags::IN, room);
+            stream.set(PollFlags::OUT, waits);
+            match &seat.end {
+                Stream::Tcp(client) => fds.push(PollFd::new(client, stream)),
+                Stream::Pty(pty) => fds.extend(pty.polls(stream).into_iter().flatten()),
+            }
+        }
+        fds.extend(self.control.iter().flat_map(ControlStream::polls));
+        let nanos = until.since(self.clock.now()).as_nanos();
+        let longest = Timespec {
+            tv_sec: i64::try_from(nanos / 1_000_000_000).unwrap_or(i64::MAX),
+            tv_nsec: i64::try_from(nanos % 1_000_000_000).unwrap_or(0),
+        };
+        match poll(&mut fds, Some(&longest)) {
+            Ok(ready) => Ok(ready > 0),
+            Err(rustix::io::Errno::INTR) => Ok(true),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Takes new connections.
+    fn accept(&mut self) {
+        for door in 0..self.doors.len() {
+            let (protocol, listener) = &self.doors[door];
+            let protocol = *protocol;
+            let came: Vec<_> = listener.accept().collect();
+            for (client, address) in came {
+                self.seats.push(Seat {
+                    protocol,
+                    end: Stream::Tcp(client),
+                    client: None,
+                    name: format!("client {address}"),
+                    wrong: false,
+                    losing: false,
+                });
+                self.come(self.seats.len() - 1);
+            }
+        }
+    }
+
+    /// Gives a client its place on the bus; without one, a connection is closed.
+    fn come(&mut self, seat: usize) {
+        let own = &mut self.seats[seat];
+        own.wrong = false;
+        own.losing = false;
+        own.client = self.server.come(own.protocol);
+        let text = match own.client {
+            Some(_) => {
+                self.here += 1;
+                self.gone = false;
+                "came".to_owned()
+            }
+            None => format!("was turned away: {MOST_CLIENTS} clients are there, the most"),
+        };
+        self.say(seat, &text);
+    }
+
+    fn say(&mut self, seat: usize, text: &str) {
+        let Seat { protocol, name, .. } = &self.seats[seat];
+        self.host
+            .say(&format!("{}: {name} {text}", protocol.name()));
+    }
+
+    /// Lets a client speak and go.
+    fn attend(&mut self, seat: usize) {
+        match (self.hear(seat), &mut self.seats[seat].end) {
+            (Err(error), _) => self.fail(seat, &error),
+            // Keeps the client's place until its input is drained.
+            (Ok(true), Stream::Pty(pty)) => {
+                if let Some(change) = pty.change() {
+                    self.change(seat, change);
+                }
+            }
+            (Ok(_), _) => {}
+        }
+    }
+
+    /// Handles a failed stream. A connection has ended. At a pseudo terminal no client is left, which its hang-up shows.
+    fn fail(&mut self, seat: usize, error: &io::Error) {
+        if matches!(self.seats[seat].end, Stream::Tcp(_)) {
+            let why = match error.kind() {
+                io::ErrorKind::UnexpectedEof => String::new(),
+                _ => format!(" ({error})"),
+            };
+            self.go(seat, &format!("has gone{why}"));
+        }
+    }
+
+    /// Handles a client that opens or closes a pseudo terminal.
+    fn change(&mut self, seat: usize, change: Change) {
+        match change {
+            Change::Came => self.come_to_terminal(seat),
+            Change::Gone => {
+                // Reads what the client sent last. An error only means that no client is left.
+                let _read = self.hear(seat);
+                let another = match &mut self.seats[seat].end {
+                    Stream::Pty(pty) => pty.gone(),
+                    Stream::Tcp(_) => false,
+                };
+                self.go(seat, "has gone");
+                if another {
+                    self.come_to_terminal(seat);
+                }
+            }
+        }
+    }
+
+    fn come_to_terminal(&mut self, seat: usize) {
+        if let Stream::Pty(pty) = &self.seats[seat].end {
+            self.seats[seat].name = format!("client at {}", pty.link().display());
+        }
+        self.come(seat);
+    }
+
+    fn go(&mut self, seat: usize, text: &str) {
+        let Some(client) = self.seats[seat].client.take() else {
+            return;
+        };
+        self.here = self.here.saturating_sub(1);
+        self.gone = self.here == 0;
+        let lost = match self.server.lost(client) {
+            0 => String::new(),
+            lost => format!("; {} lost", counted(lost, "frame")),
+        };
+        self.server.go(client);
+        self.say(seat, &format!("{text}{lost}"));
+    }
+
+    /// Takes what a client has sent, as far as there is room for it; says whether that was all. What the system has had for a while came
+    /// then, and not now.
+    fn hear(&mut self, seat: usize) -> io::Result<bool> {
+        let mut buffer = [0; CHUNK];
+        loop {
+            let client = self.seats[seat].client;
+            let room = client.map_or(CHUNK, |own| self.server.room(own).min(CHUNK));
+            if room == 0 {
+                return Ok(false);
+            }
+            let read = match &mut self.seats[seat].end {
+                Stream::Tcp(client) => client.read(&mut buffer[..room]),
+                Stream::Pty(pty) => pty.read(&mut buffer[..room]).map(|read| (read, Span::ZERO)),
+            };
+            let (read, ago) = match read {
+                Ok((0, _)) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(read) => read,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(true),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            let news = match &mut self.seats[seat].end {
+                Stream::Pty(pty) => pty.heard(),
+                Stream::Tcp(_) => false,
+            };
+            if news {
+                self.come_to_terminal(seat);
+            }
+            let Some(client) = self.seats[seat].client else {
+                continue;
+            };
+            self.server.advance(self.clock.left(ago));
+            for wrong in self.server.receive(client, &buffer[..read]) {
+                if !std::mem::replace(&mut self.seats[seat].wrong, true) {
+                    self.say(seat, &format!("said something wrong: {wrong}"));
+                }
+            }
+        }
+    }
+
+    /// Gives a client what has come for it, as far as it takes it.
+    fn speak(&mut self, seat: usize) -> io::Result<()> {
+        let Some(client) = self.seats[seat].client else {
+            return Ok(());
+        };
+        if self.server.lost(client) > 0 && !std::mem::replace(&mut self.seats[seat].losing, true) {
+            self.say(seat, "loses frames: it does not read");
+        }
+        loop {
+            let bytes = self.server.transmit(client);
+            if bytes.is_empty() {
+                return Ok(());
+            }
+            let before = std::time::Instant::now();
+            let written = match &mut self.seats[seat].end {
+                Stream::Tcp(client) => client.write(bytes),
+                Stream::Pty(pty) => pty.write(bytes),
+            };
+            match written {
+                Ok(written) => {
+                    self.clock.handed_over(before.elapsed());
+                    self.server.transmitted(client, written);
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}

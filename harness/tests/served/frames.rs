@@ -1,0 +1,196 @@
+//! `drivebench sim --bus unitek` as clients of others see it: real sockets, real pseudo terminals, the real program.
+//!
+//! Every wait has an end that a loaded machine does not reach.
+
+use crate::serve::{Sim, connect, path};
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const BUS: [&str; 2] = ["--bus", "unitek"];
+
+fn start(arguments: &[&str]) -> Sim {
+    Sim::start(&[&BUS, arguments].concat())
+}
+
+/// Reads up to `end`.
+fn until(stream: &mut impl Read, end: &str) -> String {
+    let mut text = String::new();
+    let mut byte = [0];
+    while !text.ends_with(end) {
+        stream.read_exact(&mut byte).expect("more");
+        text.push(char::from(byte[0]));
+    }
+    text
+}
+
+/// A Python that has python-can and pyserial: that of `DRIVEBENCH_PYTHON`, that of `.ci/tools`, or the system's. Without one, prints that
+/// the test `who` is skipped.
+fn python_can(who: &str) -> Option<PathBuf> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/python/bin/python");
+    let given = std::env::var_os("DRIVEBENCH_PYTHON").map(PathBuf::from);
+    let imports = |python: &PathBuf| {
+        let mut command = Command::new(python);
+        let output = command.args(["-c", "import can, serial"]).output();
+        output.is_ok_and(|output| output.status.success())
+    };
+    let all = given.into_iter().chain([own, "python3".into()]);
+    let found = all.into_iter().find(imports);
+    crate::debian::told(found.is_some(), "python-can", who);
+    found
+}
+
+/// Python-can, as a vehicle's controller would use it, over every way in.
+#[test]
+fn python_can_talks_to_a_drive() {
+    let Some(python) = python_can("SLCAN and socketcand as it speaks them") else {
+        return;
+    };
+    let terminal = path("slcan-python");
+    let mut sim = start(&[
+        "--slcan",
+        "127.0.0.1:0",
+        "--socketcand",
+        "127.0.0.1:0",
+        "--slcan-pty",
+        terminal.to_str().expect("text"),
+    ]);
+    let slcan = format!("socket://{}", sim.address());
+    let socketcand = sim.address();
+    let terminal = sim.address();
+    for (interface, channel) in [
+        ("slcan", slcan),
+        ("slcan", terminal),
+        ("socketcand", socketcand),
+    ] {
+        let script = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/harness/tests/served/python_can.py"
+        );
+        let mut command = Command::new(&python);
+        let output = command.args([script, interface, &channel]).output();
+        let output = output.expect("python");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{interface} {channel}: {said}");
+        assert_eq!(output.stdout, b"done\n", "{interface} {channel}: {said}");
+    }
+}
+
+/// Clients of both languages share one bus, and Ctrl-C ends it cleanly.
+#[test]
+fn clients_of_both_languages_share_a_bus() {
+    let mut sim = start(&[
+        "--drives",
+        "2",
+        "--slcan",
+        "127.0.0.1:0",
+        "--socketcand",
+        "127.0.0.1:0",
+    ]);
+    let line = sim.line();
+    assert!(
+        line.starts_with("slcan: 2 drives, 500 kbit/s at 127.0.0.1:"),
+        "{line}"
+    );
+    let mut slcan = connect(line.split(' ').next_back().expect("a word"));
+    let mut daemon = connect(&sim.address());
+    assert_eq!(until(&mut daemon, ">"), "< hi >");
+    daemon.write_all(b"< open can0 >< rawmode >").expect("sent");
+    assert_eq!(until(&mut daemon, "ok >"), "< ok >");
+    assert_eq!(until(&mut daemon, "ok >"), "< ok >");
+    slcan.write_all(b"S6\rO\rt20233D1B00\r").expect("sent");
+    assert_eq!(until(&mut slcan, "z\r"), "\r\rz\r");
+    // Node 2 answers; the daemon's client hears request and reply.
+    assert_eq!(until(&mut slcan, "\r"), "t18241BD80100\r");
+    assert!(until(&mut daemon, ">").starts_with("< frame 202 "));
+    let reply = until(&mut daemon, ">");
+    assert!(
+        reply.starts_with("< frame 182 ") && reply.ends_with(" 1BD80100 >"),
+        "{reply}"
+    );
+    daemon.write_all(b"< send 201 3 3d 1b 0 >").expect("sent");
+    assert_eq!(until(&mut slcan, "\r"), "t20133D1B00\r");
+    assert_eq!(until(&mut slcan, "\r"), "t18141BD80100\r");
+    sim.signal("-INT");
+    assert_eq!(sim.code(), Some(130));
+}
+
+/// A mistake is answered, said once to people, and nothing else suffers by it.
+#[test]
+fn mistakes_of_clients_are_named() {
+    let mut sim = start(&["--slcan", "127.0.0.1:0", "--socketcand", "127.0.0.1:0"]);
+    let slcan = sim.address();
+    let mut wrong = connect(&slcan);
+    wrong.write_all(b"GET / HTTP/1.1\r\n\r\n").expect("sent");
+    assert_eq!(until(&mut wrong, "\r"), "\x07\r");
+    assert!(sim.said().ends_with("came"));
+    let said = sim.said();
+    assert!(
+        said.contains("received \"GET / HTTP/1.1\"") && said.contains("t, T, r, R"),
+        "{said}"
+    );
+    let mut daemon = connect(&sim.address());
+    assert_eq!(until(&mut daemon, ">"), "< hi >");
+    daemon.write_all(b"< rawmode >< hello >").expect("sent");
+    let answer = until(&mut daemon, " >");
+    assert!(answer.starts_with("< error no bus is open"), "{answer}");
+    let answer = until(&mut daemon, " >");
+    assert!(answer.starts_with("< error received"), "{answer}");
+    let mut right = connect(&slcan);
+    right.write_all(b"O\rV\rt2010\r").expect("sent");
+    assert_eq!(until(&mut right, "z\r"), "\rV1010\rz\r");
+}
+
+/// Floods of characters that are no line cost a line, and the other clients are served.
+#[test]
+fn a_flood_is_dropped() {
+    let mut sim = start(&["--slcan", "127.0.0.1:0"]);
+    let address = sim.address();
+    let mut flood = connect(&address);
+    let junk = [b'x'; 1 << 16];
+    for _ in 0..64 {
+        flood.write_all(&junk).expect("taken");
+    }
+    flood.write_all(b"\rV\r").expect("sent");
+    assert_eq!(until(&mut flood, "\r"), "\x07V1010\r");
+    let mut right = connect(&address);
+    right.write_all(b"V\r").expect("sent");
+    assert_eq!(until(&mut right, "\r"), "V1010\r");
+}
+
+#[test]
+fn options_that_do_not_fit_are_refused() {
+    for (arguments, words) in [
+        (&["--bus", "unitek", "--tcp", "127.0.0.1:0"][..], "--slcan"),
+        (&["--slcan", "127.0.0.1:0"][..], "--bus unitek"),
+        (
+            &["--bus", "unitek", "--slcan", "0.0.0.0:0"][..],
+            "--allow-remote",
+        ),
+        (&["--bus", "unitek", "--slcan", "nowhere"][..], "HOST:PORT"),
+        (
+            &["--bus", "nordac", "--slcan", "127.0.0.1:0"][..],
+            "not built",
+        ),
+    ] {
+        let mut sim = Sim::start(arguments);
+        assert_eq!(sim.code(), Some(2), "{arguments:?}");
+        let said = sim.said();
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+/// A client that sends and closes at once has sent.
+#[test]
+fn what_a_client_sent_last_goes_its_way() {
+    let mut sim = start(&["--slcan", "127.0.0.1:0"]);
+    let address = sim.address();
+    let mut listener = connect(&address);
+    listener.write_all(b"L\rV\r").expect("sent");
+    until(&mut listener, "V1010\r");
+    let mut short = TcpStream::connect(&address).expect("the server listens");
+    short.write_all(b"O\rt2013D40000\rC\r").expect("sent");
+    drop(short);
+    assert_eq!(until(&mut listener, "\r"), "t2013D40000\r");
+}
