@@ -2,7 +2,6 @@
 
 use super::exit::Exit;
 use super::output::Output;
-use crate::guard::SafeState;
 use crate::link::{Line, Trouble};
 use crate::rig::find::folder;
 use crate::rig::lock::LockError;
@@ -63,6 +62,7 @@ pub(crate) fn exit_of(error: &SessionError) -> Exit {
         SessionError::Interrupted { end: Some(end), .. } if end.is_unsafe() => Exit::NotSafe,
         SessionError::Interrupted { .. } => Exit::Interrupted,
         SessionError::Lock(LockError::Io { .. })
+        | SessionError::Drives { .. }
         | SessionError::Quarantine { .. }
         | SessionError::State(_)
         | SessionError::Open { .. }
@@ -101,8 +101,8 @@ pub(crate) fn tell_end(end: &End, exit: Exit, output: &mut Output) -> Exit {
         output.complain(power);
     }
     match &end.safe {
-        Some(safe @ SafeState::NotConfirmed(_)) => output.complain(&safe.to_string()),
-        Some(safe @ SafeState::Confirmed(_)) => output.say(&format!("{safe}\n")),
+        Some(safe) if safe.confirmed => output.say(&format!("{safe}\n")),
+        Some(safe) => output.complain(&safe.to_string()),
         None => {}
     }
     if end.is_unsafe() {

@@ -9,6 +9,7 @@
 
 mod gate;
 mod guarded;
+mod safe;
 mod watch;
 
 pub use crate::buses::novobus::guard::safe_state::{
@@ -17,4 +18,5 @@ pub use crate::buses::novobus::guard::safe_state::{
 pub use gate::{Denied, Gate, Restore};
 pub use guarded::Guarded;
 pub use harness_proto::novobus::guard::{Denial, Found, Guard, Limits, Need};
+pub use safe::Safe;
 pub use watch::Watch;

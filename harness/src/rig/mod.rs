@@ -25,6 +25,7 @@ pub(crate) mod session;
 mod session_error;
 pub(crate) mod shared;
 pub mod state;
+pub(crate) mod taken;
 mod watchdog;
 
 pub use crate::buses::novobus::rig::health::{Health, Unhealthy, examine};
@@ -36,7 +37,7 @@ pub use file::schema;
 pub use find::{FindError, find};
 pub use open::OpenRigError;
 pub(crate) use open::{line_rate, stated_rate};
-pub(crate) use permitted::limits;
+pub(crate) use permitted::{limits, standing};
 pub(crate) use played::Again;
 pub use played::{Attempt, Played};
 pub use profile::{KnownProfile, Profile, ProfileError, Settled};

@@ -6,7 +6,7 @@ use crate::guard::{Limits, SafeStep, Standing};
 use harness_proto::time::Span;
 
 /// The safe state of a rig's file, as far as drives go.
-pub(super) fn standing(wanted: &file::SafeState) -> Standing {
+pub(crate) fn standing(wanted: &file::SafeState) -> Standing {
     let step = |step: &file::SafeStep| match step {
         file::SafeStep::Stop => Some(SafeStep::Stop),
         file::SafeStep::Block => Some(SafeStep::Block),

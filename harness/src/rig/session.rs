@@ -9,10 +9,11 @@ use super::open::{open, stated_rate};
 use super::permitted::{limits, standing};
 use super::session_error::SessionError;
 use super::state;
+use super::taken::take;
 use super::watchdog::{Alarm, Watchdog};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
-use crate::guard::{Guarded, SafeState, Watch, blind_stop, safe_state};
+use crate::guard::{Guarded, Safe, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, Octets, PortLink, Trouble};
 use crate::rig::health::{self, Health, Unhealthy, examine};
 use crate::rig::interlock::Interlocks;
@@ -52,7 +53,7 @@ pub struct Options {
 
 impl Options {
     /// Returns an error once the program has been interrupted.
-    fn unless_interrupted(&self, rig: &Rig) -> Result<(), SessionError> {
+    pub(crate) fn unless_interrupted(&self, rig: &Rig) -> Result<(), SessionError> {
         match self.interrupt.load(Ordering::Relaxed) {
             false => Ok(()),
             true => Err(SessionError::Interrupted {
@@ -67,7 +68,7 @@ impl Options {
 #[derive(Debug)]
 pub struct End {
     /// Whether every drive stands and is blocked; `None` for rings that are simulated in the program.
-    pub safe: Option<SafeState>,
+    pub safe: Option<Safe>,
     /// Power that was to be switched off and is not known to be, in sentences.
     pub power: Vec<String>,
     /// What else went wrong on the way out, in sentences.
@@ -78,13 +79,13 @@ impl End {
     /// Whether the drives or their power may not be in the safe state.
     #[must_use]
     pub fn is_unsafe(&self) -> bool {
-        !self.power.is_empty() || matches!(self.safe, Some(SafeState::NotConfirmed(_)))
+        !self.power.is_empty() || self.safe.as_ref().is_some_and(|safe| !safe.confirmed)
     }
 }
 
 impl fmt::Display for End {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let safe = self.safe.iter().map(SafeState::to_string);
+        let safe = self.safe.iter().map(Safe::to_string);
         let others = self.power.iter().chain(&self.remarks).cloned();
         f.write_str(&safe.chain(others).collect::<Vec<_>>().join("; "))
     }
@@ -164,31 +165,7 @@ impl Session {
     /// Takes a rig as its file describes it.
     fn open_as_stated(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
         rig.of_rings()?;
-        let own = |quarantine: &super::file::Quarantine| SessionError::Quarantine {
-            rig: rig.id().to_owned(),
-            since: quarantine.since.clone(),
-            reason: quarantine.reason.clone(),
-        };
-        if let Some(quarantine) = &rig.file.quarantine {
-            return Err(own(quarantine));
-        }
-        let lock = if rig.is_simulated() {
-            None
-        } else {
-            let folder = state::folder().map_err(SessionError::State)?;
-            let kept = state::quarantine(&folder, rig.id()).map_err(SessionError::State)?;
-            if let Some(quarantine) = kept {
-                return Err(own(&quarantine));
-            }
-            let lock = RigLock::acquire(rig, &options.purpose, options.wait, &options.interrupt);
-            options.unless_interrupted(rig)?;
-            Some(lock?)
-        };
-        let around = Around::begin(rig).map_err(|error| SessionError::Hook {
-            rig: rig.id().to_owned(),
-            error,
-        })?;
-        options.unless_interrupted(rig)?;
+        let taken = take(rig, options)?;
         let opened = open(rig, options.interrupt.clone()).map_err(|error| SessionError::Open {
             rig: rig.id().to_owned(),
             error: Box::new(error),
@@ -207,10 +184,10 @@ impl Session {
             // Nothing has been moved: there is nothing to make safe while the rig has not been found healthy.
             ended: true,
             opening: None,
-            around,
+            around: taken.around,
             watchdog: None,
             _ports: opened.locks,
-            _lock: lock,
+            _lock: taken.lock,
         };
         if rig.is_simulated() {
             session.link.set_interrupt(options.interrupt.clone());
@@ -572,7 +549,7 @@ impl Session {
             let wanted = self.rig.file.safe_state.clone();
             let standing = standing(&wanted);
             if !standing.order.is_empty() {
-                end.safe = Some(safe_state(&mut self.link, &self.rings, &standing));
+                end.safe = Some(safe_state(&mut self.link, &self.rings, &standing).into());
             }
             self.come_home();
             self.watchdog = None;

@@ -20,6 +20,14 @@ pub enum SessionError {
         /// Their bus.
         bus: &'static str,
     },
+    /// Its drives do not answer, or its bus is in use.
+    #[error("rig {rig}: {why}")]
+    Drives {
+        /// Which.
+        rig: String,
+        /// What is wrong, in a sentence.
+        why: String,
+    },
     /// It is held or reserved, or its lock cannot be used.
     #[error(transparent)]
     Lock(#[from] LockError),

@@ -1,7 +1,9 @@
 //! UNITEK DS/BAMOCAR on CAN: what the bench knows of this bus alone.
 
+pub mod driver;
 pub mod gate;
 pub mod rig;
+pub mod safe_state;
 pub(crate) mod serve;
 #[cfg(test)]
 mod serve_tests;

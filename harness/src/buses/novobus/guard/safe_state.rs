@@ -2,6 +2,7 @@
 
 use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Order, recover};
 use crate::counted::counted;
+use crate::guard::Safe;
 use crate::link::{Lead, Line, Octets, Trouble, wait_keeping};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nd21::bits::{flags, status};
@@ -56,6 +57,15 @@ pub enum SafeState {
     Confirmed(Vec<RingSize>),
     /// These drives are not confirmed; all others are.
     NotConfirmed(Vec<NotSafe>),
+}
+
+impl From<SafeState> for Safe {
+    fn from(state: SafeState) -> Self {
+        Self {
+            confirmed: matches!(state, SafeState::Confirmed(_)),
+            words: state.to_string(),
+        }
+    }
 }
 
 /// A drive that was not confirmed to stand.

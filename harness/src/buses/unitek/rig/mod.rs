@@ -1,9 +1,11 @@
 //! Rig files of UNITEK drives: identifiers, limits, and the simulated bench.
 
 mod permitted;
+mod session;
 
 pub use permitted::limits;
 pub(crate) use permitted::special_register;
+pub use session::Session;
 
 use super::simulate::{DriveSetup, Setup};
 use crate::rig::Rig;
@@ -57,9 +59,11 @@ pub fn rate(port: &Port) -> BitRate {
 #[must_use]
 pub fn setup(rig: &Rig) -> Option<Setup> {
     let port = rig.port()?;
-    let drives = axes(port).into_iter().map(|axis| DriveSetup {
-        identifiers: (axis.rx, axis.tx),
-        ..DriveSetup::new(axis.node)
+    let drives = axes(port).into_iter().map(|axis| {
+        let mut drive = DriveSetup::new(axis.node);
+        drive.identifiers = (axis.rx, axis.tx);
+        (drive.inputs.run, drive.inputs.rfe) = (true, true);
+        drive
     });
     Some(Setup {
         rate: rate(port),

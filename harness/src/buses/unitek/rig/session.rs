@@ -1,0 +1,248 @@
+//! A rig of UNITEK drives in use: locked, opened, found to answer, guarded, and taken to its safe state on every way out.
+
+use super::{Axis, axes, limits, setup};
+use crate::buses::unitek::driver::Driver;
+use crate::buses::unitek::gate::guarded;
+use crate::buses::unitek::safe_state::safe_state;
+use crate::buses::unitek::simulate::Bench;
+use crate::guard::Guarded;
+use crate::link::{Line, Trouble};
+use crate::medium::Heard;
+use crate::rig::taken::{Taken, take};
+use crate::rig::{End, Ends, Options, Rig, SessionError, standing};
+use harness_proto::can;
+use harness_proto::time::Span;
+
+/// How long a bus is listened to before anything is sent.
+const LISTEN: Span = Span::from_millis(50);
+
+/// Which firmware a drive has: the register that every drive is asked for at first.
+const FIRMWARE: u8 = 0x1B;
+
+/// The registers that a highest speed is measured by: the rpm of 100 %, and the limit of the speed.
+const SPEEDS: [u8; 2] = [0xC8, 0x34];
+
+/// A rig in use.
+#[derive(Debug)]
+pub struct Session {
+    rig: Rig,
+    link: Guarded<Ends>,
+    axes: Vec<Axis>,
+    patience: Span,
+    listen_only: bool,
+    /// The drives are as they are to be left.
+    ended: bool,
+    // Given back in this order.
+    taken: Taken,
+}
+
+impl Session {
+    /// Takes a rig: lock, hook, port. Listens first. Then asks every drive for its firmware, unless the file says `listen_only`.
+    ///
+    /// # Errors
+    /// [`SessionError`]; nothing is left locked or open.
+    pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
+        let (Some(port), Some(setup)) = (rig.port(), setup(rig)) else {
+            return Err(failed(rig, "it has no [port.1]"));
+        };
+        let taken = take(rig, options)?;
+        let ends = if rig.is_simulated() {
+            Ends::Simulated(Box::new(Bench::new(&setup)))
+        } else {
+            return Err(failed(rig, "no link over an adapter is built yet"));
+        };
+        let axes = axes(port);
+        let identifiers: Vec<_> = axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
+        let limits = limits(rig, options.allow_motion);
+        let mut session = Self {
+            rig: rig.clone(),
+            link: guarded(ends, limits, &identifiers, port.listen_only),
+            axes,
+            patience: span(port.patience.0),
+            listen_only: port.listen_only,
+            // Nothing has been sent: there is nothing to make safe.
+            ended: true,
+            taken,
+        };
+        if rig.is_simulated() {
+            session.link.set_interrupt(options.interrupt.clone());
+        }
+        let ready = session
+            .listen()
+            .and_then(|()| session.ask(options.ill_as_well));
+        match ready {
+            Err(_) if session.link.trouble() == Some(&Trouble::Interrupted) => {
+                let end = Some(Box::new(session.end(false)));
+                let rig = rig.id().to_owned();
+                return Err(SessionError::Interrupted { rig, end });
+            }
+            other => other?,
+        }
+        session.taken.around.used();
+        session.ended = session.listen_only || rig.is_simulated();
+        Ok(session)
+    }
+
+    /// The rig.
+    #[must_use]
+    pub const fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// Its drives.
+    #[must_use]
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    /// Its guarded link.
+    pub const fn link(&mut self) -> &mut Guarded<Ends> {
+        &mut self.link
+    }
+
+    /// A driver of its drives.
+    pub fn driver(&mut self) -> Driver<'_> {
+        Driver::new(Box::new(&mut self.link), &self.axes, self.patience)
+    }
+
+    /// Listens before anything is sent: a bench must not disturb another master.
+    fn listen(&mut self) -> Result<(), SessionError> {
+        if self.rig.is_simulated() {
+            return Ok(());
+        }
+        let end = self.link.now() + LISTEN;
+        while self.link.now() < end && self.link.trouble().is_none() {
+            self.link.wait(end);
+            while let Some((_, heard)) = self.link.receive(0) {
+                let Heard::Frame(can::Heard::Frame(frame)) = heard else {
+                    continue;
+                };
+                let number = frame.id().number();
+                let meant =
+                    |axis: &&Axis| u32::from(axis.rx) == number && !frame.id().is_extended();
+                if let Some(axis) = self.axes.iter().find(meant)
+                    && !self.listen_only
+                {
+                    let why = format!(
+                        "another master sends to drive {} ({frame}): end it first, or set `listen_only = true`",
+                        axis.node
+                    );
+                    return Err(failed(&self.rig, &why));
+                }
+            }
+        }
+        self.sound()
+    }
+
+    /// Asks every drive for its firmware, and learns what a highest speed is measured by.
+    fn ask(&mut self, ill_as_well: bool) -> Result<(), SessionError> {
+        if self.listen_only || !self.rig.file.health.before && !self.needs_speeds() {
+            return Ok(());
+        }
+        let speeds = self.needs_speeds();
+        let mut learnt = Vec::new();
+        let mut silent = Ok(());
+        let axes = self.axes.clone();
+        let mut driver = self.driver();
+        for axis in axes {
+            let mut read = |register| {
+                let reply = driver.read(axis, register);
+                reply.map(|reply| (reply.data.bits() & 0xFFFF) as u16)
+            };
+            let done = read(FIRMWARE).and_then(|_| {
+                if speeds {
+                    learnt.push((axis.rx, read(SPEEDS[0])?, read(SPEEDS[1])?));
+                }
+                Ok(())
+            });
+            if silent.is_ok() {
+                silent = done;
+            }
+        }
+        drop(driver);
+        if let Some(gate) = self.link.segment_mut() {
+            for (rx, full, limit) in learnt {
+                gate.learn(rx, full, limit);
+            }
+        }
+        self.sound()?;
+        match silent {
+            Err(error) if !ill_as_well => Err(failed(&self.rig, &error.to_string())),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a highest speed needs to know what drives hold.
+    fn needs_speeds(&self) -> bool {
+        let limits = self
+            .link
+            .segment()
+            .map(harness_proto::unitek::guard::Gate::limits);
+        limits.is_some_and(|limits| limits.motion && limits.max_speed.is_some())
+    }
+
+    fn sound(&self) -> Result<(), SessionError> {
+        self.link.trouble().map_or(Ok(()), |trouble| {
+            Err(failed(&self.rig, &trouble.to_string()))
+        })
+    }
+
+    /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
+    #[must_use]
+    pub fn close(mut self, error: bool) -> End {
+        self.end(error)
+    }
+
+    /// Gives the rig back with its drives as they are: after what has only looked, or was asked to let motors turn.
+    #[must_use]
+    pub fn release(mut self) -> End {
+        self.ended = true;
+        self.end(false)
+    }
+
+    fn end(&mut self, error: bool) -> End {
+        let mut end = End {
+            safe: None,
+            power: Vec::new(),
+            remarks: Vec::new(),
+        };
+        let wanted = self.rig.file.safe_state.clone();
+        if !std::mem::replace(&mut self.ended, true) {
+            self.link.set_watch(None);
+            if let Some(ports) = self.link.inner_mut().ports_mut() {
+                ports.resume();
+            }
+            self.link.reset_after_denial();
+            let standing = standing(&wanted);
+            if !standing.order.is_empty() {
+                let axes = self.axes.clone();
+                end.safe = Some(safe_state(&mut self.link, &axes, self.patience, &standing));
+            }
+            if wanted.order.contains(&crate::rig::file::SafeStep::PowerOff) {
+                end.power = self.taken.around.power_off();
+            }
+        }
+        end.remarks = self.taken.around.end(error);
+        end
+    }
+}
+
+impl Drop for Session {
+    /// A panic unwinds through here.
+    fn drop(&mut self) {
+        if !self.ended {
+            let _told_by_nobody = self.end(true);
+        }
+    }
+}
+
+fn failed(rig: &Rig, why: &str) -> SessionError {
+    SessionError::Drives {
+        rig: rig.id().to_owned(),
+        why: why.to_owned(),
+    }
+}
+
+fn span(time: std::time::Duration) -> Span {
+    Span::from_nanos(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX))
+}
