@@ -3,6 +3,7 @@
 //! A scenario sees a link and nothing behind it. Each link says what it can observe and inject; what it
 //! cannot makes a scenario that needs it skipped, never wrong.
 
+pub mod frames;
 pub(crate) mod inner;
 pub(crate) mod lateness;
 mod octets;
@@ -23,7 +24,7 @@ pub use replay::Replay;
 pub use tamper::{needs_line_errors, only_simulated};
 
 use crate::buses::Stimulus;
-use crate::medium::{Heard, Medium, Out};
+use crate::medium::{Heard, Medium, Out, Pieces};
 use crate::port::LastWords;
 use harness_proto::line::Received;
 use harness_proto::time::{Instant, Span};
@@ -281,11 +282,11 @@ pub trait PortLink: Link {
     /// A counter that increases as long as the user of this link keeps calling it; a watchdog reads it.
     fn beats(&self) -> Arc<AtomicU64>;
 
-    /// Prepares bytes for each port that a watchdog can send when the owner of this link hangs.
+    /// Prepares pieces for each port that a watchdog can send when the owner of this link hangs, as the port codes them.
     ///
     /// # Errors
     /// No file descriptor is left.
-    fn last_words(&self, bytes: &dyn Fn(usize) -> Vec<u8>) -> io::Result<Vec<LastWords>>;
+    fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> io::Result<Vec<LastWords>>;
 
     /// Allows sending again after an interruption, so that a safe state can be reached. Other trouble stays.
     fn resume(&mut self);

@@ -20,7 +20,7 @@ mod serial;
 mod wire;
 
 pub use last_words::{LastWords, Unsaid};
-pub use open::{Endpoint, OpenError, PortSettings, open};
+pub use open::{Endpoint, OpenError, PortSettings, open, open_adapter};
 pub use wire::{Abilities, Outgoing, Wire};
 
 use rustix::thread::set_current_timer_slack;

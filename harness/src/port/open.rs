@@ -163,6 +163,27 @@ pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
     }
 }
 
+/// Opens the stream of an adapter that speaks in characters: a serial port with 8N1 at this rate, a pseudo terminal or a socket. Nothing
+/// is sent, and what was received before is dropped.
+///
+/// # Errors
+/// [`OpenError`]; the port is left as it was.
+pub fn open_adapter(endpoint: &Endpoint, bits_per_second: u32) -> Result<Wire, OpenError> {
+    let name = endpoint.to_string();
+    match endpoint {
+        Endpoint::Serial(path) | Endpoint::Pty(path) => {
+            match serial::open_plain(path, bits_per_second) {
+                Ok((fd, serial)) => Ok(Wire::new(fd, name, Coding::Plain).keeping(serial)),
+                Err(OpenError::PseudoTerminal(_)) => Ok(Wire::new(pty(path)?, name, Coding::Plain)),
+                Err(error) => Err(error),
+            }
+        }
+        Endpoint::Tcp(address) | Endpoint::Rfc2217(address) => {
+            Ok(Wire::new(connect(address)?.into(), name, Coding::Plain))
+        }
+    }
+}
+
 fn pty(path: &Path) -> Result<rustix::fd::OwnedFd, OpenError> {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let fd = rustix::fs::open(path, flags, Mode::empty())

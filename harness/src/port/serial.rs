@@ -47,14 +47,47 @@ pub(super) fn open(
     low_latency: bool,
 ) -> Result<(OwnedFd, Serial), OpenError> {
     let name = path.display().to_string();
-    let before = look(path)?;
     let wrong = |error: &serialport::Error| OpenError::Setting {
         port: name.clone(),
         what: format!("{} 8O1 ({error})", rate.bits_per_second()),
     };
-    let port = serialport::new(name.as_str(), rate.bits_per_second())
+    let (fd, serial) = raw(path, rate.bits_per_second(), Parity::Odd, &wrong)?;
+    set_marks(&fd, rate).map_err(|what| OpenError::Setting {
+        port: name.clone(),
+        what,
+    })?;
+    if low_latency {
+        lower_latency(path);
+    }
+    Ok((fd, serial))
+}
+
+/// Opens a serial port with 8 data bits, no parity and 1 stop bit, for an adapter that speaks in characters.
+pub(super) fn open_plain(
+    path: &Path,
+    bits_per_second: u32,
+) -> Result<(OwnedFd, Serial), OpenError> {
+    let name = path.display().to_string();
+    let wrong = |error: &serialport::Error| OpenError::Other {
+        port: name.clone(),
+        error: io::Error::other(format!("{bits_per_second} 8N1 ({error})")),
+    };
+    let opened = raw(path, bits_per_second, Parity::None, &wrong)?;
+    lower_latency(path);
+    Ok(opened)
+}
+
+/// Opens a serial port without flow control; nothing is read or sent.
+fn raw(
+    path: &Path,
+    bits_per_second: u32,
+    parity: Parity,
+    wrong: &dyn Fn(&serialport::Error) -> OpenError,
+) -> Result<(OwnedFd, Serial), OpenError> {
+    let before = look(path)?;
+    let port = serialport::new(path.display().to_string(), bits_per_second)
         .data_bits(DataBits::Eight)
-        .parity(Parity::Odd)
+        .parity(parity)
         .stop_bits(StopBits::One)
         .flow_control(FlowControl::None)
         .exclusive(false)
@@ -71,15 +104,8 @@ pub(super) fn open(
             .map_err(|error| OpenError::of(path, &error))?,
         gaps: Vec::new(),
     };
-    set_marks(&fd, rate).map_err(|what| OpenError::Setting {
-        port: name.clone(),
-        what,
-    })?;
     rustix::io::ioctl_fionbio(&fd, true).map_err(other)?;
     rustix::termios::tcflush(&fd, QueueSelector::IOFlush).map_err(other)?;
-    if low_latency {
-        lower_latency(path);
-    }
     Ok((fd, serial))
 }
 

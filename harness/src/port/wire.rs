@@ -64,6 +64,8 @@ pub struct Wire {
     bytes_waiting: usize,
     /// Line errors of which it is not known at which byte they were.
     unplaced: u64,
+    /// A serial port under plain bytes: its settings are put back with it.
+    plain_serial: Option<Box<Serial>>,
 }
 
 #[derive(Debug)]
@@ -83,6 +85,15 @@ impl Wire {
             waiting: VecDeque::new(),
             bytes_waiting: 0,
             unplaced: 0,
+            plain_serial: None,
+        }
+    }
+
+    /// The same over a serial port that carries plain bytes.
+    pub(super) fn keeping(self, serial: Serial) -> Self {
+        Self {
+            plain_serial: Some(Box::new(serial)),
+            ..self
         }
     }
 
@@ -135,7 +146,7 @@ impl Wire {
     #[must_use]
     pub fn is_prompt(&self) -> bool {
         match self.coding {
-            Coding::Plain | Coding::Marked(_) => true,
+            Coding::Plain | Coding::Marked(_) => self.plain_serial.is_none(),
             Coding::Serial(..) | Coding::Telnet(_) => false,
         }
     }

@@ -15,6 +15,7 @@ use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, Safe, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, Octets, PortLink, Trouble};
+use crate::medium::Pieces;
 use crate::rig::health::{self, Health, Unhealthy, examine};
 use crate::rig::interlock::Interlocks;
 use crate::rig::line_test::{self, Cause};
@@ -414,9 +415,10 @@ impl Session {
         let Some(ports) = self.link.inner_mut().ports_mut() else {
             return Ok(None);
         };
-        let bytes = |ring: usize| sizes.get(ring).map_or(Vec::new(), |size| blind_stop(*size));
+        let stop = |ring: usize| sizes.get(ring).map_or(Vec::new(), |size| blind_stop(*size));
+        let stop = |ring: usize| Pieces::Octets(stop(ring));
         let beats = ports.beats();
-        let words = ports.last_words(&bytes).map_err(SessionError::Watchdog)?;
+        let words = ports.last_words(&stop).map_err(SessionError::Watchdog)?;
         let safe_state = &self.rig.file.safe_state;
         let limit = safe_state.watchdog.0;
         let cut = safe_state.order.contains(&file::SafeStep::PowerOff);

@@ -3,10 +3,17 @@
 //! Every wait has an end that a loaded machine does not reach.
 
 use crate::serve::{Sim, connect, path};
+use harness::link::frames::{AdapterPlace, AdapterSettings, FrameLink};
+use harness::link::{Line, Link};
+use harness::medium::Out;
+use harness_proto::can::BitRate;
+use harness_proto::can::{Frame, Heard, Id};
+use harness_proto::time::{Instant, Span};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Arc;
 
 const BUS: [&str; 2] = ["--bus", "unitek"];
 
@@ -193,4 +200,53 @@ fn what_a_client_sent_last_goes_its_way() {
     short.write_all(b"O\rt2013D40000\rC\r").expect("sent");
     drop(short);
     assert_eq!(until(&mut listener, "\r"), "t2013D40000\r");
+}
+
+/// The bench's own link over every way in: a request and its reply, and nothing that a listener says.
+#[test]
+fn the_bench_s_own_link_talks_to_a_drive() {
+    let terminal = path("slcan-link");
+    let terminal = terminal.to_str().expect("text");
+    let slcan = ["--slcan", "127.0.0.1:0", "--slcan-pty", terminal];
+    let mut sim = start(&[&slcan[..], &["--socketcand", "127.0.0.1:0"]].concat());
+    let (slcan, socketcand) = (sim.address(), sim.address());
+    for place in [
+        AdapterPlace::slcan(&slcan),
+        AdapterPlace::slcan(terminal),
+        AdapterPlace::Socketcand {
+            address: socketcand,
+            channel: "can0".to_owned(),
+        },
+    ] {
+        let settings = |listen_only| AdapterSettings {
+            place: place.clone(),
+            rate: BitRate::K500,
+            listen_only,
+        };
+        let drive = vec![(Id::base(0x181).expect("small"), 1)];
+        let open = |settings| FrameLink::open(&settings, drive.clone(), Arc::default());
+        let mut link = open(settings(false)).expect("an adapter");
+        link.begin();
+        let asked: Frame = "201#3D1B00".parse().expect("a frame");
+        link.send(0, Out::Frames(&[asked]));
+        let long = Instant::START + Span::from_millis(60_000);
+        let reply = loop {
+            if let Some(reply) = link.receive(0) {
+                break reply;
+            }
+            assert!(link.wait(long) && link.now() < long, "{:?}", link.trouble());
+        };
+        let (at, heard) = reply;
+        let expected: Frame = "181#1BD80100".parse().expect("a frame");
+        assert_eq!(heard.frame(), Some(Heard::Frame(expected)));
+        assert!(at <= link.now());
+        let trace = link.trace(0);
+        let from = |own: &harness_sim::record::LineFrame| (own.from, own.frame);
+        let carried: Vec<_> = trace.channels[0].frames().iter().map(from).collect();
+        assert_eq!(carried, [(None, asked), (Some(1), expected)]);
+        drop(link);
+        let mut listener = open(settings(true)).expect("an adapter");
+        listener.send(0, Out::Frames(&[asked]));
+        assert_eq!(listener.refused(), 1, "{place:?}");
+    }
 }

@@ -1,0 +1,356 @@
+//! A client's end of SLCAN and socketcand: frames out, what is heard in, without I/O.
+
+use super::clock::AdapterClock;
+use crate::frames::slcan::{self, Command, Report, STAMP_PERIOD, flags};
+use crate::frames::socketcand::{Answer, Messages, Request, class};
+use harness_proto::can::{BusError, Frame, Heard};
+use harness_proto::time::{Instant, Span};
+use std::collections::VecDeque;
+
+/// How long an answer may take; an adapter that does not answer every command is not waited for any longer.
+const PATIENCE: Span = Span::from_millis(500);
+
+/// How often the status of an SLCAN adapter is asked for.
+const STATUS_EVERY: Span = Span::from_millis(250);
+
+/// Unanswered commands of which the last one may still be a frame.
+const MOST_UNANSWERED: usize = 4;
+
+/// What has come of an adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Event {
+    /// Something on the bus, and when.
+    Heard(Instant, Heard),
+    /// The adapter has lost frames.
+    Overrun,
+    /// Nothing more is carried, and why.
+    Ended(String),
+}
+
+/// A language, and the state of a conversation in it.
+#[derive(Debug)]
+pub(super) enum Adapter {
+    Slcan(Slcan),
+    Socketcand(Socketcand),
+}
+
+impl Adapter {
+    /// Writes a frame; false if the language has no such frame.
+    pub(super) fn send(&mut self, now: Instant, frame: &Frame, out: &mut Vec<u8>) -> bool {
+        match self {
+            Self::Slcan(own) => own.command(now, Command::Send(*frame), out),
+            Self::Socketcand(_) if frame.is_remote() => return false,
+            Self::Socketcand(_) => Request::Send(*frame).write(out),
+        }
+        true
+    }
+
+    /// Whether the language has such a frame.
+    pub(super) const fn carries(&self, frame: &Frame) -> bool {
+        matches!(self, Self::Slcan(_)) || !frame.is_remote()
+    }
+
+    /// How a frame is written, beside the conversation.
+    pub(super) fn encode(&self, frame: &Frame, out: &mut Vec<u8>) {
+        match self {
+            Self::Slcan(_) => Command::Send(*frame).write(out),
+            Self::Socketcand(_) => Request::Send(*frame).write(out),
+        }
+    }
+
+    /// Whether the next frame may be handed over.
+    pub(super) fn is_ready(&self) -> bool {
+        match self {
+            Self::Slcan(own) => own.unanswered.len() < MOST_UNANSWERED,
+            Self::Socketcand(_) => true,
+        }
+    }
+
+    /// Does what is due, and writes it.
+    pub(super) fn attend(&mut self, now: Instant, out: &mut Vec<u8>) {
+        if let Self::Slcan(own) = self {
+            own.attend(now, out);
+        }
+    }
+
+    /// When [`Self::attend`] is to be called again.
+    pub(super) fn due(&self) -> Option<Instant> {
+        match self {
+            Self::Slcan(own) => own.due(),
+            Self::Socketcand(_) => None,
+        }
+    }
+
+    /// Takes a character that is read at `read`.
+    pub(super) fn push(&mut self, character: u8, read: Instant) -> Vec<Event> {
+        match self {
+            Self::Slcan(own) => own.push(character, read),
+            Self::Socketcand(own) => own.push(character, read).into_iter().collect(),
+        }
+    }
+}
+
+/// An SLCAN adapter whose channel is open.
+#[derive(Debug)]
+pub(super) struct Slcan {
+    lines: slcan::Lines,
+    clock: AdapterClock,
+    /// Commands that wait for an answer, and since when.
+    unanswered: VecDeque<(Command, Instant)>,
+    /// When the status is asked for again; `None` with an adapter that has none.
+    status: Option<Instant>,
+    listen_only: bool,
+}
+
+impl Slcan {
+    pub(super) fn new(listen_only: bool) -> Self {
+        let period = Span::from_millis(STAMP_PERIOD.into());
+        Self {
+            lines: slcan::Lines::default(),
+            clock: AdapterClock::new(Span::from_millis(1), Some(period)),
+            unanswered: VecDeque::new(),
+            status: Some(Instant::START),
+            listen_only,
+        }
+    }
+
+    fn command(&mut self, now: Instant, command: Command, out: &mut Vec<u8>) {
+        command.write(out);
+        self.unanswered.push_back((command, now));
+    }
+
+    fn attend(&mut self, now: Instant, out: &mut Vec<u8>) {
+        while let Some(&(_, since)) = self.unanswered.front()
+            && since + PATIENCE <= now
+        {
+            self.unanswered.pop_front();
+        }
+        if self.status.is_some_and(|at| at <= now) && self.unanswered.is_empty() {
+            self.status = Some(now + STATUS_EVERY);
+            self.command(now, Command::Flags, out);
+        }
+    }
+
+    fn due(&self) -> Option<Instant> {
+        let front = self.unanswered.front().map(|(_, since)| *since + PATIENCE);
+        let status = self.status.filter(|_| front.is_none());
+        front.or(status)
+    }
+
+    fn push(&mut self, character: u8, read: Instant) -> Vec<Event> {
+        let Some(line) = self.lines.push(character) else {
+            return Vec::new();
+        };
+        let report = line.and_then(|(line, end)| Report::parse(&line, end));
+        match report {
+            Ok(Report::Frame(frame, stamp)) => {
+                let at = stamp.map_or(read, |stamp| {
+                    self.clock.at(Span::from_millis(stamp.into()), read)
+                });
+                vec![Event::Heard(at, Heard::Frame(frame))]
+            }
+            Ok(Report::Refused) => self.refused(read),
+            Ok(Report::Flags(bits)) => {
+                self.answered(|command| command == Command::Flags);
+                status(bits, read)
+            }
+            Ok(Report::Done | Report::Taken { .. }) => {
+                self.answered(|command| command != Command::Flags);
+                Vec::new()
+            }
+            // Answers to commands of the opening, and lines that only some adapters have.
+            Ok(Report::Version(_) | Report::SerialNumber(_) | Report::Other(_)) => Vec::new(),
+            Err(error) => vec![Event::Ended(error.to_string())],
+        }
+    }
+
+    /// The oldest command of a kind was answered.
+    fn answered(&mut self, of: impl Fn(Command) -> bool) {
+        let place = self.unanswered.iter().position(|(command, _)| of(*command));
+        place.and_then(|place| self.unanswered.remove(place));
+    }
+
+    fn refused(&mut self, read: Instant) -> Vec<Event> {
+        match self.unanswered.pop_front() {
+            Some((Command::Send(frame), _)) => vec![Event::Ended(format!(
+                "the adapter has refused to send {frame}: its queue is full or it is bus-off; check rate, cable, termination and that \
+                 a drive is on"
+            ))],
+            Some((Command::Flags, _)) => {
+                self.status = None;
+                Vec::new()
+            }
+            // Not an answer of the conversation: some adapters report an error so.
+            Some(_) | None if self.listen_only => Vec::new(),
+            Some(_) | None => vec![Event::Heard(read, Heard::Error(BusError::ErrorFrame))],
+        }
+    }
+}
+
+/// What the status bits of an SLCAN adapter report.
+fn status(bits: u8, read: Instant) -> Vec<Event> {
+    let lost = bits & (flags::OVERRUN | flags::RECEIVE_FULL) != 0;
+    let wrong = bits & (flags::BUS_ERROR | flags::PASSIVE) != 0;
+    let error = Event::Heard(read, Heard::Error(BusError::ErrorFrame));
+    let all = [(lost, Event::Overrun), (wrong, error)];
+    all.into_iter()
+        .filter(|(set, _)| *set)
+        .map(|(_, event)| event)
+        .collect()
+}
+
+/// A connection to socketcand in raw mode.
+#[derive(Debug)]
+pub(super) struct Socketcand {
+    messages: Messages,
+    clock: AdapterClock,
+}
+
+impl Socketcand {
+    pub(super) fn new() -> Self {
+        Self {
+            messages: Messages::default(),
+            clock: AdapterClock::new(Span::ZERO, None),
+        }
+    }
+
+    fn push(&mut self, character: u8, read: Instant) -> Option<Event> {
+        let answer = self.messages.push(character)?;
+        let answer = answer.and_then(|message| Answer::parse(&message));
+        let heard = match answer {
+            Ok(Answer::Frame(frame, stamp)) => {
+                let since = Span::from_micros(
+                    (stamp.seconds % SECONDS) * 1_000_000 + u64::from(stamp.micros),
+                );
+                return Some(Event::Heard(
+                    self.clock.at(since, read),
+                    Heard::Frame(frame),
+                ));
+            }
+            Ok(Answer::ErrorFrame(bits, _)) if bits & class::BUS_OFF != 0 => BusError::BusOff,
+            Ok(Answer::ErrorFrame(bits, _)) if bits & class::NO_ACKNOWLEDGE != 0 => {
+                BusError::NoAcknowledge
+            }
+            Ok(Answer::ErrorFrame(bits, _)) if bits & class::RESTARTED != 0 => return None,
+            Ok(Answer::ErrorFrame(..)) => BusError::ErrorFrame,
+            Ok(Answer::Hi | Answer::Ok | Answer::Echo) => return None,
+            Ok(Answer::Error(text)) => {
+                return Some(Event::Ended(format!(
+                    "the server of socketcand reports: {text}"
+                )));
+            }
+            Err(error) => return Some(Event::Ended(error.to_string())),
+        };
+        Some(Event::Heard(read, Heard::Error(heard)))
+    }
+}
+
+/// Stamps are taken modulo this number of seconds, more than 24 years.
+const SECONDS: u64 = 800_000_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(millis: u64) -> Instant {
+        Instant::START + Span::from_millis(millis)
+    }
+
+    fn frame(text: &str) -> Frame {
+        text.parse().expect("a frame")
+    }
+
+    fn events(adapter: &mut Adapter, text: &str, read: Instant) -> Vec<Event> {
+        text.bytes()
+            .flat_map(|own| adapter.push(own, read))
+            .collect()
+    }
+
+    fn written(adapter: &mut Adapter, now: Instant, text: &str) -> String {
+        let mut out = Vec::new();
+        assert!(adapter.send(now, &frame(text), &mut out));
+        String::from_utf8(out).expect("characters")
+    }
+
+    #[test]
+    fn an_adapter_hears_and_is_asked_for_its_status() {
+        let mut own = Adapter::Slcan(Slcan::new(false));
+        let mut out = Vec::new();
+        own.attend(at(1), &mut out);
+        assert_eq!(out, b"F\r");
+        assert_eq!(events(&mut own, "F00\r", at(2)), []);
+        assert_eq!(own.due(), Some(at(251)));
+        assert_eq!(written(&mut own, at(3), "201#3D4000"), "t20133D4000\r");
+        assert_eq!(own.due(), Some(at(503)));
+        let heard = events(&mut own, "z\rt181440810100\r", at(4));
+        assert_eq!(
+            heard,
+            [Event::Heard(at(4), Heard::Frame(frame("181#40810100")))]
+        );
+        assert_eq!(own.due(), Some(at(251)));
+        let flags = events(&mut own, "F89\r", at(5));
+        assert_eq!(flags.len(), 2, "{flags:?}");
+        assert_eq!(flags[0], Event::Overrun);
+    }
+
+    /// What is refused is the oldest command; an adapter without status is not asked again.
+    #[test]
+    fn refusals_belong_to_commands() {
+        let mut own = Adapter::Slcan(Slcan::new(false));
+        own.attend(at(1), &mut Vec::new());
+        written(&mut own, at(1), "201#3D4000");
+        assert_eq!(events(&mut own, "\x07", at(2)), []);
+        assert_eq!(own.due(), Some(at(501)));
+        let refused = events(&mut own, "\x07", at(2));
+        assert!(
+            matches!(&refused[..], [Event::Ended(why)] if why.contains("201#3D4000")),
+            "{refused:?}"
+        );
+        assert_eq!(own.due(), None);
+    }
+
+    /// An adapter that does not answer frames is given further ones after a while.
+    #[test]
+    fn answers_that_do_not_come_are_not_waited_for() {
+        let mut own = Adapter::Slcan(Slcan::new(false));
+        for _ in 0..MOST_UNANSWERED {
+            assert!(own.is_ready());
+            written(&mut own, at(0), "201#3D4000");
+        }
+        assert!(!own.is_ready());
+        own.attend(at(499), &mut Vec::new());
+        assert!(!own.is_ready());
+        own.attend(at(500), &mut Vec::new());
+        assert!(own.is_ready());
+    }
+
+    #[test]
+    fn a_daemon_reports_frames_and_errors() {
+        let mut own = Adapter::Socketcand(Socketcand::new());
+        assert_eq!(
+            written(&mut own, at(0), "201#3D4000"),
+            "< send 201 3 3d 40 0 >"
+        );
+        assert!(!own.send(at(0), &frame("201#R3"), &mut Vec::new()));
+        let heard = events(&mut own, "< ok >< frame 181 1700000000.000100 AA >", at(9));
+        assert_eq!(heard, [Event::Heard(at(9), Heard::Frame(frame("181#AA")))]);
+        let errors = events(
+            &mut own,
+            "< error 040 1.0 >< error 020 1.0 >< error 088 1.0 >< error 100 1.0 >",
+            at(9),
+        );
+        let error = |error| Event::Heard(at(9), Heard::Error(error));
+        assert_eq!(
+            errors,
+            [
+                error(BusError::BusOff),
+                error(BusError::NoAcknowledge),
+                error(BusError::ErrorFrame)
+            ]
+        );
+        for text in ["< error no bus >", "hello >"] {
+            let ended = events(&mut own, text, at(9));
+            assert!(matches!(&ended[..], [Event::Ended(_)]), "{text}: {ended:?}");
+        }
+    }
+}

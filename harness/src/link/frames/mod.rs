@@ -1,0 +1,434 @@
+//! Frames over a CAN adapter in real time: SLCAN behind a serial port, a pseudo terminal or a socket, and socketcand.
+//!
+//! Time is the computer's monotonic clock. A frame is stamped by the adapter where it has stamps, and with the time of reading where it
+//! has none. When a frame of the bench itself was on the bus is not reported by either language: it counts as sent as soon as the bus can
+//! have been free for it.
+//!
+//! Nothing here decides what may be sent: that is the guard's, which stands in front of this link.
+
+mod adapter;
+mod clock;
+mod open;
+
+pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD};
+
+use super::port_end::MOST_RECORDED;
+use super::{Capability, InnerLink, Line, Link, Moment, PlacedFault, PortLink, Trouble};
+use crate::medium::{Heard, Medium, Out, Pieces};
+use crate::port::{LastWords, Outgoing, Wire, wake_on_time};
+use adapter::{Adapter, Event};
+use harness_proto::can::{self, BitRate, BusError, Frame};
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
+use rustix::event::{Timespec, poll};
+use rustix::fd::BorrowedFd;
+use std::cell::Cell;
+use std::collections::VecDeque;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time;
+
+/// How far ahead of the bus frames are handed to the adapter.
+const AHEAD: Span = Span::from_millis(2);
+
+/// How long behind the bench's last frame an answer to it may come through an adapter and a busy computer.
+const SLACK: Span = Span::from_millis(30);
+
+/// The longest sleep: a request to end is looked for at least this often.
+const NAP: Span = Span::from_millis(50);
+
+/// A link over a CAN adapter, with one port.
+#[derive(Debug)]
+pub struct FrameLink {
+    wire: Wire,
+    adapter: Adapter,
+    rate: BitRate,
+    listen_only: bool,
+    /// The identifier with which each drive sends.
+    senders: Vec<(can::Id, u8)>,
+    tolerance: Span,
+    /// When the conversation started, and that on the adapter's clock, which starts with the link.
+    start: time::Instant,
+    opened: time::Instant,
+    /// The last time that `now` returned.
+    told: Cell<Instant>,
+    /// What has not been handed to the adapter.
+    queue: VecDeque<Frame>,
+    /// When the bus is free for the next frame.
+    free: Instant,
+    /// Pieces of the last `send` that were not taken.
+    refused: usize,
+    received: VecDeque<(Instant, can::Heard)>,
+    /// Input was reported and is still unread.
+    lying: bool,
+    log: Vec<LineFrame>,
+    carried: u64,
+    unplaced: u64,
+    interrupt: Arc<AtomicBool>,
+    beats: Arc<AtomicU64>,
+    trouble: Option<Trouble>,
+}
+
+impl FrameLink {
+    /// Opens an adapter and its channel. `senders` says which drive sends with which identifier; what comes with another one counts as
+    /// from station 0. When `interrupt` is set, the link stops with [`Trouble::Interrupted`].
+    ///
+    /// # Errors
+    /// [`AdapterError`]; the channel is closed again.
+    pub fn open(
+        settings: &AdapterSettings,
+        senders: Vec<(can::Id, u8)>,
+        interrupt: Arc<AtomicBool>,
+    ) -> Result<Self, AdapterError> {
+        wake_on_time();
+        let opened = open::open(settings, &interrupt)?;
+        let now = time::Instant::now();
+        let mut link = Self {
+            wire: opened.wire,
+            adapter: opened.adapter,
+            rate: settings.rate,
+            listen_only: settings.listen_only,
+            senders,
+            tolerance: SLACK,
+            start: now,
+            opened: now,
+            told: Cell::new(Instant::START),
+            queue: VecDeque::new(),
+            free: Instant::START,
+            refused: 0,
+            received: VecDeque::new(),
+            lying: false,
+            log: Vec::new(),
+            carried: 0,
+            unplaced: 0,
+            interrupt,
+            beats: Arc::default(),
+            trouble: None,
+        };
+        link.understand(opened.come);
+        Ok(link)
+    }
+
+    /// Sets how exact its times are; 30 ms at first.
+    pub const fn set_time_tolerance(&mut self, tolerance: Span) {
+        self.tolerance = tolerance;
+    }
+
+    /// The descriptor of its stream, for locks.
+    #[must_use]
+    pub fn fd(&self) -> BorrowedFd<'_> {
+        self.wire.fd()
+    }
+
+    /// A time of the computer's clock, in the conversation.
+    fn at(&self, time: time::Instant) -> Instant {
+        Instant::START + span(time.saturating_duration_since(self.start))
+    }
+
+    /// The time on the adapter's clock, which goes on when a conversation begins.
+    fn adapter_now(&self) -> Instant {
+        Instant::START + span(self.opened.elapsed())
+    }
+
+    /// The start of the conversation on that clock.
+    fn begun(&self) -> Span {
+        span(self.start.saturating_duration_since(self.opened))
+    }
+
+    fn clock_now(&self) -> Instant {
+        self.at(time::Instant::now())
+    }
+
+    fn is_sound(&self) -> bool {
+        self.trouble.is_none()
+    }
+
+    fn end(&mut self, trouble: Trouble) {
+        self.queue.clear();
+        self.trouble.get_or_insert(trouble);
+    }
+
+    /// Hands over what is due, and reads what has come.
+    fn look(&mut self) {
+        self.beats.fetch_add(1, Ordering::Relaxed);
+        if self.interrupt.load(Ordering::Relaxed) {
+            self.end(Trouble::Interrupted);
+        }
+        let given = self.give();
+        let took = self.take();
+        if let Err(trouble) = given.and(took) {
+            self.end(trouble);
+        }
+    }
+
+    fn give(&mut self) -> Result<(), Trouble> {
+        if !self.is_sound() {
+            return Ok(());
+        }
+        let now = self.clock_now();
+        let mut bytes = Vec::new();
+        while let Some(&frame) = self.queue.front()
+            && self.free <= now + AHEAD
+            && self.adapter.is_ready()
+        {
+            self.queue.pop_front();
+            self.adapter.send(now + self.begun(), &frame, &mut bytes);
+            let start = self.free.max(now);
+            self.free = start + self.rate.time_of(frame.wire_bits());
+            self.keep(None, start, self.free, frame);
+        }
+        self.adapter.attend(now + self.begun(), &mut bytes);
+        for byte in bytes {
+            self.wire.send(Outgoing::Byte(byte))?;
+        }
+        self.wire.flush()
+    }
+
+    fn take(&mut self) -> Result<(), Trouble> {
+        if self.trouble.as_ref().is_some_and(Trouble::stops_the_line) {
+            return Ok(());
+        }
+        let mut read = Vec::new();
+        let result = self.wire.receive(&mut read);
+        self.understand(read.iter().map(|own| own.byte));
+        result
+    }
+
+    fn understand(&mut self, bytes: impl IntoIterator<Item = u8>) {
+        let (now, begun) = (self.adapter_now(), self.begun());
+        for byte in bytes {
+            for event in self.adapter.push(byte, now) {
+                match event {
+                    Event::Heard(at, heard) => self.hear(at - begun, heard),
+                    Event::Overrun => self.unplaced += 1,
+                    Event::Ended(why) => {
+                        let why = format!("{}: {why}", self.wire.name());
+                        self.end(Trouble::Lost(why));
+                    }
+                }
+            }
+        }
+    }
+
+    fn hear(&mut self, at: Instant, heard: can::Heard) {
+        let last = self.received.back();
+        let repeats =
+            matches!(heard, can::Heard::Error(_)) && last.is_some_and(|own| own.1 == heard);
+        if !repeats {
+            self.received.push_back((at, heard));
+        }
+        match heard {
+            can::Heard::Frame(frame) => {
+                let from = self.senders.iter().find(|(id, _)| *id == frame.id());
+                let from = from.map_or(0, |(_, drive)| *drive);
+                let start = at - self.rate.time_of(frame.wire_bits());
+                self.keep(Some(from), start, at, frame);
+            }
+            can::Heard::Error(BusError::BusOff) => {
+                let why = format!(
+                    "{}: the adapter is bus-off: check rate, cable and termination, and start it again",
+                    self.wire.name()
+                );
+                self.end(Trouble::Lost(why));
+            }
+            can::Heard::Error(_) => {}
+        }
+    }
+
+    fn keep(&mut self, from: Option<u8>, start: Instant, at: Instant, frame: Frame) {
+        self.carried += 1;
+        if self.log.len() < MOST_RECORDED {
+            self.log.push(LineFrame {
+                from,
+                start,
+                at,
+                frame,
+                ended: FrameEnd::Good,
+            });
+        }
+    }
+
+    /// Waits for the stream.
+    fn listen(&mut self, until: Instant) {
+        let due = match self.queue.is_empty() {
+            true => self.adapter.due().map(|due| due - self.begun()),
+            false => Some(self.free - AHEAD),
+        };
+        let now = self.clock_now();
+        let until = due.map_or(until, |due| until.min(due)).min(now + NAP);
+        let timeout = Timespec {
+            tv_sec: 0,
+            tv_nsec: i64::try_from(until.since(now).as_nanos()).unwrap_or(0),
+        };
+        // An error shows when the stream is read.
+        let _ready = poll(&mut [self.wire.poll_fd()], Some(&timeout));
+    }
+}
+
+fn span(duration: time::Duration) -> Span {
+    Span::from_nanos(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX))
+}
+
+impl Drop for FrameLink {
+    /// Closes the channel.
+    fn drop(&mut self) {
+        if matches!(self.adapter, Adapter::Slcan(_)) {
+            // A port that is gone has no channel any more.
+            let close = b"C\r"
+                .iter()
+                .map(|own| self.wire.send(Outgoing::Byte(*own)));
+            let _gone = close
+                .collect::<Result<(), _>>()
+                .and_then(|()| self.wire.flush());
+        }
+    }
+}
+
+impl Line for FrameLink {
+    fn medium(&self, _port: usize) -> Medium {
+        Medium::Frames(self.rate)
+    }
+
+    fn now(&self) -> Instant {
+        let now = self.clock_now();
+        self.told.set(now);
+        now
+    }
+
+    fn send(&mut self, port: usize, what: Out<'_>) -> Instant {
+        let now = self.now();
+        self.refused = 0;
+        if !self.permits(port, what) {
+            self.refused = what.len();
+            return now;
+        }
+        self.queue.extend(what.frames());
+        self.look();
+        let waiting = self.queue.iter().map(Frame::wire_bits).sum();
+        self.free.max(now) + self.rate.time_of(waiting)
+    }
+
+    /// Nothing while the bench only listens, and only what the adapter's language carries.
+    fn permits(&self, port: usize, what: Out<'_>) -> bool {
+        let carried =
+            what.octets().is_empty() && what.frames().iter().all(|own| self.adapter.carries(own));
+        let speaks = !self.listen_only || what.is_empty();
+        carried && speaks && port == 0 && self.is_sound()
+    }
+
+    fn refused(&self) -> usize {
+        self.refused
+    }
+
+    fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
+        let (at, heard) = self.received.pop_front().filter(|_| port == 0)?;
+        self.lying = false;
+        Some((at, Heard::Frame(heard)))
+    }
+
+    fn wait(&mut self, until: Instant) -> bool {
+        self.look();
+        if (self.lying || self.received.is_empty()) && self.is_sound() && self.clock_now() < until {
+            self.listen(until);
+            self.look();
+        }
+        self.lying = !self.received.is_empty();
+        self.is_sound()
+    }
+
+    fn trouble(&self) -> Option<&Trouble> {
+        self.trouble.as_ref()
+    }
+}
+
+impl Link for FrameLink {
+    fn capabilities(&self) -> &[Capability] {
+        &[]
+    }
+
+    fn begin(&mut self) {
+        self.look();
+        let now = self.clock_now();
+        self.free = Instant::START + self.free.since(now);
+        self.start += time::Duration::from_nanos(now.since_start().as_nanos());
+        self.told.set(Instant::START);
+        self.queue.clear();
+        self.received.clear();
+        self.lying = false;
+        self.log.clear();
+        self.carried = 0;
+    }
+
+    fn busy(&self) -> bool {
+        let answers = self.free + SLACK.max(self.tolerance);
+        let waits = !self.queue.is_empty() || self.wire.waiting() > 0;
+        let sent = self.log.iter().any(|own| own.from.is_none());
+        self.is_sound() && (waits || (sent && self.clock_now() < answers))
+    }
+
+    fn inject(&mut self, _port: usize, _fault: PlacedFault, _moment: Moment) {}
+
+    fn reaches(&self, _ring: usize, _link: usize) -> bool {
+        false
+    }
+
+    fn time_tolerance(&self) -> Span {
+        self.tolerance
+    }
+
+    fn unused_faults(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn carried(&self) -> u64 {
+        self.carried
+    }
+
+    fn drives(&self, _port: usize) -> u8 {
+        u8::try_from(self.senders.len()).unwrap_or(u8::MAX)
+    }
+
+    fn trace(&self, port: usize) -> Trace {
+        Trace {
+            channels: vec![Channel::of_frames(self.log.clone())],
+            ..Trace::empty(self.drives(port))
+        }
+    }
+}
+
+impl PortLink for FrameLink {
+    fn beats(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.beats)
+    }
+
+    fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> io::Result<Vec<LastWords>> {
+        let mut bytes = Vec::new();
+        let words = words(0);
+        let frames = words.as_out().frames().iter();
+        frames.for_each(|frame| self.adapter.encode(frame, &mut bytes));
+        Ok(vec![self.wire.last_words(&bytes)?])
+    }
+
+    fn resume(&mut self) {
+        if self.trouble == Some(Trouble::Interrupted) {
+            self.trouble = None;
+            self.interrupt = Arc::default();
+        }
+    }
+
+    fn take_unplaced(&mut self) -> u64 {
+        std::mem::take(&mut self.unplaced)
+    }
+
+    fn take_gaps(&mut self) -> Vec<time::Duration> {
+        Vec::new()
+    }
+
+    fn inner_links(&self) -> &[InnerLink] {
+        &[]
+    }
+}
+
+#[cfg(test)]
+mod tests;

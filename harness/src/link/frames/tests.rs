@@ -1,0 +1,357 @@
+//! The link against adapters and servers made of a socket and a script.
+
+use super::*;
+use crate::link::Link;
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::sync::Mutex;
+
+/// More than anything here takes.
+const LONG: Span = Span::from_millis(60_000);
+
+/// What a client has said so far.
+type Said = Arc<Mutex<Vec<String>>>;
+
+/// A server that answers each piece of a client's stream, up to one of these characters, with what `answer` gives.
+fn server(
+    greeting: &'static str,
+    ends: &'static [u8],
+    answer: impl Fn(&str) -> &'static str + Send + 'static,
+) -> (String, Said) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let said = Said::default();
+    let list = Arc::clone(&said);
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("a client");
+        let _sent = stream.write_all(greeting.as_bytes());
+        let mut piece = String::new();
+        let mut byte = [0];
+        while let Ok(1) = stream.read(&mut byte) {
+            piece.push(char::from(byte[0]));
+            if ends.contains(&byte[0]) {
+                let reply = answer(piece.trim_end());
+                list.lock()
+                    .expect("a list")
+                    .push(std::mem::take(&mut piece));
+                if stream.write_all(reply.as_bytes()).is_err() {
+                    return;
+                }
+            }
+        }
+    });
+    (address, said)
+}
+
+fn slcan(answer: impl Fn(&str) -> &'static str + Send + 'static) -> (String, Said) {
+    server("", b"\r", answer)
+}
+
+/// An adapter that does everything; what it sends on the bus comes back as a frame of a drive.
+fn good(command: &str) -> &'static str {
+    match command {
+        "V" => "V1013\r",
+        "F" => "F00\r",
+        "t20133D4000" => "z\rt1814408101000005\r",
+        command if command.starts_with('t') => "z\r",
+        _ => "\r",
+    }
+}
+
+fn settings(address: &str, listen_only: bool) -> AdapterSettings {
+    AdapterSettings {
+        place: AdapterPlace::slcan(address),
+        rate: BitRate::K500,
+        listen_only,
+    }
+}
+
+fn opened(settings: &AdapterSettings) -> FrameLink {
+    let senders = vec![(can::Id::base(0x181).expect("small"), 1)];
+    FrameLink::open(settings, senders, Arc::default()).expect("an adapter")
+}
+
+fn refused(settings: &AdapterSettings) -> String {
+    FrameLink::open(settings, Vec::new(), Arc::default())
+        .expect_err("no adapter")
+        .to_string()
+}
+
+fn frame(text: &str) -> Frame {
+    text.parse().expect("a frame")
+}
+
+/// Waits for something to come, or for trouble.
+fn next(link: &mut FrameLink) -> Option<can::Heard> {
+    let end = link.now() + LONG;
+    while link.now() < end {
+        if let Some((_, heard)) = link.receive(0) {
+            return heard.frame();
+        }
+        if !link.wait(end) {
+            return link.receive(0).and_then(|(_, heard)| heard.frame());
+        }
+    }
+    None
+}
+
+fn lost(link: &FrameLink) -> &str {
+    match link.trouble() {
+        Some(Trouble::Lost(why)) => why,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Waits until the link ends.
+fn ended(link: &mut FrameLink) -> &str {
+    let end = link.now() + LONG;
+    while link.now() < end && link.wait(end) {
+        while link.receive(0).is_some() {}
+    }
+    lost(link)
+}
+
+#[test]
+fn an_adapter_is_opened_asked_and_closed() {
+    let (address, said) = slcan(good);
+    let mut link = opened(&settings(&address, false));
+    link.begin();
+    let asked = frame("201#3D4000");
+    link.send(0, Out::Frames(&[asked]));
+    assert_eq!(
+        next(&mut link),
+        Some(can::Heard::Frame(frame("181#40810100")))
+    );
+    let trace = link.trace(0);
+    let carried: Vec<_> = trace.channels[0]
+        .frames()
+        .iter()
+        .map(|own| (own.from, own.frame))
+        .collect();
+    assert_eq!(carried, [(None, asked), (Some(1), frame("181#40810100"))]);
+    drop(link);
+    let commands: Vec<_> = loop {
+        let all = said.lock().expect("a list").clone();
+        if all.last().is_some_and(|last| last == "C\r") && all.len() > 4 {
+            break all.into_iter().filter(|own| own != "F\r").collect();
+        }
+        std::thread::yield_now();
+    };
+    assert_eq!(
+        commands,
+        [
+            "\r",
+            "\r",
+            "C\r",
+            "V\r",
+            "S6\r",
+            "Z1\r",
+            "O\r",
+            "t20133D4000\r",
+            "C\r"
+        ]
+    );
+}
+
+/// Nothing is sent, and the adapter is opened so that it does not even acknowledge.
+#[test]
+fn a_listener_sends_nothing() {
+    let (address, said) = slcan(|command| match command {
+        "L" => "\rt1811AA\r",
+        command => good(command),
+    });
+    let mut link = opened(&settings(&address, true));
+    let out = [frame("201#3D4000")];
+    assert!(!link.permits(0, Out::Frames(&out)));
+    link.send(0, Out::Frames(&out));
+    assert_eq!(link.refused(), 1);
+    // It is on the bus as soon as the channel is open.
+    assert_eq!(next(&mut link), Some(can::Heard::Frame(frame("181#AA"))));
+    drop(link);
+    let said = said.lock().expect("a list").join("");
+    assert!(
+        said.contains("L\r") && !said.contains("O\r") && !said.contains('t'),
+        "{said}"
+    );
+}
+
+/// An adapter without version, time stamps and status is one as well.
+#[test]
+fn a_poor_adapter_will_do() {
+    let (address, _) = slcan(|command| match command {
+        "V" | "Z1" | "F" => "\x07",
+        "t20133D4000" => "\rt181440810100\r",
+        _ => "\r",
+    });
+    let mut link = opened(&settings(&address, false));
+    link.send(0, Out::Frames(&[frame("201#3D4000")]));
+    assert_eq!(
+        next(&mut link),
+        Some(can::Heard::Frame(frame("181#40810100")))
+    );
+    assert_eq!(link.trouble(), None);
+}
+
+#[test]
+fn what_is_no_adapter_is_named() {
+    let (silent, _) = slcan(|_| "");
+    let why = refused(&settings(&silent, false));
+    assert!(
+        why.contains("does not answer C and V: SLCAN adapter expected"),
+        "{why}"
+    );
+    let (text, _) = server("", b"\r", |_| "t18\r");
+    let why = refused(&settings(&text, false));
+    assert!(
+        why.contains("is no SLCAN adapter: received \"t18\""),
+        "{why}"
+    );
+    let (no_rate, _) = slcan(|command| {
+        if command == "S6" {
+            "\x07"
+        } else {
+            good(command)
+        }
+    });
+    let why = refused(&settings(&no_rate, false));
+    assert!(why.contains("refuses the rate 500 kbit/s"), "{why}");
+    let (no_listening, _) = slcan(|command| {
+        if command == "L" {
+            "\x07"
+        } else {
+            good(command)
+        }
+    });
+    let why = refused(&settings(&no_listening, true));
+    assert!(
+        why.contains("refuses to listen only") && why.contains("listen_only"),
+        "{why}"
+    );
+    let odd = AdapterSettings {
+        rate: BitRate::K625,
+        ..settings(&no_rate, false)
+    };
+    assert!(refused(&odd).contains("cannot run at 625 kbit/s"));
+    let nowhere = settings("127.0.0.1:1", false);
+    assert!(refused(&nowhere).contains("failed to connect"));
+    assert!(refused(&settings("/dev/there-is-none", false)).contains("no port"));
+}
+
+/// A frame that is refused, a lost connection and a stream that is none of SLCAN end the link; lost frames are counted.
+#[test]
+fn trouble_of_an_adapter_is_the_bench_s() {
+    let (full, _) = slcan(|command| match command {
+        "t20133D4000" => "\x07",
+        command => good(command),
+    });
+    let mut link = opened(&settings(&full, false));
+    link.send(0, Out::Frames(&[frame("201#3D4000")]));
+    assert!(ended(&mut link).contains("refused to send 201#3D4000"));
+    let (overrun, _) = slcan(|command| match command {
+        "F" => "F08\rt1810\r",
+        command => good(command),
+    });
+    let mut link = opened(&settings(&overrun, false));
+    assert_eq!(next(&mut link), Some(can::Heard::Frame(frame("181#"))));
+    assert_eq!(link.take_unplaced(), 1);
+    let (garbage, _) = slcan(|command| match command {
+        "F" => "t181zz\r",
+        command => good(command),
+    });
+    let mut link = opened(&settings(&garbage, false));
+    assert!(ended(&mut link).contains("received \"t181zz\""));
+}
+
+fn socketcand(answer: impl Fn(&str) -> &'static str + Send + 'static) -> AdapterSettings {
+    let (address, _) = server("< hi >", b">", answer);
+    AdapterSettings {
+        place: AdapterPlace::Socketcand {
+            address,
+            channel: "can0".to_owned(),
+        },
+        rate: BitRate::K500,
+        listen_only: false,
+    }
+}
+
+#[test]
+fn a_server_of_socketcand_is_opened_and_asked() {
+    let mut link = opened(&socketcand(|message| match message {
+        "< send 201 3 3d 40 0 >" => "< frame 181 17.000001 40810100 >",
+        "< send 100 0 >" => "< error 040 18.0 >",
+        _ => "< ok >",
+    }));
+    let remote = [frame("201#R3")];
+    assert!(
+        !link.permits(0, Out::Frames(&remote)),
+        "there are none in this language"
+    );
+    link.send(0, Out::Frames(&[frame("201#3D4000")]));
+    assert_eq!(
+        next(&mut link),
+        Some(can::Heard::Frame(frame("181#40810100")))
+    );
+    link.send(0, Out::Frames(&[frame("100#")]));
+    assert_eq!(next(&mut link), Some(can::Heard::Error(BusError::BusOff)));
+    assert!(lost(&link).contains("bus-off"));
+}
+
+#[test]
+fn what_is_no_server_of_socketcand_is_named() {
+    let why = refused(&socketcand(|_| "< error could not open bus >"));
+    assert!(
+        why.contains("refuses < open > (could not open bus): name a bus"),
+        "{why}"
+    );
+    let why = refused(&socketcand(|_| ""));
+    assert!(
+        why.contains("does not answer < open >: server of socketcand expected"),
+        "{why}"
+    );
+    let why = refused(&socketcand(|_| "hello >"));
+    assert!(
+        why.contains("is no server of socketcand: received \"hello >\""),
+        "{why}"
+    );
+}
+
+/// What a watchdog sends is coded as the adapter has it.
+#[test]
+fn last_words_are_coded() {
+    let (address, said) = slcan(good);
+    let link = opened(&settings(&address, false));
+    let words = |_: usize| Pieces::Frames(vec![frame("201#510400"), frame("201#310000")]);
+    for words in link.last_words(&words).expect("a descriptor") {
+        words.say().expect("sent");
+    }
+    loop {
+        let said = said.lock().expect("a list").join("");
+        if said.contains("t2013510400\rt2013310000\r") {
+            return;
+        }
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn an_interruption_ends_sending_and_can_be_taken_back() {
+    let (address, _) = slcan(good);
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let mut link = FrameLink::open(
+        &settings(&address, false),
+        Vec::new(),
+        Arc::clone(&interrupt),
+    )
+    .expect("an adapter");
+    interrupt.store(true, Ordering::Relaxed);
+    assert!(!link.wait(link.now()));
+    assert_eq!(link.trouble(), Some(&Trouble::Interrupted));
+    link.resume();
+    link.send(0, Out::Frames(&[frame("201#3D4000")]));
+    assert_eq!(
+        next(&mut link),
+        Some(can::Heard::Frame(frame("181#40810100")))
+    );
+    let stopped = FrameLink::open(&settings(&address, false), Vec::new(), interrupt);
+    assert!(matches!(stopped, Err(AdapterError::Interrupted)));
+}
