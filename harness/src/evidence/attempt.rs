@@ -151,7 +151,7 @@ pub(super) fn again(
         unplaced,
         alive: &|| {},
     };
-    judge(&mut outcome, &heard);
+    let assumed = judge(&mut outcome, &heard);
     let mut attempt = Attempt::on_own_rings(outcome, Vec::new());
     (attempt.opening, attempt.unplaced) = (opening, unplaced);
     if header.qualified {
@@ -161,7 +161,8 @@ pub(super) fn again(
             driven,
             master_is_right,
             ..attempt
-        };
+        }
+        .beside(assumed);
     }
     Again {
         attempt,

@@ -49,4 +49,4 @@ pub use watchdog::Alarm;
 
 /// How the one bus that is driven today is examined when a bench is opened.
 pub use crate::buses::novobus::rig::figures;
-pub(crate) use crate::buses::novobus::rig::{health, interlock, judge, line_test, sim};
+pub(crate) use crate::buses::novobus::rig::{health, interlock, judge, left_open, line_test, sim};

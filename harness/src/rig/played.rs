@@ -1,7 +1,9 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
 use super::driven::Driven;
+use crate::buses::syntax::Header;
 use crate::buses::twin::{Comparison, Conversation, Divergence};
+use crate::rig::left_open::Explanation;
 use crate::scenario::run::{Outcome, Skip, Unready, Why};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -33,6 +35,8 @@ pub struct Attempt {
     pub master_is_right: bool,
     /// How the bytes received before the drives were reset compare with a ring at rest; `None` where they are judged with the rest.
     pub opening: Option<String>,
+    /// The choices of the manual with which it was compared, where the model's defaults do not explain what came before the scenario.
+    pub assumed: Header,
 }
 
 impl Attempt {
@@ -48,6 +52,19 @@ impl Attempt {
             driven: None,
             master_is_right: true,
             opening: None,
+            assumed: Header::default(),
+        }
+    }
+
+    /// The attempt, compared with drives of these choices.
+    pub(crate) fn beside(self, assumed: Option<Explanation>) -> Self {
+        match assumed {
+            None => self,
+            Some(found) => Self {
+                comparisons: found.comparisons,
+                assumed: found.header,
+                ..self
+            },
         }
     }
 
@@ -241,6 +258,7 @@ mod tests {
             driven: None,
             master_is_right: true,
             opening: None,
+            assumed: Header::default(),
             outcome: Outcome {
                 verdict,
                 unready: match remark {

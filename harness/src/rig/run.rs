@@ -217,7 +217,7 @@ impl<'s> Run<'s> {
             alive: &alive,
         };
         let master_is_right = driven.as_ref().is_none_or(|own| own.judge(&mut outcome));
-        judge(&mut outcome, &heard);
+        let assumed = judge(&mut outcome, &heard);
         Ok(Attempt {
             driven,
             master_is_right,
@@ -227,7 +227,9 @@ impl<'s> Run<'s> {
             traces,
             unplaced,
             opening,
-        })
+            assumed: Header::default(),
+        }
+        .beside(assumed))
     }
 
     /// How attempts go on this rig.

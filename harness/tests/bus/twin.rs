@@ -3,7 +3,7 @@
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::twin::{Conversation, Exactness, Symptom, Twin};
 use harness::library::{Entry, sources};
-use harness::link::{Event, Link, Octets, Recording, Replay};
+use harness::link::{Event, Line as _, Link, Octets, Recording, Replay};
 use harness::qualify::{
     Answer, Asked, Hypothesis, Probe, Seen, answer, explaining, hypotheses, name, probes,
 };
@@ -65,15 +65,32 @@ fn a_ring_is_its_own_twin() {
     assert!(compared > 5_000, "{compared}");
 }
 
-/// ND21 11.8: drives that leave the ring open during their self-test can be reset like others.
+/// ND21 11.8: drives that leave the ring open during their self-test can be reset like others, in rings of any size. Each is waited for once.
 #[test]
 fn drives_that_are_silent_in_their_self_test_are_reset() {
-    let header = "title t\nring 3\ndrive 0..last model nd21\ndrive 0..last property self-test-bus = silent\n\
-                  drive 0..last property self-test-time = 150ms\n> 80\n";
-    let plan = entry(header).plan.expect("novobus");
-    let mut link = bench(&plan);
-    link.run_until(harness_proto::time::Instant::START + Span::from_millis(500));
-    start_anew(&mut link, &plan.rings).expect("they come back");
+    for (drives, silent, time, most) in [
+        (3, "0..last", 81, 900),
+        (3, "0..last", 150, 900),
+        (3, "1", 150, 2_000),
+        (3, "0..last", 2_000, 8_000),
+        (60, "0..last", 150, 20_000),
+        (250, "0..last", 81, 130_000),
+    ] {
+        let header = format!(
+            "title t\nring {drives}\ndrive 0..last model nd21\ndrive {silent} property self-test-bus = silent\n\
+             drive 0..last property self-test-time = {time}ms\n> 80\n"
+        );
+        let plan = entry(&header).plan.expect("novobus");
+        let mut link = bench(&plan);
+        link.run_until(harness_proto::time::Instant::START + Span::from_millis(500));
+        let begin = link.now();
+        start_anew(&mut link, &plan.rings).expect("they come back");
+        let took = link.now().since(begin);
+        assert!(
+            took < Span::from_millis(most),
+            "{drives} {silent} {time}: {took}"
+        );
+    }
 }
 
 /// A replayed record gives the verdict and the message of the run, and no event is left over.

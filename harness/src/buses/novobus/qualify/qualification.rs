@@ -95,6 +95,8 @@ pub(crate) struct Qualification {
     facts: Facts,
     drives: u8,
     findings: Findings,
+    /// The choices of the manual that show in every attempt, before the scenario begins.
+    assumed: Header,
     ill: bool,
 }
 
@@ -105,6 +107,7 @@ impl Qualification {
         Self {
             drives,
             findings: Findings::new(drives, facts.byte_time, facts.exactness.tolerance),
+            assumed: Header::default(),
             ill: false,
             facts,
         }
@@ -114,6 +117,16 @@ impl Qualification {
     pub(crate) fn note(&mut self, name: &str, played: &Played) {
         self.findings.note(name, played);
         self.ill = played.shows_an_ill_rig();
+        self.assume(played);
+    }
+
+    /// Takes over the choices with which a scenario was compared, for what is asked of the ring later.
+    fn assume(&mut self, played: &Played) {
+        if self.assumed.setups.is_empty() {
+            let assumed = played.attempts.iter().map(|own| &own.assumed);
+            let found = assumed.into_iter().find(|own| !own.setups.is_empty());
+            found.into_iter().for_each(|own| self.assumed = own.clone());
+        }
     }
 
     /// Plays what is judged by the model alone, settles what the manual leaves open, and names the deviations of drives.
@@ -185,6 +198,7 @@ impl Qualification {
         let played = bench.play(entry)?;
         bench.show(entry, &played)?;
         self.findings.note(entry.short_name(), &played);
+        self.assume(&played);
         Ok((!bench.over()).then_some(played))
     }
 
@@ -281,7 +295,7 @@ impl Qualification {
         text
     }
 
-    /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus is part of every later
+    /// Asks by probes how the drives behave where the manual leaves it open. What has been settled of the bus, or assumed, is part of every later
     /// question and is the second value; a time of a drive is the middle of a span, and no later answer rests on it.
     fn profile<B: Bench>(&mut self, bench: &mut B) -> Result<(Profile, Header), B::Stop> {
         let rings: Vec<u8> = self.facts.rig.rings().map(|(_, own)| own.drives).collect();
@@ -293,7 +307,7 @@ impl Qualification {
             property: BTreeMap::new(),
             open: BTreeMap::new(),
         };
-        let mut known = Header::default();
+        let mut known = self.assumed.clone();
         let mut ended = false;
         for probe in probes(self.drives).unwrap_or_default() {
             ended = ended || bench.over();

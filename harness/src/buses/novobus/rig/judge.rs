@@ -1,6 +1,6 @@
 //! The verdict of an attempt, compared with its twin.
 
-use super::left_open;
+use super::left_open::{self, Explanation};
 use crate::buses::novobus::language::syntax::{Drives, Header, Setup};
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
 use crate::link::{Event, Recording};
@@ -39,8 +39,10 @@ pub(crate) struct Heard<'h> {
 
 /// Settles the verdict of an attempt. A byte that differs from the twin's is the drive's fault, unless the rig's file says that the
 /// deviation is known. Where no byte differs, what the scenario found stands, unless the drive's own state, a known deviation or the
-/// computer's time explains it.
-pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) {
+/// computer's time explains it. Returns the choices of the manual with which the drives were compared instead of the model's defaults, if
+/// they show before the scenario begins.
+pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) -> Option<Explanation> {
+    let mut assumed = None;
     let comparisons = || heard.comparisons.iter();
     for adopted in comparisons().flat_map(|c| &c.adopted).take(MOST_ADOPTED) {
         outcome.remarks.push(format!(
@@ -51,12 +53,14 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) {
     let divergence = comparisons().find_map(|c| c.divergence.as_ref());
     let untimely = comparisons().find_map(|c| c.untimely.as_ref());
     match (outcome.verdict, divergence, untimely) {
-        _ if outcome.unready.is_some() => not_ready(outcome, divergence, heard),
+        _ if outcome.unready.is_some() => {
+            not_ready(outcome, divergence, heard);
+        }
         (
             Verdict::Passed | Verdict::Failed | Verdict::Marginal | Verdict::Inconclusive,
             Some(divergence),
             _,
-        ) => diverged(outcome, divergence, heard),
+        ) => assumed = diverged(outcome, divergence, heard),
         (Verdict::Failed, None, untimely) => failed_alike(outcome, untimely, heard),
         (Verdict::Passed, None, Some(untimely)) => {
             outcome.verdict = Verdict::Marginal;
@@ -76,13 +80,16 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) {
             heard.unplaced
         ));
     }
+    assumed
 }
 
 /// Judges an attempt whose drives could not be made ready. No step was played, so it cannot pass: neither with a known deviation, nor
 /// with a twin that could not be made ready either.
 fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, heard: &Heard<'_>) {
     match divergence {
-        Some(divergence) => diverged(outcome, divergence, heard),
+        Some(divergence) => {
+            diverged(outcome, divergence, heard);
+        }
         None if outcome.verdict == Verdict::Failed => {
             outcome.verdict = Verdict::Inconclusive;
             let known = heard.rig.file.deviation.iter();
@@ -97,8 +104,12 @@ fn not_ready(outcome: &mut Outcome, divergence: Option<&Divergence>, heard: &Hea
     }
 }
 
-/// A byte differs from the twin's.
-fn diverged(outcome: &mut Outcome, divergence: &Divergence, heard: &Heard<'_>) {
+/// A byte differs from the twin's. Returns the choices of the manual with which none does, where the scenario does not depend on them.
+fn diverged(
+    outcome: &mut Outcome,
+    divergence: &Divergence,
+    heard: &Heard<'_>,
+) -> Option<Explanation> {
     let rule = format!("nd21 {}", divergence.role.rule().0);
     let mut known = heard.rig.file.deviation.iter();
     let explains = |entry: &&Deviation| {
@@ -117,10 +128,16 @@ fn diverged(outcome: &mut Outcome, divergence: &Divergence, heard: &Heard<'_>) {
             outcome.remarks.push(told(entry));
         }
         None => match left_open::explanation(heard) {
-            Some(choice) => {
+            Some(found) => {
+                let passed = matches!(outcome.verdict, Verdict::Passed | Verdict::Marginal);
+                if passed && found.before_steps && outcome.unready.is_none() {
+                    compared_with(&found, outcome);
+                    return Some(found);
+                }
                 outcome.verdict = Verdict::Inconclusive;
                 outcome.remarks.push(format!(
-                    "the manual leaves open what differs: {choice} explains every byte; `qualify` settles such properties"
+                    "the manual leaves open what differs: {} explains every byte; `qualify` settles such properties",
+                    found.words
                 ));
             }
             None => outcome.verdict = Verdict::Failed,
@@ -133,6 +150,21 @@ fn diverged(outcome: &mut Outcome, divergence: &Divergence, heard: &Heard<'_>) {
     outcome
         .remarks
         .push(format!("the model: {divergence}{whose}"));
+    None
+}
+
+/// What differs comes before the scenario, and a choice that the manual leaves open explains it: the scenario is judged beside drives with
+/// this choice.
+fn compared_with(found: &Explanation, outcome: &mut Outcome) {
+    outcome.remarks.push(format!(
+        "compared with drives of {}: the manual leaves it open, and it shows before the scenario begins",
+        found.words
+    ));
+    let untimely = found.comparisons.iter().find_map(|c| c.untimely.as_ref());
+    if let Some(untimely) = untimely {
+        outcome.verdict = Verdict::Marginal;
+        outcome.remarks.push(format!("the model: {untimely}"));
+    }
 }
 
 /// The scenario failed, and the drives gave every byte that the twin gave.

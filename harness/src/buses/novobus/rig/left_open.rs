@@ -5,7 +5,7 @@
 use super::judge::{Heard, known};
 use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
 use crate::buses::novobus::language::write::ring_prefix;
-use crate::buses::novobus::twin::Divergence;
+use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
 use crate::rig::check::Rig;
 use crate::rig::run::twin;
 use crate::scenario::times::Duration;
@@ -42,14 +42,25 @@ impl fmt::Display for Choice {
     }
 }
 
-/// The choices that explain every byte of an attempt, in words; `None` where the model's defaults explain them as well, or where no
-/// choice does.
-pub(crate) fn explanation(heard: &Heard<'_>) -> Option<String> {
+/// Choices that explain every byte of an attempt.
+pub(crate) struct Explanation {
+    /// They, in words.
+    pub(crate) words: String,
+    /// What makes simulated drives behave so.
+    pub(crate) header: Header,
+    /// How the conversations compare with these drives'.
+    pub(crate) comparisons: Vec<Comparison>,
+    /// Whether the bytes that they explain come before the steps of the scenario: nothing that it asks for depends on the choices.
+    pub(crate) before_steps: bool,
+}
+
+/// The choices that explain every byte of an attempt; `None` where the model's defaults explain them as well, or where no choice does.
+pub(crate) fn explanation(heard: &Heard<'_>) -> Option<Explanation> {
     let real = heard.exactness.tolerance > Span::ZERO && !heard.exactness.knows_cells;
     if !real {
         return None;
     }
-    let (mut first, monitored) = differs(&Header::default(), heard)?;
+    let (mut first, monitored) = compare(&Header::default(), heard).err()?;
     let mut open = choices(heard.rig);
     open.retain(|choice| choice.property != "time-out" || monitored);
     let (mut header, mut chosen) = (Header::default(), Vec::new());
@@ -58,15 +69,22 @@ pub(crate) fn explanation(heard: &Heard<'_>) -> Option<String> {
         let mut further = None;
         for (choice, whose, more) in candidates(&open, &first, &header, heard) {
             let all = header.and(&more);
-            match differs(&all, heard) {
-                None => {
+            match compare(&all, heard) {
+                Ok(comparisons) => {
                     chosen.push(format!("{choice}{whose}"));
-                    return Some(chosen.join(" and "));
+                    let has_steps = |own: &Conversation| own.has_steps();
+                    let last = first.conversation.min(heard.conversations.len());
+                    return Some(Explanation {
+                        words: chosen.join(" and "),
+                        header: all,
+                        comparisons,
+                        before_steps: !heard.conversations[..last].iter().any(has_steps),
+                    });
                 }
-                Some((place, _)) if further.is_none() && place.is_behind(&first) => {
+                Err((place, _)) if further.is_none() && place.is_behind(&first) => {
                     further = Some((place, format!("{choice}{whose}"), all, choice.property));
                 }
-                Some(_) => {}
+                Err(_) => {}
             }
         }
         let (place, words, all, property) = further?;
@@ -79,7 +97,7 @@ pub(crate) fn explanation(heard: &Heard<'_>) -> Option<String> {
 /// Where an attempt first differs from a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Place {
-    /// In which conversation, counted from 0.
+    /// In which conversation, counted from 1; 0 where the choice makes no ring.
     conversation: usize,
     /// How; `None` where the choice makes no ring.
     divergence: Option<Divergence>,
@@ -112,8 +130,11 @@ fn candidates<'c>(
         .collect();
     for choice in open {
         let whole = header.and(&every(choice));
-        let same = |(place, _): (Place, bool)| place == *first;
-        if differs(&whole, heard).is_none_or(same) {
+        let tells = match compare(&whole, heard) {
+            Ok(_) => false,
+            Err((place, _)) => place != *first,
+        };
+        if !tells {
             continue;
         }
         for (ring, size) in rings().filter(|(_, size)| (2..=SMALL).contains(&size.drives())) {
@@ -169,23 +190,29 @@ fn choices(rig: &Rig) -> Vec<Choice> {
         .collect()
 }
 
-/// Where an attempt first differs from drives with this header that have just been switched on, and whether one of them monitors
-/// time-outs; `None` where every byte is the same.
-fn differs(header: &Header, heard: &Heard<'_>) -> Option<(Place, bool)> {
+/// How an attempt compares with drives with this header that have just been switched on.
+///
+/// # Errors
+/// Where it first differs, and whether one of the drives monitors time-outs.
+fn compare(header: &Header, heard: &Heard<'_>) -> Result<Vec<Comparison>, (Place, bool)> {
     (heard.alive)();
     let Ok(mut twin) = twin(heard.rig, &known(heard.rig).and(header)) else {
         let nowhere = Place {
             conversation: 0,
             divergence: None,
         };
-        return Some((nowhere, false));
+        return Err((nowhere, false));
     };
     let comparisons = twin.follow_while_alike(heard.conversations, heard.exactness);
     let conversation = comparisons.len();
-    let divergence = comparisons.into_iter().next_back()?.divergence?;
-    let place = Place {
-        conversation,
-        divergence: Some(divergence),
-    };
-    Some((place, twin.monitors()))
+    match comparisons.last().and_then(|own| own.divergence.clone()) {
+        None => Ok(comparisons),
+        divergence => Err((
+            Place {
+                conversation,
+                divergence,
+            },
+            twin.monitors(),
+        )),
+    }
 }

@@ -20,7 +20,7 @@ use harness_proto::nd21;
 use harness_proto::nd21::cells::cell_at;
 use harness_proto::nd21::own::is_of_the_scope;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
+use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, ZEROS};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::at_rest;
 use harness_proto::novobus::sync::SYNCO;
@@ -299,9 +299,7 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
     };
     let cells: Vec<Before> = all.iter().map(cell).collect();
     for own in cells.chunk_by(|one, other| one.ring == other.ring) {
-        if reset_at_once(link, own).is_none() {
-            reset_one_by_one(link, own)?;
-        }
+        reset_ring(link, own)?;
     }
     let rings = cells.last().map_or(0, |cell| cell.ring + 1);
     let end = link.now() + SELF_TEST;
@@ -358,7 +356,8 @@ fn end_time_out(link: &mut dyn Link, ring: usize) {
 /// time-outs miss their bytes meanwhile (9.9), so the check sequence comes first each time (9.8).
 fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     let end = link.now() + SELF_TEST;
-    while !passes_synco(link, ring) {
+    let bytes = [&CHECK_SEQUENCE[..], &[SYNCO]].concat();
+    while !comes_round(link, ring, &bytes, PATIENCE) {
         if link.now() >= end || link.trouble().is_some() {
             return false;
         }
@@ -367,26 +366,74 @@ fn closes_again(link: &mut dyn Link, ring: usize) -> bool {
     true
 }
 
-/// Whether a SYNCO behind the check sequence comes round (9.2, 9.8).
-fn passes_synco(link: &mut dyn Link, ring: usize) -> bool {
+/// Whether the last bytes of some that begin with the check sequence come round (9.8), no later than `patience` behind the time that the ring
+/// itself needs.
+fn comes_round(link: &mut dyn Link, ring: usize, bytes: &[u8], patience: Span) -> bool {
+    let last = &bytes[usize::from(ZEROS)..];
     let drives = u64::from(link.drives(ring));
-    let bytes = [&CHECK_SEQUENCE[..], &[SYNCO]].concat();
     while link.receive_octet(ring).is_some() {}
-    let end = link.send_octets(ring, &bytes) + link.byte_time() * (drives + 4) + PATIENCE;
+    let end = link.send_octets(ring, bytes) + link.byte_time() * (drives + 4) + patience;
     let mut back = Vec::new();
     while link.now() < end && link.trouble().is_none() {
         link.wait(end);
         back.extend(std::iter::from_fn(|| link.receive_octet(ring)).map(|(_, byte)| byte.byte));
-        if back.ends_with(&[CHECK_SEQUENCE[CHECK_SEQUENCE.len() - 1], SYNCO]) {
+        if back.ends_with(last) {
             return true;
         }
     }
     false
 }
 
-/// A check sequence follows each telegram, so that a drive in the middle of a telegram receives the next one whole (9.8).
+/// Resets these drives of a ring. A check sequence follows each telegram, so that a drive in the middle of a telegram receives the next one
+/// whole (9.8). It also shows whether a drive opens the ring while it tests itself. If the first drive does not, the others are reset without
+/// waiting. If it does, each drive waits until the ring passes bytes again, because its answer is visible only then.
+fn reset_ring(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
+    let Some((first, others)) = cells.split_first() else {
+        return Ok(());
+    };
+    let mut passes = reset_one(link, *first)?;
+    if passes && reset_at_once(link, others).is_some() {
+        return Ok(());
+    }
+    let before = cells.iter();
+    for (before, cell) in before.zip(others) {
+        if !passes {
+            close(link, *before)?;
+        }
+        passes = reset_one(link, *cell)?;
+    }
+    match cells.last() {
+        Some(last) if !passes => close(link, *last),
+        _ => Ok(()),
+    }
+}
+
+/// Waits until a ring passes bytes again in which this drive was the last one to be reset.
+fn close(link: &mut dyn Link, cell: Before) -> Result<(), NotReady> {
+    let why = "it does not come back from its reset";
+    match closes_again(link, cell.ring) {
+        true => Ok(()),
+        false => Err(NotReady::new(cell, Unready::NoAnswer, why)),
+    }
+}
+
+/// Resets a drive, and returns whether the ring passes bytes right behind it. A drive that gives no answer is asked once more when the ring
+/// passes bytes.
+fn reset_one(link: &mut dyn Link, cell: Before) -> Result<bool, NotReady> {
+    let reset =
+        |link: &mut dyn Link| exchange(link, cell.ring, cell.drive, Command::ResetH8).is_some();
+    if !(reset(link) || closes_again(link, cell.ring) && reset(link)) {
+        let why = "it does not answer ResetH8";
+        return Err(NotReady::new(cell, Unready::NoAnswer, why));
+    }
+    Ok(comes_round(link, cell.ring, &CHECK_SEQUENCE, QUIET))
+}
+
+/// Resets drives of a ring that passes bytes meanwhile.
 fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
-    let ring = cells.first()?.ring;
+    let Some(ring) = cells.first().map(|cell| cell.ring) else {
+        return Some(());
+    };
     let drives = link.drives(ring);
     let mut exchanges = Vec::new();
     for cell in cells {
@@ -398,21 +445,6 @@ fn reset_at_once(link: &mut dyn Link, cells: &[Before]) -> Option<()> {
         });
     }
     exchange_all(link, drives, ring, &exchanges).map(|_| ())
-}
-
-/// Where a ring does not stand that, or a drive does not answer.
-fn reset_one_by_one(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
-    for cell in cells {
-        let reset =
-            |link: &mut dyn Link| exchange(link, cell.ring, cell.drive, Command::ResetH8).is_some();
-        if !(reset(link) || closes_again(link, cell.ring) && reset(link)) {
-            let why = "it does not answer ResetH8";
-            return Err(NotReady::new(*cell, Unready::NoAnswer, why));
-        }
-        let left = link.send_octets(cell.ring, &CHECK_SEQUENCE);
-        settle(link, left);
-    }
-    Ok(())
 }
 
 /// What a cell held before [`set_up`].
