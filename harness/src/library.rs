@@ -106,6 +106,9 @@ impl Entry {
     /// # Errors
     /// Its mistakes.
     pub fn fitting(source: Source, drives: Option<u8>) -> Result<Self, Box<Problems>> {
+        if parse::bus(&source) != Bus::DEFAULT {
+            return Self::new(source, None);
+        }
         let scenario: Scenario = parse(&source)?;
         let range = scenario.header.rings.first();
         let fits = |n: &u8| range.is_some_and(|own| (own.smallest..=own.largest).contains(n));
@@ -118,12 +121,17 @@ impl Entry {
         last(&self.name)
     }
 
-    /// How many drives its rings have, as `3+1`; empty for a bus that is not built yet.
+    /// The scenario settled, of whichever bus; `None` for a bus that is not built.
+    #[must_use]
+    pub fn settled(&self) -> Option<&dyn Settled> {
+        let own = self.plan.as_ref().map(|plan| plan as &dyn Settled);
+        own.or(self.other.as_deref())
+    }
+
+    /// How many drives its bench has, as `3+1`; empty for a bus that is not built yet.
     #[must_use]
     pub fn drives(&self) -> String {
-        let rings = self.plan.iter().flat_map(|plan| &plan.rings);
-        let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
-        drives.join("+")
+        self.settled().map_or(String::new(), Settled::size)
     }
 
     /// Whether the text occurs in the name, the title or a source.

@@ -39,8 +39,11 @@ use crate::serve::frames::FrameJob;
 use crate::serve::{End, Host, ServeError};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use harness_sim::record::{Carried, Trace};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -103,6 +106,47 @@ impl PortBus {
     }
 }
 
+/// Whether these are traces of a bus of frames.
+pub(crate) fn carry_frames(traces: &[Trace]) -> bool {
+    let mut channels = traces.iter().flat_map(|trace| &trace.channels);
+    channels.any(|channel| matches!(channel.carried, Carried::Frames(_)))
+}
+
+/// The frames of a trace, a row a frame: the rows that are wanted, counted from 0, and of them `at_most`. `None` for a bus of
+/// octets, which has tables of its own.
+pub(crate) fn rows(
+    trace: &Trace,
+    wanted: Option<Range<usize>>,
+    at_most: Option<usize>,
+) -> Option<String> {
+    carry_frames(std::slice::from_ref(trace))
+        .then(|| unitek::report::table::table(trace, wanted, at_most))
+}
+
+/// A form in which frames are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FrameForm {
+    /// JSON for tools.
+    Json,
+    /// The log of candump.
+    Candump,
+}
+
+/// Writes traces of a bus of frames.
+///
+/// # Errors
+/// Those of `out`.
+pub(crate) fn write_frames(
+    traces: &[Trace],
+    form: FrameForm,
+    out: impl Write,
+) -> std::io::Result<()> {
+    match form {
+        FrameForm::Json => unitek::report::json::write(Bus::Unitek, traces, out),
+        FrameForm::Candump => unitek::report::json::candump(traces, out),
+    }
+}
+
 /// What happens to a drive from outside the bus, by the bus that it is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stimulus {
@@ -117,7 +161,7 @@ pub enum Stimulus {
 pub enum Bus {
     /// The ND21's ring.
     Novobus,
-    /// UNITEK DS/BAMOCAR on CAN; not built yet.
+    /// UNITEK DS/BAMOCAR on CAN.
     Unitek,
     /// NORDAC vector on PROFIBUS DP; not built yet.
     Nordac,
@@ -184,4 +228,5 @@ macro_rules! languages {
 
 languages! {
     Novobus => novobus::language::Novobus,
+    Unitek => unitek::language::Unitek,
 }

@@ -429,6 +429,8 @@ pub enum TraceFormat {
     Pcapng,
     /// One row per byte.
     Csv,
+    /// The log of candump: a line per frame of CAN.
+    Candump,
 }
 
 /// How the rows of a picture are placed.

@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::output::Output;
 use crate::counted::counted;
 use crate::library::{Entry, sources};
+use crate::scenario::settled::Settled;
 
 /// Reads scenarios and plays nothing.
 pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io::Result<Exit> {
@@ -24,14 +25,17 @@ pub(crate) fn check(arguments: &CheckArguments, output: &mut Output) -> std::io:
         let name = source.name.clone();
         match Entry::new(source, arguments.ring) {
             Ok(entry) => {
-                let steps = entry.scenario.steps.len();
-                let needs = entry
-                    .plan
-                    .map(|plan| crate::scenario::run::needs(&plan).join(", "));
-                let needs = needs
-                    .filter(|needs| !needs.is_empty())
-                    .map(|needs| format!("; needs {needs}"))
-                    .unwrap_or_default();
+                let settled = entry.settled();
+                let steps = match entry.scenario.steps.len() {
+                    0 => settled.map_or(0, Settled::steps),
+                    written => written,
+                };
+                let needs = settled.map_or(&[][..], Settled::needs).iter();
+                let needs: Vec<_> = needs.map(|need| need.name()).collect();
+                let needs = match needs.is_empty() {
+                    true => String::new(),
+                    false => format!("; needs {}", needs.join(", ")),
+                };
                 output.result(&format!(
                     "{name}: no mistakes, {}{needs}\n",
                     counted(steps, "step")

@@ -40,12 +40,15 @@ pub(crate) fn list(selection: &Selection, output: &mut Output) -> std::io::Resul
                 }
             })
             .collect();
+        let bench = match rings.is_empty() {
+            true => format!("{} {}", entry.scenario.bus.name(), entry.drives()),
+            false => format!("ring {}", rings.join(", ")),
+        };
         // Writing to a String cannot fail.
         let _infallible = writeln!(
             text,
-            "{:44} ring {:8} {:26} {}",
+            "{:44} {bench:13} {:26} {}",
             entry.short_name(),
-            rings.join(", "),
             sources.join(", "),
             entry.scenario.title
         );

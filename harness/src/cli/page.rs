@@ -38,8 +38,6 @@ impl Page {
             .iter()
             .map(|s| s.text.clone())
             .collect();
-        let rings = entry.plan.iter().flat_map(|plan| &plan.rings);
-        let drives: Vec<_> = rings.map(|ring| ring.drives().to_string()).collect();
         let rate = entry
             .plan
             .as_ref()
@@ -50,7 +48,7 @@ impl Page {
             name: entry.short_name(),
             title: &entry.scenario.title,
             sources: &sources,
-            drives: &drives.join("+"),
+            drives: &entry.drives(),
             text: &entry.source.text,
             outcome,
             traces,

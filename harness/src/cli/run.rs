@@ -18,7 +18,6 @@ use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, play};
-use crate::scenario::settled::Settled;
 use crate::scenario::simulate::simulated;
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -221,8 +220,7 @@ pub(crate) struct Played {
 
 /// Plays a scenario on a simulated bench.
 pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> Played {
-    let own = entry.plan.as_ref().map(|plan| plan as &dyn Settled);
-    let Some(plan) = own.or(entry.other.as_deref()) else {
+    let Some(plan) = entry.settled() else {
         return Played {
             outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
             traces: Vec::new(),

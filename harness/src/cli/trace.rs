@@ -4,6 +4,7 @@ use super::args::{Layout, Showing, TraceArguments, TraceFormat};
 use super::exit::Exit;
 use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
+use crate::buses::{FrameForm, carry_frames, rows, write_frames};
 use crate::library::{Entry, sources};
 use crate::regular;
 use crate::report::plot::plots;
@@ -12,9 +13,11 @@ use crate::report::table::{LEGEND, Part, table, wires};
 use crate::report::vcd::{self, Signals};
 use crate::report::{csv, json, pcapng};
 use crate::scenario::run::{AtMismatch, Record};
+use clap::ValueEnum as _;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
 use std::io::{BufWriter, Write};
+use std::ops::Range;
 
 /// Lines about damaged bytes shown below a table.
 const WIRES: usize = 20;
@@ -46,6 +49,9 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
         return Ok(Exit::Usage);
     }
     let played = play_entry(&entry, AtMismatch::GoOn);
+    if !fits_bus(arguments.format, &played.traces, output) {
+        return Ok(Exit::Usage);
+    }
     let shown = Shown {
         title: &entry.scenario.title,
         traces: &played.traces,
@@ -110,6 +116,9 @@ fn write(
     mut out: impl Write,
 ) -> std::io::Result<()> {
     let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
+    if carry_frames(shown.traces) {
+        return frames(shown.traces, format, rows, out);
+    }
     match format {
         TraceFormat::Json => json::write(shown.traces, shown.records, out),
         TraceFormat::Csv => csv::write(shown.traces, out),
@@ -136,6 +145,8 @@ fn write(
             out.write_all(svg(shown.traces, &options).as_bytes())?;
             out.flush()
         }
+        // `fits_bus` has refused it.
+        TraceFormat::Candump => Ok(()),
         TraceFormat::Table => {
             for trace in shown.traces {
                 let part = Part {
@@ -149,4 +160,43 @@ fn write(
             out.flush()
         }
     }
+}
+
+/// Writes frames. Other forms have been refused by [`fits_bus`].
+fn frames(
+    traces: &[Trace],
+    format: TraceFormat,
+    wanted: Option<Range<usize>>,
+    mut out: impl Write,
+) -> std::io::Result<()> {
+    match format {
+        TraceFormat::Json => write_frames(traces, FrameForm::Json, out),
+        TraceFormat::Candump => write_frames(traces, FrameForm::Candump, out),
+        _ => {
+            for trace in traces {
+                let text = rows(trace, wanted.clone(), None).unwrap_or_default();
+                out.write_all(text.as_bytes())?;
+            }
+            out.flush()
+        }
+    }
+}
+
+/// Whether a form can show what was carried. One that cannot is reported.
+pub(crate) fn fits_bus(format: TraceFormat, traces: &[Trace], output: &mut Output) -> bool {
+    const OF_FRAMES: [TraceFormat; 3] =
+        [TraceFormat::Table, TraceFormat::Json, TraceFormat::Candump];
+    let name = format.to_possible_value();
+    let name = name.as_ref().map_or("", |value| value.get_name());
+    let why = match (carry_frames(traces), format) {
+        (true, format) if !OF_FRAMES.contains(&format) => {
+            format!("`--format {name}` shows bytes of a ring, and this bus carries frames; use table, json or candump")
+        }
+        (false, TraceFormat::Candump) => {
+            "`--format candump` shows frames of CAN, and this bus carries bytes; use table, json or csv".to_owned()
+        }
+        _ => return true,
+    };
+    output.complain(&why);
+    false
 }

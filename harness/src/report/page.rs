@@ -1,5 +1,6 @@
 //! The page that a scenario leaves: verdict, table and plots. Snapshots of scenarios are such pages.
 
+use crate::buses::rows;
 use crate::library::Entry;
 use crate::report::plot::plots;
 use crate::report::table::{LEGEND, Part, table, wires};
@@ -28,7 +29,13 @@ pub fn page(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
     for remark in &outcome.remarks {
         let _infallible = writeln!(page, "note: {remark}");
     }
+    let mut legend = true;
     for trace in traces {
+        if let Some(rows) = rows(trace, None, Some(ROWS)) {
+            let _infallible = write!(page, "\n{rows}");
+            legend = false;
+            continue;
+        }
         let part = Part {
             at_most: Some(ROWS),
             columns_at_most: Some(COLUMNS),
@@ -36,6 +43,9 @@ pub fn page(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
         };
         let _infallible = write!(page, "\n{}{}", table(trace, &part), wires(trace, WIRES));
     }
-    let _infallible = write!(page, "\n{LEGEND}{}", plots(&outcome.records));
+    if legend {
+        let _infallible = write!(page, "\n{LEGEND}");
+    }
+    page.push_str(&plots(&outcome.records));
     page
 }

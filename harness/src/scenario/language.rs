@@ -60,6 +60,11 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// What settles the steps of a scenario one after another.
     type Planner: Settle<Self>;
 
+    /// Where the comment of a line begins.
+    fn comment(line: &str) -> Option<usize> {
+        line.find('#')
+    }
+
     /// Words with which header lines begin, for suggestions.
     fn header_words() -> Vec<&'static str>;
 
@@ -120,6 +125,9 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         let _one = plan;
         format!("{}:{link}", port + 1)
     }
+
+    /// How many drives the bench has; `3+1` where it has two buses.
+    fn size(plan: &Plan<Self>) -> String;
 
     /// How many ports the master has.
     fn ports(plan: &Plan<Self>) -> usize;

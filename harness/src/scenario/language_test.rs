@@ -197,6 +197,10 @@ impl Language for Frames {
         Box::new(super::simulate::simulated(&ring))
     }
 
+    fn size(plan: &Plan<Self>) -> String {
+        plan.setup.len().to_string()
+    }
+
     fn ports(_: &Plan<Self>) -> usize {
         1
     }

@@ -14,9 +14,14 @@ pub struct Scanner<'a> {
 impl<'a> Scanner<'a> {
     /// A scanner for the line that starts at `offset`; a `#` begins a comment.
     pub(crate) fn new(line: &'a str, offset: usize) -> Self {
-        let text = line.split('#').next().unwrap_or_default().trim_end();
+        Self::up_to(line, line.find('#'), offset)
+    }
+
+    /// A scanner for the line that starts at `offset`, with a comment from a place in it on.
+    pub(crate) fn up_to(line: &'a str, comment: Option<usize>, offset: usize) -> Self {
+        let text = comment.map_or(line, |at| &line[..at]);
         Self {
-            text,
+            text: text.trim_end(),
             offset,
             at: 0,
         }

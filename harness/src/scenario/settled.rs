@@ -16,6 +16,12 @@ pub trait Settled: Debug + Send + Sync {
     /// What a rig must have for it.
     fn needs(&self) -> &[Capability];
 
+    /// How many drives its bench has; `3+1` where it has two buses.
+    fn size(&self) -> String;
+
+    /// How many steps are played.
+    fn steps(&self) -> usize;
+
     /// How many ports the master has on its bench.
     fn ports(&self) -> usize;
 
@@ -29,6 +35,14 @@ pub trait Settled: Debug + Send + Sync {
 impl<L: Language> Settled for Plan<L> {
     fn needs(&self) -> &[Capability] {
         &self.needs
+    }
+
+    fn size(&self) -> String {
+        L::size(self)
+    }
+
+    fn steps(&self) -> usize {
+        self.steps.len()
     }
 
     fn ports(&self) -> usize {

@@ -4,10 +4,8 @@
 //! with the print, cell by cell, and take the `.new` away (`INSTA_UPDATE=always` writes it in place).
 
 use harness::library::Entry;
-use harness::link::Link;
 use harness::report::page::page;
-use harness::scenario::run::run;
-use harness::scenario::simulate::simulated;
+use harness::scenario::run::AtMismatch;
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use std::path::Path;
@@ -15,10 +13,10 @@ use std::path::Path;
 pub(crate) fn snapshot(path: &Path) -> datatest_stable::Result<()> {
     let source = Source::read(path)?;
     let entry = Entry::new(source, None).map_err(|problems| format!("{:#?}", problems.all()))?;
-    let plan = entry.plan.as_ref().ok_or("a bus that is not built yet")?;
-    let mut link = simulated(plan);
-    let outcome = run(plan, &mut link);
-    let traces: Vec<_> = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+    let plan = entry.settled().ok_or("a bus that is not built yet")?;
+    let mut link = plan.simulate();
+    let outcome = plan.play(&mut *link, AtMismatch::Stop);
+    let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
     let page = page(&entry, &outcome, &traces);
 
     let folder = path

@@ -231,7 +231,7 @@ fn a_ring_of_another_size_is_taken_where_the_scenario_allows_it() {
 
 #[test]
 fn a_bus_that_is_not_built_is_skipped() {
-    let path = file("skipped", "a.scn", "title a\nbus unitek\n");
+    let path = file("skipped", "a.scn", "title a\nbus nordac\n");
     let output = drivebench(&["run", text(&path)]);
     // Nothing was judged, so nothing passed.
     assert_eq!(code(&output), 5);

@@ -2,6 +2,8 @@
 
 pub mod driver;
 pub mod gate;
+pub mod language;
+pub mod report;
 pub mod rig;
 pub mod safe_state;
 pub(crate) mod serve;

@@ -299,6 +299,7 @@ impl Line for Bench {
 
     fn wait(&mut self, until: Instant) -> bool {
         let until = self.on_bench(until);
+        let busy = self.busy();
         loop {
             let heard = self.heard_at().filter(|at| *at > self.now);
             let fault = self.scheduled.front().map(|(at, _)| *at);
@@ -313,7 +314,7 @@ impl Line for Bench {
                 return true;
             }
             self.run_to(next.max(self.now));
-            if heard == Some(next) || fault == Some(next) {
+            if heard == Some(next) || fault == Some(next) || busy != self.busy() {
                 return true;
             }
         }

@@ -3,6 +3,7 @@
 use super::page::{Part, Section};
 use super::summary::{Row, Shown, colour};
 use super::write::Html;
+use crate::buses::rows;
 use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
@@ -17,6 +18,9 @@ const AROUND: usize = 12;
 
 /// Expectations shown at most.
 const EXPECTED: usize = 100;
+
+/// Frames shown at most.
+const FRAMES: usize = 2_000;
 
 /// Remarks shown at most.
 const REMARKS: usize = 40;
@@ -242,6 +246,10 @@ fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
     let two = played.traces.len() > 1;
     let instead = format!("It is shown by: {}", played.again);
     for (ring, trace) in played.traces.iter().enumerate() {
+        if let Some(rows) = rows(trace, None, Some(FRAMES)) {
+            parts.push(frames(&rows));
+            continue;
+        }
         if trace.channels.iter().all(|link| link.octets().is_empty()) {
             continue;
         }
@@ -284,6 +292,17 @@ fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
     }
     parts.extend(text(played.text));
     parts
+}
+
+/// What a bus of frames carried, a row a frame.
+fn frames(rows: &str) -> Part {
+    let mut html = Html::new();
+    html.element("pre", &[], |html| html.line("code", &[], rows));
+    Part {
+        heading: "Frames".to_owned(),
+        html,
+        instead: String::new(),
+    }
 }
 
 /// The scenario's own text.

@@ -49,7 +49,8 @@ pub(crate) fn bus(source: &Source) -> Bus {
 /// # Errors
 /// The line is no step.
 pub fn parse_step<L: Language>(source: &Source) -> Result<Step<L>, Problems> {
-    step::step(&mut Scanner::new(&source.text, 0))
+    let comment = L::comment(&source.text);
+    step::step(&mut Scanner::up_to(&source.text, comment, 0))
         .map_err(|problem| Problems::new(&source.name, source.text.clone(), vec![problem]))
 }
 
@@ -73,7 +74,8 @@ pub(crate) fn read<L: Language>(source: &Source, part: Part) -> Result<Scenario<
             break;
         }
         let text = line.strip_suffix('\r').unwrap_or(line);
-        if let Err(problem) = reader.line(Scanner::new(text, offset)) {
+        let scanner = Scanner::up_to(text, L::comment(text), offset);
+        if let Err(problem) = reader.line(scanner) {
             reader.problems.push(problem);
         }
         offset += line.len() + 1;

@@ -230,6 +230,12 @@ impl DeviantMaster {
         self.master.handle_timeout(now);
     }
 
+    /// See [`Master::identifiers`].
+    #[must_use]
+    pub const fn identifiers(&self) -> (u16, u16) {
+        self.master.identifiers()
+    }
+
     /// See [`Master::poll_event`].
     pub fn poll_event(&mut self) -> Option<Event> {
         self.master.poll_event()

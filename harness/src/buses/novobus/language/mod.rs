@@ -105,6 +105,11 @@ impl Language for Novobus {
         plan.link_name(ring, link)
     }
 
+    fn size(plan: &Plan<Self>) -> String {
+        let drives = plan.rings.iter().map(|ring| ring.drives().to_string());
+        drives.collect::<Vec<_>>().join("+")
+    }
+
     fn ports(plan: &Plan<Self>) -> usize {
         plan.rings.len()
     }

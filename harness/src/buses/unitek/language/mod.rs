@@ -1,0 +1,158 @@
+//! The words of the scenario language that belong to UNITEK drives on CAN: drives, frames, registers, jobs.
+
+mod parse;
+pub mod plan;
+mod play;
+pub mod syntax;
+mod write;
+
+pub use play::State;
+pub(crate) use play::written;
+pub(crate) use write::identifier;
+
+use self::plan::{Act, Bench, Planner, WantedFrame};
+use self::syntax::{Header, Message, Step};
+use crate::buses::Bus;
+use crate::buses::unitek::simulate;
+use crate::link::Link;
+use crate::medium::Out;
+use crate::scenario::language::{Language, Opening};
+use crate::scenario::plan::{Plan, PlannedStep};
+use crate::scenario::problem::{Problem, Spanned};
+use crate::scenario::run::outcome::{Mismatch, Stop};
+use crate::scenario::run::player::Runner;
+use crate::scenario::scanner::Scanner;
+use crate::scenario::syntax::Scenario;
+use harness_proto::can::Frame;
+use harness_proto::time::Instant;
+
+/// The language of scenarios with the words of this bus.
+#[derive(Clone, Copy, Debug)]
+pub struct Unitek;
+
+impl Language for Unitek {
+    const BUS: Bus = Bus::Unitek;
+    const STRICT: bool = true;
+    const SOURCE: &'static str = "unitek 5.4 ex 8";
+    const EXAMPLE: &'static str = "`> 201 3D 40 00`: the master asks drive 1 for STATUS";
+
+    type Header = Header;
+    type Message = Message;
+    type Step = Step;
+    type Setup = Bench;
+    type Sent = Frame;
+    type Wanted = WantedFrame;
+    type Act = Act;
+    type Received = Frame;
+    type State = State;
+    type Planner = Planner;
+
+    fn comment(line: &str) -> Option<usize> {
+        parse::comment(line)
+    }
+
+    fn header_words() -> Vec<&'static str> {
+        parse::HEADER.to_vec()
+    }
+
+    fn step_words() -> (Vec<&'static str>, &'static [&'static str]) {
+        (parse::NAMES.to_vec(), &parse::STEPS)
+    }
+
+    fn header(
+        word: &Spanned<&str>,
+        scanner: &mut Scanner<'_>,
+        header: &mut Header,
+        begun: bool,
+    ) -> Option<Result<(), Problem>> {
+        parse::header(word, scanner, header, begun)
+    }
+
+    fn incomplete(header: &Header) -> Option<Problem> {
+        parse::incomplete(header)
+    }
+
+    fn message(scanner: &mut Scanner<'_>) -> Result<Message, Problem> {
+        parse::message(scanner)
+    }
+
+    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<Step, Problem>> {
+        parse::step(opening, scanner)
+    }
+
+    fn settle(
+        scenario: &Scenario<Self>,
+        size: Option<u8>,
+        found: &mut Vec<Problem>,
+    ) -> Result<Planner, Problem> {
+        plan::settle(scenario, size, found)
+    }
+
+    fn resume(bench: &Bench) -> Planner {
+        plan::resume(bench)
+    }
+
+    fn simulate(plan: &Plan<Self>) -> Box<dyn Link> {
+        Box::new(simulate::Bench::new(&plan.setup.setup))
+    }
+
+    fn size(plan: &Plan<Self>) -> String {
+        plan.setup.setup.drives.len().to_string()
+    }
+
+    fn ports(_: &Plan<Self>) -> usize {
+        1
+    }
+
+    fn state(plan: &Plan<Self>, _: &dyn Link) -> State {
+        State::new(plan)
+    }
+
+    fn begin(runner: &mut Runner<'_, Self>) -> Result<(), Stop> {
+        play::begin(runner);
+        Ok(())
+    }
+
+    fn act(runner: &mut Runner<'_, Self>, act: &Act, step: &PlannedStep<Self>) -> Result<(), Stop> {
+        play::act(runner, act, step)
+    }
+
+    fn transmit(link: &mut dyn Link, port: usize, frames: &[Frame]) -> Instant {
+        link.send(port, Out::Frames(frames))
+    }
+
+    fn fetch(state: &mut State, link: &mut dyn Link, port: usize) -> Option<(Instant, Frame)> {
+        state.fetch(link, port)
+    }
+
+    fn matches(wanted: &WantedFrame, frame: Frame) -> bool {
+        play::matches(wanted, &frame)
+    }
+
+    fn describe(wanted: &WantedFrame) -> String {
+        play::describe(wanted)
+    }
+
+    fn show(frame: Frame) -> String {
+        written(&frame)
+    }
+
+    fn complete(runner: &Runner<'_, Self>, finding: &mut Mismatch) {
+        play::complete(&runner.own, finding);
+    }
+
+    fn write_header(header: &Header) -> (Vec<(&'static str, String)>, Vec<String>) {
+        write::header(header)
+    }
+
+    fn write_message(message: &Message) -> String {
+        write::message(message)
+    }
+
+    fn write_step(step: &Step) -> String {
+        write::step(step)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,178 @@
+//! Writes header lines, messages and steps as they are read.
+
+use super::parse::mode_word;
+use super::syntax::{
+    Content, DriveHarm, Expect, FrameHarm, Header, Job, JobKind, Message, Outside, PropertyValue,
+    RegisterName, Setup, Step, Value, ValueKind,
+};
+use crate::scenario::expression::Located;
+use harness_proto::can::Id;
+use harness_proto::unitek::Register;
+use std::fmt::Display;
+
+/// The header lines: those of one word, and those about devices.
+pub(super) fn header(header: &Header) -> (Vec<(&'static str, String)>, Vec<String>) {
+    let kilo = |rate: harness_proto::can::BitRate| rate.bits_per_second() / 1000;
+    let rate = header.rate.map(|rate| ("rate", kilo(rate).to_string()));
+    let drives = header.drives.iter().map(|line| {
+        let what = setup(&line.what);
+        let blank = if what.is_empty() { "" } else { " " };
+        format!("drive {}{blank}{what}", line.drive.expression)
+    });
+    let master = header.master.as_ref();
+    let master = master.map(|own| format!("master deviates {}", own.value.name));
+    (rate.into_iter().collect(), drives.chain(master).collect())
+}
+
+fn setup(what: &Setup) -> String {
+    match what {
+        Setup::There { rx, tx } => {
+            let given = [("rx", *rx), ("tx", *tx)].into_iter();
+            let given = given.filter_map(|(name, id)| Some((name, id?)));
+            let words: Vec<_> = given.map(|(name, id)| format!("{name} {id:03X}")).collect();
+            words.join(" ")
+        }
+        Setup::Profile(name) => format!("profile {name}"),
+        Setup::Property(property, value) => {
+            let value: &dyn Display = match value {
+                PropertyValue::Word(word) => word,
+                PropertyValue::Time(time) => time,
+            };
+            format!("property {} = {value}", property.name)
+        }
+        Setup::Mode(mode) => format!("mode {}", mode_word(*mode)),
+        Setup::Deviates(deviation) => format!("deviates {}", deviation.name),
+        Setup::Outside(own) => outside(own),
+    }
+}
+
+fn outside(what: &Outside) -> String {
+    match what {
+        Outside::Register(name, own) => format!("register {} = {}", register(name), value(own)),
+        Outside::Input(name, high) => {
+            format!("input {name} {}", if *high { "high" } else { "low" })
+        }
+        Outside::Force(name, Some(own)) => format!("force {name} = {}", value(own)),
+        Outside::Force(name, None) => format!("force {name} off"),
+        Outside::Restart => "restart".to_owned(),
+    }
+}
+
+fn register(name: &RegisterName) -> String {
+    match name {
+        RegisterName::Known { register, by_name } => {
+            // A name of the dump that several registers have stands for none of them.
+            match Register::named(register.name) {
+                Ok(_) if *by_name => register.name.to_owned(),
+                _ => format!("{:02X}", register.number),
+            }
+        }
+        RegisterName::Counted(number) => counted(number),
+    }
+}
+
+fn counted(number: &Located) -> String {
+    format!("({})", number.expression)
+}
+
+fn value(value: &Value) -> String {
+    match &value.kind {
+        ValueKind::Raw(raw, digits) => format!("{raw:0digits$X}"),
+        ValueKind::Given(decimal, given) => {
+            let places = usize::from(decimal.places);
+            let digits = format!(
+                "{:0>width$}",
+                decimal.digits.unsigned_abs(),
+                width = places + 1
+            );
+            let (whole, fraction) = digits.split_at(digits.len() - places);
+            let sign = if decimal.digits < 0 { "-" } else { "" };
+            // `5A` would be hexadecimal digits.
+            let point = match (places, given.name()) {
+                (0, "A") => ".0",
+                (0, _) => "",
+                _ => ".",
+            };
+            format!("{sign}{whole}{point}{fraction}{}", given.name())
+        }
+        ValueKind::Counted(number) => counted(number),
+    }
+}
+
+fn expect(own: &Expect) -> String {
+    match &own.tolerance {
+        Some(tolerance) => format!("{} +- {}", value(&own.value), value(tolerance)),
+        None => value(&own.value),
+    }
+}
+
+/// A frame as it stands behind `>` or `<`.
+pub(super) fn message(message: &Message) -> String {
+    let id = identifier(message.id);
+    match &message.content {
+        Content::Empty => id,
+        Content::Data(data) => format!("{id} {data}"),
+        Content::Remote(length) => format!("{id} rtr {length}"),
+    }
+}
+
+/// An identifier: `201`, `x00000201`.
+pub(crate) fn identifier(id: Id) -> String {
+    let number = id.number();
+    match id.is_extended() {
+        true => format!("x{number:08X}"),
+        false => format!("{number:03X}"),
+    }
+}
+
+/// Any other step.
+pub(super) fn step(step: &Step) -> String {
+    match step {
+        Step::Frame(number, harm) => {
+            let harm = match harm {
+                FrameHarm::Lost => "lost".to_owned(),
+                FrameHarm::Doubled => "doubled".to_owned(),
+                FrameHarm::Delay(time) => format!("delay {time}"),
+                FrameHarm::Corrupt => "corrupt".to_owned(),
+                FrameHarm::NoAcknowledge => "no-acknowledge".to_owned(),
+            };
+            format!("! frame {}: {harm}", number.expression)
+        }
+        Step::Drive(drive, harm) => {
+            let harm = match harm {
+                DriveHarm::Off => "off",
+                DriveHarm::On => "on",
+                DriveHarm::BusOff => "bus-off",
+            };
+            format!("! drive {}: {harm}", drive.expression)
+        }
+        Step::Outside(drive, own) => format!("drive {} {}", drive.expression, outside(own)),
+        Step::Quiet => "? quiet".to_owned(),
+        Step::Register(drive, name, own) => {
+            let drive = &drive.expression;
+            format!(
+                "? drive {drive} register {} = {}",
+                register(name),
+                expect(own)
+            )
+        }
+        Step::Job(own) => job(own),
+        Step::Master(own) => format!("master {}", job(own)),
+    }
+}
+
+fn job(job: &Job) -> String {
+    let drive = &job.drive.expression;
+    match &job.what {
+        JobKind::Read(name, None) => format!("read {drive} {}", register(name)),
+        JobKind::Read(name, Some(own)) => {
+            format!("read {drive} {} = {}", register(name), expect(own))
+        }
+        JobKind::Write(name, own) => format!("write {drive} {} = {}", register(name), value(own)),
+        JobKind::Every(name, time) => format!("every {drive} {} {time}", register(name)),
+        JobKind::StopEvery(name) => format!("stop-every {drive} {}", register(name)),
+        JobKind::Lock => format!("lock {drive}"),
+        JobKind::Release => format!("release {drive}"),
+        JobKind::StartUp => format!("start-up {drive}"),
+    }
+}
