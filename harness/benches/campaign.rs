@@ -5,7 +5,7 @@
 
 use divan::counter::ItemsCount;
 use harness::campaign::find::find;
-use harness::campaign::{Campaign, Case};
+use harness::campaign::{Campaign, CaseFaults};
 use harness::link::Octets;
 use harness::scenario::simulate::bench;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn main() {
     divan::main();
 }
 
-fn load(name: &str) -> (Campaign, Vec<Case>) {
+fn load(name: &str) -> (Campaign, Vec<CaseFaults>) {
     let campaign = find(Path::new(name)).expect("a built-in campaign");
     let cases = campaign.cases.iter().step_by(STRIDE).take(32);
     let cases = cases.copied().collect();

@@ -3,7 +3,7 @@
 
 use divan::counter::ItemsCount;
 use harness::capture::read;
-use harness::report::svg::{Options, Scale, svg};
+use harness::report::svg::{Options, RowPlacing, svg};
 use harness::report::vcd::Signals;
 use harness::report::{csv, pcapng, vcd};
 use harness_proto::line::{LineError, Rate};
@@ -115,9 +115,9 @@ fn picture(bencher: divan::Bencher<'_, '_>, scale: &str) {
         title: "100 axes",
         id: "ring",
         scale: if scale == "time" {
-            Scale::Time
+            RowPlacing::Time
         } else {
-            Scale::Index
+            RowPlacing::Index
         },
         rate: Rate::Baud38400,
         rows: None,

@@ -3,7 +3,7 @@
 
 use harness::library::Entry;
 use harness::link::Link;
-use harness::report::html::{Head, Played, run, section};
+use harness::report::html::{Head, ScenarioView, run, section};
 use harness::report::walk::Reader;
 use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::simulate::simulated;
@@ -45,7 +45,7 @@ fn page_of(all: &[(Entry, Outcome, Vec<Trace>)]) -> String {
         .iter()
         .enumerate()
         .map(|(number, (entry, outcome, traces))| {
-            let played = Played {
+            let played = ScenarioView {
                 name: entry.short_name(),
                 title: &entry.scenario.title,
                 sources: &[],

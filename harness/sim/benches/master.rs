@@ -9,7 +9,7 @@ use divan::counter::ItemsCount;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{Job, Master, Options, Pace};
+use harness_proto::novobus::master::{CyclePace, Job, Master, Options};
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::plain::PlainDrive;
 use harness_sim::novobus::ring::Ring;
@@ -54,7 +54,7 @@ impl Player {
         if matches!(work, Work::Exchange) {
             let all: Vec<u8> = (0..size.drives()).collect();
             master
-                .set_exchange(&all, Pace::Continuous)
+                .set_exchange(&all, CyclePace::Continuous)
                 .expect("drives of the ring");
         }
         Self {

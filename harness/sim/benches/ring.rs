@@ -7,7 +7,7 @@
 use divan::counter::ItemsCount;
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::bus_end::{Deadline, Reaction};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::error_mode::Marks;
@@ -98,8 +98,8 @@ fn repeater(bencher: divan::Bencher<'_, '_>, drives: u64) {
 struct Repeater;
 
 impl Device for Repeater {
-    fn receive(&mut self, _now: Instant, received: Received) -> Step {
-        Step {
+    fn receive(&mut self, _now: Instant, received: Received) -> Reaction {
+        Reaction {
             byte: Some(received.byte),
             marks: Marks::NONE,
         }
@@ -109,8 +109,8 @@ impl Device for Repeater {
         None
     }
 
-    fn handle_deadline(&mut self, _now: Instant) -> Step {
-        Step::default()
+    fn handle_deadline(&mut self, _now: Instant) -> Reaction {
+        Reaction::default()
     }
 
     fn power_on(&mut self, _now: Instant) {}

@@ -137,12 +137,12 @@ impl fmt::Display for DriveFault {
 
 /// Faults waiting for their byte: a list in order of bytes that is used up from the front.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan<F> {
+pub(crate) struct FaultPlan<F> {
     /// In order of byte numbers, the last one first, so that taking one costs nothing.
     waiting: Vec<(u64, F)>,
 }
 
-impl<F> Default for Plan<F> {
+impl<F> Default for FaultPlan<F> {
     fn default() -> Self {
         Self {
             waiting: Vec::new(),
@@ -150,7 +150,7 @@ impl<F> Default for Plan<F> {
     }
 }
 
-impl<F: Copy> Plan<F> {
+impl<F: Copy> FaultPlan<F> {
     /// Adds a fault at byte `byte`, behind those already there for the same byte.
     pub(crate) fn add(&mut self, byte: u64, fault: F) {
         let place = self.waiting.partition_point(|(at, _)| *at > byte);
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_plan_gives_faults_in_order_of_bytes_and_of_lines() {
-        let mut plan = Plan::default();
+        let mut plan = FaultPlan::default();
         for (byte, fault) in [(5, 'c'), (2, 'a'), (9, 'e'), (2, 'b'), (5, 'd')] {
             plan.add(byte, fault);
         }

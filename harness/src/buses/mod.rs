@@ -16,10 +16,10 @@ pub mod run {
         NotReady, play_over_bus, reset_drives, start_anew,
     };
     pub(crate) use super::novobus::language::run::over_bus::{come_home, read_byte};
-    pub use super::novobus::language::run::record::{MAX_SAMPLES, Record, Sample};
+    pub use super::novobus::language::run::record::{CellRecord, MAX_SAMPLES, Sample};
 }
 
-pub(crate) use harness_proto::novobus::guard::Setting;
+pub(crate) use harness_proto::novobus::guard::LimitSetting;
 pub(crate) use novobus::language::parse::header;
 
 /// The bus of a scenario without a `bus` line.

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// A bit of a byte on the line (ND21 8.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Bit {
+pub enum LineBit {
     /// The start bit.
     Start,
     /// Data bit 0 to 7.
@@ -23,7 +23,7 @@ pub enum Bit {
     Stop,
 }
 
-impl Bit {
+impl LineBit {
     /// All 11, in the order in which they are sent.
     #[must_use]
     pub fn all() -> Vec<Self> {
@@ -37,9 +37,9 @@ impl Bit {
 
 /// What a fault does to its byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum What {
+pub enum FaultEffect {
     /// A bit is inverted.
-    Bit(Bit),
+    Bit(LineBit),
     /// The byte does not arrive.
     Drop,
     /// It arrives twice.
@@ -64,7 +64,7 @@ pub struct Injected {
     /// The byte that its transmitter sends, counted from 1.
     pub byte: u64,
     /// What happens to it.
-    pub what: What,
+    pub what: FaultEffect,
 }
 
 /// The link that ends at a drive, counted from the master's outgoing one.
@@ -100,26 +100,26 @@ fn span(time: Time) -> Span {
     Span::from_nanos(u64::try_from(time.0.as_nanos()).unwrap_or(u64::MAX))
 }
 
-impl What {
+impl FaultEffect {
     /// The same as faults of a link, each with its distance in bytes.
     #[must_use]
     pub fn on_link(self) -> Vec<(u64, LinkFault)> {
         let flip = |flips| LinkFault::Flip(flips);
         let none = Flips::default();
         let fault = match self {
-            Self::Bit(Bit::Start) => flip(Flips {
+            Self::Bit(LineBit::Start) => flip(Flips {
                 start: true,
                 ..none
             }),
-            Self::Bit(Bit::Data(bit)) => flip(Flips {
+            Self::Bit(LineBit::Data(bit)) => flip(Flips {
                 data: 1 << bit,
                 ..none
             }),
-            Self::Bit(Bit::Parity) => flip(Flips {
+            Self::Bit(LineBit::Parity) => flip(Flips {
                 parity: true,
                 ..none
             }),
-            Self::Bit(Bit::Stop) => flip(Flips { stop: true, ..none }),
+            Self::Bit(LineBit::Stop) => flip(Flips { stop: true, ..none }),
             Self::Drop => LinkFault::Drop,
             Self::Duplicate => LinkFault::Duplicate,
             Self::Overrun => LinkFault::Overrun,
@@ -163,7 +163,7 @@ impl What {
     }
 }
 
-impl fmt::Display for Bit {
+impl fmt::Display for LineBit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Start => f.write_str("b"),
@@ -174,7 +174,7 @@ impl fmt::Display for Bit {
     }
 }
 
-impl fmt::Display for What {
+impl fmt::Display for FaultEffect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Bit(bit) => bit.fmt(f),
@@ -189,7 +189,7 @@ impl fmt::Display for What {
     }
 }
 
-impl FromStr for What {
+impl FromStr for FaultEffect {
     type Err = ();
 
     fn from_str(text: &str) -> Result<Self, ()> {
@@ -210,14 +210,14 @@ impl FromStr for What {
             };
         }
         match text {
-            "b" => Ok(Self::Bit(Bit::Start)),
-            "p" => Ok(Self::Bit(Bit::Parity)),
-            "s" => Ok(Self::Bit(Bit::Stop)),
+            "b" => Ok(Self::Bit(LineBit::Start)),
+            "p" => Ok(Self::Bit(LineBit::Parity)),
+            "s" => Ok(Self::Bit(LineBit::Stop)),
             "drop" => Ok(Self::Drop),
             "duplicate" => Ok(Self::Duplicate),
             "overrun" => Ok(Self::Overrun),
             bit => match bit.parse() {
-                Ok(bit @ 0..=7) => Ok(Self::Bit(Bit::Data(bit))),
+                Ok(bit @ 0..=7) => Ok(Self::Bit(LineBit::Data(bit))),
                 _ => Err(()),
             },
         }
@@ -226,14 +226,14 @@ impl FromStr for What {
 
 /// The faults of one case: one, or two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Case {
+pub struct CaseFaults {
     /// The first.
     pub first: Injected,
     /// The second, where there are two.
     pub second: Option<Injected>,
 }
 
-impl Case {
+impl CaseFaults {
     /// The faults, in order.
     pub fn faults(&self) -> impl Iterator<Item = &Injected> {
         std::iter::once(&self.first).chain(&self.second)
@@ -302,7 +302,7 @@ mod tests {
             "4->3:2:break-500us",
             "4->3:2:drop",
         ] {
-            let case = Case::from_name(name, 100).expect("a case");
+            let case = CaseFaults::from_name(name, 100).expect("a case");
             assert_eq!(case.name(100), name);
         }
         for name in [
@@ -317,7 +317,7 @@ mod tests {
             "1->0:1:gap-0",
             "1->0:1:delay-2s",
         ] {
-            assert!(Case::from_name(name, 100).is_err(), "{name}");
+            assert!(CaseFaults::from_name(name, 100).is_err(), "{name}");
         }
     }
 }

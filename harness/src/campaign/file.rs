@@ -1,7 +1,7 @@
 //! What may stand in a campaign file (`corpora/campaigns/*.toml`), and the check of a text.
 
-use super::fault::{Bit, LONGEST, MAX_GAP, wire_index};
-use crate::campaign::class::Class;
+use super::fault::{LONGEST, LineBit, MAX_GAP, wire_index};
+use crate::campaign::class::CaseClass;
 use crate::file::schema::{Step, compare, place, syntax};
 use crate::file::values::{Time, Wire};
 use crate::scenario::problem::{Problem, Problems};
@@ -31,7 +31,7 @@ pub struct CampaignFile {
     pub drives: Option<u8>,
     /// The kinds of faults.
     #[schemars(length(min = 1, max = 8))]
-    pub faults: Vec<Kind>,
+    pub faults: Vec<FaultFamily>,
     /// The links, such as "98->97"; all where none is named.
     #[serde(default)]
     #[schemars(length(min = 1, max = 251))]
@@ -79,7 +79,7 @@ pub struct CampaignFile {
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum FaultFamily {
     /// Each bit of `bits`.
     Bits,
     /// The byte is lost.
@@ -136,7 +136,7 @@ pub enum BitName {
     Stop,
 }
 
-impl From<BitName> for Bit {
+impl From<BitName> for LineBit {
     fn from(name: BitName) -> Self {
         match name {
             BitName::Start => Self::Start,
@@ -166,25 +166,25 @@ pub struct Expect {
     /// All cases together.
     #[schemars(range(min = 0))]
     pub cases: Option<u64>,
-    /// See [`Class::Harmless`].
+    /// See [`CaseClass::Harmless`].
     #[schemars(range(min = 0))]
     pub harmless: Option<u64>,
-    /// See [`Class::Located`].
+    /// See [`CaseClass::Located`].
     #[schemars(range(min = 0))]
     pub located: Option<u64>,
-    /// See [`Class::Recovered`].
+    /// See [`CaseClass::Recovered`].
     #[schemars(range(min = 0))]
     pub recovered: Option<u64>,
-    /// See [`Class::Mislocated`].
+    /// See [`CaseClass::Mislocated`].
     #[schemars(range(min = 0))]
     pub mislocated: Option<u64>,
-    /// See [`Class::NotRecovered`].
+    /// See [`CaseClass::NotRecovered`].
     #[schemars(range(min = 0))]
     pub not_recovered: Option<u64>,
-    /// See [`Class::Corrupted`].
+    /// See [`CaseClass::Corrupted`].
     #[schemars(range(min = 0))]
     pub corrupted: Option<u64>,
-    /// See [`Class::SilentCorruption`].
+    /// See [`CaseClass::SilentCorruption`].
     #[schemars(range(min = 0))]
     pub silent_corruption: Option<u64>,
 }
@@ -192,15 +192,15 @@ pub struct Expect {
 impl Expect {
     /// How many cases of a class are expected.
     #[must_use]
-    pub const fn of(&self, class: Class) -> Option<u64> {
+    pub const fn of(&self, class: CaseClass) -> Option<u64> {
         match class {
-            Class::Harmless => self.harmless,
-            Class::Located => self.located,
-            Class::Recovered => self.recovered,
-            Class::Mislocated => self.mislocated,
-            Class::NotRecovered => self.not_recovered,
-            Class::Corrupted => self.corrupted,
-            Class::SilentCorruption => self.silent_corruption,
+            CaseClass::Harmless => self.harmless,
+            CaseClass::Located => self.located,
+            CaseClass::Recovered => self.recovered,
+            CaseClass::Mislocated => self.mislocated,
+            CaseClass::NotRecovered => self.not_recovered,
+            CaseClass::Corrupted => self.corrupted,
+            CaseClass::SilentCorruption => self.silent_corruption,
         }
     }
 }
@@ -300,19 +300,27 @@ impl Read<'_> {
         let file = &self.file;
         let mut found = Vec::new();
         let lists = [
-            (Kind::Bits, "bits", file.bits.as_ref().map(Vec::len)),
+            (FaultFamily::Bits, "bits", file.bits.as_ref().map(Vec::len)),
             (
-                Kind::Insert,
+                FaultFamily::Insert,
                 "inserted",
                 file.inserted.as_ref().map(Vec::len),
             ),
-            (Kind::Gap, "gaps", file.gaps.as_ref().map(Vec::len)),
-            (Kind::Delay, "delays", file.delays.as_ref().map(Vec::len)),
-            (Kind::Break, "breaks", file.breaks.as_ref().map(Vec::len)),
+            (FaultFamily::Gap, "gaps", file.gaps.as_ref().map(Vec::len)),
+            (
+                FaultFamily::Delay,
+                "delays",
+                file.delays.as_ref().map(Vec::len),
+            ),
+            (
+                FaultFamily::Break,
+                "breaks",
+                file.breaks.as_ref().map(Vec::len),
+            ),
         ];
         for (kind, key, list) in lists {
             let named = file.faults.contains(&kind);
-            if named && list.is_none() && kind != Kind::Bits {
+            if named && list.is_none() && kind != FaultFamily::Bits {
                 let message = format!("`{key}` is missing for these faults");
                 let expected = format!("a list `{key}` expected beside it");
                 found.push(self.wrong(&["faults"], message, expected));

@@ -11,7 +11,7 @@ static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/campaigns")
 
 /// Why a campaign cannot be loaded.
 #[derive(Debug, thiserror::Error)]
-pub enum FindError {
+pub enum FindCampaignError {
     /// Neither a file nor the name of a built-in campaign.
     #[error("failed to find {name}: neither a file nor a built-in campaign; {remedy}")]
     NotFound {
@@ -43,7 +43,7 @@ pub fn names() -> Vec<&'static str> {
 ///
 /// # Errors
 /// There is none, or it cannot be played.
-pub fn find(name: &Path) -> Result<Campaign, FindError> {
+pub fn find(name: &Path) -> Result<Campaign, FindCampaignError> {
     if name.is_file() {
         let folder = name.parent().map_or_else(PathBuf::new, Path::to_path_buf);
         return Ok(Campaign::load(&Source::read(name)?, &folder)?);
@@ -54,7 +54,7 @@ pub fn find(name: &Path) -> Result<Campaign, FindError> {
         let known = names();
         let near = nearest(bare, &known).map(|near| format!("did you mean `{near}`? "));
         let known = known.join(", ");
-        return Err(FindError::NotFound {
+        return Err(FindCampaignError::NotFound {
             name: wanted,
             remedy: format!("{}there are {known}", near.unwrap_or_default()),
         });

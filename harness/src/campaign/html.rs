@@ -1,10 +1,10 @@
 //! The page of campaigns: how many cases of each class, and where in the ring which class happens, as a map of letters and colours.
 
-use crate::campaign::fault::{Bit, What};
+use crate::campaign::fault::{FaultEffect, LineBit};
 use crate::campaign::report::{WORST, happened, share};
-use crate::campaign::{Class, Finished};
+use crate::campaign::{CaseClass, PlayedCampaign};
 use crate::report::html::Html;
-use crate::report::html::{Part, Section, page};
+use crate::report::html::{FoldedPart, Section, page};
 use std::collections::BTreeMap;
 
 /// Maximum number of cells of a map; a larger map shows several bytes in one row.
@@ -14,29 +14,29 @@ const CELLS: usize = 12_000;
 const LINKS: usize = 251;
 
 /// A class's letter, for readers who see no colours.
-const fn letter(class: Class) -> char {
+const fn letter(class: CaseClass) -> char {
     match class {
-        Class::Harmless => '.',
-        Class::Located => 'L',
-        Class::Recovered => 'R',
-        Class::Mislocated => 'M',
-        Class::NotRecovered => 'N',
-        Class::Corrupted => 'C',
-        Class::SilentCorruption => 'S',
+        CaseClass::Harmless => '.',
+        CaseClass::Located => 'L',
+        CaseClass::Recovered => 'R',
+        CaseClass::Mislocated => 'M',
+        CaseClass::NotRecovered => 'N',
+        CaseClass::Corrupted => 'C',
+        CaseClass::SilentCorruption => 'S',
     }
 }
 
 /// The class of a class's colour.
-fn colour(class: Class) -> String {
+fn colour(class: CaseClass) -> String {
     format!("k{}", class as u8)
 }
 
 /// How many cases there are of each class.
-type Counts = BTreeMap<Class, u64>;
+type Counts = BTreeMap<CaseClass, u64>;
 
 /// The page of campaigns that were played.
 #[must_use]
-pub fn campaigns(all: &[Finished]) -> String {
+pub fn campaigns(all: &[PlayedCampaign]) -> String {
     let mut front = Html::new();
     front.element("section", &[("aria-labelledby", &"summary")], |html| {
         html.line("h2", &[("id", &"summary")], "Summary");
@@ -56,11 +56,11 @@ pub fn campaigns(all: &[Finished]) -> String {
     page("drivebench: campaigns of faults", &front, &sections)
 }
 
-fn summary(html: &mut Html, all: &[Finished]) {
+fn summary(html: &mut Html, all: &[PlayedCampaign]) {
     html.element("table", &[], |html| {
         html.line("caption", &[], "Campaigns");
         let mut names = vec!["Campaign", "Drives", "Bytes", "Cases", "Pinned figures"];
-        names.extend(Class::ALL.map(Class::name));
+        names.extend(CaseClass::ALL.map(CaseClass::name));
         html.heads(&names);
         for (number, one) in all.iter().enumerate() {
             html.element("tr", &[], |html| {
@@ -75,7 +75,7 @@ fn summary(html: &mut Html, all: &[Finished]) {
                     0 => html.line("td", &[("class", &"good")], "as found"),
                     many => html.line("td", &[("class", &"bad")], format_args!("{many} differ")),
                 }
-                for class in Class::ALL {
+                for class in CaseClass::ALL {
                     html.line("td", &[("class", &"n")], one.count(class));
                 }
             });
@@ -88,7 +88,7 @@ fn letters(html: &mut Html) {
     html.element("table", &[], |html| {
         html.line("caption", &[], "Classes, in order of gravity");
         html.heads(&["Letter", "Class", "What it means"]);
-        for class in Class::ALL {
+        for class in CaseClass::ALL {
             html.element("tr", &[], |html| {
                 html.line("td", &[("class", &colour(class))], letter(class));
                 html.line("th", &[("scope", &"row")], class.name());
@@ -98,11 +98,11 @@ fn letters(html: &mut Html) {
     });
 }
 
-fn name(finished: &Finished) -> &str {
+fn name(finished: &PlayedCampaign) -> &str {
     finished.name.trim_end_matches(".toml")
 }
 
-fn section(number: usize, finished: &Finished) -> Section {
+fn section(number: usize, finished: &PlayedCampaign) -> Section {
     let mut html = Html::new();
     html.line("p", &[], &finished.title);
     html.line(
@@ -121,7 +121,7 @@ fn section(number: usize, finished: &Finished) -> Section {
         "It is in: drivebench campaign {} --format json",
         name(finished)
     );
-    let part = |heading: &str, html: Html| Part {
+    let part = |heading: &str, html: Html| FoldedPart {
         heading: heading.to_owned(),
         html,
         instead: instead.clone(),
@@ -130,7 +130,7 @@ fn section(number: usize, finished: &Finished) -> Section {
     parts.extend(by_bit(finished).map(|html| part("Which bit: links across, bits down", html)));
     parts.push(part("By link", by_link(finished)));
     parts.extend(worst(finished).map(|html| part("The worst", html)));
-    let gravest = Class::ALL
+    let gravest = CaseClass::ALL
         .into_iter()
         .rfind(|class| finished.count(*class) > 0);
     let differs = !finished.differs().is_empty();
@@ -143,12 +143,12 @@ fn section(number: usize, finished: &Finished) -> Section {
     }
 }
 
-fn classes(html: &mut Html, finished: &Finished) {
+fn classes(html: &mut Html, finished: &PlayedCampaign) {
     let all = finished.outcomes.len() as u64;
     html.element("table", &[], |html| {
         html.line("caption", &[], "Cases by class");
         html.heads(&["Class", "Cases", "Share", "What it means"]);
-        for class in Class::ALL {
+        for class in CaseClass::ALL {
             let count = finished.count(class);
             html.element("tr", &[], |html| {
                 html.line("th", &[("scope", &"row")], class.name());
@@ -159,7 +159,7 @@ fn classes(html: &mut Html, finished: &Finished) {
         }
     });
     for differs in finished.differs() {
-        let class = differs.class.map_or("cases", Class::name);
+        let class = differs.class.map_or("cases", CaseClass::name);
         html.line(
             "p",
             &[("class", &"bad")],
@@ -175,7 +175,7 @@ fn classes(html: &mut Html, finished: &Finished) {
 fn map(
     html: &mut Html,
     caption: &str,
-    finished: &Finished,
+    finished: &PlayedCampaign,
     rows: &[(String, BTreeMap<usize, Counts>)],
 ) {
     let links = usize::from(finished.drives) + 1;
@@ -227,7 +227,7 @@ fn add(to: &mut Counts, from: &Counts) {
     }
 }
 
-fn by_byte(finished: &Finished) -> Html {
+fn by_byte(finished: &PlayedCampaign) -> Html {
     let places = finished.by_place();
     let last = places.keys().map(|(_, byte)| *byte).max().unwrap_or(0);
     let links = u64::from(finished.drives) + 1;
@@ -259,11 +259,11 @@ fn by_byte(finished: &Finished) -> Html {
 }
 
 /// The same by bits, where the campaign damages single ones.
-fn by_bit(finished: &Finished) -> Option<Html> {
-    let mut bits: BTreeMap<Bit, BTreeMap<usize, Counts>> = BTreeMap::new();
+fn by_bit(finished: &PlayedCampaign) -> Option<Html> {
+    let mut bits: BTreeMap<LineBit, BTreeMap<usize, Counts>> = BTreeMap::new();
     for outcome in &finished.outcomes {
         for fault in outcome.case.faults() {
-            if let What::Bit(bit) = fault.what {
+            if let FaultEffect::Bit(bit) = fault.what {
                 let cells = bits.entry(bit).or_default();
                 *cells
                     .entry(fault.link)
@@ -279,10 +279,10 @@ fn by_bit(finished: &Finished) -> Option<Html> {
     let rows: Vec<_> = bits
         .into_iter()
         .map(|(bit, cells)| match bit {
-            Bit::Data(number) => (format!("data bit {number}"), cells),
-            Bit::Start => ("start bit".to_owned(), cells),
-            Bit::Parity => ("parity bit".to_owned(), cells),
-            Bit::Stop => ("stop bit".to_owned(), cells),
+            LineBit::Data(number) => (format!("data bit {number}"), cells),
+            LineBit::Start => ("start bit".to_owned(), cells),
+            LineBit::Parity => ("parity bit".to_owned(), cells),
+            LineBit::Stop => ("stop bit".to_owned(), cells),
         })
         .collect();
     let mut html = Html::new();
@@ -295,7 +295,7 @@ fn by_bit(finished: &Finished) -> Option<Html> {
     Some(html)
 }
 
-fn by_link(finished: &Finished) -> Html {
+fn by_link(finished: &PlayedCampaign) -> Html {
     let mut links: BTreeMap<usize, Counts> = BTreeMap::new();
     for ((link, _), counts) in finished.by_place() {
         add(links.entry(link).or_default(), &counts);
@@ -310,12 +310,12 @@ fn by_link(finished: &Finished) -> Html {
                 "Cases by link and class; a case with two faults counts at both",
             );
             let mut names = vec!["Link"];
-            names.extend(Class::ALL.map(Class::name));
+            names.extend(CaseClass::ALL.map(CaseClass::name));
             html.heads(&names);
             for (link, counts) in links.iter().take(LINKS) {
                 html.element("tr", &[], |html| {
                     html.line("th", &[("scope", &"row")], finished.link(*link));
-                    for class in Class::ALL {
+                    for class in CaseClass::ALL {
                         html.line(
                             "td",
                             &[("class", &"n")],
@@ -329,11 +329,11 @@ fn by_link(finished: &Finished) -> Html {
     html
 }
 
-fn worst(finished: &Finished) -> Option<Html> {
+fn worst(finished: &PlayedCampaign) -> Option<Html> {
     let mut worst: Vec<_> = finished
         .outcomes
         .iter()
-        .filter(|outcome| outcome.class >= Class::Recovered)
+        .filter(|outcome| outcome.class >= CaseClass::Recovered)
         .collect();
     worst.sort_by_key(|outcome| std::cmp::Reverse(outcome.class));
     if worst.is_empty() {

@@ -13,10 +13,10 @@ pub mod plan;
 pub mod replay;
 pub(crate) mod run;
 
-pub use crate::buses::novobus::campaign::class::{Class, Evidence, Wrong};
-pub use fault::Case;
+pub use crate::buses::novobus::campaign::class::{CaseClass, CaseEvidence, Wrong};
+pub use fault::CaseFaults;
 pub use html::campaigns;
-pub use run::{Campaign, Contradiction, Finished, Outcome};
+pub use run::{Campaign, CaseOutcome, Contradiction, PlayedCampaign};
 
 /// The classes of the one bus whose conversations are disturbed today, and how a case is played there.
 pub use crate::buses::novobus::campaign::{

@@ -1,7 +1,7 @@
 //! The list of cases: a pure function of a campaign file and the ring and conversation that it is for.
 
-use super::fault::{Bit, Case, Injected, What, wire_index};
-use super::file::{CampaignFile, Kind, MAX_CASES, Pairs, hex};
+use super::fault::{CaseFaults, FaultEffect, Injected, LineBit, wire_index};
+use super::file::{CampaignFile, FaultFamily, MAX_CASES, Pairs, hex};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ pub struct TooMany(pub u64);
 ///
 /// # Errors
 /// There are more than [`MAX_CASES`].
-pub fn cases(file: &CampaignFile, shape: &Shape) -> Result<Vec<Case>, TooMany> {
+pub fn cases(file: &CampaignFile, shape: &Shape) -> Result<Vec<CaseFaults>, TooMany> {
     let singles = singles(file, shape);
     let groups = match file.pairs {
         None => vec![Group::Singles(0..singles.len())],
@@ -92,43 +92,43 @@ fn singles(file: &CampaignFile, shape: &Shape) -> Vec<Injected> {
     all
 }
 
-fn whats(file: &CampaignFile, kind: Kind) -> Vec<What> {
+fn whats(file: &CampaignFile, kind: FaultFamily) -> Vec<FaultEffect> {
     match kind {
-        Kind::Bits => match &file.bits {
+        FaultFamily::Bits => match &file.bits {
             Some(bits) => {
-                let mut bits: Vec<_> = bits.iter().map(|bit| Bit::from(*bit)).collect();
+                let mut bits: Vec<_> = bits.iter().map(|bit| LineBit::from(*bit)).collect();
                 bits.sort_unstable();
                 bits.dedup();
-                bits.into_iter().map(What::Bit).collect()
+                bits.into_iter().map(FaultEffect::Bit).collect()
             }
-            None => Bit::all().into_iter().map(What::Bit).collect(),
+            None => LineBit::all().into_iter().map(FaultEffect::Bit).collect(),
         },
-        Kind::Drop => vec![What::Drop],
-        Kind::Duplicate => vec![What::Duplicate],
-        Kind::Overrun => vec![What::Overrun],
-        Kind::Insert => {
+        FaultFamily::Drop => vec![FaultEffect::Drop],
+        FaultFamily::Duplicate => vec![FaultEffect::Duplicate],
+        FaultFamily::Overrun => vec![FaultEffect::Overrun],
+        FaultFamily::Insert => {
             let bytes = file.inserted.iter().flatten();
             bytes
-                .filter_map(|text| hex(text).map(What::Insert))
+                .filter_map(|text| hex(text).map(FaultEffect::Insert))
                 .collect()
         }
-        Kind::Gap => file
+        FaultFamily::Gap => file
             .gaps
             .iter()
             .flatten()
-            .map(|gap| What::Gap(*gap))
+            .map(|gap| FaultEffect::Gap(*gap))
             .collect(),
-        Kind::Delay => file
+        FaultFamily::Delay => file
             .delays
             .iter()
             .flatten()
-            .map(|t| What::Delay(*t))
+            .map(|t| FaultEffect::Delay(*t))
             .collect(),
-        Kind::Break => file
+        FaultFamily::Break => file
             .breaks
             .iter()
             .flatten()
-            .map(|t| What::Break(*t))
+            .map(|t| FaultEffect::Break(*t))
             .collect(),
     }
 }
@@ -149,12 +149,12 @@ impl Group {
         }
     }
 
-    fn case(&self, index: u64, singles: &[Injected]) -> Case {
+    fn case(&self, index: u64, singles: &[Injected]) -> CaseFaults {
         let place = |range: &Range<usize>, index: u64| {
             singles[range.start + usize::try_from(index).unwrap_or(usize::MAX)]
         };
         match self {
-            Self::Singles(all) => Case {
+            Self::Singles(all) => CaseFaults {
                 first: place(all, index),
                 second: None,
             },
@@ -167,12 +167,12 @@ impl Group {
                 while (second + 1) * second / 2 <= index {
                     second += 1;
                 }
-                Case {
+                CaseFaults {
                     first: place(all, index - second * (second - 1) / 2),
                     second: Some(place(all, second)),
                 }
             }
-            Self::Between(a, b) => Case {
+            Self::Between(a, b) => CaseFaults {
                 first: place(a, index / b.len() as u64),
                 second: Some(place(b, index % b.len() as u64)),
             },

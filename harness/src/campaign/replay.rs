@@ -1,6 +1,6 @@
 //! One case as a scenario, to be looked at with `drivebench trace`.
 
-use super::fault::Case;
+use super::fault::CaseFaults;
 use super::run::{Campaign, Contradiction};
 use crate::buses::syntax::{Fault, Header, Job, LinkEnds, RingStep};
 use crate::link::link_name;
@@ -20,7 +20,7 @@ const RUN: usize = 3;
 ///
 /// # Errors
 /// The case fits no class.
-pub fn scenario(campaign: &Campaign, case: &Case) -> Result<String, Contradiction> {
+pub fn scenario(campaign: &Campaign, case: &CaseFaults) -> Result<String, Contradiction> {
     let (outcome, said) = campaign.play(case)?;
     let drives = campaign.shape.drives;
     let entry = &campaign.entry;

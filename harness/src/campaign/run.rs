@@ -1,13 +1,13 @@
 //! A campaign, read and played.
 
-use super::fault::Case;
+use super::fault::CaseFaults;
 use super::file::{CampaignFile, Expect, read};
 use super::plan::{Shape, cases};
 use crate::buses::syntax::{Setup, SetupKind};
 use crate::campaign::by_driver::ByDriver;
 use crate::campaign::by_manual::{ByManual, Said};
-use crate::campaign::class::{Class, Evidence};
-use crate::campaign::conversation::{Talk, talk, telegrams};
+use crate::campaign::class::{CaseClass, CaseEvidence};
+use crate::campaign::conversation::{MasterTalk, talk, telegrams};
 use crate::library::{Entry, LibraryError, sources};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::simulate::bench;
@@ -33,7 +33,7 @@ pub struct Campaign {
     /// How many drives the ring has, and where telegrams begin.
     pub shape: Shape,
     /// The cases, in order.
-    pub cases: Vec<Case>,
+    pub cases: Vec<CaseFaults>,
     played: Played,
 }
 
@@ -46,13 +46,13 @@ enum Played {
 
 /// The outcome of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Outcome {
+pub struct CaseOutcome {
     /// The faults.
-    pub case: Case,
+    pub case: CaseFaults,
     /// The class of the outcome.
-    pub class: Class,
+    pub class: CaseClass,
     /// The evidence for this class.
-    pub evidence: Evidence,
+    pub evidence: CaseEvidence,
 }
 
 /// A case that fits no class: a defect of the bench.
@@ -69,7 +69,7 @@ pub struct Contradiction {
 
 /// A campaign that has been played.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct PlayedCampaign {
     /// The campaign's name.
     pub name: String,
     /// What it shows.
@@ -81,7 +81,7 @@ pub struct Finished {
     /// How many bytes the conversation has.
     pub bytes: u64,
     /// Every case, in the order of the plan.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<CaseOutcome>,
     /// The figures that the file pins.
     pub expect: Expect,
 }
@@ -157,7 +157,7 @@ impl Campaign {
         };
         let drives = plan.rings.first().map_or(0, |ring| ring.drives());
         let (played, shape) = match talk(plan).map_err(own)? {
-            Talk::Bytes(bytes) => {
+            MasterTalk::Bytes(bytes) => {
                 let Some(by_manual) = ByManual::new(start, bytes) else {
                     let message =
                         "played twice, the conversation leaves other cells than played once";
@@ -168,7 +168,7 @@ impl Campaign {
                 let shape = by_manual.answers().shape.clone();
                 (Played::ByManual(Box::new(by_manual)), shape)
             }
-            Talk::Calls(calls) => {
+            MasterTalk::Calls(calls) => {
                 let Some(by_driver) = ByDriver::new(start, calls) else {
                     let message = "the driver does not get through it without a fault, or a call is more than one command";
                     return Err(mistake(read.wrong(
@@ -212,7 +212,7 @@ impl Campaign {
     ///
     /// # Errors
     /// It fits no class.
-    pub fn play(&self, case: &Case) -> Result<(Outcome, Vec<Said>), Contradiction> {
+    pub fn play(&self, case: &CaseFaults) -> Result<(CaseOutcome, Vec<Said>), Contradiction> {
         let (evidence, said) = match &self.played {
             Played::ByManual(by_manual) => by_manual.play(case),
             Played::ByDriver(by_driver) => (by_driver.play(case), Vec::new()),
@@ -222,7 +222,7 @@ impl Campaign {
             case: case.name(self.shape.drives),
             why,
         })?;
-        let outcome = Outcome {
+        let outcome = CaseOutcome {
             case: *case,
             class,
             evidence,
@@ -239,7 +239,7 @@ impl Campaign {
         &self,
         threads: usize,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Finished, Contradiction> {
+    ) -> Result<PlayedCampaign, Contradiction> {
         let next = AtomicUsize::new(0);
         let failed = AtomicBool::new(false);
         let done = Mutex::new(Vec::with_capacity(self.cases.len() / BATCH + 1));
@@ -271,7 +271,7 @@ impl Campaign {
         let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
         done.sort_by_key(|(first, _)| *first);
         let outcomes = done.into_iter().flat_map(|(_, outcomes)| outcomes);
-        Ok(Finished {
+        Ok(PlayedCampaign {
             name: self.name.clone(),
             title: self.file.title.clone(),
             scenario: self.entry.short_name().to_owned(),
@@ -287,14 +287,14 @@ impl Campaign {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Differs {
     /// Of which class; `None` for all cases together.
-    pub class: Option<Class>,
+    pub class: Option<CaseClass>,
     /// What the file says.
     pub expected: u64,
     /// What came out.
     pub found: u64,
 }
 
-impl Finished {
+impl PlayedCampaign {
     /// A link as people write it: `98->97`; `place` counts from the master's outgoing one.
     #[must_use]
     pub fn link(&self, place: usize) -> String {
@@ -303,15 +303,16 @@ impl Finished {
 
     /// How many cases there are of a class.
     #[must_use]
-    pub fn count(&self, class: Class) -> u64 {
-        let of_class = |outcome: &&Outcome| outcome.class == class;
+    pub fn count(&self, class: CaseClass) -> u64 {
+        let of_class = |outcome: &&CaseOutcome| outcome.class == class;
         self.outcomes.iter().filter(of_class).count() as u64
     }
 
     /// The pinned figures that were not met: the number of cases first, then the classes in order of gravity.
     #[must_use]
     pub fn differs(&self) -> Vec<Differs> {
-        let all = Class::ALL.map(|class| (Some(class), self.expect.of(class), self.count(class)));
+        let all =
+            CaseClass::ALL.map(|class| (Some(class), self.expect.of(class), self.count(class)));
         let cases = (None, self.expect.cases, self.outcomes.len() as u64);
         let pinned = std::iter::once(cases).chain(all);
         let pinned = pinned.filter_map(|(class, expected, found)| {
@@ -328,7 +329,7 @@ impl Finished {
     /// How many cases of each class there are at each link and byte, where a case with two faults counts at both:
     /// the figures of a map with a row for a link and a column for a byte.
     #[must_use]
-    pub fn by_place(&self) -> BTreeMap<(usize, u64), BTreeMap<Class, u64>> {
+    pub fn by_place(&self) -> BTreeMap<(usize, u64), BTreeMap<CaseClass, u64>> {
         let mut map: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
         for outcome in &self.outcomes {
             let mut places: Vec<_> = outcome.case.faults().map(|f| (f.link, f.byte)).collect();

@@ -16,7 +16,7 @@ const AROUND: usize = 4;
 
 /// One side of a comparison.
 #[derive(Clone, Copy, Debug)]
-pub struct Run<'r> {
+pub struct ComparedRun<'r> {
     /// What it is called.
     pub name: &'r str,
     /// What was captured.
@@ -25,7 +25,7 @@ pub struct Run<'r> {
 
 /// The first difference on one link.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Difference {
+pub struct LinkDifference {
     /// The link, as in a scenario.
     pub link: String,
     /// Which byte of it, counted from 1.
@@ -46,7 +46,7 @@ pub struct Difference {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// The first difference in time.
-    pub first: Option<Difference>,
+    pub first: Option<LinkDifference>,
     /// How many links both have.
     pub links: usize,
     /// Links that one side alone has.
@@ -71,15 +71,15 @@ impl Summary {
 
 /// Compares two runs: bytes, line status, and times as far as `tolerance`.
 #[must_use]
-pub fn diff(left: Run<'_>, right: Run<'_>, tolerance: Span) -> Summary {
+pub fn diff(left: ComparedRun<'_>, right: ComparedRun<'_>, tolerance: Span) -> Summary {
     compare(left, right, tolerance, &|_, _, _| false, None)
 }
 
 /// The same; `ignored` says of ring, link and byte what is not compared, and bytes of the right side behind `until` that the left
 /// has not are none too many.
 pub(crate) fn compare(
-    left: Run<'_>,
-    right: Run<'_>,
+    left: ComparedRun<'_>,
+    right: ComparedRun<'_>,
     tolerance: Span,
     ignored: &dyn Fn(usize, &Channel, usize) -> bool,
     until: Option<Instant>,
@@ -175,7 +175,7 @@ impl Pair<'_> {
         }
     }
 
-    fn difference(&self, index: usize, at: Instant, only_time: bool) -> Difference {
+    fn difference(&self, index: usize, at: Instant, only_time: bool) -> LinkDifference {
         let (a, b) = (&self.a.0.channels[self.a.1], &self.b.0.channels[self.b.1]);
         let end = a
             .octets()
@@ -189,7 +189,7 @@ impl Pair<'_> {
                 b.octets().get(n).copied(),
             )
         });
-        Difference {
+        LinkDifference {
             link: name(self.ring, a),
             byte: index + 1,
             at,

@@ -1,6 +1,6 @@
 //! The body of a fuzz target: any bytes, as a file.
 
-use super::{Options, Run, diff, read, scenario};
+use super::{ComparedRun, Options, diff, read, scenario};
 use crate::report::{csv, json, pcapng, svg, vcd};
 use harness_proto::time::Span;
 
@@ -33,11 +33,11 @@ pub fn import(data: &[u8]) {
         // Small times are relative to the start; large ones are times since 1970.
         Ok(again) if capture.end().since_start() < Span::from_millis(86_400_000) => {
             let (left, right) = (
-                Run {
+                ComparedRun {
                     name: "read",
                     capture: &capture,
                 },
-                Run {
+                ComparedRun {
                     name: "written",
                     capture: &again,
                 },
@@ -58,7 +58,7 @@ pub fn import(data: &[u8]) {
         &svg::Options {
             title: "any",
             id: "any",
-            scale: svg::Scale::Time,
+            scale: svg::RowPlacing::Time,
             rate: capture.rate,
             rows: None,
         },

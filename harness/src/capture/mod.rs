@@ -15,7 +15,7 @@ mod pcapng;
 
 pub use crate::buses::novobus::capture::judge::{JudgeError, Judged, judge};
 pub use crate::buses::novobus::capture::scenario::{Options, SketchError, scenario};
-pub use diff::{Difference, Run, Summary, diff};
+pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 
 use crate::regular::{self, Links};
 use harness_proto::line::Rate;

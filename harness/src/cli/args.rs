@@ -23,11 +23,11 @@ pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
     /// Whether to use colours.
-    #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
-    pub color: When,
+    #[arg(long, global = true, value_enum, default_value_t = ColourWhen::Auto)]
+    pub color: ColourWhen,
     /// Whether to show a progress bar on standard error.
-    #[arg(long, global = true, value_enum, default_value_t = Progress::Auto)]
-    pub progress: Progress,
+    #[arg(long, global = true, value_enum, default_value_t = ShowProgress::Auto)]
+    pub progress: ShowProgress,
 }
 
 const EXAMPLES: &str = "\
@@ -268,12 +268,12 @@ pub struct TraceArguments {
     pub ring: Option<u8>,
     /// How it is shown and where it goes.
     #[command(flatten)]
-    pub showing: Showing,
+    pub showing: TraceOutput,
 }
 
 /// How a trace is shown, and where it goes.
 #[derive(Clone, Debug, Default, Args)]
-pub struct Showing {
+pub struct TraceOutput {
     /// Only these rows of the table or the picture, counted from 1.
     #[arg(long, value_name = "FIRST..LAST", value_parser = rows)]
     pub rows: Option<Rows>,
@@ -311,7 +311,7 @@ pub struct ImportArguments {
     pub line: Option<Rate>,
     /// How it is shown and where it goes.
     #[command(flatten)]
-    pub showing: Showing,
+    pub showing: TraceOutput,
 }
 
 /// For `diff`.
@@ -359,8 +359,8 @@ pub struct CampaignArguments {
     #[arg(value_name = "CAMPAIGN")]
     pub campaigns: Vec<PathBuf>,
     /// Output format.
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    pub format: Format,
+    #[arg(long, value_enum, default_value_t = TableFormat::Table)]
+    pub format: TableFormat,
     /// Show the cases of this class, one per line.
     #[arg(long, value_name = "CLASS", value_enum)]
     pub only: Option<ClassName>,
@@ -381,8 +381,8 @@ pub struct DeviationsArguments {
     /// Only deviations with this text in their name, section or description.
     pub filter: Option<String>,
     /// Output format.
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    pub format: Format,
+    #[arg(long, value_enum, default_value_t = TableFormat::Table)]
+    pub format: TableFormat,
 }
 
 /// Shells with a completion script.
@@ -407,7 +407,7 @@ pub enum SchemaName {
 
 /// The forms of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
+pub enum TableFormat {
     /// A table for people.
     Table,
     /// JSON for tools; the guide describes it.
@@ -445,7 +445,7 @@ pub enum Layout {
 
 /// When to do something that suits a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum When {
+pub enum ColourWhen {
     /// On a terminal, unless NO_COLOR is set or TERM is `dumb`.
     Auto,
     /// Always.
@@ -456,7 +456,7 @@ pub enum When {
 
 /// When to show a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Progress {
+pub enum ShowProgress {
     /// On a terminal, unless TERM is `dumb`.
     Auto,
     /// Always.

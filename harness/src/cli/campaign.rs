@@ -1,14 +1,14 @@
 //! `drivebench campaign`.
 
-use super::args::{CampaignArguments, Format};
+use super::args::{CampaignArguments, TableFormat};
 use super::exit::Exit;
 use super::output::Output;
 use super::page::{writable, write};
 use super::run::progress_bar;
-use crate::campaign::find::{FindError, find, names};
+use crate::campaign::find::{FindCampaignError, find, names};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line, table};
-use crate::campaign::{Campaign, Case, Class, Finished};
+use crate::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -49,7 +49,7 @@ pub(crate) fn campaign(
         bar.finish_and_clear();
         match finished {
             Ok(finished) => {
-                if arguments.format == Format::Table {
+                if arguments.format == TableFormat::Table {
                     output.result(&shown(&finished, arguments.only))?;
                 }
                 all.push(finished);
@@ -60,10 +60,10 @@ pub(crate) fn campaign(
             }
         }
     }
-    if arguments.format == Format::Json {
+    if arguments.format == TableFormat::Json {
         output.result(&format!(
             "{}\n",
-            json(&all, arguments.only.map(Class::from))
+            json(&all, arguments.only.map(CaseClass::from))
         ))?;
     }
     if let Some(path) = &arguments.html
@@ -80,8 +80,8 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-fn shown(finished: &Finished, only: Option<ClassName>) -> String {
-    let Some(only) = only.map(Class::from) else {
+fn shown(finished: &PlayedCampaign, only: Option<ClassName>) -> String {
+    let Some(only) = only.map(CaseClass::from) else {
         return table(finished) + "\n";
     };
     let outcomes = finished.outcomes.iter();
@@ -91,9 +91,9 @@ fn shown(finished: &Finished, only: Option<ClassName>) -> String {
         .collect()
 }
 
-fn complain(error: &FindError, output: &mut Output) {
+fn complain(error: &FindCampaignError, output: &mut Output) {
     match error {
-        FindError::Mistakes(problems) => output.mistakes(problems),
+        FindCampaignError::Mistakes(problems) => output.mistakes(problems),
         error => output.complain(&error.to_string()),
     }
 }
@@ -104,7 +104,7 @@ fn replay(name: &str, campaigns: &[Campaign], output: &mut Output) -> std::io::R
         output.complain("--case needs exactly one campaign; name the one that the case belongs to");
         return Ok(Exit::Usage);
     };
-    let case = match Case::from_name(name, campaign.shape.drives) {
+    let case = match CaseFaults::from_name(name, campaign.shape.drives) {
         Ok(case) => case,
         Err(wrong) => {
             output.complain(&wrong);
@@ -142,7 +142,7 @@ pub enum ClassName {
     SilentCorruption,
 }
 
-impl From<ClassName> for Class {
+impl From<ClassName> for CaseClass {
     fn from(name: ClassName) -> Self {
         match name {
             ClassName::Harmless => Self::Harmless,

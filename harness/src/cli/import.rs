@@ -4,9 +4,9 @@ use super::args::{DiffArguments, ImportArguments};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
-use super::trace::{Shown, fits_output, show};
+use super::trace::{ShownRun, fits_output, show};
 use crate::capture::{
-    Capture, Judged, Options, Run, diff as compare, is_capture, judge, read_file, scenario,
+    Capture, ComparedRun, Judged, Options, diff as compare, is_capture, judge, read_file, scenario,
 };
 use crate::counted::counted;
 use crate::library::{Entry, sources};
@@ -36,7 +36,7 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     };
     let title = title(path);
     if let Some(format) = arguments.format {
-        let shown = Shown {
+        let shown = ShownRun {
             title: &title,
             traces: &capture.traces,
             rate: capture.rate,
@@ -188,11 +188,11 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
     };
     let names = [title(&arguments.left), title(&arguments.right)];
     let summary = compare(
-        Run {
+        ComparedRun {
             name: &names[0],
             capture: &left,
         },
-        Run {
+        ComparedRun {
             name: &names[1],
             capture: &right,
         },

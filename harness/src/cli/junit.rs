@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::output::Output;
 use super::run::drives;
-use crate::evidence::{Case, junit};
+use crate::evidence::{JunitCase, junit};
 use crate::library::Entry;
 use crate::regular;
 use crate::report::finding::{class, explain};
@@ -16,7 +16,7 @@ use std::time::Duration;
 pub(crate) struct Cases {
     rig: String,
     file: Option<PathBuf>,
-    cases: Vec<Case>,
+    cases: Vec<JunitCase>,
 }
 
 impl Cases {
@@ -34,7 +34,7 @@ impl Cases {
         let found = outcome.finding.iter().map(|found| found.message.clone());
         let message: Vec<_> = found.chain(outcome.remarks.clone()).collect();
         let found = outcome.finding.as_ref();
-        self.cases.push(Case {
+        self.cases.push(JunitCase {
             name: format!(
                 "{}[rig={},drives={}]",
                 entry.short_name(),

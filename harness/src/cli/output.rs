@@ -1,6 +1,6 @@
 //! The two streams of the program, and how mistakes are shown on the second.
 
-use super::args::{Progress, When};
+use super::args::{ColourWhen, ShowProgress};
 use super::exit::Exit;
 use crate::library::LibraryError;
 use crate::scenario::problem::Problems;
@@ -59,23 +59,23 @@ pub(crate) fn colour_of_usage() -> clap::ColorChoice {
 }
 
 impl Output {
-    pub(crate) fn new(color: When, progress: Progress) -> Self {
+    pub(crate) fn new(color: ColourWhen, progress: ShowProgress) -> Self {
         Self::on(&Streams::of_process(), color, progress)
     }
 
-    fn on(streams: &Streams, color: When, progress: Progress) -> Self {
+    fn on(streams: &Streams, color: ColourWhen, progress: ShowProgress) -> Self {
         let colour = |terminal: bool| match color {
-            When::Always => true,
-            When::Never => false,
-            When::Auto => terminal && !streams.no_color && !streams.dumb,
+            ColourWhen::Always => true,
+            ColourWhen::Never => false,
+            ColourWhen::Auto => terminal && !streams.no_color && !streams.dumb,
         };
         Self {
             colour_out: colour(streams.out_is_terminal),
             colour_err: colour(streams.err_is_terminal),
             progress: match progress {
-                Progress::Auto => streams.err_is_terminal && !streams.dumb,
-                Progress::Bar => true,
-                Progress::None => false,
+                ShowProgress::Auto => streams.err_is_terminal && !streams.dumb,
+                ShowProgress::Bar => true,
+                ShowProgress::None => false,
             },
             terminal: streams.out_is_terminal,
             full_screen: streams.out_is_terminal && !streams.dumb,
@@ -223,32 +223,32 @@ mod tests {
         }
     }
 
-    fn output(streams: &Streams, color: When) -> (bool, bool, bool) {
-        let output = Output::on(streams, color, Progress::Auto);
+    fn output(streams: &Streams, color: ColourWhen) -> (bool, bool, bool) {
+        let output = Output::on(streams, color, ShowProgress::Auto);
         assert_eq!(output.colour_out, output.colour_err);
         (output.colour_out, output.progress, output.full_screen)
     }
 
     #[test]
     fn colours_need_a_terminal_that_knows_them() {
-        assert_eq!(output(&terminal(), When::Auto), (true, true, true));
+        assert_eq!(output(&terminal(), ColourWhen::Auto), (true, true, true));
         let no_color = Streams {
             no_color: true,
             ..terminal()
         };
-        assert_eq!(output(&no_color, When::Auto), (false, true, true));
+        assert_eq!(output(&no_color, ColourWhen::Auto), (false, true, true));
         let dumb = Streams {
             dumb: true,
             ..terminal()
         };
-        assert_eq!(output(&dumb, When::Auto), (false, false, false));
-        assert_eq!(output(&dumb, When::Always), (true, false, false));
-        assert_eq!(output(&terminal(), When::Never), (false, true, true));
+        assert_eq!(output(&dumb, ColourWhen::Auto), (false, false, false));
+        assert_eq!(output(&dumb, ColourWhen::Always), (true, false, false));
+        assert_eq!(output(&terminal(), ColourWhen::Never), (false, true, true));
     }
 
     #[test]
     fn lines_fit_the_terminal() {
-        let output = Output::on(&terminal(), When::Auto, Progress::Auto);
+        let output = Output::on(&terminal(), ColourWhen::Auto, ShowProgress::Auto);
         for (line, fitted) in [
             ("short\n", "short\n"),
             ("exactly twenty chars\n", "exactly twenty chars\n"),
@@ -274,7 +274,7 @@ mod tests {
         };
         let line = "name    100 drives  a title of many words\n";
         assert_eq!(
-            Output::on(&file, When::Auto, Progress::Auto).fitted(line),
+            Output::on(&file, ColourWhen::Auto, ShowProgress::Auto).fitted(line),
             line
         );
     }

@@ -3,7 +3,7 @@
 use super::output::Output;
 use crate::library::Entry;
 use crate::regular;
-use crate::report::html::{Head, Played, Shown, run, section};
+use crate::report::html::{Head, ScenarioView, ShownScenario, run, section};
 use crate::scenario::run::Outcome;
 use harness_sim::record::Trace;
 use std::path::{Path, PathBuf};
@@ -11,12 +11,15 @@ use std::path::{Path, PathBuf};
 /// A page that is being collected.
 pub(crate) struct Page {
     path: PathBuf,
-    shown: Vec<Shown>,
+    shown: Vec<ShownScenario>,
 }
 
 impl Page {
     /// Starts a page if a file is named. A file that cannot be written is refused and reported now, because a run may take hours.
-    pub(crate) fn new(path: Option<&Path>, output: &mut Output) -> Result<Option<Self>, Refused> {
+    pub(crate) fn new(
+        path: Option<&Path>,
+        output: &mut Output,
+    ) -> Result<Option<Self>, NotWritable> {
         let Some(path) = path else { return Ok(None) };
         writable(path, output)?;
         Ok(Some(Self {
@@ -44,7 +47,7 @@ impl Page {
             .map(|plan| plan.rate)
             .unwrap_or_default();
         let name = entry.name.as_str();
-        let played = Played {
+        let played = ScenarioView {
             name: entry.short_name(),
             title: &entry.scenario.title,
             sources: &sources,
@@ -66,10 +69,10 @@ impl Page {
 }
 
 /// A file cannot be written, which has been reported.
-pub(crate) struct Refused;
+pub(crate) struct NotWritable;
 
 /// Checks that a file could be written.
-pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> {
+pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), NotWritable> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
@@ -82,7 +85,7 @@ pub(crate) fn writable(path: &Path, output: &mut Output) -> Result<(), Refused> 
         return Ok(());
     };
     output.complain(&format!("failed to write {}: {why}", path.display()));
-    Err(Refused)
+    Err(NotWritable)
 }
 
 /// Writes a page atomically. Returns false after reporting a failure.

@@ -7,7 +7,7 @@ use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run::{details, line, select};
-use super::run_rig::{Job, Stop, over, play, work};
+use super::run_rig::{PlayOrder, Stop, over, play, work};
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::evidence::{DEVIATIONS, Folder, PROFILE};
@@ -40,7 +40,7 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         .evidence
         .clone()
         .unwrap_or_else(|| PathBuf::from(format!("evidence-{}-{stamp}", rig.id())));
-    let job = Job {
+    let job = PlayOrder {
         purpose: "qualify",
         allow_motion: arguments.allow_motion,
         wait: arguments.wait.unwrap_or_default(),

@@ -6,7 +6,7 @@ use super::junit::Cases;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::find_rig;
-use super::run_rig::{Job, reports, work};
+use super::run_rig::{PlayOrder, reports, work};
 use super::tally::Tally;
 use crate::buses::SimulatedLink;
 use crate::evidence::{About, EvidenceError, Folder, too_large};
@@ -74,7 +74,7 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
         return Ok(Exit::Usage);
     };
     if let Some(rig) = rig.as_ref().filter(|rig| !rig.is_bare()) {
-        let job = Job {
+        let job = PlayOrder {
             purpose: "run",
             allow_motion: arguments.allow_motion,
             wait: arguments.wait.unwrap_or_default(),
@@ -164,9 +164,9 @@ fn keep(
     entry: &Entry,
     rig: Option<&Rig>,
     folder: Option<&mut Folder>,
-) -> Result<Played, EvidenceError> {
+) -> Result<PlayedOnce, EvidenceError> {
     let too_large = rig.and_then(|rig| too_large(entry, rig));
-    let not_played = |why| Played {
+    let not_played = |why| PlayedOnce {
         outcome: Outcome::skipped(why),
         traces: Vec::new(),
     };
@@ -190,7 +190,7 @@ fn keep(
             let traces = traces(plan, &link);
             let attempt = Attempt::on_own_rings(played, traces);
             kept.ends(1, &attempt);
-            Played {
+            PlayedOnce {
                 outcome: attempt.outcome,
                 traces: attempt.traces,
             }
@@ -213,22 +213,22 @@ fn traces(plan: &Plan, link: &SimulatedLink) -> Vec<Trace> {
 }
 
 /// A scenario that was played, with what it left.
-pub(crate) struct Played {
+pub(crate) struct PlayedOnce {
     pub(crate) outcome: Outcome,
     pub(crate) traces: Vec<Trace>,
 }
 
 /// Plays a scenario on a simulated bench.
-pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> Played {
+pub(crate) fn play_entry(entry: &Entry, at_mismatch: AtMismatch) -> PlayedOnce {
     let Some(plan) = entry.settled() else {
-        return Played {
+        return PlayedOnce {
             outcome: Outcome::skipped(Skip::no_bus(entry.scenario.bus)),
             traces: Vec::new(),
         };
     };
     let mut link = plan.simulate();
     let outcome = plan.play(&mut *link, at_mismatch);
-    Played {
+    PlayedOnce {
         outcome,
         traces: (0..plan.ports()).map(|port| link.trace(port)).collect(),
     }

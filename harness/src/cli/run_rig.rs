@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// What is to be done.
-pub(crate) struct Job {
+pub(crate) struct PlayOrder {
     pub(crate) purpose: &'static str,
     pub(crate) allow_motion: bool,
     pub(crate) wait: Duration,
@@ -69,7 +69,7 @@ impl From<std::io::Error> for Stop {
 pub(crate) fn work(
     rig: &Rig,
     entries: &[Entry],
-    job: &Job,
+    job: &PlayOrder,
     mut page: Option<Page>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -154,7 +154,7 @@ pub(crate) fn reports(
 fn all(
     session: &mut Session,
     entries: &[Entry],
-    job: &Job,
+    job: &PlayOrder,
     (folder, mut page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
 ) -> Result<Exit, Stop> {
@@ -284,7 +284,7 @@ pub(crate) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
 }
 
 /// What a record begins with.
-fn about<'r>(run: &'r mut Run<'_>, job: &'r Job, entries: &'r [Entry]) -> About<'r> {
+fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> About<'r> {
     // Those for another bus are never begun.
     let selected = entries.iter().filter(|entry| entry.plan.is_some());
     let exactness = run.exactness();

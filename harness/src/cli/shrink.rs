@@ -8,7 +8,7 @@ use super::rig_failure::find_rig;
 use crate::counted::counted;
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::explore::{
-    Case, Difference, ExploreError, Finding, OnRig, OnSim, Planted, Setup, Target,
+    Case, Difference, ExploreError, Finding, OnRig, OnSim, Planted, RingSetup, Target,
 };
 use crate::rig::Run;
 use clap::Args;
@@ -131,7 +131,7 @@ fn explained(finding: &Finding, output: &mut Output) -> Option<Subject> {
             };
             let subject = Subject {
                 case: finding.case.clone(),
-                setup: Setup {
+                setup: RingSetup {
                     deviates: vec![planted],
                     ..finding.setup.clone()
                 },

@@ -115,7 +115,7 @@ mod tests {
     use crate::link::Capability;
     use crate::scenario::run::{Skip, Why};
     use crate::scenario::source::Source;
-    use harness_proto::novobus::guard::Setting;
+    use harness_proto::novobus::guard::LimitSetting;
 
     fn of(outcomes: &[Outcome]) -> Tally {
         let mut tally = Tally::default();
@@ -149,14 +149,14 @@ mod tests {
 
     #[test]
     fn what_was_not_played_is_named_in_groups() {
-        let limits = [Setting::Reset, Setting::Motion].map(Unlock::Limit);
+        let limits = [LimitSetting::Reset, LimitSetting::Motion].map(Unlock::Limit);
         let denied = Skip::from(Why::Denied("ring 1: byte 4".to_owned())).and(limits);
         let tally = of(&[
             no_interposer("1->0"),
             passed(),
             lacks(
                 &[Capability::Power, Capability::Motion],
-                [Unlock::Simulated, Unlock::Limit(Setting::Motion)],
+                [Unlock::Simulated, Unlock::Limit(LimitSetting::Motion)],
             ),
             no_interposer("2->1"),
             Outcome::skipped(Skip::other_size(vec![100], vec![3])),

@@ -1,6 +1,6 @@
 //! `drivebench trace`.
 
-use super::args::{Layout, Showing, TraceArguments, TraceFormat};
+use super::args::{Layout, TraceArguments, TraceFormat, TraceOutput};
 use super::exit::Exit;
 use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
@@ -8,11 +8,11 @@ use crate::buses::{FrameForm, carry_frames, rows, write_frames};
 use crate::library::{Entry, sources};
 use crate::regular;
 use crate::report::plot::plots;
-use crate::report::svg::{Options, Scale, svg};
-use crate::report::table::{LEGEND, Part, table, wires};
+use crate::report::svg::{Options, RowPlacing, svg};
+use crate::report::table::{LEGEND, TablePart, table, wires};
 use crate::report::vcd::{self, Signals};
 use crate::report::{csv, json, pcapng};
-use crate::scenario::run::{AtMismatch, Record};
+use crate::scenario::run::{AtMismatch, CellRecord};
 use clap::ValueEnum as _;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
@@ -52,7 +52,7 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
     if !fits_bus(arguments.format, &played.traces, output) {
         return Ok(Exit::Usage);
     }
-    let shown = Shown {
+    let shown = ShownRun {
         title: &entry.scenario.title,
         traces: &played.traces,
         rate: entry
@@ -70,15 +70,15 @@ pub(crate) fn trace(arguments: &TraceArguments, output: &mut Output) -> std::io:
 }
 
 /// A run that is to be shown.
-pub(crate) struct Shown<'s> {
+pub(crate) struct ShownRun<'s> {
     pub(crate) title: &'s str,
     pub(crate) traces: &'s [Trace],
     pub(crate) rate: Rate,
-    pub(crate) records: &'s [Record],
+    pub(crate) records: &'s [CellRecord],
 }
 
 /// Whether a form can go where it is to go: what is no text is kept from a terminal.
-pub(crate) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut Output) -> bool {
+pub(crate) fn fits_output(format: TraceFormat, showing: &TraceOutput, output: &mut Output) -> bool {
     if format == TraceFormat::Pcapng && showing.output.is_none() && output.terminal {
         output.complain(
             "pcapng is not a text, and standard output is a terminal; add `--output FILE`, or send it on with `|` or `>`",
@@ -90,9 +90,9 @@ pub(crate) fn fits_output(format: TraceFormat, showing: &Showing, output: &mut O
 
 /// Shows a run. Returns false after reporting that the file could not be written.
 pub(crate) fn show(
-    shown: &Shown<'_>,
+    shown: &ShownRun<'_>,
     format: TraceFormat,
-    showing: &Showing,
+    showing: &TraceOutput,
     output: &mut Output,
 ) -> std::io::Result<bool> {
     let Some(path) = &showing.output else {
@@ -110,9 +110,9 @@ pub(crate) fn show(
 }
 
 fn write(
-    shown: &Shown<'_>,
+    shown: &ShownRun<'_>,
     format: TraceFormat,
-    showing: &Showing,
+    showing: &TraceOutput,
     mut out: impl Write,
 ) -> std::io::Result<()> {
     let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
@@ -136,8 +136,8 @@ fn write(
                 title: shown.title,
                 id: "ring",
                 scale: match showing.time {
-                    Layout::Index => Scale::Index,
-                    Layout::True => Scale::Time,
+                    Layout::Index => RowPlacing::Index,
+                    Layout::True => RowPlacing::Time,
                 },
                 rate: shown.rate,
                 rows,
@@ -149,9 +149,9 @@ fn write(
         TraceFormat::Candump => Ok(()),
         TraceFormat::Table => {
             for trace in shown.traces {
-                let part = Part {
+                let part = TablePart {
                     rows: rows.clone(),
-                    ..Part::default()
+                    ..TablePart::default()
                 };
                 let wires = wires(trace, WIRES);
                 write!(out, "{}\n{LEGEND}{wires}", table(trace, &part))?;

@@ -2,12 +2,12 @@
 
 use super::folder::capture;
 use super::header::Header;
-use super::record::Line;
+use super::record::RecordLine;
 use crate::buses::twin::{Conversation, Twin};
 use crate::file::values::Wire;
 use crate::library::Entry;
 use crate::link::{
-    Event, Line as _, Link as _, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,
+    Line as _, Link as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,
     link_name,
 };
 use crate::rig::judge::known;
@@ -33,7 +33,7 @@ pub(super) struct Recorded {
     pub(super) name: String,
     pub(super) sha256: String,
     pub(super) attempt: usize,
-    pub(super) events: Vec<Event>,
+    pub(super) events: Vec<LinkEvent>,
     pub(super) verdict: Option<Recalled>,
 }
 
@@ -179,13 +179,15 @@ pub(super) fn again(
 /// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.
 fn simulated_again(recorded: &Recorded, plan: &Plan) -> Again {
     let mut link = simulated(plan);
-    let mut events: Vec<Event> = Vec::new();
+    let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::whole(&mut link, &mut events);
     let outcome = play(plan, &mut recording, AtMismatch::Stop);
-    let written = |events: &[Event]| -> Vec<Line> { events.iter().filter_map(Line::of).collect() };
+    let written = |events: &[LinkEvent]| -> Vec<RecordLine> {
+        events.iter().filter_map(RecordLine::of).collect()
+    };
     let (theirs, own) = (written(&recorded.events), written(&events));
     let differs = (0..theirs.len().max(own.len())).find(|at| theirs.get(*at) != own.get(*at));
-    let show = |line: Option<&Line>| match line.map(serde_json::to_string) {
+    let show = |line: Option<&RecordLine>| match line.map(serde_json::to_string) {
         Some(Ok(text)) => text,
         _ => "nothing more".to_owned(),
     };
@@ -260,7 +262,7 @@ fn links(header: &Header, inner: impl Iterator<Item = (u8, Wire)>) -> Vec<(usize
 impl Recorded {
     /// Whether the rig's limits denied something in it.
     pub(super) fn was_denied(&self) -> bool {
-        let denied = |event: &Event| matches!(event, Event::Trouble(Trouble::Denied(_)));
+        let denied = |event: &LinkEvent| matches!(event, LinkEvent::Trouble(Trouble::Denied(_)));
         self.events.iter().any(denied)
     }
 
@@ -287,7 +289,7 @@ impl Recorded {
             return Some("a simulated ring places every line error".to_owned());
         }
         let asked_for = self.events.iter().filter_map(|event| match event {
-            Event::Fault(ring, _, PlacedFault::Link(link, fault), Moment::Byte(byte)) => {
+            LinkEvent::Fault(ring, _, PlacedFault::Link(link, fault), Moment::Byte(byte)) => {
                 let drives = header.drives.get(*ring).copied().unwrap_or(0);
                 let place = link_name(*ring, drives, *link);
                 Some(format!("{UNUSED}{place} byte {byte}: {fault}"))
@@ -409,8 +411,8 @@ struct Ended {
 }
 
 impl Ended {
-    fn of(events: &[Event]) -> Self {
-        let begin = |event: &Event| matches!(event, Event::Begin(_));
+    fn of(events: &[LinkEvent]) -> Self {
+        let begin = |event: &LinkEvent| matches!(event, LinkEvent::Begin(_));
         let last = events.iter().rposition(begin).unwrap_or(0);
         let mut ended = Self {
             at: Span::ZERO,
@@ -418,9 +420,11 @@ impl Ended {
         };
         for event in events.iter().skip(last + 1) {
             let at = match event {
-                Event::Sent(_, at, _) | Event::Received(_, at, _) | Event::Probe(_, at, ..) => *at,
-                Event::Tapped(_, _, at, _) => *at,
-                Event::Fault(_, at, PlacedFault::Link(_, what), _) => {
+                LinkEvent::Sent(_, at, _)
+                | LinkEvent::Received(_, at, _)
+                | LinkEvent::Probe(_, at, ..) => *at,
+                LinkEvent::Tapped(_, _, at, _) => *at,
+                LinkEvent::Fault(_, at, PlacedFault::Link(_, what), _) => {
                     if let LinkFault::Delay(span) | LinkFault::Break(span) = what {
                         ended.held = ended.held + *span;
                     }

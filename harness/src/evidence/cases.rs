@@ -1,10 +1,10 @@
 //! Derives the verdict of each scenario again from its attempts, and checks the reasons of skipped scenarios.
 
 use super::files::{SCENARIOS, sum};
-use super::record::Line;
+use super::record::RecordLine;
 use super::verify::{Judged, Opened};
 use crate::library::Entry;
-use crate::link::{Event, Replay};
+use crate::link::{LinkEvent, Replay};
 use crate::rig::run::not_played;
 use crate::rig::{Again as Retries, Attempt, Played, Rig};
 use crate::scenario::run::{DENIED, Outcome, Skip, Why};
@@ -29,13 +29,13 @@ pub(super) fn differences(opened: &Opened, judged: &[Judged], texts: Texts<'_>) 
     let mut pending = 0;
     for line in &opened.lines {
         match line {
-            Line::Scenario { .. } => pending += 1,
-            Line::Case { .. } => {
+            RecordLine::Scenario { .. } => pending += 1,
+            RecordLine::Case { .. } => {
                 let (own, rest) = left.split_at(pending.min(left.len()));
                 settling.case(line, own);
                 (left, pending) = (rest, 0);
             }
-            Line::End { verdicts, safe } => settling.end(verdicts, *safe, &left[..pending]),
+            RecordLine::End { verdicts, safe } => settling.end(verdicts, *safe, &left[..pending]),
             _ => {}
         }
     }
@@ -51,8 +51,8 @@ struct Settling<'s> {
 }
 
 impl Settling<'_> {
-    fn case(&mut self, line: &Line, attempts: &[Judged]) {
-        let Line::Case {
+    fn case(&mut self, line: &RecordLine, attempts: &[Judged]) {
+        let RecordLine::Case {
             name,
             title,
             drives,
@@ -197,7 +197,7 @@ impl Judged {
     /// Whether the rig's line was lost in it, or the like: nothing is played behind it.
     pub(super) fn ends_the_run(&self) -> bool {
         let mut events = self.recorded.events.iter();
-        events.any(|own| matches!(own, Event::Trouble(trouble) if trouble.ends_a_run()))
+        events.any(|own| matches!(own, LinkEvent::Trouble(trouble) if trouble.ends_a_run()))
     }
 
     /// The attempt as it was judged again.

@@ -5,13 +5,13 @@
 
 use super::files::{self, CAPTURES, SCENARIOS};
 use super::folder::EvidenceError;
-use super::junit::{Case, junit};
-use super::record::Line;
+use super::junit::{JunitCase, junit};
+use super::record::RecordLine;
 use super::verify::{Judged, Opened, is_name, scenarios};
 use crate::capture::read;
 use crate::library::Entry;
 use crate::report::finding::{class, explain};
-use crate::report::html::{Head, Played, Shown, run, section};
+use crate::report::html::{Head, ScenarioView, ShownScenario, run, section};
 use crate::scenario::problem;
 use crate::scenario::run::{Mismatch, Outcome};
 use crate::scenario::source::Source;
@@ -87,7 +87,7 @@ pub(super) fn derived(
         let entry = text.and_then(|text| entry(&case.name, &text));
         let judged = attempt.and_then(|attempt| attempt.outcome.as_ref());
         let outcome = case.outcome(judged);
-        cases.push(Case {
+        cases.push(JunitCase {
             class: entry.as_ref().map_or_else(String::new, class),
             details: match (&entry, &outcome.finding) {
                 (Some(entry), Some(found)) => explain(entry, found, &traces),
@@ -126,8 +126,8 @@ pub(super) struct Settled {
 
 impl Settled {
     /// Reads its line; `None` for all others.
-    pub(super) fn of(line: &Line) -> Option<Self> {
-        let Line::Case {
+    pub(super) fn of(line: &RecordLine) -> Option<Self> {
+        let RecordLine::Case {
             name,
             title,
             drives,
@@ -170,9 +170,9 @@ impl Settled {
     }
 
     /// The case of JUnit, without class and details, with the files that the scenario left in a folder.
-    fn case(&self, path: &Path, rig: &str) -> Case {
+    fn case(&self, path: &Path, rig: &str) -> JunitCase {
         let messages: Vec<_> = self.messages().map(String::as_str).collect();
-        Case {
+        JunitCase {
             name: format!("{}[rig={rig},drives={}]", self.name, self.drives),
             class: String::new(),
             verdict: self.verdict,
@@ -285,7 +285,7 @@ fn show(
     case: &Settled,
     attempt: Option<&Attempt>,
     (outcome, traces): (&Outcome, &[Trace]),
-) -> Shown {
+) -> ShownScenario {
     let entry = attempt.and_then(|attempt| entry(&case.name, &attempt.text));
     let sources = entry.map_or_else(Vec::new, |entry| {
         let sources = entry.scenario.sources.into_iter();
@@ -300,7 +300,7 @@ fn show(
     };
     section(
         number,
-        &Played {
+        &ScenarioView {
             name: &case.name,
             title: &case.title,
             sources: &sources,
@@ -316,7 +316,7 @@ fn show(
 
 fn head(opened: &Opened) -> Head<'static> {
     let mut facts = vec![("Rig", opened.rig.id().to_owned())];
-    if let Some(Line::Run {
+    if let Some(RecordLine::Run {
         drivebench,
         started,
         rate,
@@ -341,7 +341,7 @@ fn head(opened: &Opened) -> Head<'static> {
         ));
     }
     let safe = opened.lines.iter().find_map(|line| match line {
-        Line::End { safe, .. } => Some(*safe),
+        RecordLine::End { safe, .. } => Some(*safe),
         _ => None,
     });
     facts.push((

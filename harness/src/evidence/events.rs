@@ -1,7 +1,7 @@
 //! Events of a link as lines of a record, and back.
 
-use super::record::Line;
-use crate::link::{Event, Lead, LinkFault, Look, Moment, PlacedFault, Trouble};
+use super::record::RecordLine;
+use crate::link::{Lead, LinkEvent, LinkFault, Look, Moment, PlacedFault, Trouble};
 use crate::medium::{Heard, Pieces};
 use harness_proto::can::{self, BusError, Frame};
 use harness_proto::line::{LineError, Received};
@@ -97,25 +97,25 @@ fn unfault((kind, number): &(String, u64)) -> Option<LinkFault> {
     })
 }
 
-impl Line {
+impl RecordLine {
     /// An event as a line; `None` for what no rig can be given: drives' power and what stands outside the bus.
     #[must_use]
-    pub fn of(event: &Event) -> Option<Self> {
+    pub fn of(event: &LinkEvent) -> Option<Self> {
         let units = |at: &Instant| at.since_start().units();
         Some(match event {
-            Event::Begin(at) => Self::Begin { t: units(at) },
-            Event::Step(place) => Self::Step { place: *place },
-            Event::Sent(ring, at, Pieces::Octets(bytes)) => Self::Sent {
+            LinkEvent::Begin(at) => Self::Begin { t: units(at) },
+            LinkEvent::Step(place) => Self::Step { place: *place },
+            LinkEvent::Sent(ring, at, Pieces::Octets(bytes)) => Self::Sent {
                 ring: ring + 1,
                 t: units(at),
                 bytes: hex(bytes),
             },
-            Event::Sent(ring, at, Pieces::Frames(frames)) => Self::SentFrames {
+            LinkEvent::Sent(ring, at, Pieces::Frames(frames)) => Self::SentFrames {
                 ring: ring + 1,
                 t: units(at),
                 frames: frames.iter().map(Frame::to_string).collect(),
             },
-            Event::Received(ring, at, Heard::Octet(byte)) => {
+            LinkEvent::Received(ring, at, Heard::Octet(byte)) => {
                 let (byte, error) = written(*byte);
                 Self::Received {
                     ring: ring + 1,
@@ -124,7 +124,7 @@ impl Line {
                     error,
                 }
             }
-            Event::Received(ring, at, Heard::Frame(heard)) => Self::Frame {
+            LinkEvent::Received(ring, at, Heard::Frame(heard)) => Self::Frame {
                 ring: ring + 1,
                 t: units(at),
                 frame: match heard {
@@ -136,7 +136,7 @@ impl Line {
                     can::Heard::Error(error) => Some(error.to_string()),
                 },
             },
-            Event::Fault(ring, at, PlacedFault::Link(link, what), moment) => Self::Fault {
+            LinkEvent::Fault(ring, at, PlacedFault::Link(link, what), moment) => Self::Fault {
                 ring: ring + 1,
                 t: units(at),
                 link: *link,
@@ -150,14 +150,14 @@ impl Line {
                 },
                 what: fault(*what),
             },
-            Event::Fault(..) => return None,
-            Event::Look(look) => Self::Look {
+            LinkEvent::Fault(..) => return None,
+            LinkEvent::Look(look) => Self::Look {
                 t: units(&look.at),
                 busy: look.busy,
                 lead: look.lead.map(|lead| (lead.far.units(), lead.near.units())),
                 pause: look.pause.as_ref().map(units),
             },
-            Event::Trouble(trouble) => Self::Trouble {
+            LinkEvent::Trouble(trouble) => Self::Trouble {
                 cause: match trouble {
                     Trouble::Denied(_) => "denied",
                     Trouble::Lost(_) => "lost",
@@ -168,13 +168,13 @@ impl Line {
                 .to_owned(),
                 text: trouble.to_string(),
             },
-            Event::Tapped(ring, link, at, bytes) => Self::Tapped {
+            LinkEvent::Tapped(ring, link, at, bytes) => Self::Tapped {
                 ring: ring + 1,
                 link: *link,
                 t: units(at),
                 bytes: bytes.iter().map(|byte| written(*byte)).collect(),
             },
-            Event::Probe(ring, at, sent, came) => Self::Probe {
+            LinkEvent::Probe(ring, at, sent, came) => Self::Probe {
                 ring: ring + 1,
                 t: units(at),
                 count: sent.len(),
@@ -210,18 +210,18 @@ impl Line {
 
     /// The event of a line; `None` where it is none, or holds what cannot be.
     #[must_use]
-    pub fn event(&self) -> Option<Event> {
+    pub fn event(&self) -> Option<LinkEvent> {
         let instant = |t: &u64| Instant::START + Span::from_units(*t);
         let index = |ring: &usize| ring.checked_sub(1).filter(|ring| *ring < 2);
         Some(match self {
-            Self::Begin { t } => Event::Begin(instant(t)),
-            Self::Step { place } => Event::Step(*place),
+            Self::Begin { t } => LinkEvent::Begin(instant(t)),
+            Self::Step { place } => LinkEvent::Step(*place),
             Self::Sent { ring, t, bytes } => {
-                Event::Sent(index(ring)?, instant(t), Pieces::Octets(unhex(bytes)?))
+                LinkEvent::Sent(index(ring)?, instant(t), Pieces::Octets(unhex(bytes)?))
             }
             Self::SentFrames { ring, t, frames } => {
                 let frames: Option<_> = frames.iter().map(|frame| frame.parse().ok()).collect();
-                Event::Sent(index(ring)?, instant(t), Pieces::Frames(frames?))
+                LinkEvent::Sent(index(ring)?, instant(t), Pieces::Frames(frames?))
             }
             Self::Frame {
                 ring,
@@ -234,7 +234,7 @@ impl Line {
                     (None, Some(error)) => can::Heard::Error(BusError::from_name(error)?),
                     _ => return None,
                 };
-                Event::Received(index(ring)?, instant(t), Heard::Frame(heard))
+                LinkEvent::Received(index(ring)?, instant(t), Heard::Frame(heard))
             }
             Self::Received {
                 ring,
@@ -243,7 +243,7 @@ impl Line {
                 error,
             } => {
                 let octet = received(byte, error.as_deref())?;
-                Event::Received(index(ring)?, instant(t), Heard::Octet(octet))
+                LinkEvent::Received(index(ring)?, instant(t), Heard::Octet(octet))
             }
             Self::Fault {
                 ring,
@@ -259,14 +259,14 @@ impl Line {
                     (None, None) => Moment::Now,
                 };
                 let what = PlacedFault::Link(*link, unfault(what)?);
-                Event::Fault(index(ring)?, instant(t), what, moment)
+                LinkEvent::Fault(index(ring)?, instant(t), what, moment)
             }
             Self::Look {
                 t,
                 busy,
                 lead,
                 pause,
-            } => Event::Look(Look {
+            } => LinkEvent::Look(Look {
                 at: instant(t),
                 busy: *busy,
                 lead: lead.map(|(far, near)| Lead {
@@ -275,7 +275,7 @@ impl Line {
                 }),
                 pause: pause.as_ref().map(instant),
             }),
-            Self::Trouble { cause, text } => Event::Trouble(match cause.as_str() {
+            Self::Trouble { cause, text } => LinkEvent::Trouble(match cause.as_str() {
                 "denied" => Trouble::Denied(text.clone()),
                 "lost" => Trouble::Lost(text.clone()),
                 "garbled" => Trouble::Garbled(text.clone()),
@@ -288,7 +288,7 @@ impl Line {
                 link,
                 t,
                 bytes,
-            } => Event::Tapped(index(ring)?, *link, instant(t), all_received(bytes)?),
+            } => LinkEvent::Tapped(index(ring)?, *link, instant(t), all_received(bytes)?),
             Self::Probe {
                 ring,
                 t,
@@ -300,7 +300,7 @@ impl Line {
                     Some(sent) => unhex(sent).filter(|sent| sent.len() == *count)?,
                     None => vec![PROBED; *count],
                 };
-                Event::Probe(index(ring)?, instant(t), sent, all_received(bytes)?)
+                LinkEvent::Probe(index(ring)?, instant(t), sent, all_received(bytes)?)
             }
             Self::Run { .. }
             | Self::Scenario { .. }

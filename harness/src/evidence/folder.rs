@@ -4,11 +4,11 @@ use super::derive::{Settled, bare, derive, plain};
 use super::files::{
     CAPTURES, JUNIT, KNOWN_PROFILE, PAGE, RECORD, REPORT, RIG, SCENARIOS, SUMS, VERSIONS, sum, sums,
 };
-use super::record::{Line, SCHEMA, Writer};
+use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
 use crate::buses::SimulatedLink;
 use crate::buses::twin::Exactness;
-use crate::link::{Capability, Event, Sink};
+use crate::link::{Capability, LinkEvent, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
 use crate::scenario::run::Outcome;
@@ -146,7 +146,7 @@ impl Folder {
         let rings: Vec<u8> = about.rig.rings().map(|(_, ring)| ring.drives).collect();
         let selected = about.selected.iter().map(|text| sum(text.as_bytes()));
         let names = about.capabilities.iter().map(|own| own.name().to_owned());
-        folder.writer.line(&Line::Run {
+        folder.writer.line(&RecordLine::Run {
             schema: SCHEMA,
             drivebench: env!("CARGO_PKG_VERSION").to_owned(),
             rig: about.rig.id().to_owned(),
@@ -179,11 +179,11 @@ impl Folder {
     }
 
     /// Keeps the attempts at a scenario of this name and text.
-    pub fn keep<'f>(&'f mut self, name: &str, text: &'f str) -> Kept<'f> {
+    pub fn keep<'f>(&'f mut self, name: &str, text: &'f str) -> KeptAttempts<'f> {
         let name = self.unique(name);
         let file = format!("{SCENARIOS}/{name}.scn");
         self.text = Some(sum(text.as_bytes()));
-        Kept {
+        KeptAttempts {
             error: self.write(&file, text).err(),
             name,
             text,
@@ -193,7 +193,7 @@ impl Folder {
 
     /// Counts a scenario, all its attempts done.
     pub fn done(&mut self, name: &str, drives: &str, title: &str, outcome: &Outcome) {
-        let case = Line::of_case(name, (title, drives), self.text.clone(), outcome);
+        let case = RecordLine::of_case(name, (title, drives), self.text.clone(), outcome);
         self.writer.line(&case);
         self.cases.extend(Settled::of(&case));
     }
@@ -213,7 +213,7 @@ impl Folder {
     pub fn finish(mut self, safe: Option<bool>) -> Result<PathBuf, EvidenceError> {
         let verdicts = self.cases.iter().map(|case| case.verdict.name().to_owned());
         let verdicts = verdicts.collect();
-        self.writer.line(&Line::End { verdicts, safe });
+        self.writer.line(&RecordLine::End { verdicts, safe });
         self.check()?;
         self.write(REPORT, &plain(&self.rig, &self.cases))?;
         // The verdicts and the sums are written even if the page cannot be made.
@@ -277,14 +277,14 @@ impl Folder {
 
 /// Attempts at one scenario, on their way into a folder.
 #[derive(Debug)]
-pub struct Kept<'f> {
+pub struct KeptAttempts<'f> {
     folder: &'f mut Folder,
     name: String,
     text: &'f str,
     error: Option<EvidenceError>,
 }
 
-impl Kept<'_> {
+impl KeptAttempts<'_> {
     /// Its name in the folder, once all attempts are kept.
     ///
     /// # Errors
@@ -303,20 +303,20 @@ impl Kept<'_> {
     }
 }
 
-impl Sink for Kept<'_> {
-    fn take(&mut self, event: &Event) {
+impl Sink for KeptAttempts<'_> {
+    fn take(&mut self, event: &LinkEvent) {
         self.folder.writer.take(event);
     }
 }
 
-impl Keeper for Kept<'_> {
+impl Keeper for KeptAttempts<'_> {
     fn begins(&mut self, attempt: usize) {
-        let line = Line::of_scenario(&self.name, self.text, attempt);
+        let line = RecordLine::of_scenario(&self.name, self.text, attempt);
         self.folder.writer.line(&line);
     }
 
     fn ends(&mut self, number: usize, attempt: &Attempt) {
-        self.folder.writer.line(&Line::of_verdict(attempt));
+        self.folder.writer.line(&RecordLine::of_verdict(attempt));
         let file = format!("{CAPTURES}/{}.{number}.json", self.name);
         let capture = capture(&attempt.traces, &attempt.outcome);
         let written = self.folder.write(&file, &capture);

@@ -2,7 +2,7 @@
 //! hang.
 
 use super::read::{RecordError, read};
-use super::record::Line;
+use super::record::RecordLine;
 use super::verify::{Beside, judge_record};
 use crate::rig::{Rig, parse};
 use crate::scenario::source::Source;
@@ -48,7 +48,7 @@ pub fn record(input: &[u8]) {
     let mut longest = Span::ZERO;
     for line in &lines {
         if let Some(event) = line.event() {
-            let again = Line::of(&event).and_then(|line| line.event());
+            let again = RecordLine::of(&event).and_then(|line| line.event());
             assert_eq!(
                 again.as_ref(),
                 Some(&event),
@@ -120,7 +120,7 @@ pub(crate) fn noted(input: &[u8], note: &mut dyn FnMut(&'static str, String)) {
 }
 
 /// What a line tells, with the words that stand in it for a kind.
-fn kind(line: &Line) -> String {
+fn kind(line: &RecordLine) -> String {
     let value = serde_json::to_value(line).unwrap_or_default();
     let word = |key: &str| value.get(key).and_then(serde_json::Value::as_str);
     let words = ["kind", "cause", "error", "verdict"]

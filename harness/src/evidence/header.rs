@@ -1,7 +1,7 @@
 //! The first line of a record: all of it but date and version follows from the rig's file.
 
 use super::files::{RIG, sum};
-use super::record::{Line, capabilities};
+use super::record::{RecordLine, capabilities};
 use crate::buses::SimulatedLink;
 use crate::buses::twin::Exactness;
 use crate::guard::Limits;
@@ -39,8 +39,12 @@ pub(super) struct Header {
 ///
 /// # Errors
 /// It is no first line, or of other rings than the rig has.
-pub(super) fn header(lines: &[Line], rig: &Rig, wrong: &mut Vec<String>) -> Result<Header, String> {
-    let Some(Line::Run {
+pub(super) fn header(
+    lines: &[RecordLine],
+    rig: &Rig,
+    wrong: &mut Vec<String>,
+) -> Result<Header, String> {
+    let Some(RecordLine::Run {
         schema,
         drivebench,
         rig: id,

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// A scenario as a test case.
 #[derive(Clone, Debug)]
-pub struct Case {
+pub struct JunitCase {
     /// Its unique name: `9.7-parity-error[rig=lab-1,drives=3]`.
     pub name: String,
     /// The group that reports show it in, as `package.class`: `nd21.chapter-9`.
@@ -29,7 +29,7 @@ pub struct Case {
 
 /// The test cases as XML.
 #[must_use]
-pub fn junit(suite: &str, cases: &[Case]) -> String {
+pub fn junit(suite: &str, cases: &[JunitCase]) -> String {
     let mut report = Report::new("drivebench");
     let mut own = TestSuite::new(named(suite, "run"));
     let mut took = Duration::ZERO;
@@ -82,7 +82,7 @@ fn in_millis(took: Duration) -> Duration {
     Duration::from_millis(u64::try_from(took.as_millis()).unwrap_or(u64::MAX))
 }
 
-fn status(case: &Case) -> TestCaseStatus {
+fn status(case: &JunitCase) -> TestCaseStatus {
     let message = printable(&case.message);
     let details = printable(&case.details);
     let mut status = match case.verdict {
@@ -109,7 +109,7 @@ fn status(case: &Case) -> TestCaseStatus {
 }
 
 /// What there is to say about what passed only just, and the files.
-fn output(case: &Case) -> String {
+fn output(case: &JunitCase) -> String {
     let said = match case.verdict {
         Verdict::Marginal => format!("marginal: {}\n", printable(&case.message)),
         _ => String::new(),

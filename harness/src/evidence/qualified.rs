@@ -2,7 +2,7 @@
 
 use super::attempt::reached;
 use super::files::{DEVIATIONS, PROFILE, read_text, sum};
-use super::record::Line;
+use super::record::RecordLine;
 use super::verify::{Judged, Opened};
 use crate::buses::qualify::{Bench, Facts, Qualification, Qualified, thorough};
 use crate::buses::syntax::Header;
@@ -108,8 +108,8 @@ fn cases(opened: &Opened, judged: &[Judged]) -> Result<VecDeque<Case>, String> {
     let mut cases = VecDeque::new();
     for line in &opened.lines {
         match line {
-            Line::Scenario { .. } => pending += 1,
-            Line::Case {
+            RecordLine::Scenario { .. } => pending += 1,
+            RecordLine::Case {
                 name,
                 verdict,
                 remarks,

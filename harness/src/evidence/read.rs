@@ -1,8 +1,8 @@
 //! A record read back: every line is one, holds what can be, and stands where it can. The first that does not is named with its
 //! place.
 
-use super::record::{Line, SCHEMA};
-use crate::link::{Event, Lead, LinkFault, Moment, PlacedFault};
+use super::record::{RecordLine, SCHEMA};
+use crate::link::{Lead, LinkEvent, LinkFault, Moment, PlacedFault};
 use crate::scenario::verdict::Verdict;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
@@ -31,7 +31,7 @@ pub struct RecordError {
 ///
 /// # Errors
 /// The first line that is none, or that cannot stand where it does.
-pub fn read(bytes: &[u8]) -> Result<(Vec<Line>, bool), RecordError> {
+pub fn read(bytes: &[u8]) -> Result<(Vec<RecordLine>, bool), RecordError> {
     let mut lines = Vec::new();
     let mut order = Order::default();
     let mut offset = 0;
@@ -66,13 +66,13 @@ pub fn read(bytes: &[u8]) -> Result<(Vec<Line>, bool), RecordError> {
 }
 
 /// Parses a line. The error has the column, counted from 1, and the reason.
-fn parse(bytes: &[u8]) -> Result<Line, (usize, String)> {
+fn parse(bytes: &[u8]) -> Result<RecordLine, (usize, String)> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let at = error.valid_up_to();
         let byte = bytes.get(at).copied().unwrap_or(0);
         (at + 1, format!("this is not UTF-8: {byte:02X} stands here"))
     })?;
-    serde_json::from_str::<Line>(text.trim_end_matches('\n')).map_err(|error| {
+    serde_json::from_str::<RecordLine>(text.trim_end_matches('\n')).map_err(|error| {
         let message = error.to_string();
         // The place is reported separately.
         let message = message.split(" at line ").next().unwrap_or_default();
@@ -92,18 +92,18 @@ struct Order {
 
 impl Order {
     /// Whether a line can stand behind those before, and hold what it holds; why not, in a sentence.
-    fn take(&mut self, line: &Line) -> Result<(), String> {
+    fn take(&mut self, line: &RecordLine) -> Result<(), String> {
         if self.ended {
             return Err("nothing can stand behind the end of the record".to_owned());
         }
-        if matches!(line, Line::Run { .. }) == self.begun {
+        if matches!(line, RecordLine::Run { .. }) == self.begun {
             return Err(match self.begun {
                 true => "the record has begun already".to_owned(),
                 false => format!("the record of a run expected here, of schema {SCHEMA}"),
             });
         }
         match line {
-            Line::Run {
+            RecordLine::Run {
                 schema,
                 rings,
                 tolerance,
@@ -112,19 +112,19 @@ impl Order {
                 self.run(*schema, rings)?;
                 in_time(Span::from_units(*tolerance))
             }
-            Line::Scenario { attempt, .. } => {
+            RecordLine::Scenario { attempt, .. } => {
                 (self.scenario, self.verdict) = (true, false);
                 match attempt {
                     0 => Err("attempts are counted from 1".to_owned()),
                     _ => Ok(()),
                 }
             }
-            Line::End { verdicts, .. } => {
+            RecordLine::End { verdicts, .. } => {
                 self.ended = true;
                 verdicts.iter().try_for_each(|name| verdict(name))
             }
             // A scenario that was skipped has one, and no attempt.
-            Line::Case {
+            RecordLine::Case {
                 verdict: name,
                 took,
                 ..
@@ -134,7 +134,7 @@ impl Order {
                 in_time(Span::from_units(*took))
             }
             _ if !self.scenario => Err("no scenario has begun".to_owned()),
-            Line::Verdict {
+            RecordLine::Verdict {
                 verdict: name,
                 took,
                 ..
@@ -169,27 +169,27 @@ impl Order {
         Ok(())
     }
 
-    fn event(&self, event: &Event) -> Result<(), String> {
+    fn event(&self, event: &LinkEvent) -> Result<(), String> {
         let (ring, at) = match event {
-            Event::Begin(at) => (0, *at),
-            Event::Look(look) => {
+            LinkEvent::Begin(at) => (0, *at),
+            LinkEvent::Look(look) => {
                 let lead = look.lead.unwrap_or(Lead::NONE);
                 in_time(lead.far)?;
                 in_time(lead.near)?;
                 in_time(look.pause.unwrap_or(look.at).since_start())?;
                 (0, look.at)
             }
-            Event::Sent(ring, at, _)
-            | Event::Received(ring, at, _)
-            | Event::Fault(ring, at, ..)
-            | Event::Probe(ring, at, ..) => (*ring, *at),
-            Event::Tapped(ring, _, at, _) => (*ring, *at),
-            Event::Step(_) | Event::Trouble(_) => return Ok(()),
+            LinkEvent::Sent(ring, at, _)
+            | LinkEvent::Received(ring, at, _)
+            | LinkEvent::Fault(ring, at, ..)
+            | LinkEvent::Probe(ring, at, ..) => (*ring, *at),
+            LinkEvent::Tapped(ring, _, at, _) => (*ring, *at),
+            LinkEvent::Step(_) | LinkEvent::Trouble(_) => return Ok(()),
         };
         let Some(drives) = self.drives.get(ring) else {
             return Err(format!("the bench has no ring {}", ring + 1));
         };
-        if let Event::Fault(_, _, PlacedFault::Link(link, what), moment) = event {
+        if let LinkEvent::Fault(_, _, PlacedFault::Link(link, what), moment) = event {
             if *link > usize::from(*drives) {
                 return Err(format!("a ring of {drives} drives has no link {link}"));
             }

@@ -1,7 +1,7 @@
 //! The lines of a record, and events written as such.
 
 use super::files::sum;
-use crate::link::{Capability, Event, Sink};
+use crate::link::{Capability, LinkEvent, Sink};
 use crate::rig::Attempt;
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
@@ -17,7 +17,7 @@ pub(super) const SCHEMA: u32 = 2;
 /// 78125 of them); bytes are hexadecimal; rings are counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Line {
+pub enum RecordLine {
     /// The first line.
     Run {
         /// The version of the form: 2. Records of schema 1 have no looks, no purpose, and no sums of skipped scenarios.
@@ -286,11 +286,11 @@ fn verdicts_schema(generator: &mut SchemaGenerator) -> Schema {
 /// The JSON schema of a line of a record, draft 2020-12.
 #[must_use]
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(Line).to_value()
+    schemars::schema_for!(RecordLine).to_value()
 }
 
 /// Lines of the evidence of a scenario.
-impl Line {
+impl RecordLine {
     /// An attempt at a scenario of this text begins.
     pub(super) fn of_scenario(name: &str, text: &str, attempt: usize) -> Self {
         Self::Scenario {
@@ -348,7 +348,7 @@ impl Writer {
     }
 
     /// Writes a line at once; what goes wrong is kept for [`Self::failed`].
-    pub fn line(&mut self, line: &Line) {
+    pub fn line(&mut self, line: &RecordLine) {
         if self.failed.is_some() {
             return;
         }
@@ -364,8 +364,8 @@ impl Writer {
 }
 
 impl Sink for Writer {
-    fn take(&mut self, event: &Event) {
-        if let Some(line) = Line::of(event) {
+    fn take(&mut self, event: &LinkEvent) {
+        if let Some(line) = RecordLine::of(event) {
             self.line(&line);
         }
     }

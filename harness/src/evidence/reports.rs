@@ -7,10 +7,10 @@ use super::files::{
     SCENARIOS, SUMS, VERSIONS,
 };
 use super::folder::capture;
-use super::record::Line;
+use super::record::RecordLine;
 use super::verify::{Judged, Opened};
 use crate::capture::read;
-use crate::link::{Event, PlacedFault};
+use crate::link::{LinkEvent, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::time::Instant;
 use harness_sim::record::{Channel, Trace};
@@ -143,28 +143,29 @@ impl Ends {
         let mut ends = Self::new(opened);
         let conversations = recorded
             .events
-            .split(|event| matches!(event, Event::Begin(_)));
+            .split(|event| matches!(event, LinkEvent::Begin(_)));
         let conversations: Vec<_> = conversations.collect();
-        let has_steps = |own: &&&[Event]| own.iter().any(|event| matches!(event, Event::Step(_)));
+        let has_steps =
+            |own: &&&[LinkEvent]| own.iter().any(|event| matches!(event, LinkEvent::Step(_)));
         let played = conversations
             .iter()
             .find(has_steps)
             .or(conversations.last());
         for event in played.into_iter().flat_map(|own| own.iter()) {
             match event {
-                Event::Sent(ring, end, sent) => {
+                LinkEvent::Sent(ring, end, sent) => {
                     let bytes = sent.as_out().octets();
                     for (left, byte) in (0..bytes.len() as u64).rev().zip(bytes) {
                         let at = *end - byte_time * left;
                         ends.carry(*ring, 0, at, Received::good(*byte));
                     }
                 }
-                Event::Received(ring, at, heard) => {
+                LinkEvent::Received(ring, at, heard) => {
                     if let Some(byte) = heard.octet() {
                         ends.carry(*ring, 1, *at, byte);
                     }
                 }
-                Event::Fault(ring, _, PlacedFault::Link(link, _), _) => {
+                LinkEvent::Fault(ring, _, PlacedFault::Link(link, _), _) => {
                     let last = opened.header.drives.get(*ring).copied().unwrap_or(0);
                     match *link {
                         0 => ends.forget(*ring, 0),
@@ -172,7 +173,7 @@ impl Ends {
                         _ => {}
                     }
                 }
-                Event::Probe(ring, ..) => {
+                LinkEvent::Probe(ring, ..) => {
                     ends.forget(*ring, 0);
                     ends.forget(*ring, 1);
                 }
@@ -248,7 +249,7 @@ fn foreign(path: &Path, opened: &Opened, judged: &[Judged]) -> Vec<String> {
         known.insert(format!("{CAPTURES}/{name}.{attempt}.json"));
     }
     for line in &opened.lines {
-        if let Line::Case { name, .. } = line {
+        if let RecordLine::Case { name, .. } = line {
             known.insert(format!("{SCENARIOS}/{name}.scn"));
         }
     }

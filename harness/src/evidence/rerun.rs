@@ -2,9 +2,9 @@
 
 use super::files::{CAPTURES, read_text};
 use super::folder::capture;
-use super::record::Line;
+use super::record::RecordLine;
 use super::verify::{Opened, text_of};
-use crate::link::{Event, Sink};
+use crate::link::{LinkEvent, Sink};
 use crate::rig::{Alarm, Attempt, Keeper, Options, Played, Run, Session};
 use crate::scenario::run::{Outcome, Skip};
 use std::path::Path;
@@ -51,7 +51,7 @@ pub(super) fn rerun(
     let mut lines = &opened.lines[1..];
     while let Some(end) = lines
         .iter()
-        .position(|line| matches!(line, Line::Case { .. }))
+        .position(|line| matches!(line, RecordLine::Case { .. }))
     {
         let (own, rest) = lines.split_at(end + 1);
         match scenario(&mut run, path, opened, own, texts) {
@@ -71,10 +71,10 @@ fn scenario(
     run: &mut Run<'_>,
     path: &Path,
     opened: &Opened,
-    lines: &[Line],
+    lines: &[RecordLine],
     texts: &dyn Fn(&str) -> Result<String, String>,
 ) -> Result<Vec<String>, String> {
-    let Some(Line::Case { name, sha256, .. }) = lines.last() else {
+    let Some(RecordLine::Case { name, sha256, .. }) = lines.last() else {
         return Ok(Vec::new());
     };
     let text = text_of(name, sha256.as_deref().unwrap_or_default(), texts)?;
@@ -95,7 +95,7 @@ fn scenario(
         },
     };
     let title = entry.scenario.title.as_str();
-    tape.lines.push(Line::of_case(
+    tape.lines.push(RecordLine::of_case(
         name,
         (title, &entry.drives()),
         sha256.clone(),
@@ -125,30 +125,30 @@ fn scenario(
 struct Tape<'t> {
     name: &'t str,
     text: &'t str,
-    lines: Vec<Line>,
+    lines: Vec<RecordLine>,
     captures: Vec<String>,
 }
 
 impl Sink for Tape<'_> {
-    fn take(&mut self, event: &Event) {
-        self.lines.extend(Line::of(event));
+    fn take(&mut self, event: &LinkEvent) {
+        self.lines.extend(RecordLine::of(event));
     }
 }
 
 impl Keeper for Tape<'_> {
     fn begins(&mut self, attempt: usize) {
         self.lines
-            .push(Line::of_scenario(self.name, self.text, attempt));
+            .push(RecordLine::of_scenario(self.name, self.text, attempt));
     }
 
     fn ends(&mut self, _: usize, attempt: &Attempt) {
-        self.lines.push(Line::of_verdict(attempt));
+        self.lines.push(RecordLine::of_verdict(attempt));
         self.captures
             .push(capture(&attempt.traces, &attempt.outcome));
     }
 }
 
-fn shown(line: Option<&Line>) -> String {
+fn shown(line: Option<&RecordLine>) -> String {
     let text = line.map(serde_json::to_string);
     match text {
         Some(Ok(text)) => text,

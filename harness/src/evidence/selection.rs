@@ -2,7 +2,7 @@
 
 use super::attempt::reached;
 use super::files::sum;
-use super::record::Line;
+use super::record::RecordLine;
 use super::verify::Opened;
 use crate::buses::qualify::{TRIALS, conversations, probes, thorough};
 use crate::library::Entry;
@@ -77,9 +77,9 @@ pub(super) fn compare(opened: &Opened) -> Selection {
 }
 
 /// The name of a case and the sum of its text.
-fn case(line: &Line) -> Option<(&str, String)> {
+fn case(line: &RecordLine) -> Option<(&str, String)> {
     match line {
-        Line::Case { name, sha256, .. } => Some((name, sha256.clone().unwrap_or_default())),
+        RecordLine::Case { name, sha256, .. } => Some((name, sha256.clone().unwrap_or_default())),
         _ => None,
     }
 }

@@ -11,7 +11,7 @@ use super::folder::EvidenceError;
 use super::header::{Header, header};
 use super::qualified;
 use super::read::{RecordError, read};
-use super::record::Line;
+use super::record::RecordLine;
 use super::reports;
 use super::rerun::rerun;
 use super::selection;
@@ -144,7 +144,7 @@ pub fn judge_record(record: &[u8], beside: &Beside<'_>) -> Result<Verified, Evid
 
 /// A record that has been read, and what it is judged by.
 pub(super) struct Opened {
-    pub(super) lines: Vec<Line>,
+    pub(super) lines: Vec<RecordLine>,
     /// Whether the last line is.
     whole: bool,
     pub(super) rig: Rig,
@@ -239,7 +239,7 @@ impl Opened {
     /// Whether the record has its last line and the verdict of every attempt.
     fn is_ended(&self, judged: &[Judged]) -> bool {
         self.whole
-            && matches!(self.lines.last(), Some(Line::End { .. }))
+            && matches!(self.lines.last(), Some(RecordLine::End { .. }))
             && judged.iter().all(|own| own.recorded.verdict.is_some())
     }
 
@@ -329,11 +329,11 @@ impl Judged {
 }
 
 /// The attempts of a record.
-fn group(lines: &[Line]) -> Vec<Recorded> {
+fn group(lines: &[RecordLine]) -> Vec<Recorded> {
     let mut all: Vec<Recorded> = Vec::new();
     for line in lines {
         match line {
-            Line::Scenario {
+            RecordLine::Scenario {
                 name,
                 sha256,
                 attempt,
@@ -344,7 +344,7 @@ fn group(lines: &[Line]) -> Vec<Recorded> {
                 events: Vec::new(),
                 verdict: None,
             }),
-            Line::Verdict {
+            RecordLine::Verdict {
                 verdict,
                 finding,
                 remarks,

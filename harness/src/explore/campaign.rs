@@ -7,12 +7,12 @@ use super::dice::Dice;
 use super::drive_name;
 use super::error::ExploreError;
 use super::mutate;
-use super::record::{About, Kept, LogLine, Progress, Record};
+use super::record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress};
 use super::swarm::Swarm;
 use super::target::{Rehearsal, Target};
 use super::tour;
-use super::{Act, Case, Talk, To, What};
-use super::{Generator, Scope};
+use super::{Act, ActKind, Case, Talk, To};
+use super::{CaseScope, Generator};
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub struct Bounds {
 
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum RunEnd {
     /// All cases were tried.
     Cases,
     /// The next case would use the line for too long.
@@ -62,9 +62,9 @@ pub trait Watcher {
 
 /// A run.
 #[derive(Debug)]
-pub struct Campaign {
-    about: About,
-    scope: Scope,
+pub struct FuzzRun {
+    about: FuzzSettings,
+    scope: CaseScope,
     pool: Pool,
     progress: Progress,
     /// How often each difference was flaky, by its key; `SETTLED` for a confirmed one.
@@ -78,10 +78,10 @@ pub struct Campaign {
     flaky: usize,
 }
 
-impl Campaign {
+impl FuzzRun {
     /// A run that begins.
     #[must_use]
-    pub fn new(about: About, scope: Scope) -> Self {
+    pub fn new(about: FuzzSettings, scope: CaseScope) -> Self {
         let rings = std::iter::once(&scope.first).chain(&scope.second);
         let rings = rings.filter(|_| about.ports);
         let tours = rings.map(|ring| tour(&scope, ring, about.seed));
@@ -103,8 +103,8 @@ impl Campaign {
     /// # Errors
     /// The model cannot be made.
     pub fn resumed(
-        kept: &Kept,
-        scope: Scope,
+        kept: &KeptRun,
+        scope: CaseScope,
         target: &mut dyn Target,
     ) -> Result<Self, ExploreError> {
         let mut campaign = Self::new(kept.about.clone(), scope);
@@ -193,10 +193,10 @@ impl Campaign {
     pub fn run(
         &mut self,
         target: &mut dyn Target,
-        mut record: Option<&mut Record>,
+        mut record: Option<&mut FuzzRecord>,
         bounds: &Bounds,
         watcher: &mut dyn Watcher,
-    ) -> Result<End, ExploreError> {
+    ) -> Result<RunEnd, ExploreError> {
         let mut swarm = None;
         let end = loop {
             if let Some(end) = self.end(bounds, target) {
@@ -220,7 +220,7 @@ impl Campaign {
             swarm = Some((round, own));
             let rehearsal = target.rehearse(&case)?;
             if self.too_long(bounds, rehearsal.took) {
-                break End::Wire;
+                break RunEnd::Wire;
             }
             self.one(&case, &rehearsal, target, &mut record, watcher)?;
             self.progress.cases += 1;
@@ -242,11 +242,11 @@ impl Campaign {
         &mut self,
         cases: &[Case],
         target: &mut dyn Target,
-        mut record: Option<&mut Record>,
+        mut record: Option<&mut FuzzRecord>,
         bounds: &Bounds,
         watcher: &mut dyn Watcher,
-    ) -> Result<End, ExploreError> {
-        let mut end = End::Cases;
+    ) -> Result<RunEnd, ExploreError> {
+        let mut end = RunEnd::Cases;
         for case in cases {
             if let Some(own) = self.end(bounds, target) {
                 end = own;
@@ -254,7 +254,7 @@ impl Campaign {
             }
             let rehearsal = target.rehearse(case)?;
             if self.too_long(bounds, rehearsal.took) {
-                end = End::Wire;
+                end = RunEnd::Wire;
                 break;
             }
             self.one(case, &rehearsal, target, &mut record, watcher)?;
@@ -265,14 +265,14 @@ impl Campaign {
         Ok(end)
     }
 
-    fn end(&self, bounds: &Bounds, target: &mut dyn Target) -> Option<End> {
+    fn end(&self, bounds: &Bounds, target: &mut dyn Target) -> Option<RunEnd> {
         if let Some(why) = target.over() {
-            return Some(End::Over(why));
+            return Some(RunEnd::Over(why));
         }
         if self.confirmed >= bounds.findings {
-            return Some(End::Findings);
+            return Some(RunEnd::Findings);
         }
-        (self.progress.cases >= bounds.cases).then_some(End::Cases)
+        (self.progress.cases >= bounds.cases).then_some(RunEnd::Cases)
     }
 
     /// Whether the line would be used for longer than it may.
@@ -290,7 +290,7 @@ impl Campaign {
         case: &Case,
         rehearsal: &Rehearsal,
         target: &mut dyn Target,
-        record: &mut Option<&mut Record>,
+        record: &mut Option<&mut FuzzRecord>,
         watcher: &mut dyn Watcher,
     ) -> Result<(), ExploreError> {
         if rehearsal.denied.is_some() {
@@ -510,7 +510,7 @@ fn last_acts(acts: &[Act], drives: u8, most: usize) -> &[Act] {
 fn exchanged(case: &Case, step: u8) -> Case {
     let mut new = case.clone();
     for act in &mut new.acts {
-        if let What::Talk(Talk {
+        if let ActKind::Talk(Talk {
             to: To::Drive(drive),
             ..
         }) = &mut act.what
@@ -523,7 +523,7 @@ fn exchanged(case: &Case, step: u8) -> Case {
 }
 
 fn write(
-    record: &mut Option<&mut Record>,
+    record: &mut Option<&mut FuzzRecord>,
     line: impl FnOnce() -> LogLine,
 ) -> Result<(), ExploreError> {
     match record {

@@ -3,7 +3,7 @@
 //! A [`Case`] is a conversation as a value. [`Generator`] and [`mutate`] make them from a seed, within a [`Swarm`]'s subset of what a
 //! conversation can have; a [`Target`] tries them: [`OnSim`] on simulated rings, [`OnRig`] on a rig with ports behind its guard. A [`Pool`]
 //! keeps the cases that show something new, a difference from the model is a [`Finding`], and every finding is a scenario
-//! ([`text`](mod@text)). A [`Campaign`] does all of it and a [`Record`] writes it down as it happens. [`shrink`](mod@shrink) reduces
+//! ([`text`](mod@text)). A [`FuzzRun`] does all of it and a [`FuzzRecord`] writes it down as it happens. [`shrink`](mod@shrink) reduces
 //! findings and [`promote`](mod@promote) makes them regression tests.
 
 mod campaign;
@@ -14,18 +14,18 @@ mod record;
 mod swarm;
 mod target;
 
-pub use campaign::{Bounds, Campaign, End, Watcher};
+pub use campaign::{Bounds, FuzzRun, RunEnd, Watcher};
 pub use dice::Dice;
 pub use error::ExploreError;
-pub use record::{About, Kept, LogLine, Progress, RECORD, Record, read};
+pub use record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read};
 pub use swarm::{Spice, Swarm};
 pub use target::{Rehearsal, Target, Tried};
 
 /// What the one bus that is explored today gives: its cases and targets.
 pub use crate::buses::novobus::explore::{
-    Act, Beside, Case, Command, Damage, Difference, Finding, Generator, Harm, MOST_ACTS,
-    MOST_BYTES, MOST_KEPT, MOST_NET, OnRig, OnSim, Order, Planted, Pool, RingScope, Scope, Seen,
-    Setup, Spoil, Talk, To, What, against_model, against_reference, against_witnesses, beside,
-    by_novelty, features, mutate, page, play, promote, shrink, text,
+    Act, ActKind, Case, CaseScope, Command, CommandSent, Damage, Difference, Finding, Generator,
+    Harm, MOST_ACTS, MOST_BYTES, MOST_KEPT, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted,
+    Pool, RingScope, RingSetup, Spoil, Talk, To, against_model, against_reference,
+    against_witnesses, beside, by_novelty, features, mutate, page, play, promote, shrink, text,
 };
 pub(crate) use crate::buses::novobus::explore::{drive_name, tour};

@@ -4,7 +4,7 @@
 //! done again when a run is resumed.
 
 use super::Case;
-use super::Setup;
+use super::RingSetup;
 use super::error::ExploreError;
 use super::files::read_text;
 use rustix::fs::FlockOperation;
@@ -19,7 +19,7 @@ pub const RECORD: &str = "run.jsonl";
 /// What a run is: all that decides which cases are tried, and how they are judged.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct About {
+pub struct FuzzSettings {
     /// The version of the form: 1.
     pub schema: u32,
     /// The rig as it was named.
@@ -38,12 +38,12 @@ pub struct About {
     /// ... in this many attempts.
     pub of: u8,
     /// What the rings are made of.
-    pub setup: Setup,
+    pub setup: RingSetup,
     /// What cases may have, by name.
     pub spices: Vec<String>,
 }
 
-impl About {
+impl FuzzSettings {
     /// The version of the form.
     pub const SCHEMA: u32 = 1;
 }
@@ -53,7 +53,7 @@ impl About {
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum LogLine {
     /// The first line.
-    Run(About),
+    Run(FuzzSettings),
     /// A round begins.
     Swarm {
         /// Which, counted from 0.
@@ -101,9 +101,9 @@ pub struct Progress {
 
 /// What a record holds.
 #[derive(Clone, Debug)]
-pub struct Kept {
+pub struct KeptRun {
     /// The first line.
-    pub about: About,
+    pub about: FuzzSettings,
     /// The lines behind it, up to the last one of progress.
     pub lines: Vec<LogLine>,
     /// The last line of progress.
@@ -114,17 +114,17 @@ pub struct Kept {
 
 /// The record of a run under way.
 #[derive(Debug)]
-pub struct Record {
+pub struct FuzzRecord {
     folder: PathBuf,
     file: File,
 }
 
-impl Record {
+impl FuzzRecord {
     /// A record in a folder that is not there or is empty.
     ///
     /// # Errors
     /// It is there with something in it, or cannot be written.
-    pub fn create(folder: &Path, about: &About) -> Result<Self, ExploreError> {
+    pub fn create(folder: &Path, about: &FuzzSettings) -> Result<Self, ExploreError> {
         let unusable =
             |error: std::io::Error| ExploreError::unwritten("make the folder", folder, &error);
         std::fs::create_dir_all(folder).map_err(unusable)?;
@@ -156,7 +156,7 @@ impl Record {
     ///
     /// # Errors
     /// There is none, or a line of it is damaged; half a line at its end is not.
-    pub fn resume(folder: &Path) -> Result<(Self, Kept), ExploreError> {
+    pub fn resume(folder: &Path) -> Result<(Self, KeptRun), ExploreError> {
         let path = folder.join(RECORD);
         let (kept, length) = read(folder)?;
         let file = File::options()
@@ -211,7 +211,7 @@ fn hold(file: &File, folder: &Path) -> Result<(), ExploreError> {
 ///
 /// # Errors
 /// There is no record, or it is damaged.
-pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
+pub fn read(folder: &Path) -> Result<(KeptRun, usize), ExploreError> {
     let path = folder.join(RECORD);
     if !path.exists() {
         return Err(ExploreError::Usage(format!(
@@ -241,7 +241,9 @@ pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
         let line: LogLine =
             serde_json::from_str(line).map_err(|error| damaged(number, &error.to_string()))?;
         match line {
-            LogLine::Run(own) if number == 0 && own.schema == About::SCHEMA => about = Some(own),
+            LogLine::Run(own) if number == 0 && own.schema == FuzzSettings::SCHEMA => {
+                about = Some(own)
+            }
             LogLine::Run(_) => return Err(damaged(number, "another kind of record")),
             LogLine::Progress(progress) => {
                 history.push(progress);
@@ -257,7 +259,7 @@ pub fn read(folder: &Path) -> Result<(Kept, usize), ExploreError> {
         return Err(damaged(0, "the record is cut off before its first case"));
     };
     lines.truncate(count);
-    let kept = Kept {
+    let kept = KeptRun {
         about,
         lines,
         progress,

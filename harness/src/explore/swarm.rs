@@ -1,7 +1,7 @@
 //! Swarm options: each round of a run uses a random subset of what a conversation can have. What is never there lets the rest
 //! stand out: a drive that forgets something after ten reads is not found where every third byte is damaged.
 
-use super::Scope;
+use super::CaseScope;
 use super::dice::Dice;
 use std::collections::BTreeSet;
 
@@ -130,7 +130,7 @@ impl Swarm {
 
     /// The subset of a round of a run, of what the scope allows.
     #[must_use]
-    pub fn of_round(seed: u64, round: u64, scope: &Scope) -> Self {
+    pub fn of_round(seed: u64, round: u64, scope: &CaseScope) -> Self {
         // Other numbers than those of the cases.
         let mut dice = Dice::of_part(!seed, round);
         let mut own: BTreeSet<_> = scope

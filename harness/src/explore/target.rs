@@ -1,7 +1,7 @@
 //! What cases are tried on.
 
 use super::Difference;
-use super::Seen;
+use super::MasterView;
 use super::error::ExploreError;
 use super::{Act, Case};
 use harness_proto::time::Span;
@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 #[derive(Clone, Debug, Default)]
 pub struct Rehearsal {
     /// What the master sees of it.
-    pub seen: Seen,
+    pub seen: MasterView,
     /// How long the line is used for it, with all that comes before it on a rig.
     pub took: Span,
     /// What it shows.

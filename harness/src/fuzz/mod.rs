@@ -13,10 +13,10 @@ pub use text::{rig, scenario, written};
 use crate::buses::novobus::fuzz::noted;
 /// The targets that reach transitions of the one bus that is fuzzed today.
 pub use crate::buses::novobus::fuzz::{coverage, distil};
-use harness_sim::novobus::fuzz::{NOTING, Noting, TARGETS, Target};
+use harness_sim::novobus::fuzz::{FuzzTarget, NOTING, Noting, TARGETS};
 
 /// The targets whose bodies need the whole bench.
-pub const BENCH_TARGETS: [Target; 4] = [
+pub const BENCH_TARGETS: [FuzzTarget; 4] = [
     ("scenario", scenario),
     ("rig", rig),
     ("capture", crate::capture::fuzz::import),
@@ -24,7 +24,7 @@ pub const BENCH_TARGETS: [Target; 4] = [
 ];
 
 /// Every target.
-pub fn targets() -> impl Iterator<Item = Target> {
+pub fn targets() -> impl Iterator<Item = FuzzTarget> {
     TARGETS.into_iter().chain(BENCH_TARGETS)
 }
 

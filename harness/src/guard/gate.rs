@@ -1,6 +1,6 @@
 //! What one port may send.
 
-use crate::buses::Setting;
+use crate::buses::LimitSetting;
 use crate::link::{Line, Moment, PlacedFault};
 use crate::medium::Out;
 use harness_proto::can;
@@ -17,7 +17,7 @@ pub struct Denied {
     /// What is not sent and why, in a sentence.
     pub why: String,
     /// The settings of the rig's `[limits]` that deny it; empty where no setting permits it.
-    pub settings: Vec<Setting>,
+    pub settings: Vec<LimitSetting>,
 }
 
 /// The rules of one port: decides piece by piece what may be sent, by what a drive would read out of it.

@@ -2,7 +2,7 @@
 
 use super::Watch;
 use super::gate::{Denied, Gate};
-use crate::buses::Setting;
+use crate::buses::LimitSetting;
 use crate::link::{Capability, Lead, Line, Link, Moment, Octets, PlacedFault, Trouble};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Received;
@@ -24,7 +24,7 @@ pub struct Guarded<L> {
     gates: Vec<Box<dyn Gate>>,
     trouble: Option<Trouble>,
     /// The settings that denied what is the trouble.
-    denying: Vec<Setting>,
+    denying: Vec<LimitSetting>,
     capabilities: Vec<Capability>,
     /// When the present conversation began, on the guard's clock, which is never set back.
     origin: Instant,
@@ -162,7 +162,7 @@ impl<L: Line> Guarded<L> {
 
     /// The settings of the rig's `[limits]` that have denied something; empty where it is denied whatever they are.
     #[must_use]
-    pub fn denying(&self) -> &[Setting] {
+    pub fn denying(&self) -> &[LimitSetting] {
         &self.denying
     }
 

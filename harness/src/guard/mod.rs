@@ -13,7 +13,7 @@ mod safe;
 mod watch;
 
 pub use crate::buses::novobus::guard::safe_state::{
-    NotSafe, SafeState, SafeStep, Standing, blind_stop, safe_state,
+    NotSafe, SafeState, SafeStep, Standstill, blind_stop, safe_state,
 };
 pub use gate::{Denied, Gate, Restore};
 pub use guarded::Guarded;

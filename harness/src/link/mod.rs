@@ -19,7 +19,7 @@ pub use harness_sim::fault::{DriveFault, LinkFault};
 pub use harness_sim::segment::FrameFault;
 pub use inner::{Delay, InnerLink, Ports};
 pub use octets::Octets;
-pub use record::{Event, Look, Recording, Sink};
+pub use record::{LinkEvent, Look, Recording, Sink};
 pub use replay::Replay;
 pub use tamper::{needs_line_errors, only_simulated};
 

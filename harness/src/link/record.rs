@@ -30,9 +30,9 @@ pub struct Look {
     pub pause: Option<Instant>,
 }
 
-/// Something that happened. Times are those of the conversation, but that of [`Event::Begin`].
+/// Something that happened. Times are those of the conversation, but that of [`LinkEvent::Begin`].
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Event {
+pub enum LinkEvent {
     /// A conversation began, at this time of the one before.
     Begin(Instant),
     /// A step of the scenario began, that at this place of its text.
@@ -56,11 +56,11 @@ pub enum Event {
 /// Takes events as they happen.
 pub trait Sink: Send {
     /// Takes one.
-    fn take(&mut self, event: &Event);
+    fn take(&mut self, event: &LinkEvent);
 }
 
-impl Sink for Vec<Event> {
-    fn take(&mut self, event: &Event) {
+impl Sink for Vec<LinkEvent> {
+    fn take(&mut self, event: &LinkEvent) {
         self.push(event.clone());
     }
 }
@@ -148,7 +148,7 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             && let Some(trouble) = self.link.trouble()
         {
             self.trouble = Some(trouble.clone());
-            self.sink.take(&Event::Trouble(trouble.clone()));
+            self.sink.take(&LinkEvent::Trouble(trouble.clone()));
         }
     }
 
@@ -179,9 +179,9 @@ impl<'l, L: Link + ?Sized> Recording<'l, L> {
             pause: known.pause,
         };
         known.lead = lead;
-        self.sink.take(&Event::Look(look));
+        self.sink.take(&LinkEvent::Look(look));
         for (port, at, byte) in came {
-            self.sink.take(&Event::Received(port, at, byte));
+            self.sink.take(&LinkEvent::Received(port, at, byte));
             known.came[port].push_back((at, byte));
         }
     }
@@ -215,7 +215,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
         let taken = what.len().saturating_sub(self.link.refused());
         if taken > 0 {
             self.sink
-                .take(&Event::Sent(port, end, what.first(taken).to_pieces()));
+                .take(&LinkEvent::Sent(port, end, what.first(taken).to_pieces()));
             if let Some(known) = &mut self.known {
                 known.busy = true;
             }
@@ -229,7 +229,7 @@ impl<L: Link + ?Sized> Line for Recording<'_, L> {
             return known.came.get_mut(port)?.pop_front();
         }
         let (at, byte) = self.link.receive(port)?;
-        self.sink.take(&Event::Received(port, at, byte));
+        self.sink.take(&LinkEvent::Received(port, at, byte));
         self.tell();
         Some((at, byte))
     }
@@ -285,7 +285,7 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
     }
 
     fn begin(&mut self) {
-        self.sink.take(&Event::Begin(self.link.now()));
+        self.sink.take(&LinkEvent::Begin(self.link.now()));
         if std::mem::take(&mut self.stepped) {
             let ports = (0..PORTS).filter(|port| self.link.drives(*port) > 0);
             self.scenario = ports.map(|port| self.link.trace(port)).collect();
@@ -301,7 +301,7 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
     fn step(&mut self, place: usize) {
         self.stepped = true;
         self.scenario.clear();
-        self.sink.take(&Event::Step(place));
+        self.sink.take(&LinkEvent::Step(place));
         self.link.step(place);
     }
 
@@ -312,7 +312,7 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
 
     fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
         let at = self.now();
-        self.sink.take(&Event::Fault(port, at, fault, moment));
+        self.sink.take(&LinkEvent::Fault(port, at, fault, moment));
         self.link.inject(port, fault, moment);
         self.tell();
     }
@@ -330,7 +330,7 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         let at = self.now();
         let known = self.tapped.insert((port, link), all.len()).unwrap_or(0);
         let new = all.get(known..).unwrap_or_default().to_vec();
-        self.sink.take(&Event::Tapped(port, link, at, new));
+        self.sink.take(&LinkEvent::Tapped(port, link, at, new));
         Some(all)
     }
 
@@ -342,7 +342,7 @@ impl<L: Link + ?Sized> Link for Recording<'_, L> {
         let at = self.now();
         let came = self.link.probe(port, octets);
         self.sink
-            .take(&Event::Probe(port, at, octets.to_vec(), came.clone()));
+            .take(&LinkEvent::Probe(port, at, octets.to_vec(), came.clone()));
         self.look_now();
         came
     }

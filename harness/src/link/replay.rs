@@ -6,7 +6,9 @@
 //! A record of a ring with ports holds every [`Look`], so that the caller sees the same at each call and must do the same. Records of
 //! schema 1 have no looks: of these only the order is repeated, and a driver that depends on the time may send something else.
 
-use super::{Capability, Event, Lead, Line, Link, LinkFault, Look, Moment, PlacedFault, Trouble};
+use super::{
+    Capability, Lead, Line, Link, LinkEvent, LinkFault, Look, Moment, PlacedFault, Trouble,
+};
 use crate::medium::{Heard, Medium, Out, Pieces};
 use harness_proto::can;
 use harness_proto::line::Received;
@@ -17,7 +19,7 @@ use std::collections::{BTreeMap, VecDeque};
 /// A record, played back.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    events: VecDeque<Event>,
+    events: VecDeque<LinkEvent>,
     now: Instant,
     medium: Medium,
     tolerance: Span,
@@ -63,22 +65,24 @@ impl Replay {
     /// Replays events recorded at ports of this medium with these numbers of stations, on a link with these capabilities.
     #[must_use]
     pub fn new(
-        events: Vec<Event>,
+        events: Vec<LinkEvent>,
         medium: impl Into<Medium>,
         tolerance: Span,
         drives: Vec<u8>,
         capabilities: Vec<Capability>,
     ) -> Self {
         let reached = events.iter().filter_map(|event| match event {
-            Event::Fault(ring, _, PlacedFault::Link(link, _), _) => Some((*ring, *link)),
+            LinkEvent::Fault(ring, _, PlacedFault::Link(link, _), _) => Some((*ring, *link)),
             _ => None,
         });
         let tapped = events.iter().filter_map(|event| match event {
-            Event::Tapped(ring, link, ..) => Some((*ring, *link)),
+            LinkEvent::Tapped(ring, link, ..) => Some((*ring, *link)),
             _ => None,
         });
         let listens = tapped.collect();
-        let looks = events.iter().any(|event| matches!(event, Event::Look(_)));
+        let looks = events
+            .iter()
+            .any(|event| matches!(event, LinkEvent::Look(_)));
         Self {
             reaches: reached.collect(),
             listens,
@@ -86,7 +90,7 @@ impl Replay {
             // Without looks it is not known which step came when.
             events: events
                 .into_iter()
-                .filter(|event| looks || !matches!(event, Event::Step(_)))
+                .filter(|event| looks || !matches!(event, LinkEvent::Step(_)))
                 .collect(),
             now: Instant::START,
             medium: medium.into(),
@@ -123,19 +127,21 @@ impl Replay {
     #[must_use]
     pub fn left(&self) -> Option<String> {
         let exact = self.known.is_some();
-        let words = |event: &Event| match event {
-            Event::Trouble(_) => None,
-            Event::Received(..) | Event::Step(_) | Event::Look(_) if !exact => None,
-            Event::Received(_, at, byte) => Some(format!("{} received at {at}", words_of(*byte))),
-            Event::Step(place) => Some(format!("a step at byte {place} of the scenario")),
-            Event::Look(look) => Some(format!("a look at {}", look.at)),
-            Event::Begin(_) => Some("another conversation".to_owned()),
-            Event::Sent(_, at, sent) => {
+        let words = |event: &LinkEvent| match event {
+            LinkEvent::Trouble(_) => None,
+            LinkEvent::Received(..) | LinkEvent::Step(_) | LinkEvent::Look(_) if !exact => None,
+            LinkEvent::Received(_, at, byte) => {
+                Some(format!("{} received at {at}", words_of(*byte)))
+            }
+            LinkEvent::Step(place) => Some(format!("a step at byte {place} of the scenario")),
+            LinkEvent::Look(look) => Some(format!("a look at {}", look.at)),
+            LinkEvent::Begin(_) => Some("another conversation".to_owned()),
+            LinkEvent::Sent(_, at, sent) => {
                 Some(format!("sending {} until {at}", counted(sent.as_out())))
             }
-            Event::Fault(_, at, ..) => Some(format!("a fault at {at}")),
-            Event::Tapped(_, link, at, _) => Some(format!("a look at link {link} at {at}")),
-            Event::Probe(_, at, sent, _) => Some(format!(
+            LinkEvent::Fault(_, at, ..) => Some(format!("a fault at {at}")),
+            LinkEvent::Tapped(_, link, at, _) => Some(format!("a look at link {link} at {at}")),
+            LinkEvent::Probe(_, at, sent, _) => Some(format!(
                 "a probe with {} from {at} on",
                 counted(Out::Octets(sent))
             )),
@@ -159,11 +165,11 @@ impl Replay {
     /// Whether the second event is a denial.
     fn denied_behind(&self) -> bool {
         let behind = self.events.get(1);
-        matches!(behind, Some(Event::Trouble(Trouble::Denied(_))))
+        matches!(behind, Some(LinkEvent::Trouble(Trouble::Denied(_))))
     }
 
     fn trouble_comes(&mut self) {
-        if let Some(Event::Trouble(trouble)) = self.events.front() {
+        if let Some(LinkEvent::Trouble(trouble)) = self.events.front() {
             self.trouble.get_or_insert(trouble.clone());
             self.events.pop_front();
         }
@@ -172,7 +178,7 @@ impl Replay {
     /// The time of the next look; `None` where there is none.
     fn next_look(&self) -> Option<Instant> {
         self.events.iter().find_map(|event| match event {
-            Event::Look(look) => Some(look.at),
+            LinkEvent::Look(look) => Some(look.at),
             _ => None,
         })
     }
@@ -182,7 +188,7 @@ impl Replay {
         let Some(known) = &mut self.known else {
             return;
         };
-        let Some(Event::Look(look)) = self.events.front() else {
+        let Some(LinkEvent::Look(look)) = self.events.front() else {
             return self.differs("a look at the ports");
         };
         let Look {
@@ -200,7 +206,7 @@ impl Replay {
         let held = known.held;
         let mut came = 0;
         let mut wrong = (at < before.0).then(|| format!("{at} stands behind {}", before.0));
-        while let Some(Event::Received(ring, arrived, byte)) = self.events.front() {
+        while let Some(LinkEvent::Received(ring, arrived, byte)) = self.events.front() {
             let (ring, arrived, byte) = (*ring, *arrived, *byte);
             let known_times = before.0..=at;
             if held == Span::ZERO && !known_times.contains(&arrived) {
@@ -214,7 +220,7 @@ impl Replay {
             came += 1;
             known.came[ring.min(1)].push_back((arrived, byte));
         }
-        let trouble = matches!(self.events.front(), Some(Event::Trouble(_)));
+        let trouble = matches!(self.events.front(), Some(LinkEvent::Trouble(_)));
         let stopped = self.trouble.as_ref().is_some_and(Trouble::stops_the_line);
         let news = came > 0 || trouble || stopped || busy != before.1;
         if let Some(until) = until.filter(|until| at < *until && !news) {
@@ -263,7 +269,7 @@ impl Line for Replay {
         }
         match self.events.front() {
             // What was denied was not sent.
-            Some(Event::Sent(own, end, sent))
+            Some(LinkEvent::Sent(own, end, sent))
                 if *own == port
                     && (sent.as_out() == what
                         || begins_with(what, sent) && self.denied_behind()) =>
@@ -278,7 +284,7 @@ impl Line for Replay {
                 end
             }
             // With trouble nothing is carried, and what was sent all the same is not in the record.
-            Some(Event::Trouble(_)) => {
+            Some(LinkEvent::Trouble(_)) => {
                 self.trouble_comes();
                 self.now
             }
@@ -296,7 +302,9 @@ impl Line for Replay {
         // In real time a wait until a time may have ended later, and what came meanwhile was fetched.
         let late = self.tolerance > Span::ZERO;
         match self.events.front() {
-            Some(Event::Received(own, at, byte)) if *own == port && (late || *at <= self.now) => {
+            Some(LinkEvent::Received(own, at, byte))
+                if *own == port && (late || *at <= self.now) =>
+            {
                 let byte = (*at, *byte);
                 self.events.pop_front();
                 self.now = self.now.max(byte.0);
@@ -317,7 +325,7 @@ impl Line for Replay {
         }
         // The next byte that comes, behind those that have come and are not fetched.
         let mut bytes = self.events.iter().map_while(|event| match event {
-            Event::Received(_, at, _) => Some(*at),
+            LinkEvent::Received(_, at, _) => Some(*at),
             _ => None,
         });
         let now = self.now;
@@ -330,7 +338,7 @@ impl Line for Replay {
         // Nothing was done on the link between the event before and the trouble, so it may show at once: the last step of a scenario
         // may let no time pass behind it.
         let next = match self.events.front() {
-            Some(Event::Trouble(trouble)) => Some(trouble),
+            Some(LinkEvent::Trouble(trouble)) => Some(trouble),
             _ => None,
         };
         self.trouble.as_ref().or(next)
@@ -356,12 +364,12 @@ impl Link for Replay {
     }
 
     fn begin(&mut self) {
-        while self.known.is_none() && matches!(self.events.front(), Some(Event::Received(..))) {
+        while self.known.is_none() && matches!(self.events.front(), Some(LinkEvent::Received(..))) {
             self.events.pop_front();
         }
         self.tapped.clear();
         match self.events.pop_front() {
-            Some(Event::Begin(at)) => {
+            Some(LinkEvent::Begin(at)) => {
                 if self.known.is_some() && at < self.now {
                     self.fails(format!(
                         "the times of the record cannot be: a conversation begins at {at}, the one before lasted until {}",
@@ -392,7 +400,7 @@ impl Link for Replay {
             return;
         }
         match self.events.front() {
-            Some(Event::Step(own)) if *own == place => {
+            Some(LinkEvent::Step(own)) if *own == place => {
                 self.events.pop_front();
             }
             _ => self.differs("the steps of the scenario"),
@@ -400,14 +408,14 @@ impl Link for Replay {
     }
 
     fn busy(&self) -> bool {
-        let byte = || matches!(self.events.front(), Some(Event::Received(..)));
+        let byte = || matches!(self.events.front(), Some(LinkEvent::Received(..)));
         let known = self.known.as_ref();
         known.map_or_else(byte, |known| known.busy)
     }
 
     fn inject(&mut self, port: usize, fault: PlacedFault, moment: Moment) {
         match self.events.front() {
-            Some(Event::Fault(own, at, what, then))
+            Some(LinkEvent::Fault(own, at, what, then))
                 if (*own, *what, *then) == (port, fault, moment)
                     && (self.known.is_none() || *at == self.now) =>
             {
@@ -417,7 +425,7 @@ impl Link for Replay {
                 }
                 self.trouble_comes();
             }
-            Some(Event::Trouble(_)) => self.trouble_comes(),
+            Some(LinkEvent::Trouble(_)) => self.trouble_comes(),
             _ => self.differs("the fault that is asked for"),
         }
     }
@@ -432,7 +440,7 @@ impl Link for Replay {
 
     fn tapped(&mut self, port: usize, link: usize) -> Option<Vec<Received>> {
         match self.events.pop_front() {
-            Some(Event::Tapped(own, place, _, bytes)) if (own, place) == (port, link) => {
+            Some(LinkEvent::Tapped(own, place, _, bytes)) if (own, place) == (port, link) => {
                 let all = self.tapped.entry((port, link)).or_default();
                 all.extend(bytes);
                 Some(all.clone())
@@ -453,7 +461,7 @@ impl Link for Replay {
 
     fn probe(&mut self, port: usize, octets: &[u8]) -> Vec<Received> {
         match self.events.pop_front() {
-            Some(Event::Probe(own, at, sent, came))
+            Some(LinkEvent::Probe(own, at, sent, came))
                 if own == port && sent == octets && (self.known.is_none() || at == self.now) =>
             {
                 self.now = self.now.max(at);
@@ -534,10 +542,10 @@ mod tests {
     fn overslept(tolerance: Span) -> Replay {
         let byte = Heard::Octet(Received::good(0x80));
         let events = vec![
-            Event::Begin(Instant::START),
-            Event::Sent(0, ms(1), Pieces::Octets(vec![0x80])),
-            Event::Received(0, ms(300), byte),
-            Event::Sent(0, ms(301), Pieces::Octets(vec![0x81])),
+            LinkEvent::Begin(Instant::START),
+            LinkEvent::Sent(0, ms(1), Pieces::Octets(vec![0x80])),
+            LinkEvent::Received(0, ms(300), byte),
+            LinkEvent::Sent(0, ms(301), Pieces::Octets(vec![0x81])),
         ];
         Replay::new(events, Rate::default(), tolerance, vec![1], Vec::new())
     }

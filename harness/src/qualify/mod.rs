@@ -4,9 +4,9 @@
 //! that the real ring gave.
 
 pub use crate::buses::novobus::qualify::{
-    Answer, Asked, Culprit, Evidence, Hypothesis, Meant, Named, Pinned, Probe, Question, Seen,
+    Answer, Asked, Culprit, Fit, Hypothesis, Meant, Named, Pinned, Probe, Question, RingSeen,
     Sighting, Trial, Whose, agreed, answer, conversations, culprit, deviating_masters, dumps,
     exchange, explaining, hypotheses, marches, name, probes, questions, thorough,
 };
 pub(crate) use crate::buses::novobus::qualify::{Bench, Facts, Qualification};
-pub use crate::rig::{Profile, ProfileError, Settled};
+pub use crate::rig::{Profile, ProfileError, SettledProperty};

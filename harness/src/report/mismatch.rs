@@ -1,7 +1,7 @@
 //! A finding, shown as the manual's table with the first byte that differs, expected beside received.
 
-use crate::report::table::{LEGEND, Part, table};
-use crate::scenario::run::{Difference, Mismatch, show};
+use crate::report::table::{LEGEND, TablePart, table};
+use crate::scenario::run::{ByteDifference, Mismatch, show};
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
@@ -24,11 +24,11 @@ pub fn mismatch(finding: &Mismatch, traces: &[Trace], sources: &[String]) -> Str
         return out;
     };
     let row = row_of(trace, difference.byte);
-    let part = Part {
+    let part = TablePart {
         rows: Some(row.saturating_sub(AROUND)..row + AROUND + 1),
         pointed: Some(row),
         columns_at_most: Some(COLUMNS),
-        ..Part::default()
+        ..TablePart::default()
     };
     // Writing to a String cannot fail.
     let _infallible = write!(out, "\n{}\n{LEGEND}", table(trace, &part));
@@ -57,7 +57,7 @@ fn row_of(trace: &Trace, byte: usize) -> usize {
 /// received  88 5F C0 13 89 A4
 ///                       ^^ byte 5 at the master
 /// ```
-fn beside(difference: &Difference) -> String {
+fn beside(difference: &ByteDifference) -> String {
     let from = difference.index.saturating_sub(BYTES_AROUND);
     let to = difference.index + BYTES_AROUND + 1;
     let mut lines = [

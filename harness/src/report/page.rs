@@ -3,7 +3,7 @@
 use crate::buses::rows;
 use crate::library::Entry;
 use crate::report::plot::plots;
-use crate::report::table::{LEGEND, Part, table, wires};
+use crate::report::table::{LEGEND, TablePart, table, wires};
 use crate::scenario::run::Outcome;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
@@ -36,10 +36,10 @@ pub fn page(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
             legend = false;
             continue;
         }
-        let part = Part {
+        let part = TablePart {
             at_most: Some(ROWS),
             columns_at_most: Some(COLUMNS),
-            ..Part::default()
+            ..TablePart::default()
         };
         let _infallible = write!(page, "\n{}{}", table(trace, &part), wires(trace, WIRES));
     }

@@ -20,7 +20,7 @@
 //! drawn one behind the other.
 
 use super::pcapng::name;
-use crate::report::walk::{Reader, State};
+use crate::report::walk::{Reader, SenderState};
 use harness_proto::line::{LineError, Rate};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Channel, Trace};
@@ -193,7 +193,7 @@ impl<'t> Drawn<'t> {
             (_, Some(LineError::Break)) => 3,
             (_, Some(LineError::Overrun)) => 4,
         };
-        let state = State::ALL.iter().position(|own| *own == seen.state);
+        let state = SenderState::ALL.iter().position(|own| *own == seen.state);
         let read = Change::Read {
             byte: byte.received,
             status,

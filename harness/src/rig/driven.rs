@@ -4,7 +4,7 @@
 //! function of what it is asked for and of what comes back: one that is given the record must send and tell the same.
 
 use super::run::{Way, play_one};
-use crate::link::{Capability, Event, Line as _, Replay};
+use crate::link::{Capability, Line as _, LinkEvent, Replay};
 use crate::scenario::plan::Plan;
 use crate::scenario::run::Outcome;
 use crate::scenario::verdict::Verdict;
@@ -19,7 +19,7 @@ const WRONG: &str =
 #[derive(Clone, Debug)]
 pub struct Driven {
     plan: Plan,
-    events: Vec<Event>,
+    events: Vec<LinkEvent>,
     way: Way,
     tolerance: Span,
     capabilities: Vec<Capability>,
@@ -32,7 +32,7 @@ impl Driven {
     /// An attempt at a plan, as it was recorded; `None` where the driver had no part in it.
     pub(crate) fn new(
         plan: &Plan,
-        events: &[Event],
+        events: &[LinkEvent],
         way: &Way,
         (tolerance, capabilities): (Span, &[Capability]),
         outcome: &Outcome,
@@ -80,7 +80,7 @@ impl Driven {
         // Trouble of the rig is in the record, so a replay meets it again. A replay in other trouble means that the master did
         // something else.
         let recorded = self.events.iter().find_map(|event| match event {
-            Event::Trouble(trouble) => Some(trouble),
+            LinkEvent::Trouble(trouble) => Some(trouble),
             _ => None,
         });
         replay.trouble() == recorded

@@ -40,7 +40,7 @@ pub(crate) use open::{line_rate, stated_rate};
 pub(crate) use permitted::{limits, standing};
 pub(crate) use played::Again;
 pub use played::{Attempt, Played};
-pub use profile::{KnownProfile, Profile, ProfileError, Settled};
+pub use profile::{KnownProfile, Profile, ProfileError, SettledProperty};
 pub use run::{Keeper, Run, Way, play_one};
 pub use session::{End, Options, Session};
 pub use session_error::SessionError;

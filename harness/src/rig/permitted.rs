@@ -2,17 +2,17 @@
 
 use super::{Rig, file};
 use crate::file::values::MaxSpeed;
-use crate::guard::{Limits, SafeStep, Standing};
+use crate::guard::{Limits, SafeStep, Standstill};
 use harness_proto::time::Span;
 
 /// The safe state of a rig's file, as far as drives go.
-pub(crate) fn standing(wanted: &file::SafeState) -> Standing {
+pub(crate) fn standing(wanted: &file::SafeState) -> Standstill {
     let step = |step: &file::SafeStep| match step {
         file::SafeStep::Stop => Some(SafeStep::Stop),
         file::SafeStep::Block => Some(SafeStep::Block),
         file::SafeStep::PowerOff => None,
     };
-    Standing {
+    Standstill {
         order: wanted.order.iter().filter_map(step).collect(),
         rpm: wanted.speed_tolerance.0,
         within: Span::from_nanos(u64::try_from(wanted.within.0.as_nanos()).unwrap_or(u64::MAX)),

@@ -18,7 +18,7 @@ pub struct Profile {
     pub rings: Vec<u8>,
     /// The properties that were settled, by name.
     #[serde(default)]
-    pub property: BTreeMap<String, Settled>,
+    pub property: BTreeMap<String, SettledProperty>,
     /// The properties that were not, with the reason.
     #[serde(default)]
     pub open: BTreeMap<String, String>,
@@ -27,7 +27,7 @@ pub struct Profile {
 /// A property that was settled.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settled {
+pub struct SettledProperty {
     /// What was found, for people.
     pub value: String,
     /// The section that leaves it open.
@@ -72,7 +72,7 @@ impl Profile {
     /// Notes what was found of a property, of one drive after another.
     pub fn settle(&mut self, property: &str, section: &str, value: &str, header: &Header) {
         let settled = self.property.entry(property.to_owned());
-        let settled = settled.or_insert_with(|| Settled {
+        let settled = settled.or_insert_with(|| SettledProperty {
             value: String::new(),
             section: section.to_owned(),
             setup: Header::default(),

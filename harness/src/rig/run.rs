@@ -9,7 +9,7 @@ use super::session_error::SessionError;
 use crate::buses::syntax::Header;
 use crate::buses::twin::{Comparison, Conversation, Exactness, Twin};
 use crate::guard::Guarded;
-use crate::link::{Capability, Event, Line, Link, Octets, Recording, Sink, Trouble};
+use crate::link::{Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble};
 use crate::rig::health::{Unhealthy, examine};
 use crate::rig::judge::{Heard, judge, known};
 use crate::scenario::plan::Plan;
@@ -19,7 +19,7 @@ use crate::scenario::run::{
 };
 use crate::scenario::simulate;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::guard::{Limits, Setting};
+use harness_proto::novobus::guard::{LimitSetting, Limits};
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation::MasterDeviation;
 use std::sync::Arc;
@@ -89,7 +89,7 @@ impl<'s> Run<'s> {
     /// What the rig can be asked, with what only a simulated one shows left out.
     #[must_use]
     pub fn capabilities(&mut self) -> Vec<Capability> {
-        let mut forgotten: Vec<Event> = Vec::new();
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
         let recording = Recording::new(self.session.link(), &mut forgotten);
         recording.capabilities().to_vec()
     }
@@ -130,7 +130,7 @@ impl<'s> Run<'s> {
         plan: &Plan,
         mut keeper: Option<&mut dyn Keeper>,
     ) -> Result<Played, SessionError> {
-        let mut forgotten: Vec<Event> = Vec::new();
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
         let way = self.way();
         let recording = Recording::new(self.session.link(), &mut forgotten);
         let lacks = not_played(plan, &recording, &way.rings);
@@ -272,7 +272,7 @@ impl<'s> Run<'s> {
         let mut limits = self.session.limits();
         let mut skip = lacks;
         // Each turn changes a setting.
-        for _ in Setting::ALL {
+        for _ in LimitSetting::ALL {
             let Some((why, denying)) = self.denied_within(plan, limits) else {
                 break;
             };
@@ -288,7 +288,7 @@ impl<'s> Run<'s> {
     }
 
     /// What the guard refuses of a plan on the model, and by which settings.
-    fn denied_within(&self, plan: &Plan, limits: Limits) -> Option<(String, Vec<Setting>)> {
+    fn denied_within(&self, plan: &Plan, limits: Limits) -> Option<(String, Vec<LimitSetting>)> {
         if limits.allow_everything() && limits.bytes_per_second.is_none() {
             return None;
         }
@@ -299,7 +299,7 @@ impl<'s> Run<'s> {
         // The model's drives have just been made.
         guarded.assume_fresh();
         guarded.know_as(self.session.guarded());
-        let mut forgotten: Vec<Event> = Vec::new();
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut guarded, &mut forgotten);
         let way = Way {
             anew: self.resets(limits),
@@ -450,12 +450,12 @@ fn play_examined(link: &mut dyn Link, plan: &Plan, way: &Way) -> Outcome {
 
 /// Keeps events and hands them on.
 struct Both<'s> {
-    events: Vec<Event>,
+    events: Vec<LinkEvent>,
     sink: Option<&'s mut dyn Sink>,
 }
 
 impl Sink for Both<'_> {
-    fn take(&mut self, event: &Event) {
+    fn take(&mut self, event: &LinkEvent) {
         self.events.push(event.clone());
         if let Some(sink) = &mut self.sink {
             sink.take(event);

@@ -7,8 +7,8 @@
 use super::expression::Scope;
 use super::plan::{Plan, PlannedStep, Unroll};
 use super::problem::{Problem, Span, Spanned};
-use super::run::Record;
-use super::run::outcome::{Difference, Mismatch, Stop};
+use super::run::CellRecord;
+use super::run::outcome::{ByteDifference, Mismatch, Stop};
 use super::run::player::Runner;
 use super::scanner::Scanner;
 use super::syntax::Scenario;
@@ -203,7 +203,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
         place: (usize, usize),
         wanted: &[Self::Wanted],
         received: &[(Instant, Self::Received)],
-    ) -> Option<Difference> {
+    ) -> Option<ByteDifference> {
         let _not_shown = (port, place, wanted, received);
         None
     }
@@ -243,7 +243,7 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     }
 
     /// What was recorded.
-    fn records(state: Self::State) -> Vec<Record> {
+    fn records(state: Self::State) -> Vec<CellRecord> {
         let _none = state;
         Vec::new()
     }

@@ -16,7 +16,7 @@ mod shell;
 mod tcp;
 
 pub use control::Answer;
-pub use place::{ControlPlace, Inner, Role, ServedAt};
+pub use place::{ClientRole, ControlPlace, Inner, ServedAt};
 pub use server::{Marks, Pace, Server};
 pub use shell::{End, Host, Job, ServeError, serve};
 pub(crate) use shell::{Ending, serve_until};

@@ -28,12 +28,12 @@ pub struct Inner {
     /// Which link, counted from the master's outgoing one.
     pub link: usize,
     /// What the client does there.
-    pub role: Role,
+    pub role: ClientRole,
 }
 
 /// What a client does at a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum ClientRole {
     /// It hears what the link carries; what it sends is dropped.
     Tap,
     /// The link is cut open there: the client hears the drive in front and feeds the drive behind.
@@ -44,7 +44,7 @@ pub enum Role {
     Downstream,
 }
 
-impl Role {
+impl ClientRole {
     pub(super) fn hears(self) -> bool {
         self != Self::Downstream
     }

@@ -1,6 +1,6 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
-use super::place::{Inner, Role};
+use super::place::{ClientRole, Inner};
 use crate::buses::SimulatedLink;
 use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
 use crate::scenario::plan::Plan;
@@ -153,8 +153,8 @@ impl Server {
     /// Adds a seat at an inner link, behind the existing ones. A link that is cut is open from now on, with or without a client.
     pub fn add(&mut self, inner: Inner) {
         match inner.role {
-            Role::Tap => self.link.tap(inner.ring, inner.link),
-            Role::Cut | Role::Upstream | Role::Downstream => {
+            ClientRole::Tap => self.link.tap(inner.ring, inner.link),
+            ClientRole::Cut | ClientRole::Upstream | ClientRole::Downstream => {
                 self.link.open(inner.ring, inner.link);
             }
         }
@@ -182,10 +182,10 @@ impl Server {
             Some(At::Inner(Inner { ring, link, role })) => {
                 let link = link_name(ring, self.drives(ring), link);
                 match role {
-                    Role::Tap => format!("tap {link}"),
-                    Role::Cut => format!("cut {link}"),
-                    Role::Upstream => format!("cut {link} upstream"),
-                    Role::Downstream => format!("cut {link} downstream"),
+                    ClientRole::Tap => format!("tap {link}"),
+                    ClientRole::Cut => format!("cut {link}"),
+                    ClientRole::Upstream => format!("cut {link} upstream"),
+                    ClientRole::Downstream => format!("cut {link} downstream"),
                 }
             }
         }

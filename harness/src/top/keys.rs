@@ -1,6 +1,6 @@
 //! Keys: what each does to the view.
 
-use crate::top::{Entry, Top};
+use crate::top::{KeyTarget, Top};
 
 /// The longest text to filter by, in characters.
 const MOST: usize = 60;
@@ -69,15 +69,15 @@ impl Top {
             return Press::Interrupt;
         }
         match self.entry {
-            Entry::Filter => {
+            KeyTarget::Filter => {
                 self.type_filter(key);
                 Press::Stay
             }
-            Entry::Help => {
-                self.entry = Entry::None;
+            KeyTarget::Help => {
+                self.entry = KeyTarget::None;
                 Press::Stay
             }
-            Entry::None => self.command(key),
+            KeyTarget::None => self.command(key),
         }
     }
 
@@ -89,10 +89,10 @@ impl Top {
             Key::Backspace => {
                 self.filter.pop();
             }
-            Key::Enter => self.entry = Entry::None,
+            Key::Enter => self.entry = KeyTarget::None,
             Key::Escape => {
                 self.filter.clear();
-                self.entry = Entry::None;
+                self.entry = KeyTarget::None;
             }
             _ => self.scroll(key),
         }
@@ -101,8 +101,8 @@ impl Top {
     fn command(&mut self, key: Key) -> Press {
         match key {
             Key::Char('q') | Key::Escape => return Press::Quit,
-            Key::Char('/') => self.entry = Entry::Filter,
-            Key::Char('?' | 'h') => self.entry = Entry::Help,
+            Key::Char('/') => self.entry = KeyTarget::Filter,
+            Key::Char('?' | 'h') => self.entry = KeyTarget::Help,
             Key::Char('e') => self.only_errors = !self.only_errors,
             Key::Char('s') => self.sort = self.sort.next(),
             Key::Char('p') => self.pause(),

@@ -36,7 +36,7 @@ pub struct Screen {
 
 /// What came from the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Input {
+pub enum ScreenInput {
     /// A key.
     Key(Key),
     /// Something by which the page changes: another size.
@@ -83,17 +83,17 @@ impl Screen {
     ///
     /// # Errors
     /// The terminal gives nothing more.
-    pub fn input(&self, patience: Duration) -> io::Result<Input> {
+    pub fn input(&self, patience: Duration) -> io::Result<ScreenInput> {
         if !event::poll(patience)? {
-            return Ok(Input::Nothing);
+            return Ok(ScreenInput::Nothing);
         }
         Ok(match event::read()? {
             Event::Key(key) if key.kind != KeyEventKind::Release => {
                 let control = key.modifiers.contains(KeyModifiers::CONTROL);
-                key_of(key.code, control).map_or(Input::Nothing, Input::Key)
+                key_of(key.code, control).map_or(ScreenInput::Nothing, ScreenInput::Key)
             }
-            Event::Resize(..) => Input::Redraw,
-            _ => Input::Nothing,
+            Event::Resize(..) => ScreenInput::Redraw,
+            _ => ScreenInput::Nothing,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::keys::HELP;
 use crate::counted::counted;
-use crate::top::{Entry, RingReading, Row, Top};
+use crate::top::{KeyTarget, RingReading, Top, TopRow};
 use harness_proto::time::Span;
 use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;
@@ -70,7 +70,7 @@ pub fn render(top: &mut Top, colour: bool, area: Rect, buffer: &mut Buffer) {
     let room = height.saturating_sub(head_room + foot_room + 1);
     top.resize(room);
     let mut lines: Vec<(String, Look)> = head.into_iter().take(head_room).collect();
-    if matches!(top.entry, Entry::Help) {
+    if matches!(top.entry, KeyTarget::Help) {
         lines.extend(help());
         lines.truncate(height.saturating_sub(1));
     } else {
@@ -233,7 +233,7 @@ fn cut(text: String, width: usize) -> String {
     kept + "..."
 }
 
-fn look(row: &Row) -> Look {
+fn look(row: &TopRow) -> Look {
     if row.in_error {
         Look::Error
     } else {
@@ -271,7 +271,7 @@ fn foot(top: &Top, width: usize) -> Vec<(String, Look)> {
 }
 
 fn status_line(top: &Top, width: usize) -> String {
-    if matches!(top.entry, Entry::Filter) {
+    if matches!(top.entry, KeyTarget::Filter) {
         return format!("filter: {}_  Enter keeps it, Esc takes it away", top.filter);
     }
     let rows = top.rows().len();

@@ -2,9 +2,9 @@
 
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::link::BesideTheBus as _;
-use harness::evidence::Line as Written;
+use harness::evidence::RecordLine as Written;
 use harness::guard::{Guarded, Limits};
-use harness::link::{Event, Line as _, Link, Recording, Replay};
+use harness::link::{Line as _, Link, LinkEvent, Recording, Replay};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::properties::Properties;
@@ -71,7 +71,7 @@ fn a_probe_is_played_back_for_the_same_bytes() {
 /// Records name no bytes of a probe that sends SYNCO.
 #[test]
 fn a_probe_of_synco_is_written_by_its_number() {
-    let probe = Event::Probe(0, Instant::START, vec![0x80; 8], Vec::new());
+    let probe = LinkEvent::Probe(0, Instant::START, vec![0x80; 8], Vec::new());
     let line = Written::of(&probe).expect("a line");
     let text = serde_json::to_string(&line).expect("JSON");
     assert_eq!(

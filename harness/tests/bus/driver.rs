@@ -2,13 +2,14 @@
 
 use harness::buses::SimulatedLink;
 use harness::buses::novobus::driver::{
-    Axis, Bus, Error, Options, Recovery, Scope, SkStatus, Trigger, count_drives, recover,
+    Axis, Error, OpenRings, Options, Recovery, ScopeSettings, SkStatus, Trigger, count_drives,
+    recover,
 };
 use harness::link::{Line, Link, Moment, Octets, PlacedFault};
 use harness::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::nd21::io::Input;
-use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::s_ramp::Direction;
 use harness_proto::nd21::units::{Ratio, trigger_delay, trigger_level_to_raw};
 use harness_proto::nd21::{ee, ram};
@@ -42,13 +43,13 @@ fn ring(drives: u64, properties: Nd21Properties) -> Ring<Drive> {
     })
 }
 
-fn bus_of(ring: Ring<Drive>, options: Options) -> Bus<'static> {
+fn bus_of(ring: Ring<Drive>, options: Options) -> OpenRings<'static> {
     let drives = u64::from(ring.size().drives());
     let link = SimulatedLink::new(Bench::one(ring));
-    Bus::open(Box::new(link), &[size(drives)], options).expect("an open bus")
+    OpenRings::open(Box::new(link), &[size(drives)], options).expect("an open bus")
 }
 
-fn bus() -> Bus<'static> {
+fn bus() -> OpenRings<'static> {
     bus_of(ring(3, Nd21Properties::default()), Options::default())
 }
 
@@ -192,7 +193,7 @@ fn a_disturbed_read_of_the_eeprom() {
             damages: false,
             heard: [0; 4],
         };
-        Bus::open(Box::new(line), &[size(3)], Options::default()).expect("an open bus")
+        OpenRings::open(Box::new(line), &[size(3)], Options::default()).expect("an open bus")
     };
     // 02 stands there, and 00 at 02.
     let place = ee::SERIENNUMMER + 2;
@@ -223,7 +224,8 @@ fn the_eeprom_on_a_disturbed_ring() {
         ] {
             let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
             link.inject(0, PlacedFault::Link(place, fault), Moment::Byte(byte));
-            let bus = Bus::open(Box::new(link), &[size(3)], Options::default()).expect("open");
+            let bus =
+                OpenRings::open(Box::new(link), &[size(3)], Options::default()).expect("open");
             let read = bus.read_eeprom(axis(2), ee::SERIENNUMMER + 2);
             assert_eq!(read, Ok(2), "{fault:?} at byte {byte} of link {place}");
         }
@@ -272,7 +274,10 @@ fn positioning_of_13_2() {
         .expect("written");
     bus.reference(axis(1)).expect("referenced");
     assert_eq!(bus.read_word(axis(1), ram::PS_V0), Ok(0x0800), "step 9");
-    let target = Position::from_turns(Mode::Absolute, Ratio::decimal(1025, 2).expect("turns"));
+    let target = Position::from_turns(
+        PositionMode::Absolute,
+        Ratio::decimal(1025, 2).expect("turns"),
+    );
     bus.write_ps(axis(1), target.expect("a position"))
         .expect("sent");
     bus.start_ps(axis(1)).expect("started");
@@ -393,7 +398,7 @@ fn oscilloscope_of_14_10_6() {
     let [_, nist] = ram::NIST.to_be_bytes();
     let level = trigger_level_to_raw(2);
     let delay = trigger_delay(-5_000, 0).expect("a delay");
-    let scope = Scope {
+    let scope = ScopeSettings {
         signals: [nist; 2],
         timer0: 0,
         trigger: Some(Trigger {
@@ -424,7 +429,7 @@ fn oscilloscope_of_14_10_6() {
         bus.read_byte(axis(1), ram::SCOPE_STATUS).map(|s| s & 0x80),
         Ok(0x80)
     );
-    let at_once = Scope {
+    let at_once = ScopeSettings {
         trigger: None,
         ..scope
     };
@@ -439,13 +444,13 @@ fn oscilloscope_of_14_10_6() {
 #[test]
 fn opening_and_correcting() {
     let link = SimulatedLink::new(Bench::one(ring(4, Nd21Properties::default())));
-    let opened = Bus::open(Box::new(link), &[size(3)], Options::default());
+    let opened = OpenRings::open(Box::new(link), &[size(3)], Options::default());
     let message = opened.map(|_| ()).expect_err("another size").to_string();
     assert!(message.contains("4 drives"), "{message}");
 
     let mut link = SimulatedLink::new(Bench::one(ring(3, Nd21Properties::default())));
     link.inject(0, PlacedFault::Link(1, LinkFault::Drop), Moment::Byte(40));
-    let bus = Bus::open(Box::new(link), &[size(3)], Options::default()).expect("open");
+    let bus = OpenRings::open(Box::new(link), &[size(3)], Options::default()).expect("open");
     for value in 0..30 {
         bus.write_word(axis(0), ram::NSOLL, value).expect("written");
         assert_eq!(bus.read_word(axis(0), ram::NSOLL), Ok(value));
@@ -463,7 +468,7 @@ fn two_rings() {
         ring(3, Nd21Properties::default()),
     );
     let link = Box::new(SimulatedLink::new(bench));
-    let bus = Bus::open(link, &[size(2), size(3)], Options::default()).expect("open");
+    let bus = OpenRings::open(link, &[size(2), size(3)], Options::default()).expect("open");
     assert_eq!(bus.axes().len(), 5);
     bus.write_word(axis(0x0102), ram::NSOLL, 7)
         .expect("written");
@@ -539,7 +544,7 @@ fn a_hostile_ring_ends_every_call() {
         let _any = count_drives(&mut counting, 0);
         assert!(counting.now < Instant::START + Span::from_millis(2_000));
         let drives = 1 + case % 7;
-        let Ok(bus) = Bus::open(Box::new(line), &[size(drives)], Options::default()) else {
+        let Ok(bus) = OpenRings::open(Box::new(line), &[size(drives)], Options::default()) else {
             continue;
         };
         for _ in 0..5 {

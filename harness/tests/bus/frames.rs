@@ -1,8 +1,8 @@
 //! A link of frames: a bus on CAN needs no ring to be sent to, recorded and played back.
 
-use harness::evidence::Line as Written;
+use harness::evidence::RecordLine as Written;
 use harness::guard::{Guarded, Limits};
-use harness::link::{Capability, Event, Line, Link, Moment, PlacedFault, Recording, Replay};
+use harness::link::{Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay};
 use harness::medium::{Heard, Medium, Out};
 use harness_proto::can::{self, BitRate, BusError, Frame};
 use harness_proto::time::{Instant, Span};
@@ -222,6 +222,6 @@ fn a_frame_and_an_error_at_once_is_no_event() {
         r#"{"kind":"sent-frames","ring":1,"t":0,"frames":["201#3"]}"#,
     ] {
         let line: Written = serde_json::from_str(text).expect("a line");
-        assert_eq!(line.event(), None::<Event>, "{text}");
+        assert_eq!(line.event(), None::<LinkEvent>, "{text}");
     }
 }

@@ -6,10 +6,10 @@ use harness::buses::SimulatedLink;
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::twin::{Conversation, Exactness, Twin};
 use harness::library::{Entry, sources};
-use harness::link::{Capability, Event, Octets, Recording};
+use harness::link::{Capability, LinkEvent, Octets, Recording};
 use harness::qualify::{
-    Answer, Culprit, Meant, Named, Pinned, Seen, Sighting, Whose, agreed, answer, conversations,
-    culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
+    Answer, Culprit, Meant, Named, Pinned, RingSeen, Sighting, Whose, agreed, answer,
+    conversations, culprit, dumps, exchange, hypotheses, marches, name, probes, questions,
 };
 use harness::rig::{Way, play_one};
 use harness::scenario::plan::Plan;
@@ -80,7 +80,7 @@ fn plans() -> &'static [Plan] {
         let right = twin(&[]).expect("a ring").into_link();
         let fits = |plan: &Plan| {
             let mut link = right.clone();
-            let mut events: Vec<Event> = Vec::new();
+            let mut events: Vec<LinkEvent> = Vec::new();
             let mut recording = Recording::new(&mut link, &mut events);
             plan.rings.len() == 1
                 && plan.rings[0].drives() == DRIVES
@@ -124,7 +124,7 @@ fn played(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
 fn played_in_time(plan: &Plan, link: &SimulatedLink) -> Vec<Conversation> {
     let mut link = link.clone();
     let byte_time = link.byte_time();
-    let mut events: Vec<Event> = Vec::new();
+    let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::new(&mut link, &mut events);
     let _verdict = play_one(&mut recording, plan, &as_they_are());
     Conversation::all(&events, byte_time, true)
@@ -200,7 +200,7 @@ fn verdict(lines: &[String]) -> Verdict {
         let meant = sighting.map_or(Meant::Nobody, |own| own.meant);
         Ok::<_, ()>(Some(differs.then_some(meant)))
     });
-    let seen_all = Seen {
+    let seen_all = RingSeen {
         drives: DRIVES,
         suspects: &[],
         differing: &play.differing,
@@ -347,7 +347,7 @@ fn what_is_right_refutes_a_name() {
         let _sighting = play.judge(all, link.byte_time(), twin(&wrong[..1]).expect("a ring"));
     }
     assert_eq!((play.differing.len(), play.alike.len()), (1, 1));
-    let seen = Seen {
+    let seen = RingSeen {
         drives: DRIVES,
         suspects: &[],
         differing: &play.differing,
@@ -375,7 +375,7 @@ fn a_march_over_an_eeprom_leaves_what_was_there() {
     let mut link = bench(&ring.plan.expect("novobus"));
     let byte_time = link.byte_time();
     let mut play = |entry: &Entry| {
-        let mut events: Vec<Event> = Vec::new();
+        let mut events: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut events);
         let plan = entry.plan.as_ref().expect("novobus");
         let outcome = play_one(&mut recording, plan, &as_they_are()).expect("it is played");

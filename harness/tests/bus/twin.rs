@@ -3,9 +3,9 @@
 use harness::buses::novobus::language::syntax::Header;
 use harness::buses::novobus::twin::{Conversation, Exactness, Symptom, Twin};
 use harness::library::{Entry, sources};
-use harness::link::{Event, Line as _, Link, Octets, Recording, Replay};
+use harness::link::{Line as _, Link, LinkEvent, Octets, Recording, Replay};
 use harness::qualify::{
-    Answer, Asked, Hypothesis, Probe, Seen, answer, explaining, hypotheses, name, probes,
+    Answer, Asked, Hypothesis, Probe, RingSeen, answer, explaining, hypotheses, name, probes,
 };
 use harness::scenario::plan::Plan;
 use harness::scenario::run::{AtMismatch, Outcome, lacks, play_over_bus, start_anew};
@@ -32,7 +32,7 @@ fn entry(text: &str) -> Entry {
 /// Plays a plan on a ring and gives what the master's end saw of it.
 fn conversations(plan: &Plan, link: &mut dyn Link) -> Vec<Conversation> {
     let byte_time = link.byte_time();
-    let mut events: Vec<Event> = Vec::new();
+    let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::new(link, &mut events);
     let _outcome = play_over_bus(plan, &mut recording, AtMismatch::GoOn);
     Conversation::all(&events, byte_time, true)
@@ -50,7 +50,7 @@ fn a_ring_is_its_own_twin() {
             continue;
         }
         let mut link = bench(&plan);
-        let mut events: Vec<Event> = Vec::new();
+        let mut events: Vec<LinkEvent> = Vec::new();
         if lacks(&plan, &Recording::new(&mut link, &mut events)).is_some() {
             continue;
         }
@@ -105,7 +105,7 @@ fn a_record_is_played_again() {
             continue;
         }
         let mut link = bench(&plan);
-        let mut events: Vec<Event> = Vec::new();
+        let mut events: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut events);
         let capabilities = recording.capabilities().to_vec();
         let outcome = play_over_bus(&plan, &mut recording, AtMismatch::Stop);
@@ -303,7 +303,7 @@ fn many_cells_are_set_back() {
         entry("title x\nring 60\ndrive 0..last memory FDB0 = 01*20\nread-byte 0 FDB0 = 01\n");
     let plan = plan.plan.expect("novobus");
     let (_, mut link) = model_of(60, &[]);
-    let mut events: Vec<Event> = Vec::new();
+    let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::new(&mut link, &mut events);
     let outcome = play_over_bus(&plan, &mut recording, AtMismatch::Stop);
     assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:?}");
@@ -412,7 +412,7 @@ fn what_the_right_drive_explains_names_no_deviation() {
             let (plan, link) = model(&header.lines());
             Ok(Twin::new(link, &plan.rings))
         };
-        let seen = Seen {
+        let seen = RingSeen {
             drives: 3,
             suspects: &[],
             differing: &[seen],

@@ -2,7 +2,7 @@
 
 use harness::buses::novobus::driver::{Axis, State};
 use harness::top::view::{page, render, text};
-use harness::top::{DriveReading, Heading, Key, Press, Reading, RingReading, Top};
+use harness::top::{DriveReading, Heading, Key, Press, RingReading, Snapshot, Top};
 use harness_proto::nd21::bits::{flags, flags2, status};
 use harness_proto::novobus::master::Counters;
 use harness_proto::time::Span;
@@ -77,11 +77,11 @@ fn ring(disturbed: u64) -> RingReading {
 }
 
 /// Four drives: one turns, one stands, one is blocked, one is in error.
-fn four() -> Reading {
-    let mut reading = Reading {
+fn four() -> Snapshot {
+    let mut reading = Snapshot {
         at: at(3_725),
         rings: vec![ring(3)],
-        ..Reading::default()
+        ..Snapshot::default()
     };
     let go = state(0, 0, flags2::OK | flags2::MONITORING, 0);
     // They come in any order.
@@ -115,10 +115,10 @@ fn of_four() -> Top {
 
 /// A long ring, every seventh drive in error, every fifth at a speed of its own.
 fn hundred() -> Top {
-    let mut reading = Reading {
+    let mut reading = Snapshot {
         at: at(61),
         rings: vec![ring(0)],
-        ..Reading::default()
+        ..Snapshot::default()
     };
     for number in 0..100 {
         let own = match number % 7 {
@@ -206,11 +206,11 @@ fn the_help_names_every_key() {
 fn two_rings_of_which_little_is_known() {
     let mut top = Top::new(heading(&["2 drives, simulated", "1 drive, simulated"]));
     kept("nothing-80x24.txt", &drawn(&mut top, 80, 24));
-    let mut reading = Reading {
+    let mut reading = Snapshot {
         at: at(1),
         rings: vec![ring(0), ring(1)],
         unplaced: 4,
-        ..Reading::default()
+        ..Snapshot::default()
     };
     let nothing = DriveReading {
         speed: None,
@@ -261,7 +261,7 @@ fn only_drives_in_error() {
 #[test]
 fn a_code_without_the_error_mode_is_an_error_that_the_display_does_not_show() {
     let mut top = Top::default();
-    let mut reading = Reading::default();
+    let mut reading = Snapshot::default();
     reading.drive(drive(0, 0, state(0, 0, 0, 0x0508), 0.0));
     top.take(reading);
     press(&mut top, "e");
@@ -365,7 +365,7 @@ fn disturbances_are_counted_by_kind_and_can_be_forgotten() {
         "{page}"
     );
     // Kinds without an end are only counted.
-    let mut many = Reading::default();
+    let mut many = Snapshot::default();
     (0..1_000).for_each(|n| many.disturbed(0, format!("kind {n}")));
     assert_eq!((many.disturbances.len(), many.others), (64, 936));
     top.take(many);

@@ -1,6 +1,6 @@
 //! The RAM of the drive, cell by cell (ND21 14.2.1).
 
-use super::units::{Drive, Scale, UnitError, Value};
+use super::units::{DriveUnits, Scale, UnitError, Value};
 
 /// What a master may do with a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -59,7 +59,7 @@ impl Cell {
     /// # Errors
     /// The bytes are outside what the manual gives a meaning to.
     #[must_use]
-    pub fn value(&self, bytes: &[u8], drive: Drive) -> Option<Result<Value, UnitError>> {
+    pub fn value(&self, bytes: &[u8], drive: DriveUnits) -> Option<Result<Value, UnitError>> {
         self.scale?.value(bytes, drive)
     }
 }
@@ -293,11 +293,11 @@ pub(super) fn at(table: &'static [Cell], address: u16) -> Option<&'static Cell> 
 #[cfg(test)]
 mod tests {
     use super::super as nd21;
-    use super::super::units::{Device, Ratio, SpeedRange};
+    use super::super::units::{DriveType, Ratio, SpeedRange};
     use super::*;
 
-    const DRIVE: Drive = Drive {
-        device: Device::Nd5610,
+    const DRIVE: DriveUnits = DriveUnits {
+        device: DriveType::Nd5610,
         range: SpeedRange::To8000,
     };
 

@@ -57,7 +57,7 @@ addresses ee: u8;
 
 /// A run of EEPROM bytes and the RAM cells that are loaded with them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Link {
+pub struct LoadedRange {
     /// The first EEPROM address.
     pub eeprom: u8,
     /// The RAM address that it belongs to.
@@ -71,7 +71,7 @@ pub struct Link {
 /// Which bytes of the EEPROM belong to which RAM cells, in order of EEPROM addresses. The first is the
 /// parameters: FF60-FF7F come from 20-3F. The others are the pairs of ND21 13.1.4 and 14.6.6; only of
 /// `Vtippen` does the print say that it is loaded after switching on.
-pub const LINKS: &[Link] = &[
+pub const LINKS: &[LoadedRange] = &[
     link(0x20, 0xFF60, 0x20, "14.2.2"),
     link(0x48, 0xFD8C, 2, "13.1.4"),
     link(0x4A, 0xFD8E, 2, "13.1.4"),
@@ -82,8 +82,8 @@ pub const LINKS: &[Link] = &[
     link(0x54, 0xFD9E, 2, "13.1.4"),
 ];
 
-const fn link(eeprom: u8, ram: u16, size: u8, section: &'static str) -> Link {
-    Link {
+const fn link(eeprom: u8, ram: u16, size: u8, section: &'static str) -> LoadedRange {
+    LoadedRange {
         eeprom,
         ram,
         size,

@@ -17,7 +17,7 @@ const RELATIVE: u32 = 1 << 31;
 
 /// What a position is measured from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Mode {
+pub enum PositionMode {
     /// Bit 31 = 0: a distance from the zero point.
     Absolute,
     /// Bit 31 = 1: a path.
@@ -27,7 +27,7 @@ pub enum Mode {
 /// A position in the format of 13.1.9, of -16384 turns to less than 16384.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Position {
-    mode: Mode,
+    mode: PositionMode,
     increments: i32,
 }
 
@@ -41,7 +41,7 @@ impl Position {
     ///
     /// # Errors
     /// Outside [`Self::MIN`] to [`Self::MAX`].
-    pub fn new(mode: Mode, increments: i32) -> Result<Self, UnitError> {
+    pub fn new(mode: PositionMode, increments: i32) -> Result<Self, UnitError> {
         let reason = if increments < Self::MIN {
             Reason::Below(Ratio::whole(Self::MIN))
         } else if increments > Self::MAX {
@@ -61,7 +61,7 @@ impl Position {
     ///
     /// # Errors
     /// Less than -16384 turns, or nearer to 16384 than to the greatest position.
-    pub fn from_turns(mode: Mode, turns: Ratio) -> Result<Self, UnitError> {
+    pub fn from_turns(mode: PositionMode, turns: Ratio) -> Result<Self, UnitError> {
         let increments = turns_to_raw(turns).ok();
         let position = increments.and_then(|increments| Self::new(mode, increments).ok());
         position.ok_or(UnitError {
@@ -78,7 +78,7 @@ impl Position {
 
     /// Whether it is absolute or relative.
     #[must_use]
-    pub const fn mode(self) -> Mode {
+    pub const fn mode(self) -> PositionMode {
         self.mode
     }
 
@@ -109,8 +109,8 @@ impl Position {
     #[must_use]
     pub const fn encode(self) -> u32 {
         let mode = match self.mode {
-            Mode::Absolute => 0,
-            Mode::Relative => RELATIVE,
+            PositionMode::Absolute => 0,
+            PositionMode::Relative => RELATIVE,
         };
         mode | self.increments.cast_unsigned() & !RELATIVE
     }
@@ -120,9 +120,9 @@ impl Position {
     pub const fn decode(word: u32) -> Self {
         Self {
             mode: if word & RELATIVE == 0 {
-                Mode::Absolute
+                PositionMode::Absolute
             } else {
-                Mode::Relative
+                PositionMode::Relative
             },
             // Bit 30 is the sign: moved to bit 31 and back, it fills both.
             increments: (word << 1).cast_signed() >> 1,
@@ -155,12 +155,12 @@ pub const fn eeprom_address(n: u8) -> Option<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::Mode::{Absolute, Relative};
+    use super::PositionMode::{Absolute, Relative};
     use super::*;
 
     /// The twelve worked examples of ND21 13.1.9: turns as a fraction, then the word. The last is
     /// printed as "Distance = 100 revolutions" and is -100 (E64).
-    const EXAMPLES: [(Mode, i64, i64, u32); 12] = [
+    const EXAMPLES: [(PositionMode, i64, i64, u32); 12] = [
         (Absolute, 1_025, 100, 0x000A_4000),
         (Absolute, -1_025, 100, 0x7FF5_C000),
         (Relative, 50, 360, 0x8000_238E),

@@ -24,14 +24,14 @@ pub use view::{Remaining, Silent};
 
 /// What a drive does about a byte or a deadline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Step {
+pub struct Reaction {
     /// The byte that goes out, if one does.
     pub byte: Option<u8>,
     /// What there is to remark.
     pub marks: Marks,
 }
 
-impl Step {
+impl Reaction {
     /// Nothing goes out.
     pub const SILENCE: Self = Self {
         byte: None,
@@ -213,7 +213,12 @@ impl BusEnd {
 
     /// Takes a received byte.
     #[inline]
-    pub fn receive<M: Memory>(&mut self, now: Instant, received: Received, memory: &mut M) -> Step {
+    pub fn receive<M: Memory>(
+        &mut self,
+        now: Instant,
+        received: Received,
+        memory: &mut M,
+    ) -> Reaction {
         self.last_received = Some(now);
         match &mut self.state {
             // Nearly every byte of a large ring: not for this drive, and not looked at (9.3).
@@ -222,7 +227,7 @@ impl BusEnd {
                 if *left == 0 {
                     self.state = State::Sync;
                 }
-                Step::plain(received.byte)
+                Reaction::plain(received.byte)
             }
             _ => self.consider(received, memory),
         }
@@ -230,17 +235,17 @@ impl BusEnd {
 
     /// Takes a byte that this drive looks at.
     #[inline]
-    fn consider<M: Memory>(&mut self, received: Received, memory: &mut M) -> Step {
+    fn consider<M: Memory>(&mut self, received: Received, memory: &mut M) -> Reaction {
         if let State::Error(mode, silence) = &mut self.state {
             let waiting = matches!(silence, Silence::Waiting { .. });
             let step = if waiting && self.properties.time_out_answer == TimeOutAnswer::Silent {
-                Step {
+                Reaction {
                     byte: None,
                     marks: mode.overhear(received),
                 }
             } else {
                 let response = mode.receive(received, self.properties.broken_sequence);
-                Step {
+                Reaction {
                     byte: Some(response.byte),
                     marks: response.marks,
                 }
@@ -278,7 +283,7 @@ impl BusEnd {
     /// Handles [`Self::deadline`] (ND21 9.9): first the time-out is detected; then, after
     /// a further wait, zeros go out, one whenever the line is free. A drive that is already in the error mode
     /// also monitors the time, because a breaking cable often causes a damaged byte first.
-    pub fn handle_deadline<M: Memory>(&mut self, now: Instant, memory: &mut M) -> Step {
+    pub fn handle_deadline<M: Memory>(&mut self, now: Instant, memory: &mut M) -> Reaction {
         let waiting = Silence::Waiting {
             until: now + self.properties.time_out_wait,
         };
@@ -286,20 +291,20 @@ impl BusEnd {
             State::Error(mode, silence @ Silence::None) => {
                 mode.time_out();
                 *silence = waiting;
-                Step::default()
+                Reaction::default()
             }
             State::Error(_, silence @ Silence::Waiting { .. }) => {
                 *silence = Silence::Sending { since: now };
-                Step::default()
+                Reaction::default()
             }
-            State::Error(mode, Silence::Sending { .. }) => Step {
+            State::Error(mode, Silence::Sending { .. }) => Reaction {
                 byte: Some(0),
                 marks: mode.send_zero(),
             },
             _ => {
                 self.blame(BusError::TimeOut, memory);
                 self.state = State::Error(ErrorMode::enter_after_time_out(self.rules), waiting);
-                Step {
+                Reaction {
                     byte: None,
                     marks: Marks::DETECTED,
                 }
@@ -309,7 +314,7 @@ impl BusEnd {
 
     /// A byte in normal mode, without a line error.
     #[inline(never)]
-    fn normal<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Step, BusError> {
+    fn normal<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Reaction, BusError> {
         match &mut self.state {
             State::Sync => self.sync_byte(byte, memory),
             State::Address(header) => {
@@ -318,7 +323,7 @@ impl BusEnd {
                 memory.write(nd21::ram::BUS_ADDR, sum);
                 self.short_address_valid = true;
                 self.begin_net_bytes(header, sum == ADDRESSED);
-                Ok(Step::plain(sum))
+                Ok(Reaction::plain(sum))
             }
             State::Addressed { left, next } => {
                 let step = match *next {
@@ -328,12 +333,12 @@ impl BusEnd {
                             received: byte,
                             to_send: low,
                         };
-                        Step::plain(high)
+                        Reaction::plain(high)
                     }
                     Net::ProcessLow { received, to_send } => {
                         process_data_in(memory, [received, byte]);
                         *next = Net::Parameter;
-                        Step::plain(to_send)
+                        Reaction::plain(to_send)
                     }
                     Net::Parameter => {
                         let answer =
@@ -341,12 +346,12 @@ impl BusEnd {
                                 .receive(byte, self.properties.read_long, memory)?;
                         if answer.reset {
                             *self = self.reset();
-                            return Ok(Step {
+                            return Ok(Reaction {
                                 byte: Some(answer.byte),
                                 marks: answer.marks,
                             });
                         }
-                        Step {
+                        Reaction {
                             byte: Some(answer.byte),
                             marks: answer.marks,
                         }
@@ -358,15 +363,15 @@ impl BusEnd {
                 }
                 Ok(step)
             }
-            State::Passing { .. } | State::Error(..) => Ok(Step::plain(byte)),
+            State::Passing { .. } | State::Error(..) => Ok(Reaction::plain(byte)),
         }
     }
 
     /// ND21 9.2.
-    fn sync_byte<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Step, BusError> {
+    fn sync_byte<M: Memory>(&mut self, byte: u8, memory: &mut M) -> Result<Reaction, BusError> {
         let header = match SyncByte::decode(byte).map_err(|_| BusError::Sync)? {
-            SyncByte::Synco => return Ok(Step::plain(byte)),
-            SyncByte::Pause => return Ok(Step::default()),
+            SyncByte::Synco => return Ok(Reaction::plain(byte)),
+            SyncByte::Pause => return Ok(Reaction::default()),
             SyncByte::Telegram(header) => header,
         };
         if header.net_length() == 0
@@ -376,7 +381,7 @@ impl BusEnd {
         }
         if header.addressing() == Addressing::AddressFollows {
             self.state = State::Address(header);
-            return Ok(Step::plain(byte));
+            return Ok(Reaction::plain(byte));
         }
         let valid =
             self.short_address_valid || self.properties.short_address == ShortAddress::KeptSum;
@@ -386,7 +391,7 @@ impl BusEnd {
             memory.write(nd21::ram::BUS_ADDR, sum);
         }
         self.begin_net_bytes(header, valid && sum == ADDRESSED);
-        Ok(Step::plain(byte))
+        Ok(Reaction::plain(byte))
     }
 
     fn begin_net_bytes(&mut self, header: Header, addressed: bool) {
@@ -406,10 +411,15 @@ impl BusEnd {
     }
 
     #[inline]
-    fn detect<M: Memory>(&mut self, error: BusError, offending: Received, memory: &mut M) -> Step {
+    fn detect<M: Memory>(
+        &mut self,
+        error: BusError,
+        offending: Received,
+        memory: &mut M,
+    ) -> Reaction {
         self.blame(error, memory);
         self.state = State::Error(ErrorMode::enter(offending, self.rules), Silence::None);
-        Step {
+        Reaction {
             byte: Some(0),
             marks: Marks::DETECTED,
         }

@@ -20,13 +20,13 @@ pub const CHECK_SEQUENCE: [u8; ZEROS as usize + SEQUENCE.len()] = {
 
 /// Watches a stream of bytes for [`SEQUENCE`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Watch {
+pub struct SequenceWatch {
     matched: u8,
 }
 
-/// What a byte was to the [`Watch`].
+/// What a byte was to the [`SequenceWatch`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
+pub enum SequenceProgress {
     /// Not part of a sequence.
     None,
     /// The FF that starts one; it may restart a sequence that broke off.
@@ -37,7 +37,7 @@ pub enum Progress {
     Complete,
 }
 
-impl Watch {
+impl SequenceWatch {
     /// How many bytes of a sequence have come, 0 to 4.
     #[must_use]
     pub const fn matched(self) -> u8 {
@@ -46,28 +46,28 @@ impl Watch {
 
     /// Takes the next byte; `good` is false where the line status said that it was damaged.
     #[inline]
-    pub fn see(&mut self, byte: u8, good: bool) -> Progress {
+    pub fn see(&mut self, byte: u8, good: bool) -> SequenceProgress {
         if !good {
             self.matched = 0;
-            return Progress::None;
+            return SequenceProgress::None;
         }
         if byte == SEQUENCE[usize::from(self.matched)] {
             self.matched += 1;
             if self.matched == 1 {
-                return Progress::Started;
+                return SequenceProgress::Started;
             }
             if usize::from(self.matched) == SEQUENCE.len() {
                 self.matched = 0;
-                return Progress::Complete;
+                return SequenceProgress::Complete;
             }
-            return Progress::Continued;
+            return SequenceProgress::Continued;
         }
         // No byte of the sequence but the first is an FF, so only a fresh start can follow a break-off.
         self.matched = u8::from(byte == SEQUENCE[0]);
         if self.matched == 1 {
-            Progress::Started
+            SequenceProgress::Started
         } else {
-            Progress::None
+            SequenceProgress::None
         }
     }
 }

@@ -13,7 +13,7 @@
 //!
 //! After a time-out (9.9) received + 1 starts with the "*" itself, as the printed figure has it.
 
-use super::check_sequence::{Progress, Watch, ZEROS};
+use super::check_sequence::{SequenceProgress, SequenceWatch, ZEROS};
 use super::properties::BrokenSequence;
 use crate::line::Received;
 
@@ -127,7 +127,7 @@ pub struct ErrorMode {
     zeros_sent: u8,
     upstream: bool,
     after_time_out: bool,
-    watch: Watch,
+    watch: SequenceWatch,
     in_sequence: bool,
 }
 
@@ -151,7 +151,7 @@ impl ErrorMode {
             zeros_sent: 1,
             upstream: false,
             after_time_out: false,
-            watch: Watch::default(),
+            watch: SequenceWatch::default(),
             in_sequence: false,
         }
     }
@@ -165,7 +165,7 @@ impl ErrorMode {
             zeros_sent: 0,
             upstream: false,
             after_time_out: true,
-            watch: Watch::default(),
+            watch: SequenceWatch::default(),
             in_sequence: false,
         }
     }
@@ -183,18 +183,23 @@ impl ErrorMode {
         if self.upstream {
             let was_in_sequence = self.in_sequence;
             let progress = self.watch.see(received.byte, good);
-            self.in_sequence = matches!(progress, Progress::Started | Progress::Continued);
+            self.in_sequence = matches!(
+                progress,
+                SequenceProgress::Started | SequenceProgress::Continued
+            );
             let forward = match progress {
-                Progress::Started => {
+                SequenceProgress::Started => {
                     marks = marks.and(Marks::SEQUENCE);
                     true
                 }
-                Progress::Continued => true,
-                Progress::Complete => {
+                SequenceProgress::Continued => true,
+                SequenceProgress::Complete => {
                     marks = marks.and(Marks::RECOVERED);
                     true
                 }
-                Progress::None => was_in_sequence && broken_sequence == BrokenSequence::Forwarded,
+                SequenceProgress::None => {
+                    was_in_sequence && broken_sequence == BrokenSequence::Forwarded
+                }
             };
             if forward {
                 return Response {
@@ -221,9 +226,9 @@ impl ErrorMode {
             return marks;
         }
         match self.watch.see(received.byte, received.error.is_none()) {
-            Progress::Started => marks.and(Marks::SEQUENCE),
-            Progress::Complete => marks.and(Marks::RECOVERED),
-            Progress::Continued | Progress::None => marks,
+            SequenceProgress::Started => marks.and(Marks::SEQUENCE),
+            SequenceProgress::Complete => marks.and(Marks::RECOVERED),
+            SequenceProgress::Continued | SequenceProgress::None => marks,
         }
     }
 

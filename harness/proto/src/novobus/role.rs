@@ -1,7 +1,7 @@
 //! What each byte of the master's is for, and the answer to it, by ND21 9.1 to 9.8 and 10.
 
 use super::address::RingSize;
-use super::check_sequence::{Progress, SEQUENCE, Watch};
+use super::check_sequence::{SEQUENCE, SequenceProgress, SequenceWatch};
 use super::command::{Field, Layout, Reply, layout};
 use super::properties::{Properties, ReadLongAnswer, ShortAddress};
 use super::sync::{Addressing, SyncByte};
@@ -89,7 +89,7 @@ impl Role {
 struct Reader {
     ring: u8,
     read_long: ReadLongAnswer,
-    watch: Watch,
+    watch: SequenceWatch,
     /// Bytes of the present telegram that are still to come.
     net: u8,
     address_next: bool,
@@ -135,7 +135,7 @@ fn read(ring: RingSize, sent: &[(u8, bool)], properties: &Properties) -> (Vec<Ro
     for (byte, good) in sent {
         let role = reader.read(*byte, *good);
         roles.push(role);
-        if reader.watch.see(*byte, *good) == Progress::Complete {
+        if reader.watch.see(*byte, *good) == SequenceProgress::Complete {
             let from = roles.len().saturating_sub(SEQUENCE.len());
             roles[from..].fill(Role::CheckSequence);
             let keeps = properties.short_address == ShortAddress::KeptSum;

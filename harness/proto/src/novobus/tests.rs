@@ -1,7 +1,7 @@
 //! The codec: round trips, prefixes, every sync byte, the timing tables of 8.2.
 
 use super::address::{AddressError, RingSize};
-use super::check_sequence::{CHECK_SEQUENCE, Progress, Watch};
+use super::check_sequence::{CHECK_SEQUENCE, SequenceProgress, SequenceWatch};
 use super::checksum::Checksum;
 use super::command::{Command, CommandError, LAYOUTS};
 use super::decode::Decoded;
@@ -339,31 +339,31 @@ fn layouts_are_those_of_chapter_10() {
 /// ND21 9.8; a sequence that breaks off may be followed by a fresh start.
 #[test]
 fn the_watch_finds_the_check_sequence() {
-    let mut watch = Watch::default();
+    let mut watch = SequenceWatch::default();
     let seen: Vec<_> = CHECK_SEQUENCE.iter().map(|&b| watch.see(b, true)).collect();
     assert_eq!(
         seen[16..],
         [
-            Progress::None,
-            Progress::Started,
-            Progress::Continued,
-            Progress::Continued,
-            Progress::Continued,
-            Progress::Complete,
+            SequenceProgress::None,
+            SequenceProgress::Started,
+            SequenceProgress::Continued,
+            SequenceProgress::Continued,
+            SequenceProgress::Continued,
+            SequenceProgress::Complete,
         ]
     );
     let broken = [0xFF, 0x44, 0xFF, 0xFF, 0x44, 0x72, 0x4C, 0x41];
-    let mut watch = Watch::default();
+    let mut watch = SequenceWatch::default();
     let last = broken.iter().map(|&b| watch.see(b, true)).last();
-    assert_eq!(last, Some(Progress::Complete));
-    let mut watch = Watch::default();
+    assert_eq!(last, Some(SequenceProgress::Complete));
+    let mut watch = SequenceWatch::default();
     let damaged = [0xFF, 0x44, 0x72, 0x4C]
         .iter()
         .map(|&b| watch.see(b, true))
         .count();
     assert_eq!(damaged, 4);
-    assert_eq!(watch.see(0x41, false), Progress::None);
-    assert_eq!(watch.see(0x41, true), Progress::None);
+    assert_eq!(watch.see(0x41, false), SequenceProgress::None);
+    assert_eq!(watch.see(0x41, true), SequenceProgress::None);
 }
 
 /// Every property can be set to its default and to nothing that it does not know.

@@ -2,13 +2,13 @@
 
 use super::program::Program;
 use super::properties::Nd21Properties;
-use super::world::{Shown, Stimulus};
+use super::world::{OutputLevels, Stimulus};
 use crate::novobus::cells::Cells;
 use crate::novobus::device::Device;
 use harness_proto::line::Received;
 use harness_proto::nd21::functions::Function;
 use harness_proto::nd21::s_ramp::{Direction, SRamp, Status};
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
@@ -68,7 +68,7 @@ impl Nd21Drive {
 
     /// What it shows outside the bus.
     #[must_use]
-    pub fn shown(&self) -> Shown {
+    pub fn shown(&self) -> OutputLevels {
         self.program.shown()
     }
 
@@ -96,9 +96,9 @@ impl Nd21Drive {
 }
 
 impl Device for Nd21Drive {
-    fn receive(&mut self, now: Instant, received: Received) -> Step {
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction {
         if self.program.is_deaf() {
-            return Step::SILENCE;
+            return Reaction::SILENCE;
         }
         let step = self.bus_end.receive(now, received, &mut self.program);
         self.bus_has_worked();
@@ -109,7 +109,7 @@ impl Device for Nd21Drive {
         self.bus_end.deadline(&self.program)
     }
 
-    fn handle_deadline(&mut self, now: Instant) -> Step {
+    fn handle_deadline(&mut self, now: Instant) -> Reaction {
         self.bus_end.handle_deadline(now, &mut self.program)
     }
 

@@ -40,4 +40,4 @@ pub use plant::PlantParameters;
 pub use program::Program;
 pub use properties::{BusErrors, Nd21Properties, PROPERTIES, Property, PsPosition};
 pub use s_ramp::SRampWire;
-pub use world::{Mode, Shown, Stimulus};
+pub use world::{Mode, OutputLevels, Stimulus};

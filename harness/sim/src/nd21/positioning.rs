@@ -20,7 +20,7 @@ use super::world::Mode;
 use crate::novobus::cells::Cells;
 use harness_proto::nd21::bits::{flags2, ps_status, sw_version};
 use harness_proto::nd21::errors::ErrorCode;
-use harness_proto::nd21::position::{Mode as PositionMode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
 
 /// 26 s in cycles of 432 us, the longest positioning (13.1).

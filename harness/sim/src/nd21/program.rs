@@ -17,7 +17,7 @@ use super::referencing::{Referencing, Run};
 use super::s_ramp::{SRampRun, SRampWire};
 use super::scope::Scope;
 use super::source::Source;
-use super::world::{Mode, Shown, Stimulus, World};
+use super::world::{Mode, OutputLevels, Stimulus, World};
 use super::{clock::Clock, memory_rules};
 use crate::novobus::cells::Cells;
 use harness_proto::nd21;
@@ -173,9 +173,9 @@ impl Program {
     }
 
     /// What can be seen from outside the bus.
-    pub(super) fn shown(&self) -> Shown {
+    pub(super) fn shown(&self) -> OutputLevels {
         let high = self.cells.byte(OUTPUTS);
-        Shown {
+        OutputLevels {
             gpo1: high & GPO1 != 0,
             gpo2: high & GPO2 != 0,
             ready: outputs::ready(self.mode),

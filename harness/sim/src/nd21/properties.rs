@@ -2,7 +2,7 @@
 
 use super::plant::PlantParameters;
 use super::s_ramp::SRampWire;
-use harness_proto::nd21::units::Device;
+use harness_proto::nd21::units::DriveType;
 use harness_proto::novobus::properties::Setting;
 use harness_proto::time::Span;
 
@@ -10,7 +10,7 @@ use harness_proto::time::Span;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nd21Properties {
     /// The type of the device, on which currents depend (4.2.2).
-    pub device: Device,
+    pub device: DriveType,
     /// The motor and what it turns.
     pub plant: PlantParameters,
     /// `eeprom-read-time`: how long the EEPROM controller reads a byte.
@@ -36,7 +36,7 @@ pub struct Nd21Properties {
 impl Default for Nd21Properties {
     fn default() -> Self {
         Self {
-            device: Device::Nd5610,
+            device: DriveType::Nd5610,
             plant: PlantParameters::default(),
             eeprom_read_time: Span::from_millis(1),
             eeprom_write_time: Span::from_millis(10),

@@ -131,7 +131,8 @@ fn run_down(cells: &mut Cells) {
 mod tests {
     use super::*;
     use harness_proto::nd21::units::{
-        Device, Ratio, momentary_current_to_raw, scope_address, trigger_delay, trigger_level_to_raw,
+        DriveType, Ratio, momentary_current_to_raw, scope_address, trigger_delay,
+        trigger_level_to_raw,
     };
 
     /// A cell that counts the scans, to tell measurements apart: it has no part in the oscilloscope.
@@ -221,7 +222,7 @@ mod tests {
     /// buffer of 14.10.6.2; the trigger is 14.10.6.3, -7 A on a 5610, with both flanks of 14.10.6.6.
     #[test]
     fn worked_examples_of_14_10_6() {
-        let level = momentary_current_to_raw(Ratio::whole(-7), Device::Nd5610).unwrap();
+        let level = momentary_current_to_raw(Ratio::whole(-7), DriveType::Nd5610).unwrap();
         assert_eq!(trigger_level_to_raw(level), 0x63);
         for (status, near) in [(0x30, level - 1), (0x20, level + 1)] {
             let mut bench = Bench::new();

@@ -37,7 +37,7 @@ pub enum Stimulus {
 
 /// The outputs of a drive outside the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shown {
+pub struct OutputLevels {
     /// GPO1 is high (5.3.5).
     pub gpo1: bool,
     /// GPO2 is high.

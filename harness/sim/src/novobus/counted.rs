@@ -5,7 +5,7 @@ use crate::novobus::device::Device;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::transitions::{Event, Reached, Transition, classify, state};
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction};
 use harness_proto::novobus::command::Kind;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
@@ -130,7 +130,7 @@ impl Counted {
 }
 
 impl Device for Counted {
-    fn receive(&mut self, now: Instant, received: Received) -> Step {
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction {
         if let Some(reached) = &mut self.reached {
             reached.add(classify(&self.bus_end, &self.memory.cells, received));
         }
@@ -141,7 +141,7 @@ impl Device for Counted {
         self.bus_end.deadline(&self.memory)
     }
 
-    fn handle_deadline(&mut self, now: Instant) -> Step {
+    fn handle_deadline(&mut self, now: Instant) -> Reaction {
         if let Some(reached) = &mut self.reached {
             reached.add(Transition {
                 state: state(&self.bus_end, &self.memory.cells),

@@ -1,20 +1,20 @@
 //! The devices of a ring: anything that answers bytes with bytes.
 
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::bus_end::{Deadline, Reaction};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 
 /// A drive as the ring sees it: bytes and deadlines, no topology.
 pub trait Device {
     /// A byte has arrived.
-    fn receive(&mut self, now: Instant, received: Received) -> Step;
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction;
 
     /// When the device next acts without a byte.
     fn deadline(&self) -> Option<Deadline>;
 
     /// The deadline has come.
-    fn handle_deadline(&mut self, now: Instant) -> Step;
+    fn handle_deadline(&mut self, now: Instant) -> Reaction;
 
     /// Does everything that the device does without the bus, up to and including `now`.
     fn advance(&mut self, now: Instant) {

@@ -1,13 +1,13 @@
 //! The drive models that a simulated ring can hold, each drive its own.
 
-use crate::nd21::{Nd21Drive, Shown, Stimulus, factory};
+use crate::nd21::{Nd21Drive, OutputLevels, Stimulus, factory};
 use crate::novobus::cells::Cells;
 use crate::novobus::deviation::Deviant;
 use crate::novobus::device::Device;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::witness::Witness;
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
 use harness_proto::time::{Instant, Span};
@@ -147,7 +147,7 @@ impl Drive {
 
     /// What it shows outside the bus; `None` where the model has no outside.
     #[must_use]
-    pub fn shown(&self) -> Option<Shown> {
+    pub fn shown(&self) -> Option<OutputLevels> {
         match self {
             Self::Plain(_) => None,
             Self::Nd21(drive) => Some(drive.shown()),
@@ -203,7 +203,7 @@ impl Drive {
 }
 
 impl Device for Drive {
-    fn receive(&mut self, now: Instant, received: Received) -> Step {
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction {
         each!(self, drive => drive.receive(now, received))
     }
 
@@ -211,7 +211,7 @@ impl Device for Drive {
         each!(self, drive => drive.deadline())
     }
 
-    fn handle_deadline(&mut self, now: Instant) -> Step {
+    fn handle_deadline(&mut self, now: Instant) -> Reaction {
         each!(self, drive => drive.handle_deadline(now))
     }
 

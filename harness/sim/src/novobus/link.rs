@@ -1,6 +1,6 @@
 //! One link of a ring: a wire that carries one byte at a time, and its faults.
 
-use crate::fault::{Flips, LinkFault, Plan};
+use crate::fault::{FaultPlan, Flips, LinkFault};
 use crate::novobus::uart::{self, Uart};
 use crate::novobus::under_way::{Bytes, UnderWay};
 use crate::record::LineByte;
@@ -26,7 +26,7 @@ pub struct Link {
     last_arrival: Instant,
     bytes: Bytes,
     transmitted: u64,
-    plan: Plan<LinkFault>,
+    plan: FaultPlan<LinkFault>,
     cut: bool,
     opening: Option<Box<Opening>>,
     /// The receiver, as long as it is out of step (a damaged start bit).
@@ -46,7 +46,7 @@ impl Link {
             last_arrival: Instant::START,
             bytes: Bytes::recorded(),
             transmitted: 0,
-            plan: Plan::default(),
+            plan: FaultPlan::default(),
             cut: false,
             opening: None,
             out_of_step: None,
@@ -134,7 +134,7 @@ impl Link {
     /// under way count as the first bytes.
     pub(crate) fn begin(&mut self) {
         self.join();
-        self.plan = Plan::default();
+        self.plan = FaultPlan::default();
         self.bytes.forget_arrived();
         self.transmitted = self.bytes.under_way().len() as u64;
         self.arrived = 0;

@@ -4,7 +4,7 @@ use crate::novobus::deviation::{DeviantMaster, MasterDeviation};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{
-    Counters, Event, Job, JobId, Master, Options, Pace, Phase, Refused,
+    Counters, CyclePace, Event, Job, JobId, Master, Options, Phase, Refused,
 };
 use harness_proto::time::Instant;
 
@@ -93,14 +93,14 @@ impl AnyMaster {
     ///
     /// # Errors
     /// [`Refused::Drive`] where the ring has not all of them.
-    pub fn set_exchange(&mut self, drives: &[u8], pace: Pace) -> Result<(), Refused> {
+    pub fn set_exchange(&mut self, drives: &[u8], pace: CyclePace) -> Result<(), Refused> {
         match self {
             Self::Right(master) => master.set_exchange(drives, pace),
             Self::Deviant(master) => master.inner_mut().set_exchange(drives, pace),
         }
     }
 
-    /// Lets one more round begin, at [`Pace::OnRequest`].
+    /// Lets one more round begin, at [`CyclePace::OnRequest`].
     pub fn start_round(&mut self) {
         match self {
             Self::Right(master) => master.start_round(),

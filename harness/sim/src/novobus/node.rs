@@ -1,11 +1,11 @@
 //! A place in the ring: a device between its two links, with the faults of a drive.
 
-use crate::fault::{DriveFault, Plan};
+use crate::fault::{DriveFault, FaultPlan};
 use crate::novobus::device::Device;
 use crate::novobus::link::Link;
 use crate::novobus::mark::bits;
 use crate::record::Remark;
-use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::bus_end::{Deadline, Reaction};
 use harness_proto::time::{Instant, Span};
 
 /// A device in its place in the ring.
@@ -14,7 +14,7 @@ pub struct Node<D> {
     device: D,
     powered: bool,
     stuck: Option<u8>,
-    plan: Plan<DriveFault>,
+    plan: FaultPlan<DriveFault>,
     remarks: Vec<Remark>,
     recording: bool,
     drive: u8,
@@ -29,7 +29,7 @@ impl<D: Device> Node<D> {
             device,
             powered: true,
             stuck: None,
-            plan: Plan::default(),
+            plan: FaultPlan::default(),
             remarks: Vec::new(),
             recording: true,
             drive,
@@ -185,7 +185,7 @@ impl<D: Device> Node<D> {
     #[inline]
     fn finish(
         &mut self,
-        step: Step,
+        step: Reaction,
         now: Instant,
         solicited: bool,
         received: u64,

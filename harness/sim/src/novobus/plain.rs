@@ -3,7 +3,7 @@
 use crate::novobus::cells::Cells;
 use crate::novobus::device::Device;
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Step};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Reaction};
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::memory::Memory;
 use harness_proto::novobus::properties::Properties;
@@ -72,7 +72,7 @@ impl Default for PlainDrive {
 
 impl Device for PlainDrive {
     #[inline]
-    fn receive(&mut self, now: Instant, received: Received) -> Step {
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction {
         self.bus_end.receive(now, received, &mut self.memory)
     }
 
@@ -81,7 +81,7 @@ impl Device for PlainDrive {
         self.bus_end.deadline(&self.memory)
     }
 
-    fn handle_deadline(&mut self, now: Instant) -> Step {
+    fn handle_deadline(&mut self, now: Instant) -> Reaction {
         self.bus_end.handle_deadline(now, &mut self.memory)
     }
 

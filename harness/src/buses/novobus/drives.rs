@@ -1,7 +1,7 @@
 //! Drives for another program: opened by the name of a rig, read and written by the names of their cells.
 
-use super::driver::cell::{Found, find, write};
-use super::driver::{self, Axis, Bus, State};
+use super::driver::cell::{CellFound, find, write};
+use super::driver::{self, Axis, OpenRings, State};
 use crate::buses::SimulatedLink;
 use crate::embed::Error;
 use crate::rig::{self, Session, Shared};
@@ -92,10 +92,10 @@ pub(crate) fn released(drives: u8, setup: &str) -> Result<(Plan, SimulatedLink),
 /// The drive does not answer.
 pub(crate) fn units_of(
     plan: &Plan,
-    bus: &Bus<'_>,
+    bus: &OpenRings<'_>,
     axis: Axis,
-) -> Result<units::Drive, driver::Error> {
-    Ok(units::Drive {
+) -> Result<units::DriveUnits, driver::Error> {
+    Ok(units::DriveUnits {
         range: bus.speed_range(axis)?,
         ..plan.units(axis.ring(), axis.drive())
     })
@@ -104,7 +104,7 @@ pub(crate) fn units_of(
 /// The drives of a rig or of a simulated ring, by their axis numbers (ND21 12.2): 0 to 249 on the first ring, 0x100 to 0x1F9 on the
 /// second. A call blocks until the drive has answered, 5 s at most.
 pub struct Drives {
-    bus: Option<Bus<'static>>,
+    bus: Option<OpenRings<'static>>,
     plan: Plan,
     rig: Option<Shared>,
 }
@@ -125,7 +125,7 @@ impl Drives {
     /// `setup` has mistakes.
     pub fn simulated(drives: u8, setup: &str) -> Result<Self, Error> {
         let (plan, link) = released(drives, setup)?;
-        let bus = Bus::open(Box::new(link), &plan.rings, driver::Options::default())?;
+        let bus = OpenRings::open(Box::new(link), &plan.rings, driver::Options::default())?;
         bus.run(WARM);
         Ok(Self {
             bus: Some(bus),
@@ -151,7 +151,7 @@ impl Drives {
         let session = Session::open(&rig, &options)?;
         let sizes = session.rings().to_vec();
         let shared = Shared::new(session);
-        let opened = Bus::open(Box::new(shared.line()), &sizes, driver::Options::default());
+        let opened = OpenRings::open(Box::new(shared.line()), &sizes, driver::Options::default());
         let drives = Self {
             bus: opened.as_ref().ok().cloned(),
             plan,
@@ -164,7 +164,7 @@ impl Drives {
     /// The axis numbers of all drives.
     #[must_use]
     pub fn axes(&self) -> Vec<u16> {
-        let axes = self.bus.iter().flat_map(Bus::axes);
+        let axes = self.bus.iter().flat_map(OpenRings::axes);
         axes.map(Axis::number).collect()
     }
 
@@ -270,7 +270,7 @@ impl Drives {
         self.rig.take()?.close(false)
     }
 
-    fn drive(&self, axis: u16) -> Result<(&Bus<'static>, Axis), Error> {
+    fn drive(&self, axis: u16) -> Result<(&OpenRings<'static>, Axis), Error> {
         let known = || {
             let axes = self.axes();
             let last = axes.last().copied().unwrap_or_default();
@@ -283,7 +283,7 @@ impl Drives {
     }
 
     /// What the scales of a drive's cells depend on (14.3.2).
-    fn units(&self, bus: &Bus<'_>, axis: Axis) -> Result<units::Drive, Error> {
+    fn units(&self, bus: &OpenRings<'_>, axis: Axis) -> Result<units::DriveUnits, Error> {
         Ok(units_of(&self.plan, bus, axis)?)
     }
 }
@@ -304,7 +304,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    fn of(found: &Found<'_>) -> Self {
+    fn of(found: &CellFound<'_>) -> Self {
         Self {
             bytes: found.bytes.clone(),
             number: found.number().as_f64(),

@@ -6,7 +6,7 @@ use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::Instant;
-use harness_sim::nd21::{Mode, Shown, Stimulus};
+use harness_sim::nd21::{Mode, OutputLevels, Stimulus};
 use harness_sim::novobus::bench::Bench;
 use harness_sim::novobus::device::Device;
 use harness_sim::novobus::drive::Drive;
@@ -29,7 +29,7 @@ pub struct SimulatedLink {
 }
 
 /// What a drive without power shows.
-const DARK: Shown = Shown {
+const DARK: OutputLevels = OutputLevels {
     gpo1: false,
     gpo2: false,
     ready: false,
@@ -424,7 +424,7 @@ pub trait BesideTheBus {
     fn error_of(&self, ring: usize, drive: u8) -> Option<Option<BusError>>;
 
     /// What a drive shows outside the bus; `None` where this cannot be seen.
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown>;
+    fn shown(&self, ring: usize, drive: u8) -> Option<OutputLevels>;
 
     /// A drive's cell; `None` where this cannot be seen.
     fn peek(&self, ring: usize, drive: u8, address: u16) -> Option<u8>;
@@ -436,13 +436,13 @@ impl<L: Link + ?Sized> BesideTheBus for L {
         Some(device.cause().filter(|_| device.in_error()))
     }
 
-    fn shown(&self, ring: usize, drive: u8) -> Option<Shown> {
+    fn shown(&self, ring: usize, drive: u8) -> Option<OutputLevels> {
         let ring = simulation(self)?.ring(ring)?;
         let shown = ring.drive(drive)?.shown()?;
         Some(if ring.powered(drive) {
             shown
         } else {
-            Shown {
+            OutputLevels {
                 encoder: shown.encoder,
                 ..DARK
             }

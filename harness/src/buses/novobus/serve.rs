@@ -2,8 +2,8 @@
 
 use crate::buses::novobus::link::BesideTheBus;
 use crate::link::Link;
-use crate::scenario::argument::{Location, Memory};
-use harness_sim::nd21::{Mode, Shown};
+use crate::scenario::argument::{MemoryKind, MemoryRange};
+use harness_sim::nd21::{Mode, OutputLevels};
 
 /// The state of a drive: what these cells of its memory hold, in hexadecimal digits, or without cells its error on the bus and what it
 /// shows outside.
@@ -14,11 +14,11 @@ pub(crate) fn state_of(
     link: &dyn Link,
     ring: usize,
     drive: u8,
-    cells: &[Location],
+    cells: &[MemoryRange],
 ) -> Result<String, String> {
     let mut found = Vec::new();
     for location in cells {
-        if location.memory == Memory::Eeprom {
+        if location.memory == MemoryKind::Eeprom {
             let name = location.name();
             return Err(format!(
                 "`{name}` is in the EEPROM; a cell of the memory expected"
@@ -44,7 +44,7 @@ pub(crate) fn state_of(
 }
 
 /// What stands outside the bus (ND21 5.3, 11.8): the analogue output in mV.
-fn outside(shown: &Shown) -> String {
+fn outside(shown: &OutputLevels) -> String {
     let level = |high| if high { "high" } else { "low" };
     let contact = if shown.ready { "closed" } else { "open" };
     let mode = Mode::NAMES.iter().find(|(_, mode)| *mode == shown.mode);

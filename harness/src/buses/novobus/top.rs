@@ -64,7 +64,7 @@ pub struct Disturbance {
 
 /// Everything that was read.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reading {
+pub struct Snapshot {
     /// How long the view has been on.
     pub at: Span,
     /// The rings, in order.
@@ -100,7 +100,7 @@ impl RingReading {
     }
 }
 
-impl Reading {
+impl Snapshot {
     /// Notes a disturbance.
     pub fn disturbed(&mut self, ring: usize, what: String) {
         let last = self.at;
@@ -172,7 +172,7 @@ impl Sort {
 
 /// What keys go to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Entry {
+pub(crate) enum KeyTarget {
     /// The commands.
     #[default]
     None,
@@ -184,7 +184,7 @@ pub(crate) enum Entry {
 
 /// The words of a row.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Row {
+pub struct TopRow {
     /// The drive.
     pub axis: Axis,
     /// Whether it is in error or shows a code.
@@ -197,15 +197,15 @@ pub struct Row {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Top {
     pub(crate) heading: Heading,
-    pub(crate) reading: Reading,
+    pub(crate) reading: Snapshot,
     /// The reading shown while the page is paused.
-    paused: Option<Reading>,
+    paused: Option<Snapshot>,
     /// Disturbances up to this time are not shown.
     forgotten: Option<Span>,
     pub(crate) filter: String,
     pub(crate) only_errors: bool,
     pub(crate) sort: Sort,
-    pub(crate) entry: Entry,
+    pub(crate) entry: KeyTarget,
     /// The first row in sight.
     pub(crate) first: usize,
     /// How many rows the page has room for.
@@ -223,7 +223,7 @@ impl Top {
     }
 
     /// Takes what was read.
-    pub fn take(&mut self, reading: Reading) {
+    pub fn take(&mut self, reading: Snapshot) {
         match &mut self.paused {
             Some(later) => *later = reading,
             None => self.reading = reading,
@@ -269,11 +269,11 @@ impl Top {
 
     /// The drives that are wanted, in the order that is wanted.
     #[must_use]
-    pub fn rows(&self) -> Vec<Row> {
+    pub fn rows(&self) -> Vec<TopRow> {
         self.shown().into_iter().map(|(_, row)| row).collect()
     }
 
-    fn shown(&self) -> Vec<(&DriveReading, Row)> {
+    fn shown(&self) -> Vec<(&DriveReading, TopRow)> {
         let wanted = self.filter.to_lowercase();
         let drives = self.reading.drives.iter();
         let mut rows: Vec<_> = drives
@@ -316,7 +316,7 @@ fn gravity(mode: &str) -> u8 {
     }
 }
 
-fn row(drive: &DriveReading) -> Row {
+fn row(drive: &DriveReading) -> TopRow {
     let state = &drive.state;
     let mode = state.mode();
     // The display shows the code in the error mode only (11.8).
@@ -340,7 +340,7 @@ fn row(drive: &DriveReading) -> Row {
     if words.is_empty() {
         words.push("-".to_owned());
     }
-    Row {
+    TopRow {
         axis: drive.axis,
         in_error: mode == "error" || error.is_some(),
         cells: [

@@ -1,6 +1,6 @@
 //! The gate of a segment of UNITEK drives: every frame is judged by what a drive would read out of it (UNITEK chapters 4 and 5).
 
-use crate::buses::Setting;
+use crate::buses::LimitSetting;
 use crate::guard::{Denied, Gate, Guarded};
 use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Medium, Out};
@@ -52,21 +52,21 @@ impl SegmentGate {
     }
 
     /// The settings that deny something for this reason.
-    fn denying(&self, denial: Denial) -> Vec<Setting> {
+    fn denying(&self, denial: Denial) -> Vec<LimitSetting> {
         let limits = self.gate.limits();
-        let wanted: &[Setting] = match denial {
+        let wanted: &[LimitSetting] = match denial {
             Denial::NotPermitted { missing, .. } => match missing {
-                Missing::Motion => &[Setting::Motion],
-                Missing::Eeprom => &[Setting::Eeprom],
-                Missing::All => &[Setting::Motion, Setting::Eeprom],
+                Missing::Motion => &[LimitSetting::Motion],
+                Missing::Eeprom => &[LimitSetting::Eeprom],
+                Missing::All => &[LimitSetting::Motion, LimitSetting::Eeprom],
                 Missing::BusSettings | Missing::WayBack | Missing::Named => &[],
             },
-            Denial::Speed { .. } => &[Setting::MaxSpeed],
+            Denial::Speed { .. } => &[LimitSetting::MaxSpeed],
             _ => &[],
         };
-        let denies = |setting: &&Setting| match setting {
-            Setting::Motion => !limits.motion,
-            Setting::Eeprom => !limits.eeprom,
+        let denies = |setting: &&LimitSetting| match setting {
+            LimitSetting::Motion => !limits.motion,
+            LimitSetting::Eeprom => !limits.eeprom,
             _ => true,
         };
         wanted.iter().filter(denies).copied().collect()
@@ -127,7 +127,7 @@ impl Gate for SegmentGate {
                     "the fault {fault:?} is not made: a drive could miss the frame that locks it, so it needs `allow_motion` in the \
                      rig's [limits] and --allow-motion"
                 ),
-                settings: vec![Setting::Motion],
+                settings: vec![LimitSetting::Motion],
             }),
         }
     }
@@ -238,7 +238,7 @@ mod tests {
                 "201#510000 is not sent: a write to register 51 (MODE) needs allow_motion in the rig file"
             )
         );
-        assert_eq!(line.denying(), [Setting::Motion]);
+        assert_eq!(line.denying(), [LimitSetting::Motion]);
         assert!(!line.permits(0, Out::Frames(&[frame("201#310100")])));
         assert!(!line.permits(0, Out::Octets(&[0x88])));
         let carried = line.inner().carried();

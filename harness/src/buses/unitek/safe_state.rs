@@ -2,7 +2,7 @@
 
 use super::driver::{Driver, Error};
 use super::rig::Axis;
-use crate::guard::{Guarded, Safe, SafeStep, Standing};
+use crate::guard::{Guarded, Safe, SafeStep, Standstill};
 use crate::link::Line;
 use crate::medium::Out;
 use harness_proto::can::Frame;
@@ -47,7 +47,7 @@ pub fn safe_state<L: Line>(
     line: &mut Guarded<L>,
     axes: &[Axis],
     patience: Span,
-    standing: &Standing,
+    standing: &Standstill,
 ) -> Safe {
     let (cycles, moved) = line.segment().map_or_else(Default::default, |gate| {
         let cycles: Vec<_> = gate.cycles().collect();
@@ -109,7 +109,7 @@ fn make_safe(
     driver: &mut Driver<'_>,
     axis: Axis,
     cycles: &[(u16, u8)],
-    standing: &Standing,
+    standing: &Standstill,
 ) -> Result<String, String> {
     let mut why = Ok(());
     let mut note = |done: Result<(), Error>| {
@@ -167,7 +167,7 @@ const fn low(bits: u32) -> u16 {
 }
 
 /// Waits until a drive stands.
-fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standing) -> Result<(), String> {
+fn stands(driver: &mut Driver<'_>, axis: Axis, standing: &Standstill) -> Result<(), String> {
     let text = |error: Error| error.to_string();
     let full = driver.read(axis, 0xCE).map_err(text)?;
     let full = f64::from(low(full.data.bits()));
@@ -240,7 +240,7 @@ mod tests {
     }
 
     fn safe(line: &mut Guarded<Bench>) -> Safe {
-        safe_state(line, &axes(), PATIENCE, &Standing::default())
+        safe_state(line, &axes(), PATIENCE, &Standstill::default())
     }
 
     fn registers(line: &Guarded<Bench>, node: u8) -> [u32; 4] {

@@ -8,8 +8,8 @@ use crate::cli::output::Output;
 use crate::cli::rig_failure::find_rig;
 use crate::counted::counted;
 use crate::explore::{
-    About, Act, Bounds, Campaign, Case, ExploreError, LogLine, MOST_BYTES, OnRig, OnSim, Setup,
-    Target, What, by_novelty, read,
+    Act, ActKind, Bounds, Case, ExploreError, FuzzRun, FuzzSettings, LogLine, MOST_BYTES, OnRig,
+    OnSim, RingSetup, Target, by_novelty, read,
 };
 use crate::guard::Limits;
 use crate::regular::{self, Links};
@@ -62,7 +62,7 @@ pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
         return Ok(Exit::NothingSelected);
     }
     if rig.is_simulated() {
-        let setup = Setup::of_rig(&rig, &[], false);
+        let setup = RingSetup::of_rig(&rig, &[], false);
         let mut target = match OnSim::ready(setup.clone(), &sizes(&rig)) {
             Ok(target) => target,
             Err(error) => return Ok(tell(&error, output)),
@@ -79,7 +79,12 @@ pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
     on_ports(&rig, &how, output, |run, output| {
         let scope = scope(run);
         let limits = scope.limits;
-        let campaign = campaign(arguments, &rig, Setup::of_ports(rig.rings().count()), scope);
+        let campaign = campaign(
+            arguments,
+            &rig,
+            RingSetup::of_ports(rig.rings().count()),
+            scope,
+        );
         match OnRig::new(run, limits) {
             Ok(mut target) => play(arguments, campaign, cases, &mut target, output),
             Err(error) => Ok(tell(&error, output)),
@@ -90,11 +95,11 @@ pub(crate) fn replay(arguments: &ReplayArguments, output: &mut Output) -> std::i
 fn campaign(
     arguments: &ReplayArguments,
     rig: &Rig,
-    setup: Setup,
-    scope: crate::explore::Scope,
-) -> Campaign {
-    let about = About {
-        schema: About::SCHEMA,
+    setup: RingSetup,
+    scope: crate::explore::CaseScope,
+) -> FuzzRun {
+    let about = FuzzSettings {
+        schema: FuzzSettings::SCHEMA,
         rig: arguments.rig.clone(),
         drives: scope.first.drives,
         second: scope.second.as_ref().map(|ring| ring.drives),
@@ -105,12 +110,12 @@ fn campaign(
         setup,
         spices: Vec::new(),
     };
-    Campaign::new(about, scope)
+    FuzzRun::new(about, scope)
 }
 
 fn play(
     arguments: &ReplayArguments,
-    mut campaign: Campaign,
+    mut campaign: FuzzRun,
     cases: Vec<Case>,
     target: &mut dyn Target,
     output: &mut Output,
@@ -218,7 +223,7 @@ fn of_hex(path: &Path) -> Result<Vec<Act>, ExploreError> {
         .map_err(|_| wrong("bytes are two hexadecimal digits each"))?;
     let wire = bytes.get(2..).unwrap_or_default().to_vec();
     match wire.len() <= MOST_BYTES {
-        true => Ok(vec![Act::sound(What::Bytes(wire))]),
+        true => Ok(vec![Act::sound(ActKind::Bytes(wire))]),
         false => Err(wrong("more bytes than a case has")),
     }
 }

@@ -3,7 +3,7 @@
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, give_back};
-use crate::explore::{ExploreError, RingScope, Scope, Setup, Spice};
+use crate::explore::{CaseScope, ExploreError, RingScope, RingSetup, Spice};
 use crate::guard::Limits;
 use crate::link::Line as _;
 use crate::link::{Capability, Link, Trouble};
@@ -99,11 +99,11 @@ pub(crate) fn rings(
 }
 
 /// What cases may have on simulated rings; plain drives have nothing behind their bus.
-pub(crate) fn simulated(rig: &Rig, limits: Limits, setup: &Setup) -> Scope {
+pub(crate) fn simulated(rig: &Rig, limits: Limits, setup: &RingSetup) -> CaseScope {
     let behind = [Spice::Motion, Spice::Eeprom];
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
     let (first, second) = rings(rig, |_, _| true);
-    Scope {
+    CaseScope {
         first,
         second,
         spices: all
@@ -116,7 +116,7 @@ pub(crate) fn simulated(rig: &Rig, limits: Limits, setup: &Setup) -> Scope {
 
 /// What cases may have on a rig with ports. What a case leaves in a drive's RAM the next reset takes away (ND21 10.5): without leave for
 /// it cases only read, stop and block. The EEPROM is never written.
-pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
+pub(crate) fn scope(run: &mut Run<'_>) -> CaseScope {
     let capabilities = run.capabilities();
     let session = run.session();
     let own = session.limits();
@@ -153,7 +153,7 @@ pub(crate) fn scope(run: &mut Run<'_>) -> Scope {
         _ => true,
     };
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
-    Scope {
+    CaseScope {
         first,
         second,
         spices: all.filter(possible).collect(),

@@ -10,8 +10,8 @@ use crate::cli::rig_failure::find_rig;
 use crate::counted::counted;
 use crate::evidence::{can_sign, seal};
 use crate::explore::{
-    About, Bounds, Campaign, End, ExploreError, Kept, OnRig, OnSim, Planted, Record, Scope, Setup,
-    Target, page, read,
+    Bounds, CaseScope, ExploreError, FuzzRecord, FuzzRun, FuzzSettings, KeptRun, OnRig, OnSim,
+    Planted, RingSetup, RunEnd, Target, page, read,
 };
 use crate::guard::Limits;
 use crate::rig::{Rig, state};
@@ -168,7 +168,7 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
         };
         let about = about(
             arguments,
-            (Setup::of_ports(rig.rings().count()), true),
+            (RingSetup::of_ports(rig.rings().count()), true),
             &scope,
         );
         let bounds = Bounds {
@@ -183,7 +183,7 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
 
 fn on_simulated(
     arguments: &FuzzRunArguments,
-    before: Option<&Kept>,
+    before: Option<&KeptRun>,
     rig: &Rig,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -205,7 +205,7 @@ fn on_simulated(
     }
     let setup = match before {
         Some(kept) => kept.about.setup.clone(),
-        None => Setup::of_rig(rig, &arguments.deviates, arguments.whole),
+        None => RingSetup::of_rig(rig, &arguments.deviates, arguments.whole),
     };
     let own = &rig.file.limits;
     let limits = Limits {
@@ -234,10 +234,14 @@ fn on_simulated(
     explore(arguments, (about, scope), &mut target, &bounds, output)
 }
 
-fn about(arguments: &FuzzRunArguments, (setup, ports): (Setup, bool), scope: &Scope) -> About {
+fn about(
+    arguments: &FuzzRunArguments,
+    (setup, ports): (RingSetup, bool),
+    scope: &CaseScope,
+) -> FuzzSettings {
     let names = scope.spices.iter().map(|spice| spice.name().to_owned());
-    About {
-        schema: About::SCHEMA,
+    FuzzSettings {
+        schema: FuzzSettings::SCHEMA,
         rig: arguments.rig.clone(),
         drives: scope.first.drives,
         second: scope.second.as_ref().map(|ring| ring.drives),
@@ -253,7 +257,7 @@ fn about(arguments: &FuzzRunArguments, (setup, ports): (Setup, bool), scope: &Sc
 /// Begins a run or goes on with one, and tells what came of it.
 fn explore(
     arguments: &FuzzRunArguments,
-    (about, scope): (About, Scope),
+    (about, scope): (FuzzSettings, CaseScope),
     target: &mut dyn Target,
     bounds: &Bounds,
     output: &mut Output,
@@ -270,7 +274,7 @@ fn explore(
             let name = name.trim_matches('-');
             let folder = arguments.out.clone();
             let folder = folder.unwrap_or_else(|| PathBuf::from(format!("fuzz-{name}-{stamp}")));
-            Record::create(&folder, &about).map(|record| (record, Campaign::new(about, scope)))
+            FuzzRecord::create(&folder, &about).map(|record| (record, FuzzRun::new(about, scope)))
         }
     };
     let (mut record, mut campaign) = match begun {
@@ -327,30 +331,30 @@ fn explore(
 }
 
 /// Why a run that was resumed played nothing, and how to go on.
-fn beyond(end: &End, bounds: &Bounds) -> String {
+fn beyond(end: &RunEnd, bounds: &Bounds) -> String {
     let remedy = match end {
-        End::Cases => format!(
+        RunEnd::Cases => format!(
             "the run has {} cases already; give --cases with more",
             bounds.cases
         ),
-        End::Findings => format!(
+        RunEnd::Findings => format!(
             "the run has {} already; give --findings with more",
             counted(bounds.findings, "finding")
         ),
-        End::Wire => "its time on the line is used up; give --wire-time with more".to_owned(),
-        End::Over(why) => why.clone(),
+        RunEnd::Wire => "its time on the line is used up; give --wire-time with more".to_owned(),
+        RunEnd::Over(why) => why.clone(),
     };
     format!("nothing was played: {remedy}\n")
 }
 
 fn resume(
     folder: &std::path::Path,
-    about: &About,
-    scope: &Scope,
+    about: &FuzzSettings,
+    scope: &CaseScope,
     target: &mut dyn Target,
-) -> Result<(Record, Campaign), ExploreError> {
-    let (record, kept) = Record::resume(folder)?;
-    let is = |about: &About| (about.drives, about.second, about.spices.clone());
+) -> Result<(FuzzRecord, FuzzRun), ExploreError> {
+    let (record, kept) = FuzzRecord::resume(folder)?;
+    let is = |about: &FuzzSettings| (about.drives, about.second, about.spices.clone());
     if is(&kept.about) != is(about) {
         return Err(ExploreError::Usage(format!(
             "the rig {} is another one than when the run in {} began: other drives, or other leave; begin another run",
@@ -358,7 +362,7 @@ fn resume(
             folder.display()
         )));
     }
-    let campaign = Campaign::resumed(&kept, scope.clone(), target)?;
+    let campaign = FuzzRun::resumed(&kept, scope.clone(), target)?;
     Ok((record, campaign))
 }
 

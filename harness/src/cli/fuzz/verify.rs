@@ -4,7 +4,7 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::counted::counted;
 use crate::evidence::{Signer, sealed};
-use crate::explore::{ExploreError, Finding, Kept, LogLine, OnSim, Target as _};
+use crate::explore::{ExploreError, Finding, KeptRun, LogLine, OnSim, Target as _};
 use std::path::Path;
 
 /// What no folder of a run confirms.
@@ -14,7 +14,7 @@ const UNCONFIRMED: &str =
 /// Checks the files of a run, and plays its findings again where its drives were simulated ones.
 pub(crate) fn verify(
     folder: &Path,
-    kept: &Kept,
+    kept: &KeptRun,
     signer: Option<Signer<'_>>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -78,7 +78,7 @@ pub(crate) fn verify(
 }
 
 /// Whether a finding differs as it says when it is played again; `None` for one of a rig with ports.
-fn again(file: &Path, kept: &Kept) -> Result<Option<bool>, ExploreError> {
+fn again(file: &Path, kept: &KeptRun) -> Result<Option<bool>, ExploreError> {
     let (finding, _) = Finding::read(file)?;
     if kept.about.ports || finding.ports {
         return Ok(None);

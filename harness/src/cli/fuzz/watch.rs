@@ -2,7 +2,7 @@
 
 use crate::cli::output::Output;
 use crate::counted::counted;
-use crate::explore::{Campaign, End, Finding, Pool, Progress, Swarm, Watcher};
+use crate::explore::{Finding, FuzzRun, Pool, Progress, RunEnd, Swarm, Watcher};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -70,14 +70,14 @@ impl Watcher for Telling<'_> {
 }
 
 /// The last line of a run.
-pub(crate) fn summary(campaign: &Campaign, end: &End) -> String {
+pub(crate) fn summary(campaign: &FuzzRun, end: &RunEnd) -> String {
     let progress = campaign.progress();
     let (confirmed, flaky) = campaign.findings();
     let why = match end {
-        End::Cases => "all cases were tried".to_owned(),
-        End::Wire => "the next case would exceed the time on the line".to_owned(),
-        End::Findings => "the limit of findings was reached".to_owned(),
-        End::Over(why) => why.clone(),
+        RunEnd::Cases => "all cases were tried".to_owned(),
+        RunEnd::Wire => "the next case would exceed the time on the line".to_owned(),
+        RunEnd::Findings => "the limit of findings was reached".to_owned(),
+        RunEnd::Over(why) => why.clone(),
     };
     format!(
         "{} ({} not allowed or not possible here, {} of findings), {:.3} s on the line, {} kept with {}; \

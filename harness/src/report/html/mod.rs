@@ -21,8 +21,8 @@ mod summary;
 mod write;
 
 pub(crate) use crate::report::lines::Curve;
-pub use page::{MAX_PAGE, Part, Section, page};
-pub use scenario::{Played, section};
+pub use page::{FoldedPart, MAX_PAGE, Section, page};
+pub use scenario::{ScenarioView, section};
 pub(crate) use summary::colour;
-pub use summary::{Head, Shown, run};
+pub use summary::{Head, ShownScenario, run};
 pub use write::{Attribute, Html};

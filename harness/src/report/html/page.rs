@@ -13,7 +13,7 @@ const SCRIPT: &str = include_str!("script.js");
 
 /// A part of a section that is left out where the page would become too long.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct FoldedPart {
     /// Its heading.
     pub heading: String,
     /// What stands below it.
@@ -34,7 +34,7 @@ pub struct Section {
     /// What is always shown.
     pub html: Html,
     /// What is shown below, if the page has room.
-    pub parts: Vec<Part>,
+    pub parts: Vec<FoldedPart>,
 }
 
 /// A page with a title, a front part and its sections.
@@ -214,7 +214,7 @@ mod tests {
         let section = |id: usize, gravity: u8| {
             let mut html = Html::new();
             html.line("p", &[], "x".repeat(100_000));
-            let part = Part {
+            let part = FoldedPart {
                 heading: "Picture".into(),
                 html,
                 instead: "Look elsewhere.".into(),

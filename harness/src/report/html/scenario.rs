@@ -1,13 +1,13 @@
 //! The section of a scenario: its outcome, what was expected beside what was received, and its pictures.
 
-use super::page::{Part, Section};
-use super::summary::{Row, Shown, colour};
+use super::page::{FoldedPart, Section};
+use super::summary::{Row, ShownScenario, colour};
 use super::write::Html;
 use crate::buses::rows;
 use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
-use crate::scenario::run::{Difference, Mismatch, Outcome, show};
+use crate::scenario::run::{ByteDifference, Mismatch, Outcome, show};
 use crate::scenario::source::line_number;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
@@ -27,7 +27,7 @@ const REMARKS: usize = 40;
 
 /// A scenario that was played.
 #[derive(Clone, Copy, Debug)]
-pub struct Played<'p> {
+pub struct ScenarioView<'p> {
     /// Its name.
     pub name: &'p str,
     /// Its title.
@@ -50,7 +50,7 @@ pub struct Played<'p> {
 
 /// Its section; `number` tells it from the others of a page.
 #[must_use]
-pub fn section(number: usize, played: &Played<'_>) -> Shown {
+pub fn section(number: usize, played: &ScenarioView<'_>) -> ShownScenario {
     let id = format!("s{number}");
     let outcome = played.outcome;
     let mut html = Html::new();
@@ -66,7 +66,7 @@ pub fn section(number: usize, played: &Played<'_>) -> Shown {
     if let Some(finding) = &outcome.finding {
         found(&mut html, played, finding);
     }
-    Shown {
+    ShownScenario {
         row: Row::of(played),
         section: Section {
             heading: played.name.to_owned(),
@@ -78,7 +78,7 @@ pub fn section(number: usize, played: &Played<'_>) -> Shown {
     }
 }
 
-fn facts(html: &mut Html, played: &Played<'_>) {
+fn facts(html: &mut Html, played: &ScenarioView<'_>) {
     let outcome = played.outcome;
     html.element("dl", &[], |html| {
         let mut fact = |name: &str, value: &dyn std::fmt::Display| {
@@ -100,7 +100,7 @@ fn facts(html: &mut Html, played: &Played<'_>) {
     });
 }
 
-fn found(html: &mut Html, played: &Played<'_>, finding: &Mismatch) {
+fn found(html: &mut Html, played: &ScenarioView<'_>, finding: &Mismatch) {
     html.line("h3", &[], "What differed");
     html.line("p", &[("class", &"bad")], &finding.message);
     let line = played.text.get(finding.span.start..finding.span.end);
@@ -126,7 +126,7 @@ fn found(html: &mut Html, played: &Played<'_>, finding: &Mismatch) {
 }
 
 /// Expected beside received, as a table with a column a byte.
-fn beside(html: &mut Html, difference: &Difference) {
+fn beside(html: &mut Html, difference: &ByteDifference) {
     let from = difference.index.saturating_sub(AROUND);
     let longest = difference.expected.len().max(difference.received.len());
     let to = longest.min(difference.index + AROUND + 1);
@@ -173,7 +173,7 @@ fn row(
 }
 
 /// What the scenario expects, line by line, and whether it came; false where it expects nothing.
-fn expectations(html: &mut Html, played: &Played<'_>) -> bool {
+fn expectations(html: &mut Html, played: &ScenarioView<'_>) -> bool {
     let mut start = 0;
     let mut rows = Vec::new();
     for (index, line) in played.text.split_inclusive('\n').enumerate() {
@@ -233,11 +233,11 @@ fn came(outcome: &Outcome, start: usize, end: usize) -> (&'static str, &'static 
     }
 }
 
-fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
+fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
     let mut parts = Vec::new();
     let mut html = Html::new();
     if expectations(&mut html, played) {
-        parts.push(Part {
+        parts.push(FoldedPart {
             heading: "Expected and received".to_owned(),
             html,
             instead: String::new(),
@@ -267,14 +267,14 @@ fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
             (ring, trace),
             played.rate,
         );
-        parts.push(Part {
+        parts.push(FoldedPart {
             heading: format!("Space-time diagram{which}"),
             html,
             instead: instead.clone(),
         });
         let mut html = Html::new();
         if sequence(&mut html, &format!("{id}-{ring}"), trace) {
-            parts.push(Part {
+            parts.push(FoldedPart {
                 heading: format!("What was said{which}"),
                 html,
                 instead: instead.clone(),
@@ -284,7 +284,7 @@ fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
     if !played.outcome.records.is_empty() {
         let mut html = Html::new();
         lines(&mut html, id, &played.outcome.records);
-        parts.push(Part {
+        parts.push(FoldedPart {
             heading: "Recorded cells".to_owned(),
             html,
             instead,
@@ -295,10 +295,10 @@ fn parts(id: &str, played: &Played<'_>) -> Vec<Part> {
 }
 
 /// What a bus of frames carried, a row a frame.
-fn frames(rows: &str) -> Part {
+fn frames(rows: &str) -> FoldedPart {
     let mut html = Html::new();
     html.element("pre", &[], |html| html.line("code", &[], rows));
-    Part {
+    FoldedPart {
         heading: "Frames".to_owned(),
         html,
         instead: String::new(),
@@ -306,7 +306,7 @@ fn frames(rows: &str) -> Part {
 }
 
 /// The scenario's own text.
-fn text(text: &str) -> Option<Part> {
+fn text(text: &str) -> Option<FoldedPart> {
     if text.is_empty() {
         return None;
     }
@@ -315,7 +315,7 @@ fn text(text: &str) -> Option<Part> {
         html.line("summary", &[], "Its text");
         html.element("pre", &[], |html| html.line("code", &[], text));
     });
-    Some(Part {
+    Some(FoldedPart {
         heading: "Scenario".to_owned(),
         html,
         instead: String::new(),

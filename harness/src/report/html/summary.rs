@@ -1,7 +1,7 @@
 //! The front part of a run's page: how many verdicts there are of each kind, and a table of all scenarios.
 
 use super::page::{Section, page};
-use super::scenario::Played;
+use super::scenario::ScenarioView;
 use super::write::Html;
 use crate::counted::counted;
 use crate::scenario::verdict::Verdict;
@@ -29,13 +29,13 @@ pub(crate) struct Row {
 
 /// A scenario's section, and its row in the summary.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct ShownScenario {
     pub(crate) row: Row,
     pub(crate) section: Section,
 }
 
 impl Row {
-    pub(crate) fn of(played: &Played<'_>) -> Self {
+    pub(crate) fn of(played: &ScenarioView<'_>) -> Self {
         Self {
             name: played.name.to_owned(),
             title: played.title.to_owned(),
@@ -49,7 +49,7 @@ impl Row {
 
 /// The page of a run.
 #[must_use]
-pub fn run(head: &Head<'_>, shown: Vec<Shown>) -> String {
+pub fn run(head: &Head<'_>, shown: Vec<ShownScenario>) -> String {
     let mut front = Html::new();
     front.element("section", &[("aria-labelledby", &"summary")], |html| {
         html.line("h2", &[("id", &"summary")], "Summary");
@@ -77,7 +77,7 @@ pub(crate) fn colour(verdict: Verdict) -> &'static str {
     }
 }
 
-fn counts(html: &mut Html, shown: &[Shown]) {
+fn counts(html: &mut Html, shown: &[ShownScenario]) {
     let mut took = Span::ZERO;
     for one in shown {
         took = took + one.row.took;
@@ -108,7 +108,7 @@ fn counts(html: &mut Html, shown: &[Shown]) {
     );
 }
 
-fn table(html: &mut Html, shown: &[Shown]) {
+fn table(html: &mut Html, shown: &[ShownScenario]) {
     html.element("table", &[], |html| {
         html.line("caption", &[], "Scenarios");
         html.element("thead", &[], |html| {
@@ -122,7 +122,7 @@ fn table(html: &mut Html, shown: &[Shown]) {
             ]);
         });
         html.element("tbody", &[], |html| {
-            for Shown { row, section } in shown {
+            for ShownScenario { row, section } in shown {
                 html.element("tr", &[], |html| {
                     html.line("td", &[("class", &colour(row.verdict))], row.verdict);
                     html.element("th", &[("scope", &"row")], |html| {

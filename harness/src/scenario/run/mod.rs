@@ -6,7 +6,7 @@ pub(crate) mod player;
 pub(crate) mod skip;
 
 pub use crate::buses::run::*;
-pub use outcome::{Difference, Mismatch, Outcome, Stop, Unready};
-pub use player::{AtMismatch, Port, Runner, needs, play, run};
+pub use outcome::{ByteDifference, Mismatch, Outcome, Stop, Unready};
+pub use player::{AtMismatch, PortState, Runner, needs, play, run};
 pub(crate) use skip::DENIED;
 pub use skip::{Skip, Unlock, Why, lacks, together};

@@ -1,6 +1,6 @@
 //! What comes of playing: outcome, finding, and why playing stops.
 
-use super::Record;
+use super::CellRecord;
 use crate::link::Trouble;
 use crate::scenario::pattern::Expected;
 use crate::scenario::problem::Span;
@@ -21,7 +21,7 @@ pub struct Outcome {
     /// How long it took, on the line's clock.
     pub took: time::Span,
     /// The cells that it recorded.
-    pub records: Vec<Record>,
+    pub records: Vec<CellRecord>,
     /// Why no step was played although the rig has all that the scenario needs: a drive could not be made ready.
     pub unready: Option<Unready>,
     /// Why it was skipped; `None` where it was not, and where this is read from a record.
@@ -115,7 +115,7 @@ pub struct Mismatch {
     /// What is wrong, in a sentence.
     pub message: String,
     /// Where the bytes differ, if bytes are what differs.
-    pub difference: Option<Difference>,
+    pub difference: Option<ByteDifference>,
     /// The drives that were in the error mode then, in words; empty where none was or where this cannot
     /// be seen.
     pub in_error: String,
@@ -123,7 +123,7 @@ pub struct Mismatch {
 
 /// Bytes that differ.
 #[derive(Clone, Debug)]
-pub struct Difference {
+pub struct ByteDifference {
     /// Which ring, counted from 0.
     pub ring: usize,
     /// Which byte that the master received, counted from 1.
@@ -138,7 +138,7 @@ pub struct Difference {
     pub received: Vec<Received>,
 }
 
-impl Difference {
+impl ByteDifference {
     /// Whether a byte differs only by not having come yet.
     pub(crate) fn is_absence(&self) -> bool {
         self.at.is_none() && !self.expected.is_empty()
@@ -200,7 +200,7 @@ impl Stop {
     }
 
     /// The same with the pieces that differ, where they are shown.
-    pub(crate) fn with(mut self, difference: Option<Difference>) -> Self {
+    pub(crate) fn with(mut self, difference: Option<ByteDifference>) -> Self {
         self.finding.difference = difference;
         self
     }

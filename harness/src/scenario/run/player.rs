@@ -63,7 +63,7 @@ pub fn play<L: Language>(plan: &Plan<L>, link: &mut dyn Link, at_mismatch: AtMis
 }
 
 /// What the master has received on one port.
-pub struct Port<L: Language> {
+pub struct PortState<L: Language> {
     pub(crate) received: Vec<(Instant, L::Received)>,
     /// The first piece that no line has asked for yet.
     pub(crate) next: usize,
@@ -79,7 +79,7 @@ pub struct Runner<'a, L: Language = DefaultBus> {
     pub(crate) full: Option<Halt>,
     /// The first check on something that the link does not show.
     pub(crate) unseen: Option<Stop>,
-    pub(crate) ports: Vec<Port<L>>,
+    pub(crate) ports: Vec<PortState<L>>,
     /// When the line before was done.
     pub(crate) line_before: Instant,
     deadline: time::Span,
@@ -90,7 +90,7 @@ pub struct Runner<'a, L: Language = DefaultBus> {
 
 impl<'a, L: Language> Runner<'a, L> {
     pub(crate) fn new(plan: &'a Plan<L>, link: &'a mut dyn Link, at_mismatch: AtMismatch) -> Self {
-        let port = |_| Port {
+        let port = |_| PortState {
             received: Vec::new(),
             next: 0,
         };

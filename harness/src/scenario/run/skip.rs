@@ -1,6 +1,6 @@
 //! Why a scenario is not played on a rig, and what would let it be played.
 
-use crate::buses::Setting;
+use crate::buses::LimitSetting;
 use crate::link::{Capability, Link};
 use crate::scenario::language::Language;
 use crate::scenario::plan::Plan;
@@ -42,7 +42,7 @@ pub enum Why {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Unlock {
     /// A change of this setting in the rig's `[limits]`.
-    Limit(Setting),
+    Limit(LimitSetting),
     /// A tap at this link.
     Tap(String),
     /// An interposer at this link.
@@ -158,13 +158,13 @@ pub fn together(unlocks: &BTreeSet<Unlock>) -> String {
         _ => None,
     };
     let settings: Vec<_> = unlocks.iter().filter_map(setting).collect();
-    let everything = |all: &[Setting]| all.iter().all(|own| settings.contains(own));
-    let limits = match everything(&Setting::PERMISSIONS) {
+    let everything = |all: &[LimitSetting]| all.iter().all(|own| settings.contains(own));
+    let limits = match everything(&LimitSetting::PERMISSIONS) {
         true => vec!["every permission".to_owned()],
-        false => settings.iter().map(Setting::to_string).collect(),
+        false => settings.iter().map(LimitSetting::to_string).collect(),
     };
     let limits = (!limits.is_empty()).then(|| format!("{} in [limits]", limits.join(" and ")));
-    let motion = settings.contains(&Setting::Motion);
+    let motion = settings.contains(&LimitSetting::Motion);
     let option = motion.then(|| "--allow-motion".to_owned());
     let others = unlocks.iter().filter(|own| setting(own).is_none());
     let all = limits
@@ -230,9 +230,9 @@ pub fn lacks<L: Language>(plan: &Plan<L>, link: &dyn Link) -> Option<Skip> {
 fn unlock(missing: Capability) -> Option<Unlock> {
     Some(match missing {
         Capability::Interposer | Capability::Tap => return None,
-        Capability::Motion => Unlock::Limit(Setting::Motion),
-        Capability::Eeprom => Unlock::Limit(Setting::Eeprom),
-        Capability::Reset => Unlock::Limit(Setting::Reset),
+        Capability::Motion => Unlock::Limit(LimitSetting::Motion),
+        Capability::Eeprom => Unlock::Limit(LimitSetting::Eeprom),
+        Capability::Reset => Unlock::Limit(LimitSetting::Reset),
         Capability::LineErrors => Unlock::LineErrors,
         Capability::TwoRings => Unlock::OtherSize,
         Capability::Memory | Capability::Power | Capability::Simulator => Unlock::Simulated,

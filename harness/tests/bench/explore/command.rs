@@ -3,7 +3,7 @@
 use super::about;
 use super::findings::empty_checkout;
 use crate::program::{ended, findings, name};
-use harness::explore::{LogLine, RECORD, Record, Setup};
+use harness::explore::{FuzzRecord, LogLine, RECORD, RingSetup};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -301,7 +301,7 @@ fn what_cannot_be() {
 fn one_at_a_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("run");
-    let held = Record::create(&out, &about(&Setup::default(), 1)).expect("room");
+    let held = FuzzRecord::create(&out, &about(&RingSetup::default(), 1)).expect("room");
     let resume = ["fuzz", "run", "--cases", "60", "--resume", name(&out)];
     ended(&drivebench(&resume), 2, "another process works on the run");
     drop(held);

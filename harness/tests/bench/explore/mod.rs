@@ -10,8 +10,8 @@ mod witness;
 
 use harness::buses::syntax::Header;
 use harness::explore::{
-    About, Bounds, Campaign, Difference, End, ExploreError, Finding, OnSim, Planted, Pool,
-    Progress, Rehearsal, RingScope, Scope, Setup, Spice, Swarm, Target, Tried, Watcher,
+    Bounds, CaseScope, Difference, ExploreError, Finding, FuzzRun, FuzzSettings, OnSim, Planted,
+    Pool, Progress, Rehearsal, RingScope, RingSetup, RunEnd, Spice, Swarm, Target, Tried, Watcher,
 };
 use harness_proto::novobus::guard::Limits;
 
@@ -29,16 +29,16 @@ fn repeat(test: &str) -> String {
 }
 
 /// Everything on a simulated ring of plain drives.
-fn scope(drives: u8) -> Scope {
+fn scope(drives: u8) -> CaseScope {
     scope_of(drives, None)
 }
 
 /// The same with a second ring.
-fn scope_of(drives: u8, second: Option<u8>) -> Scope {
+fn scope_of(drives: u8, second: Option<u8>) -> CaseScope {
     let (first, second) = RingScope::both(drives, second, |_, _| true);
     let behind = [Spice::Motion, Spice::Eeprom];
     let all = Spice::NAMES.iter().map(|(_, spice)| *spice);
-    Scope {
+    CaseScope {
         first,
         second,
         spices: all.filter(|spice| !behind.contains(spice)).collect(),
@@ -47,8 +47,8 @@ fn scope_of(drives: u8, second: Option<u8>) -> Scope {
     }
 }
 
-fn planted(drive: u8, name: &str) -> Setup {
-    Setup {
+fn planted(drive: u8, name: &str) -> RingSetup {
+    RingSetup {
         header: Header::default(),
         deviates: vec![Planted {
             ring: 0,
@@ -58,9 +58,9 @@ fn planted(drive: u8, name: &str) -> Setup {
     }
 }
 
-fn about(setup: &Setup, seed: u64) -> About {
-    About {
-        schema: About::SCHEMA,
+fn about(setup: &RingSetup, seed: u64) -> FuzzSettings {
+    FuzzSettings {
+        schema: FuzzSettings::SCHEMA,
         rig: "sim:3".to_owned(),
         drives: 3,
         second: None,
@@ -99,8 +99,8 @@ fn bounds(cases: u64, findings: usize) -> Bounds {
 }
 
 /// A run on a ring of three; what was found, and after how many cases it ended.
-fn explore(setup: &Setup, seed: u64, bounds: &Bounds) -> (Vec<Finding>, Campaign, End) {
-    let mut campaign = Campaign::new(about(setup, seed), scope(3));
+fn explore(setup: &RingSetup, seed: u64, bounds: &Bounds) -> (Vec<Finding>, FuzzRun, RunEnd) {
+    let mut campaign = FuzzRun::new(about(setup, seed), scope(3));
     let mut heard = Heard::default();
     let mut target = OnSim::new(setup.clone());
     let end = campaign.run(&mut target, None, bounds, &mut heard);

@@ -7,16 +7,16 @@ use crate::program::{ended, findings, name};
 use harness::buses::novobus::explore::shrink::{Subject, shrink};
 use harness::buses::syntax::Header;
 use harness::explore::{
-    About, Beside, Campaign, Case, Finding, LogLine, OnSim, Planted, Setup, Target, beside,
-    by_novelty, play,
+    Case, Finding, FuzzRun, FuzzSettings, LogLine, OnSim, OtherRing, Planted, RingSetup, Target,
+    beside, by_novelty, play,
 };
 use harness::link::Line as _;
 use harness::link::Octets;
 use harness_proto::time::Span;
 use std::path::Path;
 
-fn planted(ring: usize, drive: u8, name: &str) -> Setup {
-    Setup {
+fn planted(ring: usize, drive: u8, name: &str) -> RingSetup {
+    RingSetup {
         header: Header::default(),
         deviates: vec![Planted {
             ring,
@@ -27,14 +27,14 @@ fn planted(ring: usize, drive: u8, name: &str) -> Setup {
 }
 
 /// A run on rings of two and of three drives.
-fn explore(setup: &Setup, seed: u64, cases: u64) -> (Vec<Finding>, Campaign) {
-    let about = About {
+fn explore(setup: &RingSetup, seed: u64, cases: u64) -> (Vec<Finding>, FuzzRun) {
+    let about = FuzzSettings {
         rig: "sim:2,3".to_owned(),
         drives: 2,
         second: Some(3),
         ..about(setup, seed)
     };
-    let mut campaign = Campaign::new(about, scope_of(2, Some(3)));
+    let mut campaign = FuzzRun::new(about, scope_of(2, Some(3)));
     let mut heard = Heard::default();
     let mut target = OnSim::new(setup.clone());
     let end = campaign.run(&mut target, None, &bounds(cases, 1), &mut heard);
@@ -45,7 +45,7 @@ fn explore(setup: &Setup, seed: u64, cases: u64) -> (Vec<Finding>, Campaign) {
 /// Sound rings give no finding, and both are spoken to.
 #[test]
 fn both_rings_are_explored() {
-    let (found, campaign) = explore(&Setup::default(), 4, 1_500);
+    let (found, campaign) = explore(&RingSetup::default(), 4, 1_500);
     assert_eq!(found, []);
     let of = |ring: usize| {
         let own = campaign.pool().cases().iter();
@@ -101,9 +101,9 @@ fn the_scenario_names_its_ring() {
 /// A byte on the ring that a case is not with is a finding of that ring (ND21 12.2).
 #[test]
 fn the_other_ring_stays_silent() {
-    let (_, campaign) = explore(&Setup::default(), 1, 60);
+    let (_, campaign) = explore(&RingSetup::default(), 1, 60);
     let case = campaign.pool().cases()[0].clone();
-    let mut link = Setup::default().model(&case.sizes()).expect("rings");
+    let mut link = RingSetup::default().model(&case.sizes()).expect("rings");
     play(&mut link, &case);
     assert_eq!(beside(&case, &link), None);
     let other = 1 - case.ring();
@@ -116,18 +116,21 @@ fn the_other_ring_stays_silent() {
 /// What one ring has shown is no reason to leave it out of the other.
 #[test]
 fn each_ring_has_its_own_features() {
-    let (_, campaign) = explore(&Setup::default(), 1, 60);
+    let (_, campaign) = explore(&RingSetup::default(), 1, 60);
     let case = campaign.pool().cases()[0].clone();
     let on = |beside| Case {
         beside: Some(beside),
         ..case.clone()
     };
-    let mut target = OnSim::new(Setup::default());
+    let mut target = OnSim::new(RingSetup::default());
     let mut with = |case: Case| {
         let rehearsal = target.rehearse(&case).expect("rings");
         (case, rehearsal.features)
     };
-    let cases = vec![with(on(Beside::First(3))), with(on(Beside::Second(3)))];
+    let cases = vec![
+        with(on(OtherRing::First(3))),
+        with(on(OtherRing::Second(3))),
+    ];
     assert_eq!(by_novelty(cases).len(), 2);
 }
 
@@ -147,11 +150,11 @@ fn forms_of_cases() {
     let run = "{\"kind\":\"run\",\"schema\":1,\"rig\":\"sim:3\",\"drives\":3,\"ports\":false,\"seed\":1,\"confirm\":2,\"of\":3,\
                \"setup\":{\"header\":[],\"deviates\":[]},\"spices\":[]}";
     let line: LogLine = serde_json::from_str(run).expect("a line");
-    assert_eq!(line, LogLine::Run(about(&Setup::default(), 1)));
+    assert_eq!(line, LogLine::Run(about(&RingSetup::default(), 1)));
     assert_eq!(serde_json::to_string(&line).expect("a form"), run);
     for drives in [0, 251] {
         let case = Case {
-            beside: Some(Beside::Second(drives)),
+            beside: Some(OtherRing::Second(drives)),
             ..old.clone()
         };
         assert!(old.is_bounded() && !case.is_bounded(), "{drives}");

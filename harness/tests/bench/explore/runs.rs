@@ -1,21 +1,21 @@
 //! Runs: what they find, that they repeat, and that a rig that is late now and then finds nothing.
 
 use super::{
-    Campaign, Difference, End, ExploreError, Heard, Rehearsal, Target, Tried, about, bounds,
+    Difference, ExploreError, FuzzRun, Heard, Rehearsal, RunEnd, Target, Tried, about, bounds,
     explore, planted, repeat, scope, seed,
 };
 use harness::buses::novobus::twin::Symptom;
-use harness::explore::{Case, OnSim, Setup};
+use harness::explore::{Case, OnSim, RingSetup};
 
 /// The ring and the reference model, which share no code, agree on everything that a run comes to.
 #[test]
 fn ring_and_reference_agree() {
-    let (found, campaign, end) = explore(&Setup::default(), seed(), &bounds(3_000, 1));
+    let (found, campaign, end) = explore(&RingSetup::default(), seed(), &bounds(3_000, 1));
     let told = found
         .first()
         .map(|finding| finding.difference.about.clone());
     assert_eq!(told, None, "{}", repeat("ring_and_reference_agree"));
-    assert_eq!(end, End::Cases);
+    assert_eq!(end, RunEnd::Cases);
     assert!(campaign.pool().cases().len() > 100);
 }
 
@@ -31,7 +31,7 @@ fn two_telegrams_are_found() {
         ("check-sequence-without-zeros", 5_000),
     ] {
         let (found, campaign, end) = explore(&planted(1, name), 1, &bounds(most, 1));
-        assert_eq!(end, End::Findings, "{name}: {:?}", campaign.progress());
+        assert_eq!(end, RunEnd::Findings, "{name}: {:?}", campaign.progress());
         assert!(found[0].confirmed && found[0].seen_again == 2, "{name}");
         assert!(found[0].case.acts.len() > 1, "{name}: {:?}", found[0].case);
     }
@@ -100,14 +100,14 @@ fn a_finding_is_seen_again() {
             .zip([((0, 1), 0), ((0, 2), 0), ((0, 1), 3), ((1, 0), 4)])
     {
         let mut target = LateOnce {
-            inner: OnSim::new(Setup::default()),
+            inner: OnSim::new(RingSetup::default()),
             tried: 0,
             wrong,
         };
-        let mut campaign = Campaign::new(about(&Setup::default(), 1), scope(3));
+        let mut campaign = FuzzRun::new(about(&RingSetup::default(), 1), scope(3));
         let mut heard = Heard::default();
         let end = campaign.run(&mut target, None, &bounds(20, 9), &mut heard);
-        assert_eq!(end.expect("a ring"), End::Cases);
+        assert_eq!(end.expect("a ring"), RunEnd::Cases);
         assert_eq!(campaign.findings(), findings);
         assert_eq!(heard.findings[0].seen_again, again);
     }
@@ -116,8 +116,8 @@ fn a_finding_is_seen_again() {
 /// The wire's time is never exceeded, to the nanosecond.
 #[test]
 fn the_wire_budget_holds() {
-    let setup = Setup::default();
-    let mut campaign = Campaign::new(about(&setup, 1), scope(3));
+    let setup = RingSetup::default();
+    let mut campaign = FuzzRun::new(about(&setup, 1), scope(3));
     let budget = harness_proto::time::Span::from_millis(500);
     let bounds = harness::explore::Bounds {
         wire: Some(budget),
@@ -125,7 +125,7 @@ fn the_wire_budget_holds() {
     };
     let mut target = OnSim::new(setup);
     let end = campaign.run(&mut target, None, &bounds, &mut Heard::default());
-    assert_eq!(end.expect("a ring"), End::Wire);
+    assert_eq!(end.expect("a ring"), RunEnd::Wire);
     let used = campaign.progress().wire_ns;
     assert!(
         used <= budget.as_nanos() && used > budget.as_nanos() / 2,

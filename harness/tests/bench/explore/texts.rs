@@ -1,8 +1,10 @@
 //! A case and its scenario are one.
 
 use super::{repeat, scope, scope_of, seed};
-use harness::buses::novobus::explore::text::{Expected, Page, text};
-use harness::explore::{Case, Dice, Generator, Scope, Seen, Setup, Swarm, mutate, play};
+use harness::buses::novobus::explore::text::{ExpectedBytes, Surroundings, text};
+use harness::explore::{
+    Case, CaseScope, Dice, Generator, MasterView, RingSetup, Swarm, mutate, play,
+};
 use harness::library::Entry;
 use harness::link::Link;
 use harness::scenario::run::run;
@@ -16,7 +18,7 @@ pub(crate) fn cases(count: u64, drives: u8) -> Vec<Case> {
 }
 
 /// The same with one of a bench's rings.
-fn cases_with(scope: &Scope, ring: usize, count: u64) -> Vec<Case> {
+fn cases_with(scope: &CaseScope, ring: usize, count: u64) -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
     for number in 0..count {
         let mut dice = Dice::of_part(seed(), number);
@@ -32,16 +34,16 @@ fn cases_with(scope: &Scope, ring: usize, count: u64) -> Vec<Case> {
     cases
 }
 
-fn scenario(case: &Case, setup: &Setup, seen: &Seen) -> String {
-    let page = Page {
+fn scenario(case: &Case, setup: &RingSetup, seen: &MasterView) -> String {
+    let page = Surroundings {
         title: "a case",
         header: Some(&setup.header),
-        expected: Some(Expected {
+        expected: Some(ExpectedBytes {
             seen,
             any: &[],
             timed: None,
         }),
-        ..Page::default()
+        ..Surroundings::default()
     };
     text(case, &page)
 }
@@ -54,8 +56,8 @@ fn a_case_is_its_scenario() {
     let all = cases(300, 3).into_iter().chain(cases_with(&two, 0, 20));
     for (number, case) in all.chain(second).enumerate() {
         let setup = match number % 4 {
-            0 => Setup::of_ports(case.sizes().len()),
-            _ => Setup::default(),
+            0 => RingSetup::of_ports(case.sizes().len()),
+            _ => RingSetup::default(),
         };
         let mut link = setup.model(&case.sizes()).expect("rings");
         let seen = play(&mut link, &case);
@@ -97,7 +99,7 @@ fn the_same_seed_gives_the_same_cases() {
 #[test]
 fn lines_are_not_long() {
     for case in cases(200, 3) {
-        let setup = Setup::default();
+        let setup = RingSetup::default();
         let seen = setup.model_answers(&case).expect("a ring");
         for line in scenario(&case, &setup, &seen).lines() {
             assert!(line.chars().count() <= 120, "{line}");

@@ -3,12 +3,12 @@
 use super::command::drivebench;
 use super::{Heard, about, bounds, repeat, scope, seed};
 use crate::program::{ended, findings, name};
-use harness::explore::{Campaign, Finding, OnSim, Planted, Setup, Spice};
+use harness::explore::{Finding, FuzzRun, OnSim, Planted, RingSetup, Spice};
 
 /// A run on three whole drives; nothing knows of the deviation that is hidden in one of them.
 fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, u64) {
     let lines = r#"["drive 0..last model nd21", "drive 0..last input GPIN3 GPIN5 high"]"#;
-    let sound = Setup {
+    let sound = RingSetup {
         header: serde_json::from_str(lines).expect("a header"),
         deviates: Vec::new(),
     };
@@ -22,7 +22,7 @@ fn explore(hidden: Option<(u8, &str)>, seed: u64, cases: u64) -> (Vec<Finding>, 
     };
     let mut scope = scope(3);
     scope.spices = Spice::NAMES.iter().map(|(_, spice)| *spice).collect();
-    let mut campaign = Campaign::new(about(&setup, seed), scope);
+    let mut campaign = FuzzRun::new(about(&setup, seed), scope);
     let mut heard = Heard::default();
     let mut target = OnSim::new(setup);
     let end = campaign.run(&mut target, None, &bounds(cases, 1), &mut heard);

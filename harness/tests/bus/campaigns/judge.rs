@@ -1,8 +1,8 @@
 //! The classes of a ring of two beside a judge that knows nothing but the reference model.
 
-use harness::campaign::fault::{Bit, What};
+use harness::campaign::fault::{FaultEffect, LineBit};
 use harness::campaign::find::find;
-use harness::campaign::{Case, Class, Evidence, Outcome, Wrong};
+use harness::campaign::{CaseClass, CaseEvidence, CaseFaults, CaseOutcome, Wrong};
 use harness_sim::novobus::reference;
 
 /// What a case is, by the reference model alone: no code of the simulator, the master or the campaign. It knows no
@@ -92,15 +92,15 @@ impl Judge {
     }
 }
 
-fn as_reference(case: &Case) -> Option<Vec<(usize, usize, reference::Fault)>> {
+fn as_reference(case: &CaseFaults) -> Option<Vec<(usize, usize, reference::Fault)>> {
     let fault = |what| {
         Some(match what {
-            What::Bit(Bit::Data(bit)) => reference::Fault::Flip(1 << bit, false, false),
-            What::Bit(Bit::Parity) => reference::Fault::Flip(0, true, false),
-            What::Bit(Bit::Stop) => reference::Fault::Flip(0, false, true),
-            What::Drop => reference::Fault::Drop,
-            What::Duplicate => reference::Fault::Duplicate,
-            What::Insert(byte) => reference::Fault::Insert(byte),
+            FaultEffect::Bit(LineBit::Data(bit)) => reference::Fault::Flip(1 << bit, false, false),
+            FaultEffect::Bit(LineBit::Parity) => reference::Fault::Flip(0, true, false),
+            FaultEffect::Bit(LineBit::Stop) => reference::Fault::Flip(0, false, true),
+            FaultEffect::Drop => reference::Fault::Drop,
+            FaultEffect::Duplicate => reference::Fault::Duplicate,
+            FaultEffect::Insert(byte) => reference::Fault::Insert(byte),
             _ => return None,
         })
     };
@@ -142,11 +142,11 @@ fn an_independent_judge_agrees() {
     }
     // Cases of one class alone would show little.
     for class in [
-        Class::Located,
-        Class::Recovered,
-        Class::Mislocated,
-        Class::Corrupted,
-        Class::SilentCorruption,
+        CaseClass::Located,
+        CaseClass::Recovered,
+        CaseClass::Mislocated,
+        CaseClass::Corrupted,
+        CaseClass::SilentCorruption,
     ] {
         assert!(seen.get(&class).is_some_and(|count| *count > 5), "{seen:?}");
     }
@@ -155,11 +155,11 @@ fn an_independent_judge_agrees() {
 /// A classification that is planted wrong does not pass the judge: each of these is one of the others.
 #[test]
 fn the_judge_finds_a_wrong_classification() {
-    let case = Case::from_name("master->1:18:0+master->1:18:1", 2).expect("a case");
+    let case = CaseFaults::from_name("master->1:18:0+master->1:18:1", 2).expect("a case");
     let judge = Judge::new();
     let silent = judge.verdict(&as_reference(&case).expect("bits"));
     assert_eq!(silent, Verdict::Silent(vec![(0, 0xFF6A)]));
-    let right = Evidence {
+    let right = CaseEvidence {
         confirmed: true,
         all_back: true,
         wrong: vec![Wrong::Cell {
@@ -168,30 +168,30 @@ fn the_judge_finds_a_wrong_classification() {
             value: 0x11,
             expected: 0x12,
         }],
-        ..Evidence::default()
+        ..CaseEvidence::default()
     };
-    let outcome = |evidence: Evidence| Outcome {
+    let outcome = |evidence: CaseEvidence| CaseOutcome {
         case,
         class: evidence.class(&case.links()).expect("a class"),
         evidence,
     };
     check(&case, &outcome(right.clone()), &silent);
     let planted = [
-        Evidence {
+        CaseEvidence {
             wrong: Vec::new(),
             ..right.clone()
         },
-        Evidence {
+        CaseEvidence {
             noticed: true,
             ..right.clone()
         },
-        Evidence {
+        CaseEvidence {
             noticed: true,
             named: Some(0),
             wrong: Vec::new(),
             ..right.clone()
         },
-        Evidence {
+        CaseEvidence {
             wrong: vec![Wrong::Cell {
                 drive: 1,
                 address: 0xFF6A,
@@ -207,23 +207,23 @@ fn the_judge_finds_a_wrong_classification() {
         assert!(caught.is_err(), "{outcome:?}");
     }
     // A class that its evidence does not give.
-    let outcome = Outcome {
-        class: Class::Located,
+    let outcome = CaseOutcome {
+        class: CaseClass::Located,
         ..outcome(right)
     };
     assert!(std::panic::catch_unwind(|| check(&case, &outcome, &silent)).is_err());
 }
 
 /// Whether class and evidence are what the judge says.
-fn check(case: &Case, outcome: &Outcome, verdict: &Verdict) {
+fn check(case: &CaseFaults, outcome: &CaseOutcome, verdict: &Verdict) {
     let place = || format!("{}: {verdict:?} {outcome:?}", case.name(2));
     let evidence = &outcome.evidence;
     let class = evidence.class(&case.links());
     assert_eq!(class, Ok(outcome.class), "{}", place());
     match verdict {
-        Verdict::Harmless => assert_eq!(outcome.class, Class::Harmless, "{}", place()),
+        Verdict::Harmless => assert_eq!(outcome.class, CaseClass::Harmless, "{}", place()),
         Verdict::Silent(cells) => {
-            assert_eq!(outcome.class, Class::SilentCorruption, "{}", place());
+            assert_eq!(outcome.class, CaseClass::SilentCorruption, "{}", place());
             let cell = |wrong: &Wrong| match wrong {
                 Wrong::Cell { drive, address, .. } => Some((*drive, *address)),
                 Wrong::Answer { .. } => None,
@@ -234,7 +234,7 @@ fn check(case: &Case, outcome: &Outcome, verdict: &Verdict) {
         }
         Verdict::Noticed(None) => {
             // Data that are not compared may come back changed.
-            let data = outcome.class == Class::SilentCorruption
+            let data = outcome.class == CaseClass::SilentCorruption
                 && evidence
                     .wrong
                     .iter()

@@ -7,7 +7,7 @@ mod judge;
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::campaign::find::{find, names};
 use harness::campaign::report::{json, table};
-use harness::campaign::{Campaign, Case, Class, Finished, Wrong};
+use harness::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign, Wrong};
 use harness::library::Entry;
 use harness::link::{Link, Octets};
 use harness::scenario::problem::Problems;
@@ -33,7 +33,7 @@ fn load(text: &str) -> Result<Campaign, Box<Problems>> {
     Campaign::load(&source, Path::new(""))
 }
 
-fn run(campaign: &Campaign) -> Finished {
+fn run(campaign: &Campaign) -> PlayedCampaign {
     campaign.run(2, &|_| {}).expect("every case fits a class")
 }
 
@@ -73,7 +73,7 @@ fn every_campaign_pins_every_figure_and_the_page_shows_them() {
         let cases = file.expect.cases.unwrap_or_else(|| panic!("{name}"));
         let mut row = format!("| `{name}` | {cases} |");
         let mut sum = 0;
-        for class in Class::ALL {
+        for class in CaseClass::ALL {
             let count = file
                 .expect
                 .of(class)
@@ -174,7 +174,7 @@ fn a_replay_is_the_case() {
         ("9.8-driver-single-bits", "1->0:30:4"),
     ] {
         let campaign = built_in(name);
-        let case = Case::from_name(case, campaign.shape.drives).expect("a case");
+        let case = CaseFaults::from_name(case, campaign.shape.drives).expect("a case");
         let (outcome, _) = campaign.play(&case).expect("a class");
         let text = harness::campaign::replay::scenario(&campaign, &case).expect("a text");
         let source = Source {
@@ -240,7 +240,7 @@ fn cases_by_link_and_byte() {
             .filter_map(|classes| classes.get(&class))
             .sum::<u64>()
     };
-    for class in Class::ALL {
+    for class in CaseClass::ALL {
         assert_eq!(of(class), finished.count(class), "{class}");
     }
 }
@@ -256,7 +256,7 @@ fn a_conversation_that_cannot_be_repeated_is_refused() {
     let text = "schema = 1\ntitle = \"t\"\nscenario = \"twice.scn\"\nfaults = [\"bits\"]\n";
     std::fs::write(&path, text).expect("a file");
     let error = find(&path).expect_err("a mistake");
-    let harness::campaign::find::FindError::Mistakes(problems) = error else {
+    let harness::campaign::find::FindCampaignError::Mistakes(problems) = error else {
         panic!("{error}");
     };
     let message = &problems.all()[0].message;

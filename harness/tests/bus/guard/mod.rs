@@ -7,7 +7,7 @@ mod traffic;
 mod trouble;
 
 use harness::buses::SimulatedLink;
-use harness::buses::novobus::driver::{Axis, Bus, Options};
+use harness::buses::novobus::driver::{Axis, OpenRings, Options};
 use harness::guard::{Guarded, Limits};
 use harness::link::Link;
 use harness_proto::line::Rate;
@@ -53,6 +53,6 @@ fn guarded(drives: u64, limits: Limits) -> Guarded<SimulatedLink> {
     guarded
 }
 
-fn bus(line: &mut Guarded<SimulatedLink>, drives: u64) -> Bus<'_> {
-    Bus::open(Box::new(line), &[size(drives)], Options::default()).expect("an open bus")
+fn bus(line: &mut Guarded<SimulatedLink>, drives: u64) -> OpenRings<'_> {
+    OpenRings::open(Box::new(line), &[size(drives)], Options::default()).expect("an open bus")
 }

@@ -2,12 +2,12 @@
 
 use super::{axis, bus, guarded, ring, size};
 use harness::buses::SimulatedLink;
-use harness::buses::novobus::driver::Bus;
+use harness::buses::novobus::driver::OpenRings;
 use harness::buses::novobus::link::BesideTheBus as _;
-use harness::guard::{Guarded, Limits, SafeState, Standing, blind_stop, safe_state};
+use harness::guard::{Guarded, Limits, SafeState, Standstill, blind_stop, safe_state};
 use harness::link::{DriveFault, Line, Link, LinkFault, Moment, Octets, PlacedFault};
 use harness_proto::line::Rate;
-use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::Span;
@@ -16,7 +16,7 @@ use harness_sim::novobus::drive::Drive;
 use harness_sim::novobus::plain::PlainDrive;
 use harness_sim::novobus::ring::Ring;
 
-fn turning(bus: &Bus<'_>, drive: u16) {
+fn turning(bus: &OpenRings<'_>, drive: u16) {
     bus.write_word(axis(drive), ram::NSOLL, 0x2C3D)
         .expect("written");
     bus.go(axis(drive)).expect("gone");
@@ -56,7 +56,7 @@ fn word(line: &Guarded<SimulatedLink>, drive: u8, address: u16) -> i16 {
 #[test]
 fn turning_motors_stand_and_are_blocked() {
     let mut line = in_motion();
-    let state = safe_state(&mut line, &[size(3)], &Standing::default());
+    let state = safe_state(&mut line, &[size(3)], &Standstill::default());
     assert_eq!(state, SafeState::Confirmed(vec![size(3)]));
     for drive in 0..3 {
         assert!(word(&line, drive, ram::NIST).abs() <= 20);
@@ -92,7 +92,7 @@ fn half_a_telegram_does_not_keep_it_away() {
     assert!(line.trouble().is_some());
     assert_eq!(line.peek(0, 1, ram::STATUS), before);
     line.reset_after_denial();
-    let state = safe_state(&mut line, &[size(2)], &Standing::default());
+    let state = safe_state(&mut line, &[size(2)], &Standstill::default());
     assert_eq!(state, SafeState::Confirmed(vec![size(2)]), "{state}");
 }
 
@@ -101,7 +101,7 @@ fn a_drive_without_power_is_named() {
     let mut line = in_motion();
     line.inject(0, PlacedFault::Drive(1, DriveFault::Off), Moment::Now);
     let begin = line.now();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(3)], &Standing::default())
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(3)], &Standstill::default())
     else {
         panic!("confirmed");
     };
@@ -122,7 +122,7 @@ fn a_cut_ring_is_not_confirmed() {
     let mut line = in_motion();
     line.inject(0, PlacedFault::Link(0, LinkFault::Cut), Moment::Now);
     let begin = line.now();
-    let state = safe_state(&mut line, &[size(3)], &Standing::default());
+    let state = safe_state(&mut line, &[size(3)], &Standstill::default());
     assert!(matches!(&state, SafeState::NotConfirmed(drives) if drives.len() == 3));
     assert!(state.to_string().contains("NOT confirmed"));
     assert!(line.now().since(begin) < Span::from_millis(15_000));
@@ -143,14 +143,14 @@ fn a_motion_of_the_positioning_controller_ends() {
         bus.delete_error(drive).expect("deleted");
         bus.go(drive).expect("gone");
         bus.init_ps(drive).expect("initialised");
-        let path = Position::new(Mode::Relative, 200 * 65_536).expect("a path");
+        let path = Position::new(PositionMode::Relative, 200 * 65_536).expect("a path");
         bus.write_ps(drive, path).expect("written");
         bus.start_ps(drive).expect("started");
         bus.run(Span::from_millis(1_500));
         bus.close();
     }
     assert!(word(&line, 0, ram::NIST).abs() > 200);
-    let state = safe_state(&mut line, &[size(1)], &Standing::default());
+    let state = safe_state(&mut line, &[size(1)], &Standstill::default());
     assert_eq!(state, SafeState::Confirmed(vec![size(1)]), "{state}");
     let end = line.now() + Span::from_millis(1_000);
     while line.now() < end && line.wait(end) {}
@@ -169,11 +169,11 @@ fn two_rings() {
     }
     assert_eq!(line.trouble(), None);
     line.reset_after_denial();
-    let state = safe_state(&mut line, &rings, &Standing::default());
+    let state = safe_state(&mut line, &rings, &Standstill::default());
     assert_eq!(state, SafeState::Confirmed(rings.to_vec()), "{state}");
     line.inject(1, PlacedFault::Drive(2, DriveFault::Off), Moment::Now);
     line.reset_after_denial();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &rings, &Standing::default())
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &rings, &Standstill::default())
     else {
         panic!("confirmed");
     };
@@ -187,7 +187,7 @@ fn plain_drives_are_not_confirmed() {
     let bench = Bench::one(Ring::new(size(2), Rate::Baud38400, plain));
     let mut line = Guarded::new(SimulatedLink::new(bench), Limits::default());
     let begin = line.now();
-    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(2)], &Standing::default())
+    let SafeState::NotConfirmed(drives) = safe_state(&mut line, &[size(2)], &Standstill::default())
     else {
         panic!("confirmed");
     };

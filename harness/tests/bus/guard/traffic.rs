@@ -2,14 +2,14 @@
 
 use super::{axis, bus, guarded, link, size};
 use harness::buses::SimulatedLink;
-use harness::buses::novobus::driver::{Bus, Error, count_drives, recover};
+use harness::buses::novobus::driver::{Error, OpenRings, count_drives, recover};
 use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
 use harness::link::{Capability, Line, Link, LinkFault, Moment, Octets, PlacedFault, Trouble};
 use harness::scenario::run::run;
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
-use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::output::{Output, OutputChange};
 use harness_proto::time::Span;
@@ -18,7 +18,7 @@ use std::path::Path;
 
 const NOTHING: &str = "";
 
-type Call = fn(&Bus<'_>) -> Result<(), Error>;
+type Call = fn(&OpenRings<'_>) -> Result<(), Error>;
 
 /// Every function of the driver that writes, and what the denial of it names.
 const CALLS: &[(&str, Call, &str)] = &[
@@ -155,7 +155,7 @@ fn motion_alone_is_enough_for_motion() {
         bus.init_ps(drive).expect("initialised");
         bus.write_ps(
             drive,
-            Position::new(Mode::Relative, 65_536).expect("a path"),
+            Position::new(PositionMode::Relative, 65_536).expect("a path"),
         )
         .expect("written");
         bus.start_ps(drive).expect("started");

@@ -5,7 +5,7 @@ use super::link;
 use harness::guard::{Guarded, Limits};
 use harness::library::Entry;
 use harness::link::{
-    Capability, Event, Line, Link, Moment, PlacedFault, Recording, Replay, Trouble,
+    Capability, Line, Link, LinkEvent, Moment, PlacedFault, Recording, Replay, Trouble,
 };
 use harness::medium::{Heard, Medium, Out};
 use harness::scenario::plan::Plan;
@@ -36,7 +36,7 @@ fn guarded(text: &str, limits: Limits) -> Outcome {
 
 /// Plays on a link, and again from what was recorded, which must come to the same.
 fn twice(plan: &Plan, link: &mut dyn Link) -> Outcome {
-    let mut events: Vec<Event> = Vec::new();
+    let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::new(link, &mut events);
     let capabilities = recording.capabilities().to_vec();
     recording.begin();

@@ -2,7 +2,7 @@
 
 use super::{DAMAGED, built_in, root, run};
 use harness::capture::Capture;
-use harness::report::svg::{Options, Scale, svg};
+use harness::report::svg::{Options, RowPlacing, svg};
 use harness::report::{csv, vcd};
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -11,7 +11,7 @@ use quick_xml::events::Event;
 const SMALL: &str = "title small\nring 2\ndrive 1 memory FE13 = 88\n! 1->0 byte 9: flip 0\n\
     > 88 FF C0 13 FE D1\n> 80*4 81\n+5ms > 80\n";
 
-fn picture(capture: &Capture, title: &str, scale: Scale) -> String {
+fn picture(capture: &Capture, title: &str, scale: RowPlacing) -> String {
     let options = Options {
         title,
         id: "test",
@@ -50,10 +50,10 @@ fn small_examples() {
     let capture = run(SMALL);
     snapshot("small.csv", &rows(&capture));
     snapshot("small.vcd", &waves(&capture, vcd::Signals::All));
-    snapshot("small.svg", &picture(&capture, "small", Scale::Index));
+    snapshot("small.svg", &picture(&capture, "small", RowPlacing::Index));
     snapshot(
         "small-by-time.svg",
-        &picture(&capture, "small", Scale::Time),
+        &picture(&capture, "small", RowPlacing::Time),
     );
 }
 
@@ -106,7 +106,7 @@ fn every_picture_is_xml_and_readable() {
         "9.5-several-commands",
     ];
     for name in scenarios {
-        for scale in [Scale::Index, Scale::Time] {
+        for scale in [RowPlacing::Index, RowPlacing::Time] {
             let picture = picture(&built_in(name), name, scale);
             let all = elements(&picture);
             let count = |wanted: &str| all.iter().filter(|(name, _)| name == wanted).count();
@@ -122,7 +122,7 @@ fn every_picture_is_xml_and_readable() {
 
 #[test]
 fn the_fault_is_marked_and_described() {
-    let picture = picture(&built_in("9.7-parity-error"), "", Scale::Index);
+    let picture = picture(&built_in("9.7-parity-error"), "", RowPlacing::Index);
     let description = elements(&picture)
         .into_iter()
         .find(|(name, _)| name == "desc")
@@ -146,7 +146,7 @@ fn the_fault_is_marked_and_described() {
 fn hostile_titles_stay_text() {
     let capture = run(SMALL);
     let hostile = "</title><script>alert(1)</script>\"'&amp;\u{0}\u{1b}]0;\u{ffff}<![CDATA[ x ]]>";
-    let picture = picture(&capture, hostile, Scale::Index);
+    let picture = picture(&capture, hostile, RowPlacing::Index);
     let all = elements(&picture);
     assert!(all.iter().all(|(name, _)| name != "script"));
     let (_, title) = all.iter().find(|(name, _)| name == "title").expect("one");
@@ -155,7 +155,7 @@ fn hostile_titles_stay_text() {
     let options = Options {
         title: "",
         id: "x\"><script>",
-        scale: Scale::Index,
+        scale: RowPlacing::Index,
         rate: capture.rate,
         rows: None,
     };
@@ -170,7 +170,7 @@ fn a_long_run_is_cut() {
         "> 88 9C C0 13 FE D1\n> 80*20\n".repeat(120)
     );
     let capture = run(&text);
-    for scale in [Scale::Index, Scale::Time] {
+    for scale in [RowPlacing::Index, RowPlacing::Time] {
         let picture = picture(&capture, "long", scale);
         assert!(picture.len() < 2_000_000, "{} bytes", picture.len());
         assert!(picture.contains("Only the beginning is drawn."));

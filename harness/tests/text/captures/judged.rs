@@ -1,7 +1,7 @@
 //! Captures beside the model, beside each other, and as scenarios.
 
 use super::{DAMAGED, built_in, pcapng, run, text};
-use harness::capture::{Capture, Options, Run, diff, judge, read, scenario};
+use harness::capture::{Capture, ComparedRun, Options, diff, judge, read, scenario};
 use harness::scenario::source::Source;
 use harness::scenario::verdict::Verdict;
 use harness_proto::line::LineError;
@@ -48,11 +48,11 @@ fn what_the_model_did_passes() {
         let text = scenario(&capture, &options(None)).expect("a scenario");
         let again = run(&text);
         let (left, right) = (
-            Run {
+            ComparedRun {
                 name: "capture",
                 capture: &capture,
             },
-            Run {
+            ComparedRun {
                 name: "again",
                 capture: &again,
             },
@@ -200,11 +200,11 @@ fn the_first_difference() {
     let byte = &mut last.expect("octets")[5];
     *byte = LineByte::seen(byte.at, Some(0x80), Some(0x81), Some(LineError::Parity));
     let (a, b) = (
-        Run {
+        ComparedRun {
             name: "a",
             capture: &left,
         },
-        Run {
+        ComparedRun {
             name: "b",
             capture: &right,
         },
@@ -225,7 +225,7 @@ fn the_first_difference() {
     let first = late.traces[0].channels[0].octets_mut();
     let byte = &mut first.expect("octets")[7];
     byte.at += Span::from_millis(1);
-    let b = Run {
+    let b = ComparedRun {
         name: "b",
         capture: &late,
     };
@@ -233,7 +233,7 @@ fn the_first_difference() {
     assert!(diff(a, b, Span::from_millis(1)).same());
     // A link that one side alone has.
     late.traces[0].channels.pop();
-    let b = Run {
+    let b = ComparedRun {
         name: "b",
         capture: &late,
     };

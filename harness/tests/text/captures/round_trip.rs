@@ -1,7 +1,7 @@
 //! A written capture is read back unchanged: bytes, times, line status, on every link.
 
 use super::{DAMAGED, built_in, json, pcapng, root, run};
-use harness::capture::{Capture, Run, diff, read};
+use harness::capture::{Capture, ComparedRun, diff, read};
 use harness_proto::line::{LineError, Rate};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::{Instant, Span};
@@ -116,11 +116,11 @@ fn anything_is_read_back() {
         assert_same(&capture, &again);
         assert_same(&capture, &read(&json(&capture), rate).expect("a capture"));
         let (left, right) = (
-            Run {
+            ComparedRun {
                 name: "a",
                 capture: &capture,
             },
-            Run {
+            ComparedRun {
                 name: "b",
                 capture: &again,
             },

@@ -3,7 +3,7 @@
 use super::devtools::Browser;
 use super::parser::{Element, parse, sound};
 use super::{folder, played};
-use harness::report::html::{Head, Played, run, section};
+use harness::report::html::{Head, ScenarioView, run, section};
 use harness::scenario::run::AtMismatch;
 use serde_json::json;
 
@@ -36,7 +36,7 @@ fn page() -> String {
             record.name = (*text).to_owned();
         }
         let own = format!("{text}\n{calm}");
-        let played = Played {
+        let played = ScenarioView {
             name: text,
             title: text,
             sources: &[(*text).to_owned()],

@@ -9,7 +9,7 @@ mod program;
 
 use harness::library::Entry;
 use harness::link::Link;
-use harness::report::html::{Head, Played, Shown, run, section};
+use harness::report::html::{Head, ScenarioView, ShownScenario, run, section};
 use harness::scenario::run::{AtMismatch, Outcome, play};
 use harness::scenario::simulate::simulated;
 use harness::scenario::source::Source;
@@ -45,7 +45,7 @@ fn played(name: &str, text: &str) -> (Entry, Outcome, Vec<Trace>) {
 }
 
 /// Its section.
-fn shown(number: usize, name: &str, text: &str) -> Shown {
+fn shown(number: usize, name: &str, text: &str) -> ShownScenario {
     let (entry, outcome, traces) = played(name, text);
     let sources: Vec<_> = entry
         .scenario
@@ -54,7 +54,7 @@ fn shown(number: usize, name: &str, text: &str) -> Shown {
         .map(|s| s.text.clone())
         .collect();
     let drives = traces[0].stations.to_string();
-    let own = Played {
+    let own = ScenarioView {
         name: entry.short_name(),
         title: &entry.scenario.title,
         sources: &sources,

@@ -2,7 +2,7 @@
 
 use super::{Bench, program, said};
 use crate::junit_rules::wrong;
-use harness::evidence::{Case, junit};
+use harness::evidence::{JunitCase, junit};
 use harness::scenario::verdict::Verdict;
 use proptest::prelude::*;
 use std::path::Path;
@@ -17,8 +17,8 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-fn case(name: &str, verdict: Verdict, message: &str) -> Case {
-    Case {
+fn case(name: &str, verdict: Verdict, message: &str) -> JunitCase {
+    JunitCase {
         name: name.to_owned(),
         class: "nd21.chapter-9".to_owned(),
         verdict,

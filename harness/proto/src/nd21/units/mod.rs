@@ -34,7 +34,7 @@ pub use motion::{
     slipping_error_from_raw, slipping_error_to_raw, speed_from_raw, speed_to_raw,
     tacho_filter_from_raw, tacho_filter_to_raw, turns_from_raw, turns_in_radians, turns_to_raw,
 };
-pub use scale::{Drive, Scale, Value};
+pub use scale::{DriveUnits, Scale, Value};
 pub use scope::{
     SCOPE_MEASUREMENTS, TriggerDelay, scope_address, scope_period_us, scope_signal, scope_timer0,
     scope_window_us, trigger_delay, trigger_level_from_raw, trigger_level_to_raw,
@@ -47,7 +47,7 @@ use core::fmt;
 
 /// The type of the device, on which the scales of the currents depend (ND21 4.2.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Device {
+pub enum DriveType {
     /// ND21-5605: 5 A rated, 10 A peak.
     Nd5605,
     /// ND21-5610: 10 A rated, 20 A peak.
@@ -58,7 +58,7 @@ pub enum Device {
     Nd5620,
 }
 
-impl Device {
+impl DriveType {
     /// All of them, in the order of the manual's columns.
     pub const ALL: [Self; 4] = [Self::Nd5605, Self::Nd5610, Self::Nd5615, Self::Nd5620];
 
@@ -262,7 +262,7 @@ mod tests {
         for numerator in [i64::MIN, -1, 0, 1, i64::MAX] {
             for denominator in [1, 3, i64::MAX] {
                 let ratio = Ratio::new(numerator, denominator).unwrap();
-                for device in Device::ALL {
+                for device in DriveType::ALL {
                     let _ = momentary_current_to_raw(ratio, device);
                     let _ = effective_current_to_raw(ratio, device);
                     let _ = torque_limit_to_raw(ratio, device);

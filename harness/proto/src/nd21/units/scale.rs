@@ -1,7 +1,7 @@
 //! Which conversion a cell needs.
 
 use super::{
-    Date, Device, Ratio, Reason, SpeedRange, Switched, UnitError, analogue_speed_from_raw,
+    Date, DriveType, Ratio, Reason, SpeedRange, Switched, UnitError, analogue_speed_from_raw,
     analogue_speed_to_raw, angle_from_raw, angle_to_raw, cooler_from_raw, cooler_to_raw,
     effective_current_from_raw, effective_current_to_raw, emf_from_raw, emf_to_raw,
     encoder_impulses, max_speed_from_raw, max_speed_to_raw, momentary_current_from_raw,
@@ -15,9 +15,9 @@ use super::{
 
 /// What a drive's scales depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Drive {
+pub struct DriveUnits {
     /// Its type.
-    pub device: Device,
+    pub device: DriveType,
     /// Its range of speeds.
     pub range: SpeedRange,
 }
@@ -149,7 +149,7 @@ impl Scale {
     /// # Errors
     /// The bytes are outside what the manual gives a meaning to; see the functions of the module.
     #[must_use]
-    pub fn value(self, bytes: &[u8], drive: Drive) -> Option<Result<Value, UnitError>> {
+    pub fn value(self, bytes: &[u8], drive: DriveUnits) -> Option<Result<Value, UnitError>> {
         match *bytes {
             [byte] => self.value_of_byte(byte, drive),
             [high, low] => self.value_of_word([high, low], drive),
@@ -171,7 +171,7 @@ impl Scale {
     /// # Errors
     /// The cell cannot hold the value; see the functions of the module.
     #[must_use]
-    pub fn encode(self, value: Value, drive: Drive) -> Option<Result<u32, UnitError>> {
+    pub fn encode(self, value: Value, drive: DriveUnits) -> Option<Result<u32, UnitError>> {
         let number = match (self, value) {
             (Self::Date, Value::Date(date)) => return Some(Ok(u32::from(date.to_raw()))),
             (Self::Ramp, Value::Off) => {
@@ -183,7 +183,7 @@ impl Scale {
             (_, Value::Exact(number)) => number,
             _ => return None,
         };
-        let Drive { device, range } = drive;
+        let DriveUnits { device, range } = drive;
         let byte = |raw: i8| u32::from(raw.cast_unsigned());
         let word = |raw: i16| u32::from(raw.cast_unsigned());
         Some(match self {
@@ -241,7 +241,7 @@ impl Scale {
         }
     }
 
-    fn value_of_byte(self, byte: u8, drive: Drive) -> Option<Result<Value, UnitError>> {
+    fn value_of_byte(self, byte: u8, drive: DriveUnits) -> Option<Result<Value, UnitError>> {
         let signed = byte.cast_signed();
         let exact = |ratio| Ok(Value::Exact(ratio));
         Some(match self {
@@ -261,7 +261,7 @@ impl Scale {
         })
     }
 
-    fn value_of_word(self, bytes: [u8; 2], drive: Drive) -> Option<Result<Value, UnitError>> {
+    fn value_of_word(self, bytes: [u8; 2], drive: DriveUnits) -> Option<Result<Value, UnitError>> {
         let word = u16::from_be_bytes(bytes);
         let signed = word.cast_signed();
         let exact = |ratio| Ok(Value::Exact(ratio));
@@ -291,8 +291,8 @@ mod tests {
     use super::super::super::eeprom::EEPROM;
     use super::*;
 
-    const DRIVE: Drive = Drive {
-        device: Device::Nd5610,
+    const DRIVE: DriveUnits = DriveUnits {
+        device: DriveType::Nd5610,
         range: SpeedRange::To8000,
     };
 
@@ -325,8 +325,8 @@ mod tests {
     /// Every raw value that stands for a number comes back from it.
     #[test]
     fn every_cell_comes_back() {
-        let drive = Drive {
-            device: Device::Nd5610,
+        let drive = DriveUnits {
+            device: DriveType::Nd5610,
             range: SpeedRange::To8000,
         };
         for cell in RAM.iter().chain(EEPROM).filter(|cell| cell.size <= 2) {

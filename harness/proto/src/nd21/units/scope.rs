@@ -101,7 +101,7 @@ pub const fn scope_signal(address: u16) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Device, momentary_current_to_raw};
+    use super::super::{DriveType, momentary_current_to_raw};
     use super::*;
 
     /// ND21 14.10.6.2: with 0 a measurement every 108 us and 27,648 ms in all. The printed formula
@@ -122,7 +122,7 @@ mod tests {
     /// ND21 14.10.6.3: -7 A on a 5610 are H'E3, and H'63 in `scope_level`.
     #[test]
     fn trigger_threshold_of_14_10_6_3() {
-        let level = momentary_current_to_raw(Ratio::whole(-7), Device::Nd5610).unwrap();
+        let level = momentary_current_to_raw(Ratio::whole(-7), DriveType::Nd5610).unwrap();
         assert_eq!(trigger_level_to_raw(level), 0x63);
         for raw in 0..=u8::MAX {
             assert_eq!(trigger_level_to_raw(trigger_level_from_raw(raw)), raw);

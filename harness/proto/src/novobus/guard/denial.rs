@@ -1,6 +1,6 @@
 //! Why a byte did not pass.
 
-use super::effect::Act;
+use super::effect::DriveAct;
 use super::known::Facts;
 use super::limits::Need;
 use crate::nd21::cells::cell_at;
@@ -29,14 +29,14 @@ pub enum Cause {
     /// With it a drive would do what the rig does not allow.
     NotAllowed {
         /// What.
-        act: Act,
+        act: DriveAct,
         /// What leave is missing.
         missing: Need,
     },
     /// It writes a speed above `max_speed`.
     TooFast {
         /// What.
-        act: Act,
+        act: DriveAct,
         /// `max_speed` in rpm.
         most: u16,
         /// The drive's range of speeds; `None` where it was not read, and a bit counts as in the range to 12000 rpm.
@@ -45,14 +45,14 @@ pub enum Cause {
     /// It writes a part of a speed, so that the whole one is not known.
     HalfSpeed {
         /// What.
-        act: Act,
+        act: DriveAct,
         /// `max_speed` in rpm.
         most: u16,
     },
     /// A motor could turn faster than `max_speed` by it.
     Faster {
         /// What.
-        act: Act,
+        act: DriveAct,
         /// `max_speed` in rpm.
         most: u16,
         /// The section of the manual.
@@ -63,7 +63,7 @@ pub enum Cause {
     /// A motor would turn at a speed that the drive holds, and it is not known that this is within `max_speed`.
     NotKnown {
         /// What.
-        act: Act,
+        act: DriveAct,
         /// `max_speed` in rpm.
         most: u16,
         /// The facts that are not known.
@@ -186,7 +186,7 @@ impl fmt::Display for Denial {
 
 impl core::error::Error for Denial {}
 
-impl fmt::Display for Act {
+impl fmt::Display for DriveAct {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Read => f.write_str("a read")?,

@@ -14,7 +14,7 @@ use crate::novobus::output::OutputChange;
 
 /// Something that a drive would do at a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Act {
+pub enum DriveAct {
     /// `ReadByte`, `ReadWord`, `ReadLong` (ND21 10.1).
     Read,
     /// `WriteByte` (10.2): address and data.
@@ -232,7 +232,7 @@ fn note_byte(address: u16, change: Change, known: &mut Known) {
     }
 }
 
-impl Act {
+impl DriveAct {
     /// What it needs of a rig, where nothing is known of the drives.
     #[must_use]
     pub fn need(self) -> Need {

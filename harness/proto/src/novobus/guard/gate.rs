@@ -1,7 +1,7 @@
 //! The guard itself: takes bytes and permits or denies each one.
 
 use super::denial::{Cause, Denial};
-use super::effect::Act;
+use super::effect::DriveAct;
 use super::known::{Found, Known};
 use super::limits::Limits;
 use super::stage::Stage;
@@ -93,7 +93,7 @@ enum Parameter {
     /// A half command, with the byte.
     Half(Half),
     /// A command is complete.
-    Complete(Act),
+    Complete(DriveAct),
     /// It puts a drive into the error mode.
     Error,
 }
@@ -367,12 +367,12 @@ impl Guard {
                     Process::High => {
                         // If zeros must end this telegram, the low byte is one of them.
                         let data = u16::from(byte) << 8;
-                        Act::ProcessData(data).judge(&self.limits, self.known(key))?;
+                        DriveAct::ProcessData(data).judge(&self.limits, self.known(key))?;
                         (Process::Low(byte), None)
                     }
                     Process::Low(high) => {
                         let data = u16::from_be_bytes([high, byte]);
-                        Act::ProcessData(data).judge(&self.limits, self.known(key))?;
+                        DriveAct::ProcessData(data).judge(&self.limits, self.known(key))?;
                         (Process::None, None)
                     }
                     Process::None if key < FIRST_ADDRESS => (Process::None, None),
@@ -391,8 +391,8 @@ impl Guard {
                         ..Next::to(state)
                     },
                     Some(Parameter::Error) => Next::to(in_doubt(byte)),
-                    Some(Parameter::Complete(Act::Reset)) => Next {
-                        act: Some((key, Act::Reset)),
+                    Some(Parameter::Complete(DriveAct::Reset)) => Next {
+                        act: Some((key, DriveAct::Reset)),
                         ..Next::to(in_doubt(byte))
                     },
                     Some(Parameter::Complete(act)) => Next {
@@ -422,7 +422,7 @@ impl Guard {
             Err(_) => return Ok(Next::to(in_doubt(byte))),
         };
         if header.process_data() {
-            Act::ProcessDataToCome.judge(&self.limits, &Known::default())?;
+            DriveAct::ProcessDataToCome.judge(&self.limits, &Known::default())?;
         }
         let key = match (header.addressing(), self.kept) {
             (Addressing::AddressFollows, _) => return Ok(Next::to(State::Address(header))),
@@ -441,7 +441,7 @@ impl Guard {
     /// Whether the addressed drive may be given process data: judged before the first of them, with the nominal speed 0.
     fn may_have_process_data(&self, header: Header, key: u8) -> Result<(), Cause> {
         if header.process_data() && key >= FIRST_ADDRESS {
-            Act::ProcessData(0).judge(&self.limits, self.known(key))?;
+            DriveAct::ProcessData(0).judge(&self.limits, self.known(key))?;
         }
         Ok(())
     }
@@ -454,7 +454,7 @@ impl Guard {
             return Ok(Parameter::Error);
         }
         let Some(length) = length(sent.first().copied().unwrap_or(byte)) else {
-            Act::Unknown(byte).judge(&self.limits, self.known(key))?;
+            DriveAct::Unknown(byte).judge(&self.limits, self.known(key))?;
             return Ok(Parameter::Error);
         };
         if sent.len() < length {
@@ -462,13 +462,13 @@ impl Guard {
             // A drive that takes 00 for the checking byte of such a command would execute it at a zero of the recovery.
             if half.sent().len() == length
                 && Checksum::over(half.sent()) == Checksum::EMPTY
-                && let Some(act) = Act::of(half.sent())
+                && let Some(act) = DriveAct::of(half.sent())
             {
                 act.judge(&self.limits, self.known(key))?;
             }
             return Ok(Parameter::Half(half));
         }
-        match Act::of(sent) {
+        match DriveAct::of(sent) {
             Some(act) if Checksum::over(sent).plus() == byte => {
                 act.judge(&self.limits, self.known(key))?;
                 Ok(Parameter::Complete(act))
@@ -484,7 +484,7 @@ struct Next {
     half: Option<(u8, Half)>,
     kept: Option<Option<u8>>,
     /// A command that the drive of this address byte executes.
-    act: Option<(u8, Act)>,
+    act: Option<(u8, DriveAct)>,
     recovered: bool,
 }
 

@@ -69,22 +69,22 @@ impl Limits {
 
     /// The same with one setting changed so that it denies nothing.
     #[must_use]
-    pub const fn without(self, setting: Setting) -> Self {
+    pub const fn without(self, setting: LimitSetting) -> Self {
         let mut more = self;
         match setting {
-            Setting::Motion => more.motion = true,
-            Setting::Eeprom => more.eeprom = true,
-            Setting::Reset => more.reset = true,
-            Setting::Outputs => more.outputs = true,
-            Setting::Monitoring => more.monitoring = true,
-            Setting::MaxSpeed => more.max_speed = None,
-            Setting::BytesPerSecond => more.bytes_per_second = None,
+            LimitSetting::Motion => more.motion = true,
+            LimitSetting::Eeprom => more.eeprom = true,
+            LimitSetting::Reset => more.reset = true,
+            LimitSetting::Outputs => more.outputs = true,
+            LimitSetting::Monitoring => more.monitoring = true,
+            LimitSetting::MaxSpeed => more.max_speed = None,
+            LimitSetting::BytesPerSecond => more.bytes_per_second = None,
         }
         more
     }
 
     /// The settings that deny something for this reason.
-    pub fn denying(&self, cause: Cause) -> impl Iterator<Item = Setting> {
+    pub fn denying(&self, cause: Cause) -> impl Iterator<Item = LimitSetting> {
         let limits = *self;
         let need = match cause {
             Cause::NotAllowed { missing, .. } => missing,
@@ -97,16 +97,18 @@ impl Limits {
             Cause::TooMany { .. } | Cause::TooLong { .. } | Cause::Closed => Need::NONE,
         };
         let rate = matches!(cause, Cause::TooMany { .. });
-        Setting::ALL
+        LimitSetting::ALL
             .into_iter()
             .filter(move |setting| match setting {
-                Setting::Motion => need.contains(Need::MOTION) && !limits.motion,
-                Setting::Eeprom => need.contains(Need::EEPROM) && !limits.eeprom,
-                Setting::Reset => need.contains(Need::RESET) && !limits.reset,
-                Setting::Outputs => need.contains(Need::OUTPUTS) && !limits.outputs,
-                Setting::Monitoring => need.contains(Need::MONITORING) && !limits.monitoring,
-                Setting::MaxSpeed => need.contains(Need::ANY_SPEED) && limits.max_speed.is_some(),
-                Setting::BytesPerSecond => rate,
+                LimitSetting::Motion => need.contains(Need::MOTION) && !limits.motion,
+                LimitSetting::Eeprom => need.contains(Need::EEPROM) && !limits.eeprom,
+                LimitSetting::Reset => need.contains(Need::RESET) && !limits.reset,
+                LimitSetting::Outputs => need.contains(Need::OUTPUTS) && !limits.outputs,
+                LimitSetting::Monitoring => need.contains(Need::MONITORING) && !limits.monitoring,
+                LimitSetting::MaxSpeed => {
+                    need.contains(Need::ANY_SPEED) && limits.max_speed.is_some()
+                }
+                LimitSetting::BytesPerSecond => rate,
             })
     }
 
@@ -138,7 +140,7 @@ impl Limits {
 
 /// A setting of a rig's `[limits]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Setting {
+pub enum LimitSetting {
     /// [`Limits::motion`].
     Motion,
     /// [`Limits::eeprom`].
@@ -155,7 +157,7 @@ pub enum Setting {
     BytesPerSecond,
 }
 
-impl Setting {
+impl LimitSetting {
     /// Those that permit something.
     pub const PERMISSIONS: [Self; 5] = [
         Self::Motion,
@@ -177,7 +179,7 @@ impl Setting {
 }
 
 /// The change of the setting that permits more.
-impl fmt::Display for Setting {
+impl fmt::Display for LimitSetting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Motion => "`allow_motion`",

@@ -49,8 +49,8 @@ mod table;
 mod tests;
 
 pub use denial::{Cause, Denial};
-pub use effect::Act;
+pub use effect::DriveAct;
 pub use gate::Guard;
 pub use known::{Configuration, Facts, Found};
-pub use limits::{Limits, Need, Setting};
+pub use limits::{LimitSetting, Limits, Need};
 pub use stage::Stage;

@@ -1,7 +1,7 @@
 //! Tests of the table and of the gate: what is denied, and where doubt begins, each seen by itself. What drives would make of
 //! all of it is the property's business (`harness/tests/bus/guard`).
 
-use super::{Act, Cause, Guard, Limits, Need};
+use super::{Cause, DriveAct, Guard, Limits, Need};
 use crate::nd21::ram;
 use crate::novobus::address::RingSize;
 use crate::novobus::check_sequence::CHECK_SEQUENCE;
@@ -189,7 +189,7 @@ fn where_doubt_begins() {
 /// ND21 14.10.3: `DataIn` may point at a cell where any word may be written, so that a drive can be given back the value that it held.
 #[test]
 fn data_in_needs_what_the_cell_needs_that_it_points_at() {
-    let points_at = |address: u16| Act::WriteByte(ram::DATA_IN, address.to_be_bytes()[1]);
+    let points_at = |address: u16| DriveAct::WriteByte(ram::DATA_IN, address.to_be_bytes()[1]);
     let motion = Limits {
         motion: true,
         ..Limits::default()

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 /// When the rounds of the exchange begin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pace {
+pub enum CyclePace {
     /// One after another. A job for a drive that takes no part gets a telegram between two
     /// rounds.
     #[default]
@@ -22,9 +22,9 @@ pub enum Pace {
 #[derive(Clone, Debug)]
 pub(super) struct Cycle {
     drives: Vec<u8>,
-    pace: Pace,
+    pace: CyclePace,
     /// The list to come, once every answer for the present one is in.
-    change: Option<(Vec<u8>, Pace)>,
+    change: Option<(Vec<u8>, CyclePace)>,
     /// Telegrams composed and answered, in rounds of `drives`.
     composed: u64,
     answered: u64,
@@ -38,7 +38,7 @@ impl Cycle {
     pub(super) fn new(ring: RingSize) -> Self {
         Self {
             drives: Vec::new(),
-            pace: Pace::default(),
+            pace: CyclePace::default(),
             change: None,
             composed: 0,
             answered: 0,
@@ -50,7 +50,7 @@ impl Cycle {
     }
 
     /// Sets which drives take part, in ascending order.
-    pub(super) fn set(&mut self, drives: Vec<u8>, pace: Pace) {
+    pub(super) fn set(&mut self, drives: Vec<u8>, pace: CyclePace) {
         self.change = Some((drives, pace));
     }
 
@@ -105,9 +105,9 @@ impl Cycle {
         }
         !self.drives.is_empty()
             && match self.pace {
-                Pace::Continuous => true,
-                Pace::Every(_) => now >= self.due,
-                Pace::OnRequest => self.requested > 0,
+                CyclePace::Continuous => true,
+                CyclePace::Every(_) => now >= self.due,
+                CyclePace::OnRequest => self.requested > 0,
             }
     }
 
@@ -117,7 +117,7 @@ impl Cycle {
         let drive = *self.drives.get(position)?;
         if position == 0 {
             self.requested = self.requested.saturating_sub(1);
-            if let Pace::Every(period) = self.pace {
+            if let CyclePace::Every(period) = self.pace {
                 // From the time at which it was due, so that a late start does not shift the rest; but
                 // rounds that were missed are not caught up with.
                 self.due = (self.due + period).max(now);

@@ -1,6 +1,6 @@
 //! What a master reports, and what it counts.
 
-use super::fault::{Fault, Stop};
+use super::fault::{BusStop, Fault};
 use super::job::{JobId, Outcome};
 use alloc::collections::VecDeque;
 
@@ -38,7 +38,7 @@ pub enum Event {
         attempts: u8,
     },
     /// The bus has been stopped; nothing more is sent.
-    Stopped(Stop),
+    Stopped(BusStop),
 }
 
 /// What a master has done since it was made.

@@ -6,14 +6,14 @@ use core::fmt;
 
 /// An end of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum End {
+pub enum LinkEnd {
     /// The master.
     Master,
     /// A drive.
     Drive(u8),
 }
 
-impl fmt::Display for End {
+impl fmt::Display for LinkEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Master => f.write_str("the master"),
@@ -26,9 +26,9 @@ impl fmt::Display for End {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct RingLink {
     /// The end that sends.
-    pub from: End,
+    pub from: LinkEnd,
     /// The end that receives.
-    pub to: End,
+    pub to: LinkEnd,
 }
 
 impl RingLink {
@@ -38,11 +38,11 @@ impl RingLink {
     pub const fn into(ring: RingSize, drive: u8) -> Self {
         Self {
             from: if drive >= ring.first() {
-                End::Master
+                LinkEnd::Master
             } else {
-                End::Drive(drive + 1)
+                LinkEnd::Drive(drive + 1)
             },
-            to: End::Drive(drive),
+            to: LinkEnd::Drive(drive),
         }
     }
 
@@ -50,8 +50,8 @@ impl RingLink {
     #[must_use]
     pub const fn last() -> Self {
         Self {
-            from: End::Drive(0),
-            to: End::Master,
+            from: LinkEnd::Drive(0),
+            to: LinkEnd::Master,
         }
     }
 }
@@ -157,14 +157,14 @@ impl fmt::Display for Fault {
 
 /// Why a bus was stopped (ND21 11.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Stop {
+pub struct BusStop {
     /// What was wrong when the last recovery had failed.
     pub fault: Fault,
     /// How many recoveries had not helped.
     pub attempts: u8,
 }
 
-impl fmt::Display for Stop {
+impl fmt::Display for BusStop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -174,4 +174,4 @@ impl fmt::Display for Stop {
     }
 }
 
-impl core::error::Error for Stop {}
+impl core::error::Error for BusStop {}

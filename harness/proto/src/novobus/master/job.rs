@@ -3,7 +3,7 @@
 use super::super::address::{AddressError, RingSize};
 use super::super::command::{Command, Kind};
 use super::super::memory::{in_range, ranges};
-use super::fault::{Fault, Stop};
+use super::fault::{BusStop, Fault};
 use core::fmt;
 
 /// The number of a job; a later job has a greater one.
@@ -109,7 +109,7 @@ pub enum Refused {
         capacity: u16,
     },
     /// The bus has been stopped.
-    Stopped(Stop),
+    Stopped(BusStop),
 }
 
 impl fmt::Display for Refused {
@@ -149,7 +149,7 @@ pub enum Outcome {
     /// before the bus stopped.
     Unknown(Fault),
     /// It did not run (a read: has no result), and the bus is stopped.
-    Failed(Stop),
+    Failed(BusStop),
 }
 
 /// What a read brought, in memory order: byte 0 stands at the lowest address.

@@ -73,14 +73,14 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-pub use cycle::Pace;
+pub use cycle::CyclePace;
 pub use event::{Counters, Event};
-pub use fault::{End, Fault, RingLink, Stop};
+pub use fault::{BusStop, Fault, LinkEnd, RingLink};
 pub use job::{Data, Job, JobId, Outcome, Refused, Repeat};
 pub use options::{Options, Packing};
 
 use super::address::RingSize;
-use super::check_sequence::{CHECK_SEQUENCE, Watch};
+use super::check_sequence::{CHECK_SEQUENCE, SequenceWatch};
 use super::sync::{PAUSE, SYNCO};
 use crate::line::{Rate, Received};
 use crate::time::{Instant, Span};
@@ -238,7 +238,7 @@ impl Master {
     ///
     /// # Errors
     /// [`Refused::Drive`] where the ring has not all of them.
-    pub fn set_exchange(&mut self, drives: &[u8], pace: Pace) -> Result<(), Refused> {
+    pub fn set_exchange(&mut self, drives: &[u8], pace: CyclePace) -> Result<(), Refused> {
         let mut list: Vec<u8> = drives.to_vec();
         for &drive in drives {
             self.ring.address_byte(drive).map_err(Refused::Drive)?;
@@ -250,7 +250,7 @@ impl Master {
         Ok(())
     }
 
-    /// Lets one more round begin, at [`Pace::OnRequest`].
+    /// Lets one more round begin, at [`CyclePace::OnRequest`].
     pub fn start_round(&mut self) {
         self.cycle.request();
     }
@@ -335,7 +335,7 @@ impl Master {
     }
 
     /// Lets out the next byte of the check sequence.
-    fn reset_byte(&mut self, next: u8, watch: Watch, now: Instant) -> Option<u8> {
+    fn reset_byte(&mut self, next: u8, watch: SequenceWatch, now: Instant) -> Option<u8> {
         let next = usize::from(next);
         let byte = *CHECK_SEQUENCE.get(next)?;
         self.counters.sent += 1;

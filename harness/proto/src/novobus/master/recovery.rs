@@ -1,10 +1,10 @@
 //! Recovery: from the first wrong byte back to normal operation, or to a stopped bus (ND21 9.7-9.9, 11.5).
 
 use super::super::address::RingSize;
-use super::super::check_sequence::{Progress, Watch};
+use super::super::check_sequence::{SequenceProgress, SequenceWatch};
 use super::diagnosis::{Cause, Evidence, NO_TELEGRAM, SPELLING, Spelled};
 use super::event::Event;
-use super::fault::{Fault, RingLink, Stop};
+use super::fault::{BusStop, Fault, RingLink};
 use super::in_flight::{BytePlace, Owner};
 use super::job::{JobId, Outcome};
 use super::store::Entry;
@@ -30,10 +30,10 @@ pub(super) enum State {
     /// The sequence begins to come back before all of it is sent: in a small ring two bytes later.
     Resetting {
         next: u8,
-        watch: Watch,
+        watch: SequenceWatch,
     },
     Verifying {
-        watch: Watch,
+        watch: SequenceWatch,
         heard: bool,
         until: Instant,
     },
@@ -41,7 +41,7 @@ pub(super) enum State {
     Draining {
         until: Instant,
     },
-    Stopped(Stop),
+    Stopped(BusStop),
 }
 
 impl State {
@@ -52,7 +52,7 @@ impl State {
     pub(super) fn resetting() -> Self {
         Self::Resetting {
             next: 0,
-            watch: Watch::default(),
+            watch: SequenceWatch::default(),
         }
     }
 
@@ -263,7 +263,7 @@ impl Master {
             }
             _ => return,
         };
-        if watch.see(received.byte, received.error.is_none()) == Progress::Complete {
+        if watch.see(received.byte, received.error.is_none()) == SequenceProgress::Complete {
             // All drives are back in normal mode; the bytes sent behind the sequence come next.
             if self.episode.count || !self.episode.ran {
                 self.state = State::counting();
@@ -303,7 +303,7 @@ impl Master {
 
     /// The bus is stopped; every job ends.
     fn stop(&mut self, fault: Fault) {
-        let stop = Stop {
+        let stop = BusStop {
             fault,
             attempts: self.options.attempts,
         };

@@ -147,7 +147,7 @@ proptest! {
         for &k in &exchange {
             master.set_nominal(k, 0xA500 | u16::from(k)).expect("a drive");
         }
-        master.set_exchange(&exchange, Pace::OnRequest).expect("drives");
+        master.set_exchange(&exchange, CyclePace::OnRequest).expect("drives");
         for _ in 0..200 {
             master.start_round();
         }

@@ -5,8 +5,8 @@ use super::proxy::{Counts, Proxy, monitors, seen};
 use crate::novobus::device::Device;
 use crate::novobus::drive::Drive;
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{BusEnd, Deadline, Place, Step};
-use harness_proto::novobus::check_sequence::{Progress, SEQUENCE, Watch};
+use harness_proto::novobus::bus_end::{BusEnd, Deadline, Place, Reaction};
+use harness_proto::novobus::check_sequence::{SEQUENCE, SequenceProgress, SequenceWatch};
 use harness_proto::novobus::command::Field;
 use harness_proto::novobus::error::BusError;
 use harness_proto::novobus::error_mode::Marks;
@@ -25,7 +25,7 @@ pub struct Deviant {
     held: VecDeque<(Deadline, u8)>,
     nth: u64,
     zeros: u8,
-    watch: Watch,
+    watch: SequenceWatch,
     /// How many bytes of a check sequence have come in their order since the drive went into the error mode.
     in_order: usize,
     counts: Counts,
@@ -43,7 +43,7 @@ impl Deviant {
             held: VecDeque::new(),
             nth: 0,
             zeros: 0,
-            watch: Watch::default(),
+            watch: SequenceWatch::default(),
             in_order: 0,
             counts: Counts::default(),
             before_the_error: None,
@@ -229,7 +229,7 @@ fn write(cells: &mut crate::novobus::cells::Cells, address: u16, word: bool, val
 }
 
 impl Device for Deviant {
-    fn receive(&mut self, now: Instant, received: Received) -> Step {
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction {
         self.nth += 1;
         let zeros_before = self.zeros;
         self.zeros = if received.is(0) {
@@ -253,8 +253,8 @@ impl Device for Deviant {
             zeros_before,
             matched,
             in_order: begun < self.in_order && self.in_order == SEQUENCE.len(),
-            sequence: progress == Progress::Complete,
-            step: Step::default(),
+            sequence: progress == SequenceProgress::Complete,
+            step: Reaction::default(),
         };
         let heard = self.heard(&moment);
         let keeps = self.deviations.iter().any(|d| matches!(d.how, How::Keeps));
@@ -269,7 +269,7 @@ impl Device for Deviant {
         self.count(&moment);
         let (byte, twice) = self.said(&moment);
         let byte = self.told(&moment, byte);
-        Step {
+        Reaction {
             byte: self.send(now, byte, twice),
             marks: moment.step.marks,
         }
@@ -295,23 +295,23 @@ impl Device for Deviant {
         }
     }
 
-    fn handle_deadline(&mut self, now: Instant) -> Step {
+    fn handle_deadline(&mut self, now: Instant) -> Reaction {
         let due = match self.held.front() {
             Some((Deadline::At(at), _)) => *at <= now,
             Some((Deadline::LineFree(_), _)) => true,
             None => false,
         };
         if due {
-            return Step {
+            return Reaction {
                 byte: self.held.pop_front().map(|(_, byte)| byte),
-                ..Step::default()
+                ..Reaction::default()
             };
         }
         let place = self.place();
         let step = self.with(place, |bus_end, memory| {
             bus_end.handle_deadline(now, memory)
         });
-        Step {
+        Reaction {
             byte: self.send(now, step.byte, false),
             marks: step.marks,
         }
@@ -338,7 +338,7 @@ impl Device for Deviant {
         self.held.clear();
         self.nth = 0;
         self.zeros = 0;
-        self.watch = Watch::default();
+        self.watch = SequenceWatch::default();
         self.in_order = 0;
         self.counts = Counts::default();
         self.before_the_error = None;

@@ -2,7 +2,7 @@
 
 use super::{behind, cells, channel, errors, numbered, recovery, telegram};
 use harness_proto::line::{LineError, Received};
-use harness_proto::novobus::bus_end::{Deadline, Parameter, Place, Step};
+use harness_proto::novobus::bus_end::{Deadline, Parameter, Place, Reaction};
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Field, Kind, Reply};
 use harness_proto::novobus::error::BusError;
@@ -80,7 +80,7 @@ pub(super) struct Moment {
     /// Whether it completes the five bytes of a check sequence.
     pub(super) sequence: bool,
     /// What the drive made of it; nothing while it is only heard.
-    pub(super) step: Step,
+    pub(super) step: Reaction,
 }
 
 /// Bit 6 of a sync byte: "the next drive" (ND21 9.2).

@@ -4,11 +4,11 @@ use super::LONGEST;
 use crate::novobus::device::Device as _;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::reference;
-use crate::novobus::transitions::tour::Stimulus;
+use crate::novobus::transitions::tour::TourStep;
 use crate::novobus::transitions::{Event, Notes, Reached, State, Watched};
 use harness_proto::line::Received;
 use harness_proto::nd21;
-use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::bus_end::{Deadline, Reaction};
 use harness_proto::novobus::properties::Properties;
 use harness_proto::time::{Instant, Span};
 
@@ -40,11 +40,11 @@ pub fn bus_end_watched<N: Notes>(data: &[u8]) -> N {
     let mut model = (options & 1 == 0).then(reference::Drive::new);
     let mut now = Instant::START;
     let mut wire = &wire[..wire.len().min(LONGEST)];
-    while let Some(stimulus) = Stimulus::decode(&mut wire) {
+    while let Some(stimulus) = TourStep::decode(&mut wire) {
         now += Span::from_micros(287);
         match stimulus {
-            Stimulus::Silence => silence(&mut drive, &mut now),
-            Stimulus::Byte(received) => byte(&mut drive, now, received, &mut model),
+            TourStep::Silence => silence(&mut drive, &mut now),
+            TourStep::Byte(received) => byte(&mut drive, now, received, &mut model),
         }
         // Nor is what a case that switches them on does from there.
         model = model.filter(|_| drive.deadline().is_none());
@@ -74,7 +74,7 @@ fn byte<N: Notes>(
 ) {
     let cell = drive.transition(received);
     let was_in_error = drive.in_error();
-    let Step { byte, .. } = drive.receive(now, received);
+    let Reaction { byte, .. } = drive.receive(now, received);
     // 9.2: PAUSE alone gets no answer.
     assert_eq!(byte.is_none(), cell.event == Event::Pause, "{cell}");
     if was_in_error {

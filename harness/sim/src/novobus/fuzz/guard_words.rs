@@ -3,7 +3,7 @@
 use super::features::{Feature, Notebook};
 use super::words;
 use harness_proto::novobus::command::layout;
-use harness_proto::novobus::guard::{Act, Cause, Denial, Guard, Need, Stage};
+use harness_proto::novobus::guard::{Cause, Denial, DriveAct, Guard, Need, Stage};
 use harness_proto::novobus::properties::ReadLongAnswer;
 use harness_proto::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte};
 
@@ -142,18 +142,18 @@ const fn why(cause: &Cause) -> &'static str {
     }
 }
 
-const fn name(act: &Act) -> &'static str {
+const fn name(act: &DriveAct) -> &'static str {
     match act {
-        Act::Read => "read",
-        Act::WriteByte(..) => "WriteByte",
-        Act::WriteWord(..) => "WriteWord",
-        Act::And(..) => "And",
-        Act::Or(..) => "Or",
-        Act::WriteIo(_) => "WriteIO",
-        Act::Reset => "ResetH8",
-        Act::ProcessDataToCome => "process data to come",
-        Act::ProcessData(_) => "process data",
-        Act::Unknown(_) => "unknown command byte",
+        DriveAct::Read => "read",
+        DriveAct::WriteByte(..) => "WriteByte",
+        DriveAct::WriteWord(..) => "WriteWord",
+        DriveAct::And(..) => "And",
+        DriveAct::Or(..) => "Or",
+        DriveAct::WriteIo(_) => "WriteIO",
+        DriveAct::Reset => "ResetH8",
+        DriveAct::ProcessDataToCome => "process data to come",
+        DriveAct::ProcessData(_) => "process data",
+        DriveAct::Unknown(_) => "unknown command byte",
     }
 }
 

@@ -7,7 +7,7 @@ use crate::novobus::reference;
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, Kind};
-use harness_proto::novobus::master::{Event, Job, JobId, Master, Options, Pace, Phase};
+use harness_proto::novobus::master::{CyclePace, Event, Job, JobId, Master, Options, Phase};
 use harness_proto::novobus::output::OutputChange;
 use harness_proto::time::Instant;
 
@@ -82,7 +82,7 @@ impl Play {
             0xFC => return self.give(notes),
             0xF9 => {
                 let all: Vec<u8> = (0..self.size.drives()).collect();
-                let _all_of_the_ring = self.master.set_exchange(&all, Pace::Continuous);
+                let _all_of_the_ring = self.master.set_exchange(&all, CyclePace::Continuous);
                 return;
             }
             _ => {}

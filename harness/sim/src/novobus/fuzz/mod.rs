@@ -39,7 +39,7 @@ use harness_proto::novobus::decode::Decoded;
 use harness_proto::novobus::telegram::Telegram;
 
 /// A target: its name, which is that of its folder in `corpora/fuzz`, and its body.
-pub type Target = (&'static str, fn(&[u8]));
+pub type FuzzTarget = (&'static str, fn(&[u8]));
 
 /// A target that feeds drives raw bytes, and tells which transitions they went through.
 pub type Watching = (&'static str, fn(&[u8]) -> Reached);
@@ -52,7 +52,7 @@ pub const WATCHING: [Watching; 3] = [
 ];
 
 /// Every target whose body is here.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [FuzzTarget; 9] = [
     ("bus_end", bus_end),
     ("codec", codec_stream),
     ("detector", detector),

@@ -1,6 +1,6 @@
 //! The matrix: what it says of itself, and the tour through it.
 
-use super::tour::{Stimulus, file, stimulus, way};
+use super::tour::{TourStep, file, stimulus, way};
 use super::*;
 use crate::novobus::device::Device;
 use crate::novobus::plain::PlainDrive;
@@ -19,13 +19,13 @@ fn monitored() -> Watched {
     Watched::new(PlainDrive::new(Properties::default(), eeprom))
 }
 
-fn feed(drive: &mut Watched, now: &mut Instant, stimulus: Stimulus) {
+fn feed(drive: &mut Watched, now: &mut Instant, stimulus: TourStep) {
     *now += Span::from_micros(287);
     match stimulus {
-        Stimulus::Byte(received) => {
+        TourStep::Byte(received) => {
             drive.receive(*now, received);
         }
-        Stimulus::Silence => {
+        TourStep::Silence => {
             if let Some(Deadline::At(at) | Deadline::LineFree(at)) = drive.deadline() {
                 *now = at.max(*now);
                 drive.handle_deadline(*now);
@@ -142,10 +142,10 @@ fn random_runs_stay_within_the_matrix() {
         for _ in 0..60 {
             let byte = likely[(random() % 16) as usize];
             let stimulus = match random() % 40 {
-                0 => Stimulus::Silence,
-                1 => Stimulus::decode(&mut &[0xFF, (random() % 4) as u8, byte][..])
+                0 => TourStep::Silence,
+                1 => TourStep::decode(&mut &[0xFF, (random() % 4) as u8, byte][..])
                     .expect("a whole one"),
-                _ => Stimulus::Byte(harness_proto::line::Received::good(byte)),
+                _ => TourStep::Byte(harness_proto::line::Received::good(byte)),
             };
             feed(&mut drive, &mut now, stimulus);
         }
@@ -163,8 +163,8 @@ fn a_drive_knows_its_inbound_link_only() {
         .iter()
         .flat_map(|state| way(*state))
         .filter_map(|step| match step {
-            Stimulus::Byte(received) => Some(received.byte),
-            Stimulus::Silence => None,
+            TourStep::Byte(received) => Some(received.byte),
+            TourStep::Silence => None,
         })
         .chain(harness_proto::novobus::check_sequence::CHECK_SEQUENCE)
         .chain([0x88, 0xFD, 0xC0, 0x13, 0xFE, 0xD1])
@@ -190,7 +190,7 @@ fn stimuli_are_read_as_they_are_written() {
         let mut bytes = Vec::new();
         stimulus.encode(&mut bytes);
         let mut rest = &bytes[..];
-        assert_eq!(Stimulus::decode(&mut rest), Some(stimulus));
+        assert_eq!(TourStep::decode(&mut rest), Some(stimulus));
         assert!(rest.is_empty());
     }
 }

@@ -7,14 +7,14 @@ use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 
 /// What happens to a bus end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stimulus {
+pub enum TourStep {
     /// A byte arrives.
     Byte(Received),
     /// Nothing arrives until something is due.
     Silence,
 }
 
-impl Stimulus {
+impl TourStep {
     const fn good(byte: u8) -> Self {
         Self::Byte(Received::good(byte))
     }
@@ -54,8 +54,8 @@ impl Stimulus {
 
 /// The way to a state for a drive that waits for a sync byte and has seen no address byte, with time-outs monitored.
 #[must_use]
-pub fn way(state: State) -> Vec<Stimulus> {
-    let bytes = |bytes: &[u8]| bytes.iter().copied().map(Stimulus::good).collect();
+pub fn way(state: State) -> Vec<TourStep> {
+    let bytes = |bytes: &[u8]| bytes.iter().copied().map(TourStep::good).collect();
     if let Some(way) = telegram(state) {
         return bytes(way);
     }
@@ -93,11 +93,11 @@ pub fn way(state: State) -> Vec<Stimulus> {
     };
     // The first byte received arms the monitoring (9.9).
     let arms = if silences > 0 { &[0x80][..] } else { &[] };
-    let mut way: Vec<Stimulus> = bytes(arms);
-    way.extend(std::iter::repeat_n(Stimulus::Silence, silences));
-    way.extend(std::iter::repeat_n(Stimulus::good(1), others));
-    way.extend(std::iter::repeat_n(Stimulus::good(0), zeros));
-    way.extend(SEQUENCE[..sequence].iter().copied().map(Stimulus::good));
+    let mut way: Vec<TourStep> = bytes(arms);
+    way.extend(std::iter::repeat_n(TourStep::Silence, silences));
+    way.extend(std::iter::repeat_n(TourStep::good(1), others));
+    way.extend(std::iter::repeat_n(TourStep::good(0), zeros));
+    way.extend(SEQUENCE[..sequence].iter().copied().map(TourStep::good));
     way
 }
 
@@ -130,16 +130,16 @@ const fn telegram(state: State) -> Option<&'static [u8]> {
 
 /// The stimulus that causes the event of a cell in its state; `None` for an unreachable cell.
 #[must_use]
-pub fn stimulus(cell: Transition) -> Option<Stimulus> {
+pub fn stimulus(cell: Transition) -> Option<TourStep> {
     super::why_unreachable(cell).is_none().then(|| {
-        let bad = |error| Stimulus::Byte(Received::bad(0x55, error));
+        let bad = |error| TourStep::Byte(Received::bad(0x55, error));
         match cell.event {
             Event::Parity => bad(LineError::Parity),
             Event::Framing => bad(LineError::Framing),
-            Event::Break => Stimulus::Byte(Received::bad(0, LineError::Break)),
+            Event::Break => TourStep::Byte(Received::bad(0, LineError::Break)),
             Event::Overrun => bad(LineError::Overrun),
-            Event::Silence => Stimulus::Silence,
-            _ => Stimulus::good(byte(cell)),
+            Event::Silence => TourStep::Silence,
+            _ => TourStep::good(byte(cell)),
         }
     })
 }
@@ -212,13 +212,13 @@ pub fn file(state: State) -> (String, String) {
         let Some(last) = stimulus(Transition { state, event }) else {
             continue;
         };
-        let hex = |stimuli: Vec<Stimulus>| {
+        let hex = |stimuli: Vec<TourStep>| {
             let mut bytes = Vec::new();
             stimuli.iter().for_each(|one| one.encode(&mut bytes));
             let digits: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
             digits.join(" ")
         };
-        let back = CHECK_SEQUENCE.map(Stimulus::good).to_vec();
+        let back = CHECK_SEQUENCE.map(TourStep::good).to_vec();
         let parts = [hex(way(state)), hex(vec![last]), hex(back)];
         text.push_str(&format!("{} # {}\n", parts.join("  "), event.name()));
     }

@@ -4,7 +4,7 @@ use super::{Event, Notes, Reached, Transition, classify, state};
 use crate::novobus::device::Device;
 use crate::novobus::plain::PlainDrive;
 use harness_proto::line::Received;
-use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::bus_end::{Deadline, Reaction};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::Instant;
 
@@ -73,7 +73,7 @@ impl<N: Notes> Watched<N> {
 
 impl<N: Notes> Device for Watched<N> {
     #[inline(always)]
-    fn receive(&mut self, now: Instant, received: Received) -> Step {
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction {
         self.reached.note(self.transition(received));
         self.drive.receive(now, received)
     }
@@ -83,7 +83,7 @@ impl<N: Notes> Device for Watched<N> {
         self.drive.deadline()
     }
 
-    fn handle_deadline(&mut self, now: Instant) -> Step {
+    fn handle_deadline(&mut self, now: Instant) -> Reaction {
         self.reached.note(Transition {
             state: state(self.drive.bus_end(), self.drive.memory()),
             event: Event::Silence,

@@ -17,7 +17,7 @@ use cells::{Image, image};
 use harness_proto::line::{LineError, Received};
 use harness_proto::nd21::bits::flags2;
 use harness_proto::nd21::ram;
-use harness_proto::novobus::bus_end::{Deadline, Step};
+use harness_proto::novobus::bus_end::{Deadline, Reaction};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::{Instant, Span};
 
@@ -209,7 +209,7 @@ fn shown(byte: Option<u8>) -> String {
 }
 
 impl Device for Witness {
-    fn receive(&mut self, now: Instant, received: Received) -> Step {
+    fn receive(&mut self, now: Instant, received: Received) -> Reaction {
         self.before(now);
         self.heard += 1;
         self.last_byte = Some(now);
@@ -256,7 +256,7 @@ impl Device for Witness {
         self.drive.deadline()
     }
 
-    fn handle_deadline(&mut self, now: Instant) -> Step {
+    fn handle_deadline(&mut self, now: Instant) -> Reaction {
         // Whether a time-out is due is asked of the clock, not of the drive.
         let silent = self.last_byte.map(|at| now.since(at));
         let due = self.monitored()

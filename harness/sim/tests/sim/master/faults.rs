@@ -6,7 +6,7 @@ use super::common::{Couple, Random, repeat, seed, size};
 use harness_proto::line::Rate;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{
-    Event, Job, JobId, Master, Options, Outcome, Pace, Packing, Phase,
+    CyclePace, Event, Job, JobId, Master, Options, Outcome, Packing, Phase,
 };
 use harness_proto::time::Span;
 use harness_sim::fault::{DriveFault, Flips, LinkFault};
@@ -222,7 +222,7 @@ fn every_job_ends_with_the_truth_or_a_named_failure() {
         let mut jobs = Vec::new();
         if random.below(3) == 0 {
             let some: Vec<u8> = (0..drives).filter(|_| random.below(2) == 0).collect();
-            let exchange = couple.master.set_exchange(&some, Pace::Continuous);
+            let exchange = couple.master.set_exchange(&some, CyclePace::Continuous);
             exchange.expect("drives of the ring");
         }
         for step in 0..DISTURBED {

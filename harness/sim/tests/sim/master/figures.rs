@@ -3,7 +3,7 @@
 
 use super::common::{Couple, size};
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{Event, Job, Options, Outcome, Pace, Packing};
+use harness_proto::novobus::master::{CyclePace, Event, Job, Options, Outcome, Packing};
 use harness_proto::novobus::timing::{exchange_bytes, position_bytes};
 use harness_proto::time::{Instant, Span};
 
@@ -67,7 +67,7 @@ fn nominal_and_actual_values_take_what_the_manual_says() {
         }
         couple
             .master
-            .set_exchange(&all, Pace::Continuous)
+            .set_exchange(&all, CyclePace::Continuous)
             .expect("drives");
         let bytes = exchange_bytes(size(drives));
         couple.steps(usize::from(drives) + 8 + 4 * bytes as usize);
@@ -174,7 +174,7 @@ fn commands_are_woven_into_process_data() {
     let mut couple = Couple::plain(3, Options::default()).ready();
     couple
         .master
-        .set_exchange(&[2, 0, 1], Pace::Continuous)
+        .set_exchange(&[2, 0, 1], CyclePace::Continuous)
         .expect("drives");
     let id = couple.submit(Job::new(
         1,
@@ -213,7 +213,7 @@ fn others_are_not_starved_by_the_exchange() {
     let mut couple = Couple::plain(4, Options::default()).ready();
     couple
         .master
-        .set_exchange(&[0, 1], Pace::Continuous)
+        .set_exchange(&[0, 1], CyclePace::Continuous)
         .expect("drives");
     let ids: Vec<_> = (0..20)
         .map(|_| couple.submit(Job::new(3, Command::ReadByte { address: 0xFE00 })))
@@ -235,7 +235,7 @@ fn rounds_begin_when_they_are_asked_for() {
     }
     couple
         .master
-        .set_exchange(&[0, 1], Pace::OnRequest)
+        .set_exchange(&[0, 1], CyclePace::OnRequest)
         .expect("drives");
     couple.steps(30);
     assert_eq!(couple.master.counters().rounds, 0);
@@ -250,7 +250,7 @@ fn rounds_begin_when_they_are_asked_for() {
     let period = Span::from_millis(8);
     couple
         .master
-        .set_exchange(&[0, 1], Pace::Every(period))
+        .set_exchange(&[0, 1], CyclePace::Every(period))
         .expect("drives");
     couple.events.clear();
     couple.steps(280);

@@ -4,7 +4,9 @@
 use super::common::{Random, repeat, seed, size};
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::novobus::command::{Command, LAYOUTS};
-use harness_proto::novobus::master::{Event, Job, Master, Options, Outcome, Pace, Packing, Phase};
+use harness_proto::novobus::master::{
+    CyclePace, Event, Job, Master, Options, Outcome, Packing, Phase,
+};
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::{Instant, Span};
 use std::collections::BTreeSet;
@@ -125,9 +127,9 @@ fn a_hostile_ring_does_no_harm() {
                         .map(|_| random.below(256) as u8)
                         .collect();
                     let pace = match random.below(3) {
-                        0 => Pace::Continuous,
-                        1 => Pace::Every(Span::from_millis(random.below(20))),
-                        _ => Pace::OnRequest,
+                        0 => CyclePace::Continuous,
+                        1 => CyclePace::Every(Span::from_millis(random.below(20))),
+                        _ => CyclePace::OnRequest,
                     };
                     let _may_be_refused = master.set_exchange(&drives, pace);
                     let _may_be_refused = master.set_nominal(random.below(256) as u8, 7);

@@ -5,7 +5,8 @@ use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, Kind};
 use harness_proto::novobus::master::{
-    End, Event, Fault, Job, Master, Options, Outcome, Pace, Packing, Phase, Refused, RingLink, Stop,
+    BusStop, CyclePace, Event, Fault, Job, LinkEnd, Master, Options, Outcome, Packing, Phase,
+    Refused, RingLink,
 };
 use harness_proto::novobus::properties::{Properties, ReadLongAnswer};
 use harness_proto::time::Span;
@@ -29,8 +30,8 @@ const PARITY: LinkFault = LinkFault::Flip(Flips {
 
 fn link(from: u8, to: u8) -> RingLink {
     RingLink {
-        from: End::Drive(from),
-        to: End::Drive(to),
+        from: LinkEnd::Drive(from),
+        to: LinkEnd::Drive(to),
     }
 }
 
@@ -42,7 +43,7 @@ fn faults<D: Device>(couple: &Couple<D>) -> Vec<Fault> {
     couple.events.iter().filter_map(|(_, e)| fault(e)).collect()
 }
 
-fn stop<D: Device>(couple: &Couple<D>) -> Option<Stop> {
+fn stop<D: Device>(couple: &Couple<D>) -> Option<BusStop> {
     couple.events.iter().find_map(|(_, event)| match event {
         Event::Stopped(stop) => Some(*stop),
         _ => None,
@@ -308,8 +309,8 @@ fn damage_on_the_last_link_is_named_by_the_master() {
     let id = couple.submit(Job::new(1, READ));
     couple.finish(500);
     let last = RingLink {
-        from: End::Drive(0),
-        to: End::Master,
+        from: LinkEnd::Drive(0),
+        to: LinkEnd::Master,
     };
     assert_eq!(faults(&couple), [Fault::Damaged(last)]);
     assert!(matches!(couple.outcome(id), Some(Outcome::Read(_))));
@@ -472,7 +473,7 @@ fn jobs_that_cannot_be_done_are_refused() {
         message(3, READ),
         "3 jobs and unfetched results are held already (ND21 11.6)"
     );
-    assert!(master.set_exchange(&[0, 4], Pace::Continuous).is_err());
+    assert!(master.set_exchange(&[0, 4], CyclePace::Continuous).is_err());
     assert!(master.set_nominal(4, 0).is_err());
 }
 
@@ -549,7 +550,8 @@ fn a_master_out_of_step_blames_its_own_link() {
         couple.ring.arm_link(3, 6 + byte, start);
         couple.steps(600);
         let named = faults(&couple);
-        let inner = |fault: &Fault| matches!(fault, Fault::Damaged(link) if link.to != End::Master);
+        let inner =
+            |fault: &Fault| matches!(fault, Fault::Damaged(link) if link.to != LinkEnd::Master);
         assert_eq!(named.iter().find(|fault| inner(fault)), None, "byte {byte}");
         assert!(!named.is_empty(), "byte {byte}");
         assert!(couple.healthy(), "byte {byte}");

@@ -6,7 +6,7 @@ use harness_proto::novobus::check_sequence::CHECK_SEQUENCE;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::decode::Decoded;
 use harness_proto::novobus::master::{
-    End, Event, Fault, Job, Options, Outcome, Pace, Packing, Phase, RingLink,
+    CyclePace, Event, Fault, Job, LinkEnd, Options, Outcome, Packing, Phase, RingLink,
 };
 use harness_proto::novobus::output::OutputChange;
 use harness_proto::novobus::sync::SYNCO;
@@ -71,8 +71,8 @@ fn the_example_of_9_8_byte_by_byte() {
     assert_eq!(heard[9 + 34], Received::good(0x61));
 
     let link = RingLink {
-        from: End::Drive(98),
-        to: End::Drive(97),
+        from: LinkEnd::Drive(98),
+        to: LinkEnd::Drive(97),
     };
     let events: Vec<_> = couple.events.iter().map(|(_, e)| e.clone()).collect();
     assert_eq!(
@@ -145,7 +145,7 @@ fn conversation(couple: &mut Couple) -> Vec<(Job, harness_proto::novobus::master
     let all: Vec<u8> = (0..drives).collect();
     couple
         .master
-        .set_exchange(&all, Pace::OnRequest)
+        .set_exchange(&all, CyclePace::OnRequest)
         .expect("drives");
     for _ in 0..4 {
         couple.master.start_round();
@@ -188,12 +188,12 @@ fn every_single_bit_blames_the_right_link() {
         for link in 0..=usize::from(drives) {
             let damaged = RingLink {
                 from: match link {
-                    0 => End::Master,
-                    _ => End::Drive(drives - link as u8),
+                    0 => LinkEnd::Master,
+                    _ => LinkEnd::Drive(drives - link as u8),
                 },
                 to: match drives.checked_sub(link as u8 + 1) {
-                    Some(k) => End::Drive(k),
-                    None => End::Master,
+                    Some(k) => LinkEnd::Drive(k),
+                    None => LinkEnd::Master,
                 },
             };
             for byte in 1..=bytes - 10 {

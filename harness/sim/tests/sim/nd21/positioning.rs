@@ -3,7 +3,7 @@
 use super::common::Rig;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO2, Input, OUTPUTS};
-use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::Ratio;
 use harness_proto::time::Span;
@@ -49,20 +49,20 @@ fn targets_of_13_1_9() {
     let mut rig = initialised();
     let mut expected = 0_i64;
     for (mode, turns, denominator, word) in [
-        (Mode::Absolute, 1_025, 100, 0x000A_4000),
-        (Mode::Absolute, -1_025, 100, 0x7FF5_C000),
-        (Mode::Relative, 50, 360, 0x8000_238E),
-        (Mode::Relative, -50, 360, 0xFFFF_DC72),
-        (Mode::Absolute, 65, 10, 0x0006_8000),
-        (Mode::Relative, -65, 10, 0xFFF9_8000),
+        (PositionMode::Absolute, 1_025, 100, 0x000A_4000),
+        (PositionMode::Absolute, -1_025, 100, 0x7FF5_C000),
+        (PositionMode::Relative, 50, 360, 0x8000_238E),
+        (PositionMode::Relative, -50, 360, 0xFFFF_DC72),
+        (PositionMode::Absolute, 65, 10, 0x0006_8000),
+        (PositionMode::Relative, -65, 10, 0xFFF9_8000),
     ] {
         let position = Position::from_turns(mode, Ratio::new(turns, denominator).expect("turns"))
             .expect("fits");
         assert_eq!(position.encode(), word);
         let here = expected;
         expected = match mode {
-            Mode::Absolute => i64::from(position.increments()),
-            Mode::Relative => here + i64::from(position.increments()),
+            PositionMode::Absolute => i64::from(position.increments()),
+            PositionMode::Relative => here + i64::from(position.increments()),
         };
         write_ps(&mut rig, word);
         let way = expected - here;

@@ -1,12 +1,12 @@
 //! A conversation of the driver: its master packs telegrams, compares every byte, names the fault and repairs the ring
 //! (`bus`, ND21 11.5). What it reports is taken for what it knows.
 
-use super::class::{Evidence, Wrong, named};
+use super::class::{CaseEvidence, Wrong, named};
 use super::sound::{Sound, all_back};
 use crate::buses::SimulatedLink;
-use crate::buses::novobus::driver::{Axis, Bus, Error, Options};
+use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options};
 use crate::buses::novobus::language::plan::PlannedCall;
-use crate::campaign::fault::Case;
+use crate::campaign::fault::CaseFaults;
 use crate::link::{Line, Link, Moment, Octets, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::novobus::address::RingSize;
@@ -78,7 +78,7 @@ impl ByDriver {
 
     /// Plays a case.
     #[must_use]
-    pub fn play(&self, case: &Case) -> Evidence {
+    pub fn play(&self, case: &CaseFaults) -> CaseEvidence {
         let mut link = Spied {
             link: self.start.clone(),
             sound: None,
@@ -95,10 +95,10 @@ impl ByDriver {
         self.play_on(&mut link).0
     }
 
-    fn play_on(&self, link: &mut Spied) -> (Evidence, Vec<Option<u32>>) {
-        let mut evidence = Evidence {
+    fn play_on(&self, link: &mut Spied) -> (CaseEvidence, Vec<Option<u32>>) {
+        let mut evidence = CaseEvidence {
             confirmed: true,
-            ..Evidence::default()
+            ..CaseEvidence::default()
         };
         let mut answers = Vec::new();
         for calls in &self.calls {
@@ -139,14 +139,14 @@ impl ByDriver {
         &self,
         link: &mut Spied,
         calls: &[(u8, PlannedCall)],
-        evidence: &mut Evidence,
+        evidence: &mut CaseEvidence,
         answers: &mut Vec<Option<u32>>,
     ) {
         let drives = link.link.drives(0);
         let Ok(size) = RingSize::new(u64::from(drives)) else {
             return;
         };
-        let bus = match Bus::open(Box::new(&mut *link), &[size], Options::default()) {
+        let bus = match OpenRings::open(Box::new(&mut *link), &[size], Options::default()) {
             Ok(bus) => bus,
             Err(error) => {
                 evidence.fails(&error);
@@ -169,7 +169,7 @@ impl ByDriver {
     }
 }
 
-impl Evidence {
+impl CaseEvidence {
     /// Notes a job that the driver reported as not confirmed.
     fn fails(&mut self, error: &Error) {
         self.noticed = true;

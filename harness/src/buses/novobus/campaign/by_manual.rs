@@ -2,12 +2,12 @@
 //! expected ones, continues with SYNCO, reads the number of the drive that the ring spells out, sends the check sequence and repeats the
 //! incomplete telegrams.
 
-use super::class::{Evidence, Wrong};
+use super::class::{CaseEvidence, Wrong};
 use super::conversation::Answers;
 use super::sound::{Sound, all_back};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::locate::{MAX_ZEROS, locate};
-use crate::campaign::fault::{Case, link_index};
+use crate::campaign::fault::{CaseFaults, link_index};
 use crate::link::{Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
@@ -44,7 +44,7 @@ struct Play<'a> {
     of: &'a ByManual,
     link: SimulatedLink,
     said: Vec<Said>,
-    evidence: Evidence,
+    evidence: CaseEvidence,
     /// For how many byte times the faults last.
     lasts: usize,
     /// What came back at first, as far as it was not repeated: without a fault the first time. What is repeated comes when
@@ -111,7 +111,7 @@ impl ByManual {
 
     /// Plays a case.
     #[must_use]
-    pub fn play(&self, case: &Case) -> (Evidence, Vec<Said>) {
+    pub fn play(&self, case: &CaseFaults) -> (CaseEvidence, Vec<Said>) {
         let mut link = self.start.clone();
         let byte_time = link.byte_time();
         let mut lasts = 0;
@@ -126,7 +126,7 @@ impl ByManual {
             of: self,
             link,
             said: Vec::new(),
-            evidence: Evidence::default(),
+            evidence: CaseEvidence::default(),
             lasts: usize::try_from(lasts).unwrap_or(usize::MAX),
             kept: Vec::new(),
         };

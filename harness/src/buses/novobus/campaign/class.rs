@@ -1,7 +1,7 @@
 //! What can come of a fault.
 
 use crate::campaign::fault::link_index;
-use harness_proto::novobus::master::{End, Fault};
+use harness_proto::novobus::master::{Fault, LinkEnd};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -13,7 +13,7 @@ use std::fmt;
 /// every job has been confirmed by a right answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Class {
+pub enum CaseClass {
     /// Not noticed and without effect: every drive has the right cells and waits for a sync byte.
     Harmless,
     /// Noticed, the damaged link named, everything back, every cell right.
@@ -32,7 +32,7 @@ pub enum Class {
     SilentCorruption,
 }
 
-impl Class {
+impl CaseClass {
     /// All of them, in order of gravity.
     pub const ALL: [Self; 7] = [
         Self::Harmless,
@@ -73,7 +73,7 @@ impl Class {
     }
 }
 
-impl fmt::Display for Class {
+impl fmt::Display for CaseClass {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }
@@ -106,7 +106,7 @@ pub enum Wrong {
 
 /// What was seen of a case.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Evidence {
+pub struct CaseEvidence {
     /// Whether the master noticed anything.
     pub noticed: bool,
     /// The link that it named, counted from the master's outgoing one.
@@ -123,12 +123,12 @@ pub struct Evidence {
     pub wrong: Vec<Wrong>,
 }
 
-impl Evidence {
+impl CaseEvidence {
     /// The class of a case whose faults were on these links.
     ///
     /// # Errors
     /// A contradiction in the bench's own evidence, as a sentence: it fits no class.
-    pub fn class(&self, links: &[usize]) -> Result<Class, &'static str> {
+    pub fn class(&self, links: &[usize]) -> Result<CaseClass, &'static str> {
         let noticed = self.noticed;
         if !noticed && (self.named.is_some() || self.sequences > 0) {
             return Err("a link was named or a check sequence sent, and nothing had been noticed");
@@ -140,13 +140,13 @@ impl Evidence {
             return Err("nothing was noticed, and a job was not confirmed");
         }
         Ok(match self.named {
-            _ if !self.wrong.is_empty() && noticed => Class::Corrupted,
-            _ if !self.wrong.is_empty() => Class::SilentCorruption,
-            _ if !self.confirmed => Class::NotRecovered,
-            _ if !noticed => Class::Harmless,
-            None => Class::Recovered,
-            Some(link) if links.contains(&link) => Class::Located,
-            Some(_) => Class::Mislocated,
+            _ if !self.wrong.is_empty() && noticed => CaseClass::Corrupted,
+            _ if !self.wrong.is_empty() => CaseClass::SilentCorruption,
+            _ if !self.confirmed => CaseClass::NotRecovered,
+            _ if !noticed => CaseClass::Harmless,
+            None => CaseClass::Recovered,
+            Some(link) if links.contains(&link) => CaseClass::Located,
+            Some(_) => CaseClass::Mislocated,
         })
     }
 }
@@ -158,8 +158,8 @@ pub fn named(fault: Fault, drives: u8) -> Option<usize> {
         return None;
     };
     match link.to {
-        End::Drive(drive) => link_index(drives, drive),
-        End::Master => Some(usize::from(drives)),
+        LinkEnd::Drive(drive) => link_index(drives, drive),
+        LinkEnd::Master => Some(usize::from(drives)),
     }
 }
 
@@ -179,7 +179,7 @@ mod tests {
         for bits in 0..32u8 {
             let bit = |n: u8| bits >> n & 1 == 1;
             for named in [None, Some(1), Some(2)] {
-                let evidence = Evidence {
+                let evidence = CaseEvidence {
                     noticed: bit(0),
                     named,
                     diagnosis: None,
@@ -197,13 +197,13 @@ mod tests {
         assert_eq!(
             seen,
             [
-                (Class::Harmless, 1),
-                (Class::Located, 2),
-                (Class::Recovered, 2),
-                (Class::Mislocated, 2),
-                (Class::NotRecovered, 12),
-                (Class::Corrupted, 18),
-                (Class::SilentCorruption, 1),
+                (CaseClass::Harmless, 1),
+                (CaseClass::Located, 2),
+                (CaseClass::Recovered, 2),
+                (CaseClass::Mislocated, 2),
+                (CaseClass::NotRecovered, 12),
+                (CaseClass::Corrupted, 18),
+                (CaseClass::SilentCorruption, 1),
             ]
         );
     }

@@ -16,7 +16,7 @@ const MAX_LENGTH: usize = 4096;
 
 /// What the master sends.
 #[derive(Clone, Debug)]
-pub enum Talk {
+pub enum MasterTalk {
     /// These bytes, without a gap; a master by the manual alone reads what comes back (9.7, 9.8).
     Bytes(Vec<u8>),
     /// These calls, one step of the scenario after the other; the driver plays them.
@@ -28,7 +28,7 @@ pub enum Talk {
 ///
 /// # Errors
 /// A step that a campaign does not play, or drives whose cells change by themselves.
-pub fn talk(plan: &Plan) -> Result<Talk, Problem> {
+pub fn talk(plan: &Plan) -> Result<MasterTalk, Problem> {
     let start = Span::default();
     let refused = |span, message: &str| {
         let expected =
@@ -76,8 +76,8 @@ pub fn talk(plan: &Plan) -> Result<Talk, Problem> {
         }
     }
     match (bytes.is_empty(), calls.is_empty()) {
-        (false, _) => Ok(Talk::Bytes(bytes)),
-        (_, false) => Ok(Talk::Calls(calls)),
+        (false, _) => Ok(MasterTalk::Bytes(bytes)),
+        (_, false) => Ok(MasterTalk::Calls(calls)),
         _ => refused(start, "the scenario says nothing that could be disturbed"),
     }
 }

@@ -1,7 +1,7 @@
 //! The results of a campaign, for people and for tools.
 
-use super::class::{Class, Evidence, Wrong};
-use crate::campaign::run::{Finished, Outcome};
+use super::class::{CaseClass, CaseEvidence, Wrong};
+use crate::campaign::run::{CaseOutcome, PlayedCampaign};
 use crate::link::link_name;
 use harness_proto::nd21::cells::cell_at;
 use serde::Serialize;
@@ -44,7 +44,7 @@ impl fmt::Display for Wrong {
 
 /// What happened in a case, in a line.
 #[must_use]
-pub fn happened(evidence: &Evidence, drives: u8) -> String {
+pub fn happened(evidence: &CaseEvidence, drives: u8) -> String {
     let mut parts = Vec::new();
     if let Some(link) = evidence.named {
         parts.push(format!("named {}", link_name(0, drives, link)));
@@ -68,7 +68,7 @@ pub fn happened(evidence: &Evidence, drives: u8) -> String {
 
 /// One case in a line.
 #[must_use]
-pub fn line(outcome: &Outcome, drives: u8) -> String {
+pub fn line(outcome: &CaseOutcome, drives: u8) -> String {
     let name = outcome.case.name(drives);
     let happened = happened(&outcome.evidence, drives);
     let line = format!("{:18} {name:28} {happened}", outcome.class.name());
@@ -90,7 +90,7 @@ pub fn share(part: u64, all: u64) -> String {
 
 /// How many cases there are of each class, what differs from the file, and the worst cases.
 #[must_use]
-pub fn table(finished: &Finished) -> String {
+pub fn table(finished: &PlayedCampaign) -> String {
     let all = finished.outcomes.len() as u64;
     // Writing to a String cannot fail.
     let mut text = format!(
@@ -102,7 +102,7 @@ pub fn table(finished: &Finished) -> String {
         finished.scenario
     );
     let _infallible = writeln!(text, "  {:18} {:>8} {:>9}", "class", "cases", "share");
-    for class in Class::ALL {
+    for class in CaseClass::ALL {
         let count = finished.count(class);
         let share = share(count, all);
         let _infallible = writeln!(
@@ -112,7 +112,7 @@ pub fn table(finished: &Finished) -> String {
         );
     }
     for differs in finished.differs() {
-        let class = differs.class.map_or("cases", Class::name);
+        let class = differs.class.map_or("cases", CaseClass::name);
         let _infallible = writeln!(
             text,
             "  differs: {class} is {}, the file pins {}",
@@ -122,7 +122,7 @@ pub fn table(finished: &Finished) -> String {
     let mut worst: Vec<_> = finished
         .outcomes
         .iter()
-        .filter(|outcome| outcome.class >= Class::Recovered)
+        .filter(|outcome| outcome.class >= CaseClass::Recovered)
         .collect();
     worst.sort_by_key(|outcome| std::cmp::Reverse(outcome.class));
     if !worst.is_empty() {
@@ -149,13 +149,13 @@ struct Json<'a> {
 
 #[derive(Serialize)]
 struct JsonClass {
-    class: Class,
+    class: CaseClass,
     cases: u64,
 }
 
 #[derive(Serialize)]
 struct JsonDiffers {
-    class: Option<Class>,
+    class: Option<CaseClass>,
     expected: u64,
     found: u64,
 }
@@ -163,7 +163,7 @@ struct JsonDiffers {
 #[derive(Serialize)]
 struct JsonCase {
     case: String,
-    class: Class,
+    class: CaseClass,
     noticed: bool,
     named: Option<String>,
     diagnosis: Option<String>,
@@ -212,10 +212,10 @@ impl From<&Wrong> for JsonWrong {
 }
 
 impl<'a> Json<'a> {
-    fn of(finished: &'a Finished, only: Option<Class>) -> Self {
+    fn of(finished: &'a PlayedCampaign, only: Option<CaseClass>) -> Self {
         let drives = finished.drives;
-        let wanted = |outcome: &&Outcome| only.is_none_or(|class| outcome.class == class);
-        let case = |outcome: &Outcome| {
+        let wanted = |outcome: &&CaseOutcome| only.is_none_or(|class| outcome.class == class);
+        let case = |outcome: &CaseOutcome| {
             let evidence = &outcome.evidence;
             JsonCase {
                 case: outcome.case.name(drives),
@@ -243,7 +243,7 @@ impl<'a> Json<'a> {
             scenario: &finished.scenario,
             drives,
             bytes: finished.bytes,
-            classes: Class::ALL.map(count).into(),
+            classes: CaseClass::ALL.map(count).into(),
             differs: differs.collect(),
             cases: finished.outcomes.iter().filter(wanted).map(case).collect(),
         }
@@ -252,7 +252,7 @@ impl<'a> Json<'a> {
 
 /// All campaigns of a run for tools, as `corpora/campaigns/README.md` describes; of one class, where `only` is given.
 #[must_use]
-pub fn json(all: &[Finished], only: Option<Class>) -> serde_json::Value {
+pub fn json(all: &[PlayedCampaign], only: Option<CaseClass>) -> serde_json::Value {
     let campaigns: Vec<_> = all.iter().map(|one| Json::of(one, only)).collect();
     serde_json::json!({ "schema": 1, "campaigns": campaigns })
 }

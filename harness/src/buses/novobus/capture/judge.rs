@@ -2,7 +2,7 @@
 
 use super::scenario::{Options, SketchError, scenario, unforeseen};
 use crate::capture::Capture;
-use crate::capture::diff::{Run, Summary, compare};
+use crate::capture::diff::{ComparedRun, Summary, compare};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::scenario::problem::Problems;
@@ -74,11 +74,11 @@ pub fn judge(capture: &Capture, options: &Options<'_>) -> Result<Judged, JudgeEr
     };
     let tolerance = Span::from_units(options.tolerance.units().max(6));
     let (left, right) = (
-        Run {
+        ComparedRun {
             name: "capture",
             capture,
         },
-        Run {
+        ComparedRun {
             name: "model",
             capture: &model,
         },

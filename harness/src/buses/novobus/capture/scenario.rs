@@ -2,7 +2,7 @@
 
 use super::stimuli::{Told, told};
 use crate::buses::novobus::language::syntax::{
-    CellPlace, Drives, Header, RingStep, Setup, SetupKind, Written,
+    CellPlace, DriveRange, Header, RingStep, Setup, SetupKind, Written,
 };
 use crate::capture::Capture;
 use crate::capture::faults::faults;
@@ -177,7 +177,7 @@ fn cells(rings: &[Ring<'_>]) -> Vec<Setup> {
             }
             let value = Written::Bytes(Pattern::of(&bytes, usize::MAX));
             setups.push(Setup::new(
-                Drives::one(index, *drive),
+                DriveRange::one(index, *drive),
                 SetupKind::Memory(CellPlace::at(*address), value),
             ));
         }

@@ -78,7 +78,7 @@ fn of_link(link: &Channel, asked: &[Role]) -> Told {
         if *role == Role::Foreign || seen.section() == "9.7" {
             reader.open.clear();
         } else if role.drive() == seen.drive {
-            let is_data = seen.role == meaning::Role::Data;
+            let is_data = seen.role == meaning::ByteRole::Data;
             reader.read(index, byte.byte, *role, is_data, seen.fits);
         }
     }

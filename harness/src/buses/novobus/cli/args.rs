@@ -115,7 +115,7 @@ pub struct HoldArguments {
 
 /// Output format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Form {
+pub enum OutputForm {
     /// For people.
     Text,
     /// For tools; the help of the command describes it.
@@ -132,8 +132,8 @@ pub struct ReadArguments {
     #[arg(value_name = "CELL", required = true)]
     pub cells: Vec<String>,
     /// Output format.
-    #[arg(long, value_enum, default_value_t = Form::Text)]
-    pub format: Form,
+    #[arg(long, value_enum, default_value_t = OutputForm::Text)]
+    pub format: OutputForm,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
@@ -166,8 +166,8 @@ pub struct InfoArguments {
     #[arg(value_name = "DRIVE", default_value = "all")]
     pub drives: Axes,
     /// Output format.
-    #[arg(long, value_enum, default_value_t = Form::Text)]
-    pub format: Form,
+    #[arg(long, value_enum, default_value_t = OutputForm::Text)]
+    pub format: OutputForm,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,
@@ -395,8 +395,8 @@ pub struct MoveArguments {
 #[derive(Debug, Args)]
 pub struct RecoverArguments {
     /// Output format.
-    #[arg(long, value_enum, default_value_t = Form::Text)]
-    pub format: Form,
+    #[arg(long, value_enum, default_value_t = OutputForm::Text)]
+    pub format: OutputForm,
     /// Which bench.
     #[command(flatten)]
     pub rig: RigArguments,

@@ -3,8 +3,8 @@
 use super::args::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use super::axes;
 use super::failure::Failure;
-use super::rig::{self, Bench, RigName, Use};
-use crate::buses::novobus::driver::{Axis, Bus, Error};
+use super::rig::{self, OpenBench, RigName, Use};
+use crate::buses::novobus::driver::{Axis, Error, OpenRings};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::link::Line;
@@ -17,7 +17,7 @@ const CYCLES: Span = Span::from_millis(5);
 /// The same after a reset.
 const RESET: Span = Span::from_millis(200);
 
-type Call = fn(&Bus<'_>, Axis) -> Result<(), Error>;
+type Call = fn(&OpenRings<'_>, Axis) -> Result<(), Error>;
 
 /// Lets drives run.
 pub(crate) fn go(arguments: &MoveArguments, output: &mut Output) -> Result<Exit, Failure> {
@@ -170,7 +170,7 @@ fn warn(
 /// Sends the command to every drive first, and then reports the state of each. A drive that does not answer does not prevent the others
 /// from being stopped.
 fn each(
-    bench: &Bench,
+    bench: &OpenBench,
     drives: &[Axis],
     output: &mut Output,
     call: Call,

@@ -1,6 +1,6 @@
 //! `drivebench fuzz coverage`: the matrix of protocol transitions, what reaches it, and what the inputs of each target reach.
 
-use crate::cli::args::Format;
+use crate::cli::args::TableFormat;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::fuzz::coverage::{Coverage, CoverageError, Sum};
@@ -13,8 +13,8 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Args)]
 pub struct CoverageArguments {
     /// Output format.
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    pub format: Format,
+    #[arg(long, value_enum, default_value_t = TableFormat::Table)]
+    pub format: TableFormat,
     /// Play the inputs of this folder, which has one folder per target, instead of the built-in ones.
     #[arg(long, value_name = "FOLDER")]
     pub corpus: Option<PathBuf>,
@@ -62,7 +62,7 @@ impl<'a> Table<'a> {
             hardware: coverage.hardware.contains(cell),
             unreachable: why_unreachable(cell).map(|rule| rule.reason),
         };
-        let input = |file: &'a crate::fuzz::coverage::Played| Input {
+        let input = |file: &'a crate::fuzz::coverage::InputReach| Input {
             name: &file.name,
             reached: file.reached.count(),
         };
@@ -101,8 +101,8 @@ pub(crate) fn coverage(
         }
     };
     match arguments.format {
-        Format::Table => output.result(&coverage.page())?,
-        Format::Json => {
+        TableFormat::Table => output.result(&coverage.page())?,
+        TableFormat::Json => {
             let text = serde_json::to_string(&Table::new(&coverage))?;
             output.result(&(text + "\n"))?;
         }

@@ -1,6 +1,6 @@
 //! `drivebench deviations`: the wrong drives and the wrong masters that a scenario can ask for.
 
-use crate::cli::args::{DeviationsArguments, Format};
+use crate::cli::args::{DeviationsArguments, TableFormat};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use harness_sim::novobus::deviation::{
@@ -93,7 +93,7 @@ pub(crate) fn deviations(
     }
     let mut text = String::new();
     match arguments.format {
-        Format::Table => {
+        TableFormat::Table => {
             let mut line = |name, section, about| {
                 // Writing to a String cannot fail.
                 let _infallible = writeln!(text, "{name:32} {section:9} {about}");
@@ -112,7 +112,7 @@ pub(crate) fn deviations(
                 line(row.name, row.section, row.about);
             }
         }
-        Format::Json => {
+        TableFormat::Json => {
             text = serde_json::to_string(&Table {
                 schema: 1,
                 deviations: rows,

@@ -1,18 +1,18 @@
 //! `drivebench info`: which drives there are, and how they are.
 
-use super::args::{Form, InfoArguments};
+use super::args::{InfoArguments, OutputForm};
 use super::axes;
 use super::failure::Failure;
 use super::read::columns;
-use super::rig::{self, Bench, Use};
-use crate::buses::novobus::driver::cell::{Found, find};
+use super::rig::{self, OpenBench, Use};
+use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::buses::novobus::driver::{Axis, Identity, State};
 use crate::buses::novobus::language::scale::shown;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::run::progress_bar;
 use crate::counted::counted;
-use crate::scenario::argument::{Location, cells};
+use crate::scenario::argument::{MemoryRange, cells};
 use harness_proto::nd21::units::{Date, Scale, Value};
 use serde_json::json;
 
@@ -26,7 +26,7 @@ struct Drive<'a> {
     axis: Axis,
     identity: Identity,
     state: State,
-    cells: Vec<Found<'a>>,
+    cells: Vec<CellFound<'a>>,
 }
 
 /// Shows drives.
@@ -39,7 +39,11 @@ pub(crate) fn info(arguments: &InfoArguments, output: &mut Output) -> Result<Exi
     )
 }
 
-fn show(arguments: &InfoArguments, bench: &Bench, output: &mut Output) -> Result<Exit, Failure> {
+fn show(
+    arguments: &InfoArguments,
+    bench: &OpenBench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
     let locations = cells(&CELLS.map(str::to_owned))?;
     // A long ring answers slowly, so show progress.
@@ -56,7 +60,7 @@ fn show(arguments: &InfoArguments, bench: &Bench, output: &mut Output) -> Result
     bar.finish_and_clear();
     let corrected = bench.bus.corrected_errors();
     match arguments.format {
-        Form::Text => {
+        OutputForm::Text => {
             let total = bench.bus.axes().len();
             let counts = format!(
                 "{} on the bus, {} corrected\n",
@@ -65,7 +69,7 @@ fn show(arguments: &InfoArguments, bench: &Bench, output: &mut Output) -> Result
             );
             output.result(&(output.fitted(&table(&drives)) + &counts))?;
         }
-        Form::Json => {
+        OutputForm::Json => {
             let drives: Vec<_> = drives.iter().map(object).collect();
             let all = json!({"schema": 1, "corrected": corrected, "drives": drives});
             output.result(&format!("{all}\n"))?;
@@ -75,10 +79,10 @@ fn show(arguments: &InfoArguments, bench: &Bench, output: &mut Output) -> Result
 }
 
 fn drive<'a>(
-    bench: &Bench,
+    bench: &OpenBench,
     axis: Axis,
     identity: Identity,
-    locations: &'a [Location],
+    locations: &'a [MemoryRange],
 ) -> Result<Drive<'a>, Failure> {
     let units = bench.units(axis)?;
     let found = locations
@@ -114,7 +118,7 @@ fn table(drives: &[Drive<'_>]) -> String {
     ];
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let row = |drive: &Drive<'_>| {
-        let value = |cell: usize| or_dash(drive.cells.get(cell).map(Found::value));
+        let value = |cell: usize| or_dash(drive.cells.get(cell).map(CellFound::value));
         let identity = &drive.identity;
         [
             drive.axis.to_string(),
@@ -136,7 +140,7 @@ fn table(drives: &[Drive<'_>]) -> String {
 }
 
 fn object(drive: &Drive<'_>) -> serde_json::Value {
-    let value = |cell: usize| drive.cells.get(cell).map(Found::number);
+    let value = |cell: usize| drive.cells.get(cell).map(CellFound::number);
     let identity = &drive.identity;
     let text = drive.state.error_in_words();
     let code = format!("{:04X}", drive.state.error);

@@ -2,19 +2,19 @@
 
 use super::args::{LoadArguments, ParamsArguments, ParamsCommand};
 use super::failure::Failure;
-use super::params_file::{self, Entry, parameters};
-use super::rig::{self, Bench, Use};
+use super::params_file::{self, FileParameter, parameters};
+use super::rig::{self, OpenBench, Use};
 use super::{axes, file};
 use crate::buses::novobus::driver::Axis;
-use crate::buses::novobus::driver::cell::{self, Found, find, hex};
+use crate::buses::novobus::driver::cell::{self, CellFound, find, hex};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::counted::counted;
-use crate::scenario::argument::{Location, Memory};
+use crate::scenario::argument::{MemoryKind, MemoryRange};
 use crate::scenario::source::Source;
 use harness_proto::nd21::cells::Access;
 use harness_proto::nd21::eeprom::eeprom_of;
-use harness_proto::nd21::units::{Date, Drive};
+use harness_proto::nd21::units::{Date, DriveUnits};
 use harness_proto::nd21::{PARAMETERS, ee};
 
 /// Runs one of the commands.
@@ -45,7 +45,11 @@ pub(crate) fn params(command: &ParamsCommand, output: &mut Output) -> Result<Exi
     }
 }
 
-fn save(arguments: &ParamsArguments, bench: &Bench, output: &mut Output) -> Result<Exit, Failure> {
+fn save(
+    arguments: &ParamsArguments,
+    bench: &OpenBench,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
     let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
     let units = bench.units(axis)?;
     let locations = parameters();
@@ -67,11 +71,11 @@ fn save(arguments: &ParamsArguments, bench: &Bench, output: &mut Output) -> Resu
 
 /// A drive and the file that it is compared with.
 struct Comparison<'b> {
-    bench: &'b Bench,
+    bench: &'b OpenBench,
     axis: Axis,
     /// What the scales depend on now, and when the file is loaded.
-    units: [Drive; 2],
-    entries: Vec<(Entry, Vec<u8>)>,
+    units: [DriveUnits; 2],
+    entries: Vec<(FileParameter, Vec<u8>)>,
 }
 
 /// Reads the file, opens the bench, and does something with both.
@@ -91,7 +95,7 @@ impl<'b> Comparison<'b> {
     fn new(
         arguments: &ParamsArguments,
         source: &Source,
-        bench: &'b Bench,
+        bench: &'b OpenBench,
         output: &mut Output,
     ) -> Result<Self, Failure> {
         let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
@@ -121,7 +125,7 @@ impl<'b> Comparison<'b> {
     }
 
     /// What differs: the parameter, in the drive and in the file.
-    fn differences(&self) -> impl Iterator<Item = (&Entry, [String; 2])> {
+    fn differences(&self) -> impl Iterator<Item = (&FileParameter, [String; 2])> {
         let differing = self
             .entries
             .iter()
@@ -130,7 +134,7 @@ impl<'b> Comparison<'b> {
             let words = |bytes: &[u8], units| {
                 let location = &entry.location;
                 let bytes = bytes.to_vec();
-                Found {
+                CellFound {
                     axis: self.axis,
                     location,
                     bytes,
@@ -227,18 +231,18 @@ fn load(
 }
 
 /// The section that calls a cell read only.
-fn read_only(location: &Location) -> Option<&'static str> {
+fn read_only(location: &MemoryRange) -> Option<&'static str> {
     let cell = location.cell().filter(|cell| cell.access == Access::Read)?;
     Some(cell.section)
 }
 
 /// Reads back what was written.
 fn verify(
-    bench: &Bench,
+    bench: &OpenBench,
     axis: Axis,
-    entries: &[&Entry],
+    entries: &[&FileParameter],
     place: &str,
-    home: impl Fn(&Entry) -> Option<Location>,
+    home: impl Fn(&FileParameter) -> Option<MemoryRange>,
 ) -> Result<(), Failure> {
     let mut wrong = Vec::new();
     for entry in entries {
@@ -288,9 +292,9 @@ fn store(comparison: &Comparison<'_>) -> Result<(), Failure> {
 }
 
 /// Where a parameter is in the EEPROM.
-fn home(entry: &Entry) -> Option<Location> {
+fn home(entry: &FileParameter) -> Option<MemoryRange> {
     let address = eeprom_of(entry.location.address())?;
-    Some(entry.location.moved(Memory::Eeprom, address.into()))
+    Some(entry.location.moved(MemoryKind::Eeprom, address.into()))
 }
 
 /// The day (UTC); `None` if the clock is outside the range of the drive's date.

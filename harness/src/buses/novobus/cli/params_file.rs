@@ -6,15 +6,15 @@
 //! "nRampe+" = "off"         # FF6C 14.5.4    acceleration ramp
 //! ```
 
-use crate::buses::novobus::driver::cell::{Found, hex};
+use crate::buses::novobus::driver::cell::{CellFound, hex};
 use crate::buses::novobus::language::syntax::Written;
-use crate::scenario::argument::{Location, Memory, value_at};
+use crate::scenario::argument::{MemoryKind, MemoryRange, value_at};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
 use harness_proto::nd21::cells::{Access, Cell, RAM};
 use harness_proto::nd21::eeprom::LINKS;
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::{Drive, SpeedRange};
+use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
@@ -22,19 +22,19 @@ use toml::de::{DeTable, DeValue};
 const TABLE: &str = "nd21";
 
 /// The parameters FF60-FF7F, and the cells that are loaded from the EEPROM at reset (14.2.2, 13.1.4, 14.6.6).
-pub(crate) fn parameters() -> Vec<Location> {
+pub(crate) fn parameters() -> Vec<MemoryRange> {
     let cells = LINKS.iter().flat_map(|link| {
         let linked = link.ram..link.ram + u16::from(link.size);
         RAM.iter()
             .filter(move |cell| linked.contains(&cell.address) && cell.access != Access::Reserved)
     });
     cells
-        .map(|cell: &'static Cell| Location::of(Memory::Ram, cell))
+        .map(|cell: &'static Cell| MemoryRange::of(MemoryKind::Ram, cell))
         .collect()
 }
 
 /// A value as it stands in a file: a number with its unit where that gives back the same bytes.
-pub(crate) fn value(found: &Found<'_>) -> String {
+pub(crate) fn value(found: &CellFound<'_>) -> String {
     // `180 V per 1000 rpm` is written `180 V`.
     let shown = found.value();
     let text = shown.split(" per ").next().unwrap_or_default();
@@ -50,7 +50,7 @@ pub(crate) fn value(found: &Found<'_>) -> String {
 }
 
 /// The text of a file with what was found in a drive.
-pub(crate) fn text(drive: &str, found: &[Found<'_>]) -> String {
+pub(crate) fn text(drive: &str, found: &[CellFound<'_>]) -> String {
     let key = |name: &str| {
         let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if name.chars().all(bare) {
@@ -84,14 +84,17 @@ pub(crate) fn text(drive: &str, found: &[Found<'_>]) -> String {
 }
 
 /// A parameter as a file has it.
-pub(crate) struct Entry {
-    pub(crate) location: Location,
+pub(crate) struct FileParameter {
+    pub(crate) location: MemoryRange,
     pub(crate) bytes: Vec<u8>,
 }
 
 /// The parameters of a file for a drive, and what their scales depend on when they are loaded; in the order of
 /// [`parameters`].
-pub(crate) fn read(source: &Source, drive: Drive) -> Result<(Vec<Entry>, Drive), Problems> {
+pub(crate) fn read(
+    source: &Source,
+    drive: DriveUnits,
+) -> Result<(Vec<FileParameter>, DriveUnits), Problems> {
     let mut problems = Vec::new();
     let written = values(source, &mut problems);
     let units = units(&written, drive);
@@ -99,7 +102,7 @@ pub(crate) fn read(source: &Source, drive: Drive) -> Result<(Vec<Entry>, Drive),
     for (location, value, span) in written {
         match location.bytes(&value, units) {
             Ok(bytes) if bytes.len() == usize::from(location.size) => {
-                entries.push(Entry { location, bytes });
+                entries.push(FileParameter { location, bytes });
             }
             Ok(_) => problems.push(Problem::new(
                 span,
@@ -117,13 +120,13 @@ pub(crate) fn read(source: &Source, drive: Drive) -> Result<(Vec<Entry>, Drive),
 }
 
 /// With the range of speeds that the file itself sets (14.3.2).
-fn units(written: &[(Location, Written, Span)], drive: Drive) -> Drive {
+fn units(written: &[(MemoryRange, Written, Span)], drive: DriveUnits) -> DriveUnits {
     let own = written
         .iter()
         .find(|(location, ..)| location.address() == ram::SW_VERSION2)
         .and_then(|(location, value, _)| location.bytes(value, drive).ok());
     match own.as_deref() {
-        Some([byte]) => Drive {
+        Some([byte]) => DriveUnits {
             range: SpeedRange::from_sw_version2(*byte),
             ..drive
         },
@@ -132,7 +135,7 @@ fn units(written: &[(Location, Written, Span)], drive: Drive) -> Drive {
 }
 
 /// The values of the file, as far as they can be read.
-fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(Location, Written, Span)> {
+fn values(source: &Source, problems: &mut Vec<Problem>) -> Vec<(MemoryRange, Written, Span)> {
     let (document, errors) = DeTable::parse_recoverable(&source.text);
     for error in errors {
         let span = error.span().map_or(Span::default(), place);
@@ -188,7 +191,7 @@ fn entry(
     text: &str,
     range: Range<usize>,
     value: &DeValue<'_>,
-    location: &Location,
+    location: &MemoryRange,
 ) -> Result<Written, Problem> {
     let whole = place(range.clone());
     let DeValue::String(value) = value else {

@@ -3,23 +3,23 @@
 use super::args::PositionArguments;
 use super::axes;
 use super::failure::Failure;
-use super::rig::{self, Bench, Use};
+use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::find;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::scenario::argument::{Location, cells};
+use crate::scenario::argument::{MemoryRange, cells};
 use crate::scenario::quantity::Quantity;
 use harness_proto::nd21::bits::{self, ps_status};
-use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::{Drive, UnitError, speed_from_raw, speed_to_raw};
+use harness_proto::nd21::units::{DriveUnits, UnitError, speed_from_raw, speed_to_raw};
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
 /// A run, settled before anything moves.
 struct Run {
     axis: Axis,
-    units: Drive,
+    units: DriveUnits,
     target: Option<Position>,
     /// `ps_v0`.
     speed: Option<u16>,
@@ -46,7 +46,7 @@ pub(crate) fn position(
 
 fn turn(
     arguments: &PositionArguments,
-    bench: &Bench,
+    bench: &OpenBench,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
@@ -95,12 +95,18 @@ fn turn(
     Ok(Exit::Passed)
 }
 
-fn settle(arguments: &PositionArguments, axis: Axis, units: Drive) -> Result<Run, Failure> {
+fn settle(arguments: &PositionArguments, axis: Axis, units: DriveUnits) -> Result<Run, Failure> {
     let wrong = |error: UnitError| Failure::refused(error.to_string());
     let position = |mode, quantity: Quantity| Position::from_turns(mode, quantity.value);
     let (target, words) = match (arguments.to, arguments.by) {
-        (Some(to), _) => (Some(position(Mode::Absolute, to)), Some(format!("to {to}"))),
-        (None, Some(by)) => (Some(position(Mode::Relative, by)), Some(format!("by {by}"))),
+        (Some(to), _) => (
+            Some(position(PositionMode::Absolute, to)),
+            Some(format!("to {to}")),
+        ),
+        (None, Some(by)) => (
+            Some(position(PositionMode::Relative, by)),
+            Some(format!("by {by}")),
+        ),
         (None, None) => (None, None),
     };
     let speed = arguments
@@ -125,8 +131,8 @@ fn settle(arguments: &PositionArguments, axis: Axis, units: Drive) -> Result<Run
 
 impl Run {
     /// The value of a cell in words.
-    fn cell(&self, bench: &Bench, name: &str) -> Result<String, Failure> {
-        let locations: Vec<Location> = cells(&[name.to_owned()])?;
+    fn cell(&self, bench: &OpenBench, name: &str) -> Result<String, Failure> {
+        let locations: Vec<MemoryRange> = cells(&[name.to_owned()])?;
         let mut text = String::new();
         for location in &locations {
             text = find(&bench.bus, (self.axis, self.units), location)?.value();
@@ -135,7 +141,7 @@ impl Run {
     }
 
     /// Refuses a run that would end at once, or never begin.
-    fn check(&self, bench: &Bench) -> Result<(), Failure> {
+    fn check(&self, bench: &OpenBench) -> Result<(), Failure> {
         let axis = self.axis;
         let state = bench.bus.state(axis)?;
         let error = state.error_in_words().map(|error| format!(": {error}"));
@@ -166,7 +172,7 @@ impl Run {
     }
 
     /// Does it; `before` is `ps_v0`, which another speed is for this run only.
-    fn play(&self, bench: &Bench, bar: &ProgressBar, before: u16) -> Result<(), Failure> {
+    fn play(&self, bench: &OpenBench, bar: &ProgressBar, before: u16) -> Result<(), Failure> {
         let (bus, axis) = (&bench.bus, self.axis);
         if self.reference {
             bus.reference_showing(axis, |flags2| show(bar, ram::FLAGS2, flags2))?;

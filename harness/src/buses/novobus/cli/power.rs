@@ -6,8 +6,8 @@ use crate::cli::fuzz::rig::{simulated, tell};
 use crate::cli::output::Output;
 use crate::counted::counted;
 use crate::explore::{
-    About, Bounds, Campaign, ExploreError, Finding, OnSim, Planted, Pool, Progress, Setup, Swarm,
-    Watcher,
+    Bounds, ExploreError, Finding, FuzzRun, FuzzSettings, OnSim, Planted, Pool, Progress,
+    RingSetup, Swarm, Watcher,
 };
 use crate::rig::find::find;
 use clap::Args;
@@ -199,13 +199,13 @@ fn counts(
             name: deviation.name.to_owned(),
         };
         let setup = match arguments.whole {
-            true => Setup::of_rig(&rig, &[], true).hides(&planted),
-            false => Setup::of_rig(&rig, &[planted], false),
+            true => RingSetup::of_rig(&rig, &[], true).hides(&planted),
+            false => RingSetup::of_rig(&rig, &[planted], false),
         };
         let mut target = OnSim::new(setup.clone());
         let scope = simulated(&rig, Limits::unlimited(), &setup);
-        let about = About {
-            schema: About::SCHEMA,
+        let about = FuzzSettings {
+            schema: FuzzSettings::SCHEMA,
             rig: format!("sim:{DRIVES}"),
             drives: DRIVES,
             second: None,
@@ -216,7 +216,7 @@ fn counts(
             setup: setup.clone(),
             spices: Vec::new(),
         };
-        let mut campaign = Campaign::new(about, scope);
+        let mut campaign = FuzzRun::new(about, scope);
         let bounds = Bounds {
             cases: arguments.cases,
             wire: None,

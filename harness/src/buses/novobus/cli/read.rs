@@ -1,13 +1,13 @@
 //! `drivebench read`: cells of drives, with their units and bits.
 
-use super::args::{Form, ReadArguments};
+use super::args::{OutputForm, ReadArguments};
 use super::axes;
 use super::failure::Failure;
-use super::rig::{self, Bench, Use};
-use crate::buses::novobus::driver::cell::{Found, find};
+use super::rig::{self, OpenBench, Use};
+use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::scenario::argument::{Location, Memory, cells};
+use crate::scenario::argument::{MemoryKind, MemoryRange, cells};
 use serde_json::json;
 
 /// Reads cells and shows them.
@@ -21,8 +21,8 @@ pub(crate) fn read(arguments: &ReadArguments, output: &mut Output) -> Result<Exi
 
 fn show(
     arguments: &ReadArguments,
-    cells: &[Location],
-    bench: &Bench,
+    cells: &[MemoryRange],
+    bench: &OpenBench,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let drives = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
@@ -34,8 +34,8 @@ fn show(
         }
     }
     match arguments.format {
-        Form::Text => output.result(&output.fitted(&table(&found)))?,
-        Form::Json => {
+        OutputForm::Text => output.result(&output.fitted(&table(&found)))?,
+        OutputForm::Json => {
             let cells: Vec<_> = found.iter().map(object).collect();
             output.result(&format!("{}\n", json!({"schema": 1, "cells": cells})))?;
         }
@@ -44,8 +44,8 @@ fn show(
 }
 
 /// Drive, name, address, bytes, value or bits, section and meaning.
-fn table(found: &[Found<'_>]) -> String {
-    let row = |found: &Found<'_>| {
+fn table(found: &[CellFound<'_>]) -> String {
+    let row = |found: &CellFound<'_>| {
         let cell = found.location.cell();
         [
             found.axis.to_string(),
@@ -63,18 +63,18 @@ fn table(found: &[Found<'_>]) -> String {
     columns(&heading, &found.iter().map(row).collect::<Vec<_>>())
 }
 
-fn address(found: &Found<'_>) -> String {
+fn address(found: &CellFound<'_>) -> String {
     let address = found.location.address();
     match found.location.memory {
-        Memory::Ram => format!("{address:04X}"),
-        Memory::Eeprom => format!("ee:{address:02X}"),
+        MemoryKind::Ram => format!("{address:04X}"),
+        MemoryKind::Eeprom => format!("ee:{address:02X}"),
     }
 }
 
-fn object(found: &Found<'_>) -> serde_json::Value {
+fn object(found: &CellFound<'_>) -> serde_json::Value {
     let memory = match found.location.memory {
-        Memory::Ram => "ram",
-        Memory::Eeprom => "eeprom",
+        MemoryKind::Ram => "ram",
+        MemoryKind::Eeprom => "eeprom",
     };
     json!({
         "axis": found.axis.to_string(),

@@ -1,7 +1,7 @@
 //! `drivebench recover`: a ring is brought back from the error mode (ND21 9.7, 9.8) and its drives are counted
 //! (9.3).
 
-use super::args::{Form, RecoverArguments};
+use super::args::{OutputForm, RecoverArguments};
 use super::failure::Failure;
 use super::rig::{self, RigName, Use};
 use crate::buses::novobus::driver::{self, Axis, Recovery};
@@ -48,12 +48,12 @@ fn show(
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     match arguments.format {
-        Form::Text => {
+        OutputForm::Text => {
             for (ring, recovery) in found.iter().enumerate() {
                 output.result(&text(ring, recovery))?;
             }
         }
-        Form::Json => {
+        OutputForm::Json => {
             let rings: Vec<_> = found
                 .iter()
                 .map(|recovery| {

@@ -5,7 +5,7 @@ use super::args::RigArguments;
 use super::axes;
 use super::failure::Failure;
 use crate::buses::SimulatedLink;
-use crate::buses::novobus::driver::{Axis, Bus, Options};
+use crate::buses::novobus::driver::{Axis, OpenRings, Options};
 use crate::buses::novobus::drives;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
@@ -19,7 +19,7 @@ use crate::scenario::simulate;
 use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::{Drive, SpeedRange};
+use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use harness_proto::novobus::error::BusError;
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
@@ -76,23 +76,23 @@ impl Use {
 }
 
 /// A bench that has been opened.
-pub(crate) struct Bench {
-    pub(crate) bus: Bus<'static>,
+pub(crate) struct OpenBench {
+    pub(crate) bus: OpenRings<'static>,
     plan: Plan,
     /// The rig in use; `None` for a simulated bench created for this command.
     rig: Option<Shared>,
 }
 
-impl Bench {
+impl OpenBench {
     /// The values that the scales of a drive's cells depend on: its type, which the bench knows, and its range of speeds, which is read from
     /// the drive (14.3.2).
-    pub(crate) fn units(&self, axis: Axis) -> Result<Drive, Failure> {
+    pub(crate) fn units(&self, axis: Axis) -> Result<DriveUnits, Failure> {
         Ok(drives::units_of(&self.plan, &self.bus, axis)?)
     }
 
     /// The same without asking the drive: `range` is the range of speeds that it reported.
-    pub(crate) fn units_with(&self, axis: Axis, range: SpeedRange) -> Drive {
-        Drive {
+    pub(crate) fn units_with(&self, axis: Axis, range: SpeedRange) -> DriveUnits {
+        DriveUnits {
             range,
             ..self.plan.units(axis.ring(), axis.drive())
         }
@@ -155,7 +155,7 @@ pub(crate) fn on(
     arguments: &RigArguments,
     as_what: Use,
     output: &mut Output,
-    act: impl FnOnce(&Bench, &mut Output) -> Result<Exit, Failure>,
+    act: impl FnOnce(&OpenBench, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
     on_after(arguments, as_what, output, |_, _| Ok(()), act)
 }
@@ -166,14 +166,14 @@ pub(crate) fn on_after(
     as_what: Use,
     output: &mut Output,
     first: impl FnOnce(&mut Session, &mut Output) -> Result<(), Failure>,
-    act: impl FnOnce(&Bench, &mut Output) -> Result<Exit, Failure>,
+    act: impl FnOnce(&OpenBench, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
     let Some(RigName::Named(name)) = &arguments.rig else {
         let (plan, link) = link(arguments, output)?;
-        let bus = Bus::open(Box::new(link), &plan.rings, Options::default())?;
+        let bus = OpenRings::open(Box::new(link), &plan.rings, Options::default())?;
         bus.run(WARM);
         let rig = None;
-        return act(&Bench { bus, plan, rig }, output);
+        return act(&OpenBench { bus, plan, rig }, output);
     };
     let rig = named(name, arguments, output)?;
     let plan = rig.plan()?;
@@ -182,8 +182,8 @@ pub(crate) fn on_after(
     let sizes = session.rings().to_vec();
     let shared = Shared::new(session);
     let result = done.and_then(|()| {
-        let bus = Bus::open(Box::new(shared.line()), &sizes, Options::default())?;
-        let bench = Bench {
+        let bus = OpenRings::open(Box::new(shared.line()), &sizes, Options::default())?;
+        let bench = OpenBench {
             bus,
             plan,
             rig: Some(shared.clone()),

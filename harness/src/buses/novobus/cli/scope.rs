@@ -2,18 +2,18 @@
 
 use super::args::{Edge, ScopeArguments};
 use super::failure::Failure;
-use super::rig::{self, Bench, Use};
+use super::rig::{self, OpenBench, Use};
 use super::signal::Signal;
 use super::write::Orders;
 use super::{axes, file};
-use crate::buses::novobus::driver::cell::Found;
-use crate::buses::novobus::driver::{Axis, Error, Measurement, Scope, Trigger};
+use crate::buses::novobus::driver::cell::CellFound;
+use crate::buses::novobus::driver::{Axis, Error, Measurement, ScopeSettings, Trigger};
 use crate::buses::novobus::language::syntax::Written;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::report::plot::plot;
-use crate::scenario::argument::{Location, assignments};
-use crate::scenario::run::{Record, Sample};
+use crate::scenario::argument::{MemoryRange, assignments};
+use crate::scenario::run::{CellRecord, Sample};
 use harness_proto::nd21::units::{self, Scale, UnitError, Value, scope_period_us, trigger_delay};
 use harness_proto::time::{Instant, Span};
 use std::fmt::Write as _;
@@ -21,9 +21,9 @@ use std::fmt::Write as _;
 /// A recording and what its bytes are.
 struct Recording<'a> {
     axis: Axis,
-    units: units::Drive,
+    units: units::DriveUnits,
     signals: &'a [Signal],
-    scope: Scope,
+    scope: ScopeSettings,
     measurements: Vec<Measurement>,
 }
 
@@ -49,8 +49,8 @@ pub(crate) fn scope(arguments: &ScopeArguments, output: &mut Output) -> Result<E
 fn record(
     arguments: &ScopeArguments,
     signals: &[Signal],
-    then: &[(Location, Written)],
-    bench: &Bench,
+    then: &[(MemoryRange, Written)],
+    bench: &OpenBench,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let axis = axes::single(&arguments.drive, &bench.bus.axes())?;
@@ -76,9 +76,9 @@ fn record(
 }
 
 fn finish(
-    bench: &Bench,
+    bench: &OpenBench,
     axis: Axis,
-    scope: &Scope,
+    scope: &ScopeSettings,
     wait: Span,
 ) -> Result<Vec<Measurement>, Failure> {
     bench
@@ -96,8 +96,8 @@ fn finish(
 fn settle(
     arguments: &ScopeArguments,
     signals: &[Signal],
-    units: units::Drive,
-) -> Result<Scope, Failure> {
+    units: units::DriveUnits,
+) -> Result<ScopeSettings, Failure> {
     let wrong = |error: UnitError| Failure::refused(error.to_string());
     let period = Value::Exact(arguments.time_base.value);
     let timer0 = match Scale::ScopePeriod.encode(period, units) {
@@ -119,7 +119,7 @@ fn settle(
     };
     let selector = |signal: Option<&Signal>| signal.map_or(0, |signal| signal.selector);
     // One signal alone is selected twice (14.10.6.1).
-    Ok(Scope {
+    Ok(ScopeSettings {
         signals: [selector(signals.first()), selector(signals.last())],
         timer0,
         trigger,
@@ -150,7 +150,7 @@ impl Recording<'_> {
                 Instant::START + Span::from_micros(us)
             };
             let samples = self.of(index);
-            let record = Record {
+            let record = CellRecord {
                 ring: self.axis.ring(),
                 drive: self.axis.drive(),
                 name: signal.location.name(),
@@ -186,7 +186,7 @@ impl Recording<'_> {
         let mut rows = Vec::new();
         for (index, signal) in self.signals.iter().enumerate() {
             for (place, byte) in self.of(index) {
-                let found = Found {
+                let found = CellFound {
                     axis: self.axis,
                     location: &signal.location,
                     bytes: signal.bytes(byte),

@@ -1,16 +1,16 @@
 //! Signals of the oscilloscope: cells FFxx, of which one byte is recorded (ND21 14.10.6.1).
 
 use super::failure::Failure;
-use crate::scenario::argument::{Location, Memory, cells, value_at};
+use crate::scenario::argument::{MemoryKind, MemoryRange, cells, value_at};
 use crate::scenario::problem::Problems;
-use harness_proto::nd21::units::{Drive, trigger_level_to_raw};
+use harness_proto::nd21::units::{DriveUnits, trigger_level_to_raw};
 
 /// The cells of which one can be selected.
 const PAGE: u8 = 0xFF;
 
 /// A cell that can be recorded.
 pub(crate) struct Signal {
-    pub(crate) location: Location,
+    pub(crate) location: MemoryRange,
     /// The low byte of its address.
     pub(crate) selector: u8,
 }
@@ -21,7 +21,7 @@ impl Signal {
         let mut cells = cells(&[text.to_owned()])?;
         let signal = cells.pop().and_then(|location| {
             let [page, selector] = location.address().to_be_bytes();
-            let fits = location.memory == Memory::Ram && page == PAGE;
+            let fits = location.memory == MemoryKind::Ram && page == PAGE;
             fits.then_some(Self { location, selector })
         });
         signal.ok_or_else(|| {
@@ -41,7 +41,7 @@ impl Signal {
     }
 
     /// `scope_level` for a value of this signal (14.10.6.3).
-    pub(crate) fn level(&self, text: &str, units: Drive) -> Result<u8, Failure> {
+    pub(crate) fn level(&self, text: &str, units: DriveUnits) -> Result<u8, Failure> {
         let value = value_at(text, 0, &self.location);
         let bytes = value.and_then(|value| self.location.bytes(&value, units));
         match bytes {

@@ -11,7 +11,8 @@ use crate::file::values::Wire;
 use crate::scenario::argument::duration;
 use crate::serve::frames::FrameJob;
 use crate::serve::{
-    ControlPlace, End, Host, Inner, Job, Marks, Pace, Role, ServeError, ServedAt, Server, serve,
+    ClientRole, ControlPlace, End, Host, Inner, Job, Marks, Pace, ServeError, ServedAt, Server,
+    serve,
 };
 use clap::{ArgGroup, Args, ValueEnum};
 use harness_proto::time::Span;
@@ -144,10 +145,13 @@ impl FromStr for InnerPlace {
 /// The seats at inner links with their places, in the order of the command line: taps first.
 fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)>, Failure> {
     let mut all: Vec<(Inner, ServedAt)> = Vec::new();
-    let taps = arguments.tap.iter().map(|place| (place, &[Role::Tap][..]));
+    let taps = arguments
+        .tap
+        .iter()
+        .map(|place| (place, &[ClientRole::Tap][..]));
     let cuts = arguments.cut.iter().map(|place| match place.places.len() {
-        1 => (place, &[Role::Cut][..]),
-        _ => (place, &[Role::Upstream, Role::Downstream][..]),
+        1 => (place, &[ClientRole::Cut][..]),
+        _ => (place, &[ClientRole::Upstream, ClientRole::Downstream][..]),
     });
     for (given, roles) in taps.chain(cuts) {
         let text = &given.text;

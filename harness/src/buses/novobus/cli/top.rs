@@ -5,17 +5,17 @@
 
 use super::args::TopArguments;
 use super::failure::Failure;
-use super::rig::{self, Bench, RigName, Use};
+use super::rig::{self, OpenBench, RigName, Use};
 use crate::buses::novobus::driver::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::counted::counted;
 use crate::link::Trouble;
 use crate::signals::interrupt_flag;
-use crate::top::screen::{Input, leave};
-use crate::top::{DriveReading, Heading, Press, Reading, RingReading, Screen, Top, view};
+use crate::top::screen::{ScreenInput, leave};
+use crate::top::{DriveReading, Heading, Press, RingReading, Screen, Snapshot, Top, view};
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::{Drive, SpeedRange};
+use harness_proto::nd21::units::{DriveUnits, SpeedRange};
 use harness_proto::novobus::master::{Counters, Event};
 use harness_proto::time::{Instant, Span};
 use std::collections::VecDeque;
@@ -85,7 +85,7 @@ pub(crate) fn top(arguments: &TopArguments, output: &mut Output) -> Result<Exit,
 }
 
 /// The heading of the page.
-fn heading(name: &str, bench: &Bench) -> Heading {
+fn heading(name: &str, bench: &OpenBench) -> Heading {
     let mut sizes = Vec::new();
     for axis in bench.bus.axes() {
         match sizes.get_mut(axis.ring()) {
@@ -189,7 +189,7 @@ fn ended(thread: &JoinHandle<()>) -> bool {
 fn desk(
     mut screen: Screen,
     mut top: Top,
-    readings: &Receiver<Reading>,
+    readings: &Receiver<Snapshot>,
     stop: &AtomicBool,
 ) -> Leave {
     let mut stale = true;
@@ -211,13 +211,13 @@ fn desk(
             return Leave::Broken(error);
         }
         stale = match screen.input(KEYS) {
-            Ok(Input::Key(key)) => match top.press(key) {
+            Ok(ScreenInput::Key(key)) => match top.press(key) {
                 Press::Stay => true,
                 Press::Quit => return Leave::Quit,
                 Press::Interrupt => return Leave::Interrupt,
             },
-            Ok(Input::Redraw) => true,
-            Ok(Input::Nothing) => false,
+            Ok(ScreenInput::Redraw) => true,
+            Ok(ScreenInput::Nothing) => false,
             Err(error) => return Leave::Broken(error),
         };
     }
@@ -228,7 +228,7 @@ fn pump(
     reader: &mut Reader<'_>,
     every: Span,
     interrupted: &AtomicBool,
-    news: &SyncSender<Reading>,
+    news: &SyncSender<Snapshot>,
     asked: &Receiver<Leave>,
 ) -> Result<Exit, Failure> {
     let interrupt = || Failure::Bus(Error::Link(Trouble::Interrupted));
@@ -260,25 +260,25 @@ fn pump(
 
 /// What has been read, and what comes next.
 struct Reader<'b> {
-    bench: &'b Bench,
+    bench: &'b OpenBench,
     start: Instant,
     axes: Vec<Axis>,
     /// The first drive of the next piece.
     next: usize,
-    reading: Reading,
+    reading: Snapshot,
     /// What the masters had done, oldest first.
     marks: VecDeque<(Instant, Vec<Counters>)>,
 }
 
 impl<'b> Reader<'b> {
-    fn new(bench: &'b Bench) -> Self {
+    fn new(bench: &'b OpenBench) -> Self {
         let start = bench.bus.now();
         Self {
             bench,
             start,
             axes: bench.bus.axes(),
             next: 0,
-            reading: Reading::default(),
+            reading: Snapshot::default(),
             marks: VecDeque::from([(start, bench.bus.counters())]),
         }
     }
@@ -310,7 +310,7 @@ impl<'b> Reader<'b> {
     }
 
     /// All that is known now.
-    fn reading(&mut self) -> Reading {
+    fn reading(&mut self) -> Snapshot {
         let bus = &self.bench.bus;
         let now = bus.now();
         self.reading.at = now.since(self.start);
@@ -363,7 +363,7 @@ impl<'b> Reader<'b> {
     }
 }
 
-fn reading(bench: &Bench, axis: Axis, words: &[u16]) -> Option<DriveReading> {
+fn reading(bench: &OpenBench, axis: Axis, words: &[u16]) -> Option<DriveReading> {
     let &[
         status,
         flags,
@@ -402,7 +402,7 @@ fn reading(bench: &Bench, axis: Axis, words: &[u16]) -> Option<DriveReading> {
 }
 
 /// The value of a word cell in the manual's unit (14.5).
-fn value(cell: &str, word: u16, units: Drive) -> Option<f64> {
+fn value(cell: &str, word: u16, units: DriveUnits) -> Option<f64> {
     use harness_proto::nd21::units::Value;
     let cell = harness_proto::nd21::cells::cell(cell)?;
     match cell.value(&word.to_be_bytes(), units)?.ok()? {

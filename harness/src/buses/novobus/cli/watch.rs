@@ -3,13 +3,13 @@
 use super::args::{WatchArguments, WatchForm};
 use super::axes;
 use super::failure::Failure;
-use super::rig::{self, Bench, Use};
+use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::Axis;
-use crate::buses::novobus::driver::cell::{Found, find};
+use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::scenario::argument::{Location, cells};
-use harness_proto::nd21::units::Drive;
+use crate::scenario::argument::{MemoryRange, cells};
+use harness_proto::nd21::units::DriveUnits;
 use harness_proto::time::Span;
 
 /// Maximum number of lines of one command.
@@ -31,8 +31,8 @@ pub(crate) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<E
 
 fn show(
     arguments: &WatchArguments,
-    cells: &[Location],
-    bench: &Bench,
+    cells: &[MemoryRange],
+    bench: &OpenBench,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let axes = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
@@ -76,10 +76,10 @@ fn show(
 }
 
 fn look<'a>(
-    bench: &Bench,
-    drives: &[(Axis, Drive)],
-    cells: &'a [Location],
-) -> Result<Vec<Found<'a>>, Failure> {
+    bench: &OpenBench,
+    drives: &[(Axis, DriveUnits)],
+    cells: &'a [MemoryRange],
+) -> Result<Vec<CellFound<'a>>, Failure> {
     let mut found = Vec::new();
     for drive in drives {
         for cell in cells {
@@ -90,7 +90,7 @@ fn look<'a>(
 }
 
 /// Time, and of each drive the names and values.
-fn line(at: Span, found: &[Found<'_>]) -> String {
+fn line(at: Span, found: &[CellFound<'_>]) -> String {
     let mut line = format!("{:>12}", at.to_string());
     let mut axis = None;
     for found in found {
@@ -105,7 +105,7 @@ fn line(at: Span, found: &[Found<'_>]) -> String {
     line
 }
 
-fn heading(drives: &[(Axis, Drive)], cells: &[Location]) -> String {
+fn heading(drives: &[(Axis, DriveUnits)], cells: &[MemoryRange]) -> String {
     let mut line = "time_ms".to_owned();
     for (axis, _) in drives {
         for cell in cells {
@@ -117,7 +117,7 @@ fn heading(drives: &[(Axis, Drive)], cells: &[Location]) -> String {
     line + "\n"
 }
 
-fn row(at: Span, found: &[Found<'_>]) -> String {
+fn row(at: Span, found: &[CellFound<'_>]) -> String {
     let mut line = format!("{:.3}", at.as_millis_f64());
     for found in found {
         let value = match found.location.scale {

@@ -3,13 +3,13 @@
 use super::args::WriteArguments;
 use super::axes;
 use super::failure::Failure;
-use super::rig::{self, Bench, Use};
+use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::Axis;
-use crate::buses::novobus::driver::cell::{self, Found, find, hex};
+use crate::buses::novobus::driver::cell::{self, CellFound, find, hex};
 use crate::buses::novobus::language::syntax::Written;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
-use crate::scenario::argument::{Location, Memory, assignments, encode};
+use crate::scenario::argument::{MemoryKind, MemoryRange, assignments, encode};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::ram;
 
@@ -27,15 +27,15 @@ const ORDERS: [u16; 7] = [
 /// What is to be written into a drive.
 pub(crate) struct Orders {
     axis: Axis,
-    cells: Vec<(Location, Vec<u8>)>,
+    cells: Vec<(MemoryRange, Vec<u8>)>,
 }
 
 impl Orders {
     /// Resolves the values of a command line for a drive. Values that can make its motor turn need a permission.
     pub(crate) fn new(
-        bench: &Bench,
+        bench: &OpenBench,
         axis: Axis,
-        (texts, values): (&[String], &[(Location, Written)]),
+        (texts, values): (&[String], &[(MemoryRange, Written)]),
         leave: bool,
         output: &mut Output,
     ) -> Result<Self, Failure> {
@@ -58,13 +58,13 @@ impl Orders {
     }
 
     /// Why the motor can turn, if it can.
-    fn turns(&self, bench: &Bench) -> Result<Option<String>, Failure> {
+    fn turns(&self, bench: &OpenBench) -> Result<Option<String>, Failure> {
         let mode = bench.bus.state(self.axis)?.mode();
         for (location, bytes) in &self.cells {
             let first = location.address();
             let last = first.saturating_add(u16::try_from(bytes.len()).unwrap_or(u16::MAX) - 1);
             let reaches = |order: &u16| (first..=last).contains(order);
-            if location.memory != Memory::Ram || !ORDERS.iter().any(reaches) {
+            if location.memory != MemoryKind::Ram || !ORDERS.iter().any(reaches) {
                 continue;
             }
             let name = location.name();
@@ -83,7 +83,7 @@ impl Orders {
     }
 
     /// Writes all of it, in order.
-    pub(crate) fn write(&self, bench: &Bench) -> Result<(), Failure> {
+    pub(crate) fn write(&self, bench: &OpenBench) -> Result<(), Failure> {
         for (location, bytes) in &self.cells {
             cell::write(&bench.bus, self.axis, location, bytes)?;
         }
@@ -106,8 +106,8 @@ pub(crate) fn write(arguments: &WriteArguments, output: &mut Output) -> Result<E
 
 fn change(
     arguments: &WriteArguments,
-    values: &[(Location, Written)],
-    bench: &Bench,
+    values: &[(MemoryRange, Written)],
+    bench: &OpenBench,
     output: &mut Output,
 ) -> Result<Exit, Failure> {
     let drives = axes::select(std::slice::from_ref(&arguments.drives), &bench.bus.axes())?;
@@ -149,7 +149,7 @@ fn change(
 }
 
 /// Whether what was found is what was written, but for the bits that are read only (14.2.1).
-fn holds(found: &Found<'_>, written: &[u8]) -> bool {
+fn holds(found: &CellFound<'_>, written: &[u8]) -> bool {
     let fixed = found.location.cell().map_or(0, |cell| cell.read_only_bits);
     let mut pairs = found.bytes.iter().zip(written);
     pairs.all(|(found, written)| (found ^ written) & !fixed == 0)

@@ -1,6 +1,6 @@
 //! Reading and writing cells (ND21 12.2-12.4).
 
-use super::{Axis, Bus, Error, Order, value_of};
+use super::{Axis, Error, OpenRings, OrderNumber, value_of};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{Job, Outcome, Refused};
 use harness_proto::time::Span;
@@ -35,7 +35,7 @@ pub enum Width {
     Word,
 }
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Reads a byte of RAM, ROM or the register field (12.3).
     ///
     /// # Errors
@@ -132,7 +132,7 @@ impl Bus<'_> {
                 }
                 Ok(())
             });
-        for Order { ring, id } in orders {
+        for OrderNumber { ring, id } in orders {
             self.lock().forget(ring, id);
         }
         end.map(|()| ended)

@@ -1,18 +1,22 @@
 //! Cells of drives: read, written, shown.
 
-use super::{Axis, Bus, Error};
+use super::{Axis, Error, OpenRings};
 use crate::buses::novobus::language::scale::shown;
-use crate::scenario::argument::{Location, Memory};
+use crate::scenario::argument::{MemoryKind, MemoryRange};
 use harness_proto::nd21::bits;
-use harness_proto::nd21::units::{Drive, Value};
+use harness_proto::nd21::units::{DriveUnits, Value};
 use harness_proto::novobus::command::Kind;
 use harness_proto::novobus::memory::in_range;
 use serde_json::json;
 
 /// Reads the bytes of a cell; a word and a double word at one instant, where the bus can.
-pub(crate) fn read(bus: &Bus<'_>, axis: Axis, location: &Location) -> Result<Vec<u8>, Error> {
+pub(crate) fn read(
+    bus: &OpenRings<'_>,
+    axis: Axis,
+    location: &MemoryRange,
+) -> Result<Vec<u8>, Error> {
     let address = location.address();
-    if location.memory == Memory::Eeprom {
+    if location.memory == MemoryKind::Eeprom {
         return bus.read_eeprom_bytes(axis, low(address), location.size);
     }
     match location.size {
@@ -30,13 +34,13 @@ pub(crate) fn read(bus: &Bus<'_>, axis: Axis, location: &Location) -> Result<Vec
 
 /// Writes bytes from the address of a cell on, word by word where the bus can.
 pub(crate) fn write(
-    bus: &Bus<'_>,
+    bus: &OpenRings<'_>,
     axis: Axis,
-    location: &Location,
+    location: &MemoryRange,
     bytes: &[u8],
 ) -> Result<(), Error> {
     let mut address = location.address();
-    if location.memory == Memory::Eeprom {
+    if location.memory == MemoryKind::Eeprom {
         for (address, byte) in (low(address)..=u8::MAX).zip(bytes) {
             bus.write_eeprom(axis, address, *byte)?;
         }
@@ -71,14 +75,14 @@ fn low(address: u16) -> u8 {
 }
 
 /// What was found in a cell.
-pub(crate) struct Found<'a> {
+pub(crate) struct CellFound<'a> {
     pub(crate) axis: Axis,
-    pub(crate) location: &'a Location,
+    pub(crate) location: &'a MemoryRange,
     pub(crate) bytes: Vec<u8>,
-    pub(crate) units: Drive,
+    pub(crate) units: DriveUnits,
 }
 
-impl Found<'_> {
+impl CellFound<'_> {
     /// The bytes as hexadecimal digits.
     pub(crate) fn raw(&self) -> String {
         hex(&self.bytes)
@@ -115,7 +119,7 @@ impl Found<'_> {
     /// The names of the bits that are set (13.3.1, 14.4).
     pub(crate) fn bits(&self) -> Vec<&'static str> {
         match (self.location.memory, &self.bytes[..]) {
-            (Memory::Ram, [byte]) => bits::set_in(self.location.address(), *byte).collect(),
+            (MemoryKind::Ram, [byte]) => bits::set_in(self.location.address(), *byte).collect(),
             _ => Vec::new(),
         }
     }
@@ -143,11 +147,11 @@ impl Found<'_> {
 
 /// Reads a cell with what its scale depends on.
 pub(crate) fn find<'a>(
-    bus: &Bus<'_>,
-    (axis, units): (Axis, Drive),
-    location: &'a Location,
-) -> Result<Found<'a>, Error> {
-    Ok(Found {
+    bus: &OpenRings<'_>,
+    (axis, units): (Axis, DriveUnits),
+    location: &'a MemoryRange,
+) -> Result<CellFound<'a>, Error> {
+    Ok(CellFound {
         axis,
         location,
         bytes: read(bus, axis, location)?,

@@ -1,13 +1,13 @@
 //! Starting and stopping drives, errors, reset, outputs (ND21 11.8, 12.6-12.8, 14.10).
 
-use super::{Axis, Bus, Error};
+use super::{Axis, Error, OpenRings};
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::{self, ram};
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Job;
 use harness_proto::novobus::output::OutputChange;
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Takes the software block and the software stop away: the drive starts if its inputs let it.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! How many drives a ring has, and which (ND21 8.5, 9.3, 14.8).
 
 use super::error::in_words;
-use super::{Axis, Bus, Error};
+use super::{Axis, Error, OpenRings};
 use crate::buses::novobus::language::run::over_bus::read_byte;
 use crate::buses::novobus::locate::locate;
 use crate::link::{Line, Octets, wait_keeping};
@@ -204,7 +204,7 @@ impl State {
     }
 }
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Reads how a drive is.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! Reading and writing the EEPROM (ND21 12.5), by the steps of 14.10.5.
 
 use super::access::narrow;
-use super::{Axis, Bus, Error, value_of};
+use super::{Axis, Error, OpenRings, value_of};
 use harness_proto::nd21::ram;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::Outcome;
@@ -19,7 +19,7 @@ const WRITTEN: u8 = 1 << 4;
 /// How often a byte is read on a line that disturbs.
 const ATTEMPTS: u8 = 8;
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Reads a byte of the EEPROM.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use crate::link::Trouble;
 use harness_proto::nd21::errors::{ErrorCode, display_digits};
-use harness_proto::novobus::master::{Fault, Refused, Stop};
+use harness_proto::novobus::master::{BusStop, Fault, Refused};
 use harness_proto::time::Span;
 use thiserror::Error;
 
@@ -18,7 +18,7 @@ pub enum Error {
     Unknown(Fault),
     /// The bus has been stopped (11.5).
     #[error("{0}")]
-    Stopped(Stop),
+    Stopped(BusStop),
     /// The link carries nothing more.
     #[error("{0}")]
     Link(Trouble),

@@ -1,9 +1,9 @@
 //! The exchange of process data, a round at a time (ND21 9.4, 14.10.3).
 
-use super::{Axis, Bus, Error};
-use harness_proto::novobus::master::{Pace, Refused};
+use super::{Axis, Error, OpenRings};
+use harness_proto::novobus::master::{CyclePace, Refused};
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Gives these drives their nominal values in one round, and takes their actual values: in the order given. All axes are of one ring.
     ///
     /// # Errors
@@ -28,7 +28,7 @@ impl Bus<'_> {
         for (axis, value) in values {
             master.set_nominal(axis.drive(), *value).map_err(refused)?;
         }
-        let set = master.set_exchange(&own, Pace::OnRequest);
+        let set = master.set_exchange(&own, CyclePace::OnRequest);
         set.map_err(refused)?;
         master.start_round();
         pump.speak(ring);
@@ -42,7 +42,9 @@ impl Bus<'_> {
             if done || now >= end {
                 let actual = own.iter().filter_map(|drive| master.actual(*drive));
                 let actual: Vec<u16> = actual.collect();
-                master.set_exchange(&[], Pace::OnRequest).map_err(refused)?;
+                master
+                    .set_exchange(&[], CyclePace::OnRequest)
+                    .map_err(refused)?;
                 if done && actual.len() == own.len() {
                     return Ok(actual);
                 }

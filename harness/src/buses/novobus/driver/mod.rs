@@ -1,8 +1,8 @@
 //! The driver: what NOVOBUS.LIB did for a program, over any link (ND21 chapters 11, 12, 13.2).
 //!
-//! [`Bus`] opens one or two rings and hands out drives by their axis number ([`Axis`], 12.2). Its calls block,
-//! each with a time-out; [`Bus::start`], [`Bus::test`] and [`Bus::result`] are the non-blocking form (11.6). A
-//! `Bus` is a handle: clones of it may be used from several threads, and jobs of all of them go out pipelined.
+//! [`OpenRings`] opens one or two rings and hands out drives by their axis number ([`Axis`], 12.2). Its calls block,
+//! each with a time-out; [`OpenRings::start`], [`OpenRings::test`] and [`OpenRings::result`] are the non-blocking form (11.6). A
+//! `OpenRings` is a handle: clones of it may be used from several threads, and jobs of all of them go out pipelined.
 //! Every function has the manual's name as an alias for the search of the documentation.
 //!
 //! The functions of several steps follow the manual's numbered steps, which the code cites.
@@ -28,14 +28,14 @@ pub use error::Error;
 /// What a master may send, by the rules of the bus alone.
 pub use harness_sim::novobus::fuzz::jobs::conduct;
 pub use s_ramp::SkStatus;
-pub use scope::{Measurement, Scope, Trigger};
+pub use scope::{Measurement, ScopeSettings, Trigger};
 
 use crate::link::Line;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::master::{self, Counters, Event, Job, JobId, Outcome, Phase, Refused};
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::deviation::MasterDeviation;
-use pump::Pump;
+use pump::Masters;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// How a bus works. All of it can be left at its default.
@@ -71,19 +71,19 @@ impl Default for Options {
 
 /// One or two open rings. Clones are handles of the same bus.
 #[derive(Clone)]
-pub struct Bus<'l> {
-    pump: Arc<Mutex<Pump<'l>>>,
+pub struct OpenRings<'l> {
+    pump: Arc<Mutex<Masters<'l>>>,
     options: Options,
 }
 
 /// The number of a job that was started: an order of NOVOBUS.LIB (11.6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Order {
+pub struct OrderNumber {
     ring: usize,
     id: JobId,
 }
 
-impl<'l> Bus<'l> {
+impl<'l> OpenRings<'l> {
     /// Opens a bus with one ring or two over `link`; the drives are counted by the first telegram, and a
     /// ring of another size is an error.
     ///
@@ -98,7 +98,7 @@ impl<'l> Bus<'l> {
         options: Options,
     ) -> Result<Self, Error> {
         let bus = Self {
-            pump: Arc::new(Mutex::new(Pump::new(link, rings, &options))),
+            pump: Arc::new(Mutex::new(Masters::new(link, rings, &options))),
             options,
         };
         bus.wait_until_open()?;
@@ -125,7 +125,7 @@ impl<'l> Bus<'l> {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Pump<'l>> {
+    fn lock(&self) -> MutexGuard<'_, Masters<'l>> {
         // A panic in another thread leaves masters and link as they are: each byte is done whole.
         self.pump.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -233,7 +233,7 @@ impl<'l> Bus<'l> {
     /// [`Error::Refused`] where the ring, the drive or the address does not exist, or too many jobs wait.
     #[doc(alias = "NB_StartReadByte")]
     #[doc(alias = "NB_StartReadWord")]
-    pub fn start(&self, axis: Axis, job: impl FnOnce(u8) -> Job) -> Result<Order, Error> {
+    pub fn start(&self, axis: Axis, job: impl FnOnce(u8) -> Job) -> Result<OrderNumber, Error> {
         let ring = axis.ring();
         let mut pump = self.lock();
         pump.pause();
@@ -242,14 +242,14 @@ impl<'l> Bus<'l> {
             // A bus that was stopped is not the job's fault.
             Some(Err(Refused::Stopped(stop))) => Err(Error::Stopped(stop)),
             Some(Err(refused)) => Err(Error::Refused(refused)),
-            Some(Ok(id)) => Ok(Order { ring, id }),
+            Some(Ok(id)) => Ok(OrderNumber { ring, id }),
         }
     }
 
     /// Whether a job has ended, so that [`Self::result`] does not wait (12.4).
     #[doc(alias = "NB_Test")]
     #[must_use]
-    pub fn test(&self, order: Order) -> bool {
+    pub fn test(&self, order: OrderNumber) -> bool {
         let mut pump = self.lock();
         pump.poll();
         pump.has(order.ring, order.id)
@@ -261,7 +261,7 @@ impl<'l> Bus<'l> {
     /// [`Error::TimeOut`], [`Error::Unknown`], [`Error::Stopped`], or [`Error::NoSuchOrder`] for an order whose
     /// result has been fetched.
     #[doc(alias = "NB_Result")]
-    pub fn result(&self, order: Order) -> Result<Option<u32>, Error> {
+    pub fn result(&self, order: OrderNumber) -> Result<Option<u32>, Error> {
         value_of(self.outcome(order)?)
     }
 
@@ -269,7 +269,7 @@ impl<'l> Bus<'l> {
     ///
     /// # Errors
     /// [`Error::TimeOut`], [`Error::Link`] or [`Error::NoSuchOrder`]: the job has not ended.
-    pub fn outcome(&self, order: Order) -> Result<Outcome, Error> {
+    pub fn outcome(&self, order: OrderNumber) -> Result<Outcome, Error> {
         let end = self.lock().now() + self.options.patience;
         loop {
             let mut pump = self.lock();

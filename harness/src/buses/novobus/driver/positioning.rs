@@ -1,6 +1,6 @@
 //! The positioning controller over the bus, by the numbered steps of ND21 13.2.
 
-use super::{Axis, Bus, Error};
+use super::{Axis, Error, OpenRings};
 use harness_proto::nd21::bits::{flags, flags2, ps_status, status};
 use harness_proto::nd21::position::Position;
 use harness_proto::nd21::ram;
@@ -19,7 +19,7 @@ fn words(long: u32) -> [u16; 2] {
     [u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])]
 }
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Initialises the positioning controller with a referencing run (13.2.1.1) and waits for its end.
     /// The motor turns.
     ///

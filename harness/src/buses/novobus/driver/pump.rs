@@ -8,7 +8,7 @@ use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::master::{
-    self, Counters, Event, Job, JobId, Outcome, Phase, Refused, Stop,
+    self, BusStop, Counters, Event, Job, JobId, Outcome, Phase, Refused,
 };
 use harness_proto::time::{Instant, Span};
 use harness_sim::novobus::master::AnyMaster;
@@ -32,18 +32,18 @@ struct Ring {
     /// Only SYNCO has been sent behind that byte, and nothing has been requested since.
     idle: bool,
     results: BTreeMap<JobId, Option<Outcome>>,
-    stopped: Option<Stop>,
+    stopped: Option<BusStop>,
 }
 
 /// The masters of one or two rings over one link.
-pub(crate) struct Pump<'l> {
+pub(crate) struct Masters<'l> {
     link: Box<dyn Line + 'l>,
     rings: Vec<Ring>,
     /// Events that belong to no job, oldest first, with the number of the ring.
     log: Vec<(usize, Event)>,
 }
 
-impl<'l> Pump<'l> {
+impl<'l> Masters<'l> {
     pub(crate) fn new(link: Box<dyn Line + 'l>, sizes: &[RingSize], options: &Options) -> Self {
         let now = link.now();
         // A late byte must not count as lost, because the recovery stops every drive.

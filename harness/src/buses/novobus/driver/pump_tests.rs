@@ -1,7 +1,7 @@
 //! How far ahead of the line bytes are handed over, in virtual time.
 
 use crate::buses::SimulatedLink;
-use crate::buses::novobus::driver::{Axis, Bus, Options};
+use crate::buses::novobus::driver::{Axis, OpenRings, Options};
 use crate::link::{Lead, Line, Link, LinkFault, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::line::Rate;
@@ -70,7 +70,11 @@ fn simulated() -> SimulatedLink {
 }
 
 /// What the master sent while a bus ran `act`, with the time of each byte, and when `act` had ended.
-fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, u8)>, Instant) {
+fn played(
+    lead: Lead,
+    late: Span,
+    act: impl FnOnce(&OpenRings<'_>),
+) -> (Vec<(Instant, u8)>, Instant) {
     let mut link = simulated();
     if late > Span::ZERO {
         let fault = PlacedFault::Link(usize::from(DRIVES), LinkFault::Delay(late));
@@ -83,7 +87,7 @@ fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, 
         lead,
         attended: Arc::default(),
     };
-    let bus = Bus::open(Box::new(line), &[size()], Options::default()).expect("an open bus");
+    let bus = OpenRings::open(Box::new(line), &[size()], Options::default()).expect("an open bus");
     act(&bus);
     assert_eq!(bus.corrected_errors(), 0);
     let end = bus.now();
@@ -97,7 +101,7 @@ fn played(lead: Lead, late: Span, act: impl FnOnce(&Bus<'_>)) -> (Vec<(Instant, 
     (sent.collect(), end)
 }
 
-fn reads(bus: &Bus<'_>) {
+fn reads(bus: &OpenRings<'_>) {
     for drive in [0, 1, 2, 0, 1] {
         let axis = Axis::new(0, drive).expect("an axis");
         assert_eq!(bus.read_byte(axis, 0xFE13), Ok(0));
@@ -153,7 +157,8 @@ fn an_answer_is_attended_to_when_it_comes() {
             attended: Arc::clone(&attended),
         };
         let last = || attended.lock().expect("no panic").last().copied();
-        let bus = Bus::open(Box::new(line), &[size()], Options::default()).expect("an open bus");
+        let bus =
+            OpenRings::open(Box::new(line), &[size()], Options::default()).expect("an open bus");
         assert_eq!(last(), Some(bus.now()), "the count of the drives");
         for _ in 0..3 {
             let axis = Axis::new(0, 1).expect("an axis");

@@ -4,7 +4,7 @@
 //! say: without [`Options::s_ramp_puffer`](super::Options::s_ramp_puffer) these calls refuse and say so; with
 //! it they use the wire `puffer` of the simulated drive.
 
-use super::{Axis, Bus, Error};
+use super::{Axis, Error, OpenRings};
 use harness_proto::nd21::bits::{ps_status, sw_version2};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::s_ramp::{Direction, SRamp};
@@ -30,7 +30,7 @@ const OPEN: Error = Error::Open(
      only simulated drives with the property s-ramp-wire = puffer take them",
 );
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Sends a distance in impulses (65536 a turn), a speed in rpm and an acceleration time in ms.
     ///
     /// # Errors

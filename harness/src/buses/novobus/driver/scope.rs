@@ -1,6 +1,6 @@
 //! The memory oscilloscope over the bus (ND21 14.10.6).
 
-use super::{Axis, Bus, Error};
+use super::{Axis, Error, OpenRings};
 use harness_proto::nd21::bits::scope_status::{ARMED, POSITIVE, STOPPED};
 use harness_proto::nd21::ram;
 use harness_proto::nd21::units::{
@@ -23,7 +23,7 @@ pub struct Trigger {
 
 /// What is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Scope {
+pub struct ScopeSettings {
     /// The low bytes of the addresses of signal 1 and 2 (14.10.6.1).
     pub signals: [u8; 2],
     /// `scope_timer0` (14.10.6.2).
@@ -41,12 +41,12 @@ pub struct Measurement {
     pub byte: u8,
 }
 
-impl Bus<'_> {
+impl OpenRings<'_> {
     /// Programs the oscilloscope and starts a recording (14.10.6.6).
     ///
     /// # Errors
     /// See [`Error`].
-    pub fn start_scope(&self, axis: Axis, scope: &Scope) -> Result<(), Error> {
+    pub fn start_scope(&self, axis: Axis, scope: &ScopeSettings) -> Result<(), Error> {
         // "The signal selecting must be made with a blocked recording" (14.10.6.1).
         self.write_byte(axis, ram::SCOPE_STATUS, STOPPED)?;
         let [first, second] = scope.signals;
@@ -82,7 +82,7 @@ impl Bus<'_> {
     pub fn finish_scope(
         &self,
         axis: Axis,
-        scope: &Scope,
+        scope: &ScopeSettings,
         patience: Span,
     ) -> Result<Vec<Measurement>, Error> {
         let length = Span::from_micros(scope_window_us(scope.timer0).into());

@@ -3,7 +3,7 @@
 //! A case consists of acts in the manual's terms, so that it stays a valid conversation when it is mutated or shrunk. Checking bytes
 //! are computed when the bytes are made. A fault belongs to a byte of its act, wherever the act stands.
 
-use super::order::{Command, Order};
+use super::order::{Command, CommandSent};
 use crate::link::LinkFault;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::check_sequence::{SEQUENCE, ZEROS};
@@ -29,7 +29,7 @@ pub struct Case {
     pub drives: u8,
     /// The other ring of the bench, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub beside: Option<Beside>,
+    pub beside: Option<OtherRing>,
     /// The acts, in order.
     pub acts: Vec<Act>,
 }
@@ -37,7 +37,7 @@ pub struct Case {
 /// The other ring of the bench and its number of drives (ND21 12.2). No byte goes from one ring to the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Beside {
+pub enum OtherRing {
     /// It is ring 1: the conversation is with ring 2.
     First(u8),
     /// It is ring 2: the conversation is with ring 1.
@@ -49,7 +49,7 @@ pub enum Beside {
 #[serde(deny_unknown_fields)]
 pub struct Act {
     /// What.
-    pub what: What,
+    pub what: ActKind,
     /// The faults on its bytes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub damages: Vec<Damage>,
@@ -58,7 +58,7 @@ pub struct Act {
 /// What the master can do.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum What {
+pub enum ActKind {
     /// This number of SYNCO (ND21 9.2).
     Synco(u8),
     /// This number of PAUSE (9.2).
@@ -95,7 +95,7 @@ pub struct Talk {
     pub process_data: Option<u16>,
     /// The commands (9.5).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub orders: Vec<Order>,
+    pub orders: Vec<CommandSent>,
     /// Maximum number of net bytes of each telegram, 2 to 7.
     #[serde(default = "most_net", skip_serializing_if = "is_most_net")]
     pub room: u8,
@@ -178,7 +178,7 @@ impl Talk {
         Self {
             to,
             process_data: None,
-            orders: vec![Order::sound(command)],
+            orders: vec![CommandSent::sound(command)],
             room: MOST_NET,
             between: Vec::new(),
         }
@@ -188,7 +188,7 @@ impl Talk {
     #[must_use]
     pub fn telegrams(&self, drives: u8) -> Vec<Vec<u8>> {
         let room = usize::from(self.room.clamp(2, MOST_NET));
-        let all: Vec<u8> = self.orders.iter().flat_map(Order::bytes).collect();
+        let all: Vec<u8> = self.orders.iter().flat_map(CommandSent::bytes).collect();
         let mut rest = &all[..];
         let mut telegrams = Vec::new();
         let mut first = true;
@@ -238,7 +238,7 @@ fn telegram(to: To, data: Option<u16>, parameters: &[u8], drives: u8) -> Vec<u8>
 impl Act {
     /// An act without a fault.
     #[must_use]
-    pub const fn sound(what: What) -> Self {
+    pub const fn sound(what: ActKind) -> Self {
         Self {
             what,
             damages: Vec::new(),
@@ -249,18 +249,18 @@ impl Act {
     #[must_use]
     pub fn parts(&self, drives: u8) -> Vec<Vec<u8>> {
         match &self.what {
-            What::Synco(count) => vec![vec![SYNCO; usize::from(*count)]],
-            What::Pause(count) => vec![vec![PAUSE; usize::from(*count)]],
-            What::Zeros(count) => vec![vec![0; usize::from(*count)]],
-            What::Recover => {
+            ActKind::Synco(count) => vec![vec![SYNCO; usize::from(*count)]],
+            ActKind::Pause(count) => vec![vec![PAUSE; usize::from(*count)]],
+            ActKind::Zeros(count) => vec![vec![0; usize::from(*count)]],
+            ActKind::Recover => {
                 let mut bytes = vec![0; usize::from(ZEROS)];
                 bytes.extend(SEQUENCE);
                 vec![bytes]
             }
-            What::Sequence => vec![SEQUENCE.to_vec()],
-            What::Bytes(bytes) => vec![bytes.clone()],
-            What::Talk(talk) => talk.telegrams(drives),
-            What::Wait(_) | What::Power { .. } => Vec::new(),
+            ActKind::Sequence => vec![SEQUENCE.to_vec()],
+            ActKind::Bytes(bytes) => vec![bytes.clone()],
+            ActKind::Talk(talk) => talk.telegrams(drives),
+            ActKind::Wait(_) | ActKind::Power { .. } => Vec::new(),
         }
     }
 
@@ -276,8 +276,8 @@ impl Case {
     #[must_use]
     pub const fn ring(&self) -> usize {
         match self.beside {
-            Some(Beside::First(_)) => 1,
-            Some(Beside::Second(_)) | None => 0,
+            Some(OtherRing::First(_)) => 1,
+            Some(OtherRing::Second(_)) | None => 0,
         }
     }
 
@@ -286,8 +286,8 @@ impl Case {
     pub fn sizes(&self) -> Vec<u8> {
         match self.beside {
             None => vec![self.drives],
-            Some(Beside::First(other)) => vec![other, self.drives],
-            Some(Beside::Second(other)) => vec![self.drives, other],
+            Some(OtherRing::First(other)) => vec![other, self.drives],
+            Some(OtherRing::Second(other)) => vec![self.drives, other],
         }
     }
 
@@ -317,9 +317,9 @@ impl Case {
     }
 
     /// All commands, in order.
-    pub fn orders(&self) -> impl Iterator<Item = &Order> {
+    pub fn orders(&self) -> impl Iterator<Item = &CommandSent> {
         self.acts.iter().flat_map(|act| match &act.what {
-            What::Talk(talk) => &talk.orders[..],
+            ActKind::Talk(talk) => &talk.orders[..],
             _ => &[],
         })
     }
@@ -350,7 +350,7 @@ impl Case {
         let damages = self.acts.iter().flat_map(|act| &act.damages);
         let values = self.acts.iter().map(|act| values(&act.what)).sum();
         let waits = self.acts.iter().map(|act| match act.what {
-            What::Wait(ms) => u64::from(ms),
+            ActKind::Wait(ms) => u64::from(ms),
             _ => 0,
         });
         [
@@ -365,12 +365,12 @@ impl Case {
 }
 
 /// The sum of the values of an act.
-fn values(what: &What) -> u64 {
+fn values(what: &ActKind) -> u64 {
     let of_bytes = |bytes: &[u8]| bytes.iter().map(|byte| u64::from(*byte)).sum::<u64>();
     match what {
-        What::Bytes(bytes) => of_bytes(bytes),
-        What::Power { drive, .. } => u64::from(*drive),
-        What::Talk(talk) => {
+        ActKind::Bytes(bytes) => of_bytes(bytes),
+        ActKind::Power { drive, .. } => u64::from(*drive),
+        ActKind::Talk(talk) => {
             let to = match talk.to {
                 To::Drive(drive) => u64::from(drive),
                 To::Nobody(byte) => u64::from(byte),
@@ -470,7 +470,7 @@ mod tests {
             at: 2,
             harm: Harm::Drop,
         };
-        let read = What::Talk(Talk::one(To::Drive(0), Command::ReadByte { cell: 0xFE13 }));
+        let read = ActKind::Talk(Talk::one(To::Drive(0), Command::ReadByte { cell: 0xFE13 }));
         let mut case = Case {
             drives: 2,
             beside: None,
@@ -480,7 +480,7 @@ mod tests {
             }],
         };
         assert_eq!(case.faults(), [(1, 3, Harm::Drop)]);
-        case.acts.insert(0, Act::sound(What::Synco(10)));
+        case.acts.insert(0, Act::sound(ActKind::Synco(10)));
         assert_eq!(case.faults(), [(1, 13, Harm::Drop)]);
     }
 }

@@ -217,7 +217,7 @@ pub(crate) struct Must {
 
 /// A ring of such drives, each with the same properties of the bus.
 #[derive(Clone, Debug)]
-pub(crate) struct Model {
+pub(crate) struct RingModel {
     pub(crate) properties: Properties,
     /// The first drive is the one that hears the master.
     drives: Vec<Drive>,
@@ -240,7 +240,7 @@ struct Answer {
     open: bool,
 }
 
-impl Model {
+impl RingModel {
     /// A ring whose drives wait for a sync byte.
     pub(crate) fn new(size: RingSize, properties: Properties) -> Self {
         Self {

@@ -1,13 +1,13 @@
 //! A finding: a case, the difference, and how to reproduce it. It is stored as JSON next to its scenario.
 
 use crate::buses::novobus::explore::judge::Judge;
-use crate::buses::novobus::explore::text::{Expected, Page, text};
+use crate::buses::novobus::explore::text::{ExpectedBytes, Surroundings, text};
 use crate::buses::novobus::language::syntax::Header;
 use crate::explore::Case;
 use crate::explore::Difference;
 use crate::explore::ExploreError;
-use crate::explore::Seen;
-use crate::explore::Setup;
+use crate::explore::MasterView;
+use crate::explore::RingSetup;
 use crate::explore::files::{read_text, write_whole};
 use crate::manual::tables;
 use harness_proto::novobus::address::RingSize;
@@ -43,7 +43,7 @@ pub struct Finding {
     /// How the ring differs from the expected behaviour.
     pub difference: Difference,
     /// What its rings are made of.
-    pub setup: Setup,
+    pub setup: RingSetup,
     /// The conversation.
     pub case: Case,
 }
@@ -123,12 +123,12 @@ impl Finding {
         for planted in &self.setup.deviates {
             remarks.push(format!("found on {}", planted.line()));
         }
-        let page = Page {
+        let page = Surroundings {
             title,
             sources,
             header: Some(header),
             remarks: &remarks,
-            expected: Some(Expected {
+            expected: Some(ExpectedBytes {
                 seen: &seen,
                 any: &any,
                 timed: timed.and_then(|byte| byte.checked_sub(1)),
@@ -150,7 +150,7 @@ impl Finding {
 }
 
 /// Bytes that drives may answer in more than one way: what they hold and measure, and the checking bytes over it.
-fn unknowable(case: &Case, seen: &Seen) -> Vec<usize> {
+fn unknowable(case: &Case, seen: &MasterView) -> Vec<usize> {
     let Ok(size) = RingSize::new(u64::from(case.drives)) else {
         return Vec::new();
     };

@@ -1,8 +1,8 @@
 //! Generates cases from random numbers: telegrams that are mostly correct and sometimes not, and reads of their effects.
 
-use super::case::{Act, Beside, Case, Damage, Harm, MOST_NET, Talk, To, What};
+use super::case::{Act, ActKind, Case, Damage, Harm, MOST_NET, OtherRing, Talk, To};
 use super::idiom::Idiom;
-use super::order::{Command, Order, Spoil};
+use super::order::{Command, CommandSent, Spoil};
 use crate::explore::Dice;
 use crate::explore::{Spice, Swarm};
 use harness_proto::nd21::bits::status;
@@ -12,7 +12,7 @@ use harness_proto::novobus::guard::{Limits, Need};
 
 /// What cases may have on a rig.
 #[derive(Clone, Debug)]
-pub struct Scope {
+pub struct CaseScope {
     /// Its ring.
     pub first: RingScope,
     /// Its second ring, where it has two: a case is with one of them.
@@ -25,7 +25,7 @@ pub struct Scope {
     pub spare_eeprom: bool,
 }
 
-impl Scope {
+impl CaseScope {
     /// A ring of it, counted from 0.
     #[must_use]
     pub fn ring(&self, ring: usize) -> &RingScope {
@@ -40,7 +40,7 @@ pub struct RingScope {
     /// How many drives it has.
     pub drives: u8,
     /// The other ring of the bench, where there is one.
-    pub beside: Option<Beside>,
+    pub beside: Option<OtherRing>,
     /// The links on which faults can be put.
     pub links: Vec<u8>,
 }
@@ -60,8 +60,8 @@ impl RingScope {
             links: (0..drives).filter(|link| reaches(ring, *link)).collect(),
         };
         (
-            ring(0, first, second.map(Beside::Second)),
-            second.map(|second| ring(1, second, Some(Beside::First(first)))),
+            ring(0, first, second.map(OtherRing::Second)),
+            second.map(|second| ring(1, second, Some(OtherRing::First(first)))),
         )
     }
 
@@ -107,7 +107,7 @@ const BYTES: [u8; 12] = [
 /// Makes acts of a swarm's kind.
 #[derive(Debug)]
 pub struct Generator<'s> {
-    scope: &'s Scope,
+    scope: &'s CaseScope,
     ring: &'s RingScope,
     swarm: &'s Swarm,
     /// The cells of this case: written cells are read again.
@@ -116,7 +116,12 @@ pub struct Generator<'s> {
 
 impl<'s> Generator<'s> {
     /// A generator for one of the scope's rings, with a few cells of its own.
-    pub fn new(scope: &'s Scope, ring: &'s RingScope, swarm: &'s Swarm, dice: &mut Dice) -> Self {
+    pub fn new(
+        scope: &'s CaseScope,
+        ring: &'s RingScope,
+        swarm: &'s Swarm,
+        dice: &mut Dice,
+    ) -> Self {
         let mut cells = Vec::new();
         for _ in 0..1 + dice.below(3) {
             cells.push(any_cell(dice));
@@ -209,14 +214,14 @@ impl<'s> Generator<'s> {
     pub fn act(&self, dice: &mut Dice) -> Act {
         let has = |spice| self.swarm.has(spice);
         let what = match dice.below(100) {
-            0..6 if has(Spice::Idle) => What::Synco(1 + dice.below(4) as u8),
-            6..10 if has(Spice::Idle) => What::Pause(1 + dice.below(3) as u8),
+            0..6 if has(Spice::Idle) => ActKind::Synco(1 + dice.below(4) as u8),
+            6..10 if has(Spice::Idle) => ActKind::Pause(1 + dice.below(3) as u8),
             10..15 if has(Spice::Noise) => self.noise(dice),
-            15..21 if has(Spice::Zeros) => What::Zeros(1 + dice.below(20) as u8),
-            21..23 if has(Spice::Zeros) => What::Sequence,
-            23..27 if has(Spice::Zeros) || has(Spice::Spoil) => What::Recover,
-            27..31 if has(Spice::Silence) => What::Wait(1 + dice.below(45) as u16),
-            31..34 if has(Spice::Silence) => What::Talk(Talk::one(
+            15..21 if has(Spice::Zeros) => ActKind::Zeros(1 + dice.below(20) as u8),
+            21..23 if has(Spice::Zeros) => ActKind::Sequence,
+            23..27 if has(Spice::Zeros) || has(Spice::Spoil) => ActKind::Recover,
+            27..31 if has(Spice::Silence) => ActKind::Wait(1 + dice.below(45) as u16),
+            31..34 if has(Spice::Silence) => ActKind::Talk(Talk::one(
                 self.to(dice),
                 // Time-outs are monitored from now on (14.4.3).
                 Command::Or {
@@ -224,22 +229,22 @@ impl<'s> Generator<'s> {
                     data: 0x04,
                 },
             )),
-            34..36 if has(Spice::Power) => What::Power {
+            34..36 if has(Spice::Power) => ActKind::Power {
                 drive: dice.below(usize::from(self.ring.drives)) as u8,
                 on: dice.percent(60),
             },
-            _ => What::Talk(self.talk(dice)),
+            _ => ActKind::Talk(self.talk(dice)),
         };
         Act::sound(what)
     }
 
-    fn noise(&self, dice: &mut Dice) -> What {
+    fn noise(&self, dice: &mut Dice) -> ActKind {
         let length = 1 + dice.below(6);
         let byte = |dice: &mut Dice| match dice.percent(60) {
             true => BYTES[dice.below(BYTES.len())],
             false => dice.byte(),
         };
-        What::Bytes((0..length).map(|_| byte(dice)).collect())
+        ActKind::Bytes((0..length).map(|_| byte(dice)).collect())
     }
 
     /// Telegrams to a drive.
@@ -287,10 +292,10 @@ impl<'s> Generator<'s> {
     }
 
     /// A command that the rig allows, now and then spoiled.
-    pub fn order(&self, dice: &mut Dice) -> Order {
+    pub fn order(&self, dice: &mut Dice) -> CommandSent {
         let command = self.command(dice);
         let spoiled = self.swarm.has(Spice::Spoil) && dice.percent(15);
-        Order {
+        CommandSent {
             command,
             spoil: spoiled.then(|| {
                 let length = command.head().len();
@@ -421,19 +426,19 @@ impl<'s> Generator<'s> {
         // A ring in the error mode spells out its address (ND21 9.7).
         if kind < 4 {
             let synco = 24 + usize::from(self.ring.drives) + dice.below(8);
-            acts.push(Act::sound(What::Synco(synco.min(60) as u8)));
+            acts.push(Act::sound(ActKind::Synco(synco.min(60) as u8)));
         }
         if !(2..4).contains(&kind) {
             let may_be_in_error = kind < 2 || dice.percent(30);
             if may_be_in_error {
-                acts.push(Act::sound(What::Recover));
+                acts.push(Act::sound(ActKind::Recover));
             }
             let mut cells = self.cells.clone();
             cells.truncate(2);
             for cell in cells {
                 let drive = dice.below(usize::from(self.ring.drives)) as u8;
                 let read = Command::ReadByte { cell };
-                acts.push(Act::sound(What::Talk(Talk::one(To::Drive(drive), read))));
+                acts.push(Act::sound(ActKind::Talk(Talk::one(To::Drive(drive), read))));
             }
         }
     }
@@ -447,11 +452,14 @@ impl<'s> Generator<'s> {
         let acts = std::mem::take(&mut case.acts);
         let mut doubt = false;
         for act in acts {
-            let recovers = matches!(act.what, What::Recover | What::Zeros(_) | What::Wait(_));
+            let recovers = matches!(
+                act.what,
+                ActKind::Recover | ActKind::Zeros(_) | ActKind::Wait(_)
+            );
             if doubt && !recovers {
-                case.acts.push(Act::sound(What::Recover));
+                case.acts.push(Act::sound(ActKind::Recover));
             }
-            doubt = leaves_doubt(&act) || doubt && !matches!(act.what, What::Recover);
+            doubt = leaves_doubt(&act) || doubt && !matches!(act.what, ActKind::Recover);
             case.acts.push(act);
         }
     }
@@ -465,9 +473,9 @@ fn leaves_doubt(act: &Act) -> bool {
             .any(|order| order.spoil.is_some() || order.command == Command::Reset)
     };
     let own = match &act.what {
-        What::Talk(talk) => spoiled(talk),
-        What::Bytes(_) | What::Zeros(_) | What::Sequence | What::Power { .. } => true,
-        What::Synco(_) | What::Pause(_) | What::Recover | What::Wait(_) => false,
+        ActKind::Talk(talk) => spoiled(talk),
+        ActKind::Bytes(_) | ActKind::Zeros(_) | ActKind::Sequence | ActKind::Power { .. } => true,
+        ActKind::Synco(_) | ActKind::Pause(_) | ActKind::Recover | ActKind::Wait(_) => false,
     };
     own || !act.damages.is_empty()
 }

@@ -1,10 +1,10 @@
 //! The page of a run of fuzzing: what was found, what was reached, how it went on.
 
 use crate::counted::counted;
-use crate::explore::{About, Progress};
+use crate::explore::{FuzzSettings, Progress};
 use crate::report::html::Curve;
 use crate::report::html::Html;
-use crate::report::html::Shown;
+use crate::report::html::ShownScenario;
 use crate::report::html::{Section, page};
 use harness_sim::novobus::transitions::{Event, Reached, State, Transition, why_unreachable};
 
@@ -15,7 +15,7 @@ const ROWS: usize = 40;
 #[derive(Clone, Debug)]
 pub(crate) struct Explored<'e> {
     /// What the run is.
-    pub about: &'e About,
+    pub about: &'e FuzzSettings,
     /// The progress of the run over time; the last entry is the current state.
     pub history: &'e [Progress],
     /// After how many cases how many features had been seen.
@@ -23,7 +23,7 @@ pub(crate) struct Explored<'e> {
     /// The protocol transitions that the kept cases reach on the model.
     pub reached: &'e Reached,
     /// What was found, each with its picture.
-    pub findings: Vec<Shown>,
+    pub findings: Vec<ShownScenario>,
     /// The command that continues the run.
     pub again: &'e str,
 }
@@ -101,14 +101,14 @@ fn facts(html: &mut Html, run: &Explored<'_>) {
     });
 }
 
-fn findings(html: &mut Html, all: &[Shown]) {
+fn findings(html: &mut Html, all: &[ShownScenario]) {
     if all.is_empty() {
         return;
     }
     html.element("table", &[], |html| {
         html.line("caption", &[], "Findings");
         html.heads(&["Verdict", "Finding", "What differed"]);
-        for Shown { row, section } in all {
+        for ShownScenario { row, section } in all {
             html.element("tr", &[], |html| {
                 html.line(
                     "td",

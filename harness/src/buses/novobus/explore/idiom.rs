@@ -1,8 +1,8 @@
 //! Short plots: acts that belong together, as a master would do them. Single acts in any order come to them too seldom.
 
-use super::case::{Act, Damage, Harm, MOST_NET, Talk, To, What};
+use super::case::{Act, ActKind, Damage, Harm, MOST_NET, Talk, To};
 use super::generate::Generator;
-use super::order::{Command, Order, Spoil};
+use super::order::{Command, CommandSent, Spoil};
 use crate::explore::Dice;
 use crate::explore::Spice;
 use harness_proto::nd21::bits::{flags2, ps_status, status};
@@ -70,7 +70,7 @@ impl Idiom {
 }
 
 fn talk(drive: u8, command: Command) -> Act {
-    Act::sound(What::Talk(Talk::one(To::Drive(drive), command)))
+    Act::sound(ActKind::Talk(Talk::one(To::Drive(drive), command)))
 }
 
 fn reset(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
@@ -79,7 +79,7 @@ fn reset(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice)
     acts.push(talk(drive, Command::WriteByte { cell, data }));
     acts.push(talk(drive, Command::Reset));
     // The drive tests itself (11.8).
-    acts.push(Act::sound(What::Wait(120)));
+    acts.push(Act::sound(ActKind::Wait(120)));
     acts.push(talk(drive, Command::ReadByte { cell }));
 }
 
@@ -96,7 +96,7 @@ fn eeprom(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     let buffer_of = |byte| buffer(address | u16::from(byte));
     acts.push(talk(drive, buffer_of(dice.byte())));
     acts.push(talk(drive, control(0x82)));
-    acts.push(Act::sound(What::Wait(15)));
+    acts.push(Act::sound(ActKind::Wait(15)));
     acts.push(talk(
         drive,
         Command::ReadByte {
@@ -105,7 +105,7 @@ fn eeprom(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     ));
     acts.push(talk(drive, buffer_of(0)));
     acts.push(talk(drive, control(0x81)));
-    acts.push(Act::sound(What::Wait(5)));
+    acts.push(Act::sound(ActKind::Wait(5)));
     acts.push(talk(
         drive,
         Command::ReadWord {
@@ -170,12 +170,12 @@ fn exchange(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
         let mut one = Talk::one(To::Drive(drive), Command::ReadByte { cell: 0xFF08 });
         one.orders.clear();
         one.process_data = Some(dice.word());
-        acts.push(Act::sound(What::Talk(one)));
+        acts.push(Act::sound(ActKind::Talk(one)));
     }
 }
 
 fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
-    let mut order = Order::sound(maker.change(dice));
+    let mut order = CommandSent::sound(maker.change(dice));
     if dice.percent(50) {
         // Data with which the sum is 0, so that 01 must be sent (9.6) and 00 is wrong.
         let rest = |data| sum(order.command.with_data(data));
@@ -212,12 +212,12 @@ fn edge_of_command(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: 
         room: MOST_NET,
         between: Vec::new(),
     };
-    acts.push(Act::sound(What::Talk(one)));
+    acts.push(Act::sound(ActKind::Talk(one)));
     match cell.filter(|_| dice.percent(50)) {
-        None => acts.push(Act::sound(What::Synco(1 + dice.below(8) as u8))),
+        None => acts.push(Act::sound(ActKind::Synco(1 + dice.below(8) as u8))),
         Some(cell) => {
             // Whether it was done all the same (9.6).
-            acts.push(Act::sound(What::Recover));
+            acts.push(Act::sound(ActKind::Recover));
             acts.push(talk(drive, Command::ReadByte { cell }));
         }
     }
@@ -232,12 +232,12 @@ fn error_mode(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut 
         true => 0,
         false => dice.byte() & 0x7F,
     };
-    acts.push(Act::sound(What::Bytes(vec![bad])));
-    acts.push(Act::sound(What::Zeros(1 + dice.below(20) as u8)));
+    acts.push(Act::sound(ActKind::Bytes(vec![bad])));
+    acts.push(Act::sound(ActKind::Zeros(1 + dice.below(20) as u8)));
     match dice.below(4) {
-        0 => acts.push(Act::sound(What::Synco(4 + dice.below(28) as u8))),
-        1 => acts.push(Act::sound(What::Recover)),
-        _ => acts.push(Act::sound(What::Sequence)),
+        0 => acts.push(Act::sound(ActKind::Synco(4 + dice.below(28) as u8))),
+        1 => acts.push(Act::sound(ActKind::Recover)),
+        _ => acts.push(Act::sound(ActKind::Sequence)),
     }
     acts.push(talk(
         drive,
@@ -250,7 +250,7 @@ fn error_mode(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut 
 /// Something that a drive takes for an error.
 fn wrong(drive: u8, maker: &Generator<'_>, dice: &mut Dice) -> Act {
     let mut wrong = match dice.below(4) {
-        0 => Act::sound(What::Bytes(vec![dice.byte() & 0x7F])),
+        0 => Act::sound(ActKind::Bytes(vec![dice.byte() & 0x7F])),
         1 => talk(
             drive,
             Command::WriteByte {
@@ -259,18 +259,18 @@ fn wrong(drive: u8, maker: &Generator<'_>, dice: &mut Dice) -> Act {
             },
         ),
         2 => {
-            let mut order = Order::sound(Command::ReadByte { cell: 0xFE13 });
+            let mut order = CommandSent::sound(Command::ReadByte { cell: 0xFE13 });
             order.spoil = Some(Spoil {
                 at: 9,
                 byte: dice.byte(),
             });
             let mut one = Talk::one(To::Drive(drive), order.command);
             one.orders = vec![order];
-            Act::sound(What::Talk(one))
+            Act::sound(ActKind::Talk(one))
         }
-        _ => Act::sound(What::Synco(2)),
+        _ => Act::sound(ActKind::Synco(2)),
     };
-    if matches!(wrong.what, What::Synco(_)) {
+    if matches!(wrong.what, ActKind::Synco(_)) {
         let (parity, stop) = (dice.percent(50), dice.percent(50));
         let harm = Harm::Flip {
             data: 0,
@@ -289,9 +289,9 @@ fn wrong(drive: u8, maker: &Generator<'_>, dice: &mut Dice) -> Act {
 
 fn ask_for_error(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &mut Dice) {
     acts.push(wrong(drive, maker, dice));
-    acts.push(Act::sound(What::Recover));
+    acts.push(Act::sound(ActKind::Recover));
     // The drive's own cycle sees it (11.8).
-    acts.push(Act::sound(What::Wait(1 + dice.below(3) as u16)));
+    acts.push(Act::sound(ActKind::Wait(1 + dice.below(3) as u16)));
     acts.push(talk(
         drive,
         Command::ReadWord {
@@ -306,7 +306,7 @@ fn ask_for_error(acts: &mut Vec<Act>, drive: u8, maker: &Generator<'_>, dice: &m
         };
         if maker.allows(confirm) {
             acts.push(talk(drive, confirm));
-            acts.push(Act::sound(What::Wait(2)));
+            acts.push(Act::sound(ActKind::Wait(2)));
             acts.push(talk(
                 drive,
                 Command::ReadWord {
@@ -331,12 +331,12 @@ fn time_out(acts: &mut Vec<Act>, maker: &Generator<'_>, dice: &mut Dice) {
     } else {
         acts.push(talk(drive, monitor));
     }
-    acts.push(Act::sound(What::Synco(1)));
-    acts.push(Act::sound(What::Wait(
+    acts.push(Act::sound(ActKind::Synco(1)));
+    acts.push(Act::sound(ActKind::Wait(
         [5, 9, 11, 15, 22, 27, 33, 42][dice.below(8)],
     )));
-    acts.push(Act::sound(What::Synco(1 + dice.below(30) as u8)));
-    acts.push(Act::sound(What::Recover));
+    acts.push(Act::sound(ActKind::Synco(1 + dice.below(30) as u8)));
+    acts.push(Act::sound(ActKind::Recover));
     acts.push(talk(
         drive,
         Command::ReadWord {
@@ -383,7 +383,7 @@ fn turn(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
         },
     ));
     for _ in 0..1 + dice.below(3) {
-        acts.push(Act::sound(What::Wait(20 + dice.below(80) as u16)));
+        acts.push(Act::sound(ActKind::Wait(20 + dice.below(80) as u16)));
         let seen = [
             ram::NIST,
             ram::UMDRIST,
@@ -401,7 +401,7 @@ fn turn(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
     if dice.percent(50) {
         let data = [status::STOP, status::BLOCK][dice.below(2)];
         acts.push(talk(drive, Command::Or { low, data }));
-        acts.push(Act::sound(What::Wait(30)));
+        acts.push(Act::sound(ActKind::Wait(30)));
         acts.push(talk(drive, Command::ReadWord { cell: ram::NIST }));
     }
 }
@@ -446,7 +446,7 @@ fn position(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
             data: flags2::CALCULATE,
         },
     ));
-    acts.push(Act::sound(What::Wait(60)));
+    acts.push(Act::sound(ActKind::Wait(60)));
     acts.push(talk(
         drive,
         Command::Or {
@@ -454,7 +454,7 @@ fn position(acts: &mut Vec<Act>, drive: u8, dice: &mut Dice) {
             data: ps_status::START,
         },
     ));
-    acts.push(Act::sound(What::Wait(200 + dice.below(400) as u16)));
+    acts.push(Act::sound(ActKind::Wait(200 + dice.below(400) as u16)));
     acts.push(talk(
         drive,
         Command::ReadByte {

@@ -1,7 +1,7 @@
 //! Exchanges with a ring behind a port, one after the other since its drives were made ready, beside the models that it may be.
 
-use super::case::{Act, Beside, Case, Harm, Talk, To, What};
-use super::expect::{Both, Model, Must};
+use super::case::{Act, ActKind, Case, Harm, OtherRing, Talk, To};
+use super::expect::{Both, Must, RingModel};
 use super::oracle::{Difference, sent};
 use super::order::Command;
 use crate::buses::novobus::twin;
@@ -15,18 +15,18 @@ use std::collections::BTreeMap;
 
 /// The first conversation with drives that were made ready: a telegram that addresses no drive, after which every drive knows its
 /// address (ND21 9.3).
-pub(crate) fn prologue(drives: u8, beside: Option<Beside>) -> Case {
+pub(crate) fn prologue(drives: u8, beside: Option<OtherRing>) -> Case {
     let read = Command::ReadByte { cell: 0xFE13 };
     Case {
         drives,
         beside,
-        acts: vec![Act::sound(What::Talk(Talk::one(To::Nobody(0), read)))],
+        acts: vec![Act::sound(ActKind::Talk(Talk::one(To::Nobody(0), read)))],
     }
 }
 
 /// The bytes that the master sent, the faults on links, and the bytes that came back.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Exchange {
+pub(crate) struct BytesExchanged {
     /// Bytes, and whether each went round whole.
     sent: Vec<(u8, bool)>,
     /// What happens on links: which link, which byte on it counted from 1.
@@ -34,7 +34,7 @@ pub(crate) struct Exchange {
     received: Vec<Received>,
 }
 
-impl Exchange {
+impl BytesExchanged {
     /// A case that was played.
     pub(crate) fn of(case: &Case, received: Vec<Received>) -> Self {
         let mut harms: BTreeMap<_, Vec<Harm>> = BTreeMap::new();
@@ -69,8 +69,8 @@ pub(crate) struct Judge {
     line_errors: bool,
     /// What of the manual's open properties the ring can still have; that of the model first.
     possible: Vec<Properties>,
-    model: Model,
-    log: Vec<Exchange>,
+    model: RingModel,
+    log: Vec<BytesExchanged>,
     /// All bytes of the log.
     sent: Vec<(u8, bool)>,
 }
@@ -83,7 +83,7 @@ impl Judge {
             ring,
             size,
             line_errors,
-            model: Model::new(size, Properties::default()),
+            model: RingModel::new(size, Properties::default()),
             possible,
             log: Vec::new(),
             sent: Vec::new(),
@@ -95,11 +95,11 @@ impl Judge {
         self.log.clear();
         self.sent.clear();
         let properties = self.possible.first().copied().unwrap_or_default();
-        self.model = Model::new(self.size, properties);
+        self.model = RingModel::new(self.size, properties);
     }
 
     /// Mismatch of a ring with every drive that the manual permits. Call [`Self::begin`] after it.
-    pub(crate) fn see(&mut self, exchange: Exchange) -> Option<Difference> {
+    pub(crate) fn see(&mut self, exchange: BytesExchanged) -> Option<Difference> {
         let before = self.possible.clone();
         let mut best: Option<Mismatch> = None;
         loop {
@@ -142,7 +142,7 @@ impl Judge {
     }
 
     /// Lets the model live through an exchange.
-    fn follow(&mut self, exchange: &Exchange) -> Result<(), Mismatch> {
+    fn follow(&mut self, exchange: &BytesExchanged) -> Result<(), Mismatch> {
         let all = [&self.sent[..], &exchange.sent[..]].concat();
         let roles = roles_with(self.size, &all, &self.model.properties);
         let mut counts = vec![0; usize::from(self.size.drives()) + 1];
@@ -177,7 +177,7 @@ impl Judge {
     }
 
     /// Whether more bytes came than were sent.
-    fn is_shifted(&self, exchange: &Exchange) -> bool {
+    fn is_shifted(&self, exchange: &BytesExchanged) -> bool {
         exchange.harms.is_empty() && exchange.received.len() > exchange.sent.len()
     }
 
@@ -212,7 +212,7 @@ impl Judge {
         }
     }
 
-    fn difference(&self, found: &Mismatch, exchange: &Exchange) -> Difference {
+    fn difference(&self, found: &Mismatch, exchange: &BytesExchanged) -> Difference {
         let (own, rule) = found.role.rule();
         let rule = match found.section == own {
             true => rule,
@@ -254,7 +254,7 @@ impl Judge {
     pub(crate) fn foresee(&self, case: &Case) -> Foreseen {
         let mut model = self.model.clone();
         let mut seen = Foreseen::default();
-        let case = Exchange::of(case, Vec::new());
+        let case = BytesExchanged::of(case, Vec::new());
         let all = [&self.sent[..], &case.sent[..]].concat();
         let roles = roles_with(self.size, &all, &model.properties);
         let mut counts = vec![0; usize::from(self.size.drives()) + 1];
@@ -292,7 +292,7 @@ pub(crate) struct Foreseen {
 
 /// A byte of the master's on its way round.
 fn around(
-    model: &mut Model,
+    model: &mut RingModel,
     byte: u8,
     counts: &mut [u64],
     harms: &BTreeMap<(usize, u64), Vec<Harm>>,

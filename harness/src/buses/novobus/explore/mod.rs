@@ -22,17 +22,19 @@ pub mod shrink;
 pub mod text;
 mod tour;
 
-pub use case::{Act, Beside, Case, Damage, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, Talk, To, What};
+pub use case::{
+    Act, ActKind, Case, Damage, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, OtherRing, Talk, To,
+};
 pub use finding::Finding;
-pub use generate::{Generator, RingScope, Scope};
+pub use generate::{CaseScope, Generator, RingScope};
 pub use mutate::mutate;
 pub use novelty::{MOST_KEPT, Pool, by_novelty, features};
 pub use on_rig::OnRig;
 pub use on_sim::OnSim;
 pub use oracle::{Difference, against_model, against_reference, against_witnesses, beside};
-pub use order::{Command, Order, Spoil};
+pub use order::{Command, CommandSent, Spoil};
 pub use page::page;
-pub use play::{Seen, play};
+pub use play::{MasterView, play};
 pub(crate) use setup::drive_name;
-pub use setup::{Planted, Setup};
+pub use setup::{Planted, RingSetup};
 pub(crate) use tour::tour;

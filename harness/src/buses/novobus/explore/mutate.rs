@@ -1,8 +1,8 @@
 //! New cases from old ones.
 
-use super::case::{Act, Case, To, What};
+use super::case::{Act, ActKind, Case, To};
 use super::generate::Generator;
-use super::order::{Command, Order};
+use super::order::{Command, CommandSent};
 use crate::explore::Dice;
 
 /// A case made of one that is kept, and now and then of two.
@@ -69,18 +69,18 @@ fn one(case: &mut Case, other: Option<&Case>, maker: &Generator<'_>, dice: &mut 
 /// Changes something within an act.
 fn vary(act: &mut Act, maker: &Generator<'_>, dice: &mut Dice) {
     match &mut act.what {
-        What::Synco(count) | What::Pause(count) | What::Zeros(count) => {
+        ActKind::Synco(count) | ActKind::Pause(count) | ActKind::Zeros(count) => {
             *count = 1 + dice.below(30) as u8;
         }
-        What::Bytes(bytes) => {
+        ActKind::Bytes(bytes) => {
             let at = dice.below(bytes.len());
             if let Some(byte) = bytes.get_mut(at) {
                 *byte ^= 1 << dice.below(8);
             }
         }
-        What::Wait(ms) => *ms = 1 + dice.below(45) as u16,
-        What::Power { on, .. } => *on = !*on,
-        What::Talk(talk) => match dice.below(4) {
+        ActKind::Wait(ms) => *ms = 1 + dice.below(45) as u16,
+        ActKind::Power { on, .. } => *on = !*on,
+        ActKind::Talk(talk) => match dice.below(4) {
             0 => talk.to = maker.to(dice),
             1 => talk.orders.push(maker.order(dice)),
             2 if talk.orders.len() > 1 => {
@@ -93,9 +93,9 @@ fn vary(act: &mut Act, maker: &Generator<'_>, dice: &mut Dice) {
                 }
             }
         },
-        What::Recover | What::Sequence => act.what = maker.act(dice).what,
+        ActKind::Recover | ActKind::Sequence => act.what = maker.act(dice).what,
     }
-    if let What::Talk(talk) = &mut act.what {
+    if let ActKind::Talk(talk) = &mut act.what {
         talk.orders.truncate(4);
         // An address byte needs a net byte behind it (ND21 9.1), or the telegram is none.
         if talk.orders.is_empty() && talk.process_data.is_none() && matches!(talk.to, To::Drive(_))
@@ -106,7 +106,7 @@ fn vary(act: &mut Act, maker: &Generator<'_>, dice: &mut Dice) {
 }
 
 /// Another command to the same cell, or a spoiled one.
-fn like(order: &Order, maker: &Generator<'_>, dice: &mut Dice) -> Order {
+fn like(order: &CommandSent, maker: &Generator<'_>, dice: &mut Dice) -> CommandSent {
     let new = maker.order(dice);
     let cell = match (order.command.cell(), order.command) {
         (Some(cell), _) => cell,
@@ -120,7 +120,7 @@ fn like(order: &Order, maker: &Generator<'_>, dice: &mut Dice) -> Order {
         other if dice.percent(50) => other,
         _ => Command::ReadByte { cell },
     };
-    Order {
+    CommandSent {
         command,
         spoil: new.spoil.or(order.spoil),
     }

@@ -5,7 +5,7 @@
 
 use crate::explore::Case;
 use crate::explore::Dice;
-use crate::explore::Seen;
+use crate::explore::MasterView;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_sim::novobus::mark::Mark as _;
@@ -17,7 +17,7 @@ pub const MOST_KEPT: usize = 2_000;
 
 /// The features of a run of the model.
 #[must_use]
-pub fn features(case: &Case, seen: &Seen, trace: &Trace) -> BTreeSet<u32> {
+pub fn features(case: &Case, seen: &MasterView, trace: &Trace) -> BTreeSet<u32> {
     let mut found = BTreeSet::new();
     let Ok(size) = RingSize::new(u64::from(case.drives)) else {
         return found;

@@ -1,11 +1,11 @@
 //! Runs cases on a rig with ports, one after another. Bytes that the guard would deny are not sent, and a [`Judge`] sees every byte. The
 //! drives are made ready again when their state is unknown.
 
-use super::case::{Act, Beside, Case, Harm, What};
-use super::judge::{Exchange, Judge, prologue};
+use super::case::{Act, ActKind, Case, Harm, OtherRing};
+use super::judge::{BytesExchanged, Judge, prologue};
 use super::oracle::{Difference, sent};
-use super::order::{Command, Order};
-use super::play::Seen;
+use super::order::{Command, CommandSent};
+use super::play::MasterView;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::link::BesideTheBus;
@@ -100,7 +100,7 @@ impl<'r, 's> OnRig<'r, 's> {
             let received = received.into_iter().map(|(_, byte)| byte).collect();
             // A difference here shows again in the first case.
             let _again = judge
-                .see(Exchange::of(&case, received))
+                .see(BytesExchanged::of(&case, received))
                 .map(|_| judge.begin());
         }
         self.history.iter_mut().for_each(Vec::clear);
@@ -169,7 +169,7 @@ impl Target for OnRig<'_, '_> {
             Some(trouble) => Some(trouble.to_string()),
             None => beyond(case, &link, received.len()).map(str::to_owned),
         };
-        let seen = Seen { received, took };
+        let seen = MasterView { received, took };
         Ok(Rehearsal {
             took,
             features: features(case, &seen, &trace),
@@ -220,7 +220,7 @@ impl Target for OnRig<'_, '_> {
             let ring = case.ring();
             let bytes = received.iter().map(|(_, byte)| *byte).collect();
             let before = std::mem::take(&mut self.history[ring]);
-            tried.difference = self.judges[ring].see(Exchange::of(case, bytes));
+            tried.difference = self.judges[ring].see(BytesExchanged::of(case, bytes));
             if tried.difference.is_none() {
                 tried.difference = self.untimely(case, &received, &due);
             }
@@ -278,7 +278,7 @@ fn converse(
     let mut received = Vec::new();
     let mut due = Vec::new();
     for act in &case.acts {
-        if let What::Wait(ms) = act.what {
+        if let ActKind::Wait(ms) = act.what {
             let end = link.now() + Span::from_millis(u64::from(ms));
             await_bytes(link, ring, usize::MAX, end, &mut received);
         }
@@ -334,14 +334,14 @@ fn beyond(case: &Case, link: &dyn Link, received: usize) -> Option<&'static str>
 }
 
 /// The other ring of the bench, as a case with this ring names it.
-fn beside_of(rings: &[RingSize], ring: usize) -> Option<Beside> {
+fn beside_of(rings: &[RingSize], ring: usize) -> Option<OtherRing> {
     match (rings, ring) {
-        ([_, second], 0) => Some(Beside::Second(second.drives())),
-        ([first, _], 1) => Some(Beside::First(first.drives())),
+        ([_, second], 0) => Some(OtherRing::Second(second.drives())),
+        ([first, _], 1) => Some(OtherRing::First(first.drives())),
         _ => None,
     }
 }
 
-fn resets(order: &Order) -> bool {
+fn resets(order: &CommandSent) -> bool {
     order.command == Command::Reset && order.spoil.is_none()
 }

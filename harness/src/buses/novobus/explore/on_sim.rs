@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::oracle::{Difference, against_model, against_reference, against_witnesses, beside};
 use super::play::play;
-use super::setup::Setup;
+use super::setup::RingSetup;
 use crate::buses::SimulatedLink;
 use crate::explore::ExploreError;
 use crate::explore::features;
@@ -14,7 +14,7 @@ use harness_sim::record::Trace;
 /// Compares a simulated ring with its model, and with the reference model if its drives are plain and sound.
 #[derive(Debug)]
 pub struct OnSim {
-    setup: Setup,
+    setup: RingSetup,
     /// Fresh rings of the sizes of the last case.
     fresh: Option<Fresh>,
 }
@@ -29,7 +29,7 @@ struct Fresh {
 impl OnSim {
     /// Rings of this setup.
     #[must_use]
-    pub const fn new(setup: Setup) -> Self {
+    pub const fn new(setup: RingSetup) -> Self {
         Self { setup, fresh: None }
     }
 
@@ -46,7 +46,7 @@ impl OnSim {
     ///
     /// # Errors
     /// The lines of the setup have mistakes, or there is no reference for the drives that they describe.
-    pub fn ready(setup: Setup, sizes: &[u8]) -> Result<Self, ExploreError> {
+    pub fn ready(setup: RingSetup, sizes: &[u8]) -> Result<Self, ExploreError> {
         let mut new = Self::new(setup);
         new.fresh_of(sizes.to_vec())?;
         Ok(new)

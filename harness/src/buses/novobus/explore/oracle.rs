@@ -1,9 +1,9 @@
 //! Compares a ring with what it must answer: with the model of the manual, byte for byte and to the nanosecond, and with the reference
 //! model, on every link and in every cell.
 
-use super::case::{Beside, Case, Harm, What};
-use super::order::Order;
-use super::play::Seen;
+use super::case::{ActKind, Case, Harm, OtherRing};
+use super::order::CommandSent;
+use super::play::MasterView;
 use super::setup::{drive_name, is_first};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::link::BesideTheBus;
@@ -114,7 +114,7 @@ impl From<&twin::Divergence> for Difference {
 
 /// The first received byte that differs from the model: in value, line status or number, or else in time.
 #[must_use]
-pub fn against_model(case: &Case, model: &Seen, seen: &Seen) -> Option<Difference> {
+pub fn against_model(case: &Case, model: &MasterView, seen: &MasterView) -> Option<Difference> {
     if model.received == seen.received {
         return None;
     }
@@ -173,7 +173,8 @@ pub(crate) fn answered<'a>(
 /// the case: it has no time and no power.
 #[must_use]
 pub fn against_reference(case: &Case, link: &SimulatedLink, trace: &Trace) -> Option<Difference> {
-    let beyond = |act: &super::case::Act| matches!(act.what, What::Wait(_) | What::Power { .. });
+    let beyond =
+        |act: &super::case::Act| matches!(act.what, ActKind::Wait(_) | ActKind::Power { .. });
     if case.acts.iter().any(beyond) || asks_for_code(case) {
         return None;
     }
@@ -254,7 +255,7 @@ pub fn against_witnesses(
 
 /// A byte that did not go out when the byte that it answers had arrived (ND21 8.2). After faults and silence other bytes may delay it.
 fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
-    let waits = |act: &super::case::Act| matches!(act.what, What::Wait(_));
+    let waits = |act: &super::case::Act| matches!(act.what, ActKind::Wait(_));
     if !case.faults().is_empty() || case.acts.iter().any(waits) {
         return None;
     }
@@ -286,8 +287,8 @@ fn untimely(case: &Case, byte_time: Span, trace: &Trace) -> Option<Difference> {
 #[must_use]
 pub fn beside(case: &Case, link: &SimulatedLink) -> Option<Difference> {
     let other = match case.beside? {
-        Beside::First(_) => 0,
-        Beside::Second(_) => 1,
+        OtherRing::First(_) => 0,
+        OtherRing::Second(_) => 1,
     };
     let trace = link.trace(other);
     let spoke = |own: &Channel| !own.octets().is_empty();
@@ -318,7 +319,7 @@ fn asks_for_code(case: &Case) -> bool {
         Harm::Break(_) | Harm::Overrun => true,
         _ => false,
     };
-    let asks = |order: &Order| {
+    let asks = |order: &CommandSent| {
         order
             .command
             .cell()

@@ -1,12 +1,12 @@
 //! Commands with any parameters, proper or not, and perhaps with a wrong byte (ND21 chapter 10).
 
 use harness_proto::novobus::checksum::Checksum;
-use harness_proto::novobus::guard::Act as GuardedAct;
+use harness_proto::novobus::guard::DriveAct as GuardedAct;
 use serde::{Deserialize, Serialize};
 
 /// A command, perhaps spoiled.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Order {
+pub struct CommandSent {
     /// Which.
     #[serde(flatten)]
     pub command: Command,
@@ -187,7 +187,7 @@ impl Command {
     }
 }
 
-impl Order {
+impl CommandSent {
     /// A command as it should be.
     #[must_use]
     pub const fn sound(command: Command) -> Self {

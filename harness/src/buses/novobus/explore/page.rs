@@ -5,10 +5,10 @@ use crate::explore::Case;
 use crate::explore::ExploreError;
 use crate::explore::Finding;
 use crate::explore::play;
-use crate::explore::{Kept, LogLine, read};
+use crate::explore::{KeptRun, LogLine, read};
 use crate::library::Entry;
 use crate::link::Link;
-use crate::report::html::{Played, Shown, section};
+use crate::report::html::{ScenarioView, ShownScenario, section};
 use crate::scenario::problem::Span;
 use crate::scenario::run::{self, AtMismatch, Outcome, Skip};
 use crate::scenario::simulate::simulated;
@@ -64,7 +64,7 @@ fn is_name(name: &str) -> bool {
 }
 
 /// What the drives of the model go through in a case: each hears again what its link carried.
-fn reach(kept: &Kept, case: &Case, reached: &mut Reached) -> Result<(), ExploreError> {
+fn reach(kept: &KeptRun, case: &Case, reached: &mut Reached) -> Result<(), ExploreError> {
     if !case.is_bounded() {
         return Err(ExploreError::File(
             "a kept case in the record is larger than a case may be".to_owned(),
@@ -98,7 +98,12 @@ fn heard(link: &Channel) -> Reached {
 }
 
 /// A finding as a section: shows the ring under test, or its model if the ring is behind ports.
-fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Shown, ExploreError> {
+fn shown(
+    number: usize,
+    finding: &Finding,
+    file: &str,
+    path: &Path,
+) -> Result<ShownScenario, ExploreError> {
     let sources = finding.sources();
     let text = finding.scenario(&finding.difference.kind(), &sources)?;
     let (text, mut outcome, traces) = played(finding, &text)?;
@@ -132,7 +137,7 @@ fn shown(number: usize, finding: &Finding, file: &str, path: &Path) -> Result<Sh
         ),
         false => format!("drivebench shrink {name}, in the folder of the run"),
     };
-    let played = Played {
+    let played = ScenarioView {
         name: file,
         title: &finding.difference.signature(),
         sources: &sources,

@@ -1,6 +1,6 @@
 //! A case on simulated rings without the way over its text: thousands a second. A test holds that both ways are one.
 
-use super::case::{Case, What};
+use super::case::{ActKind, Case};
 use crate::buses::SimulatedLink;
 use crate::link::{DriveFault, Line, Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
@@ -11,7 +11,7 @@ const MOST_ROUND: Span = Span::from_millis(60_000);
 
 /// What the master saw.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Seen {
+pub struct MasterView {
     /// What it received, and when.
     pub received: Vec<(Instant, Received)>,
     /// How long it took on the line.
@@ -19,7 +19,7 @@ pub struct Seen {
 }
 
 /// Plays a case on a ring to which nothing has been sent, in the steps of a scenario.
-pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
+pub fn play(link: &mut SimulatedLink, case: &Case) -> MasterView {
     let ring = case.ring();
     for (place, byte, harm) in case.faults() {
         let fault = PlacedFault::Link(usize::from(place), harm.fault());
@@ -29,11 +29,11 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
     let mut line_before = link.now();
     for act in &case.acts {
         match act.what {
-            What::Wait(ms) => {
+            ActKind::Wait(ms) => {
                 line_before = line_before.max(link.now()) + Span::from_millis(u64::from(ms));
                 link.run_until(line_before);
             }
-            What::Power { drive, on } => {
+            ActKind::Power { drive, on } => {
                 let fault = if on { DriveFault::On } else { DriveFault::Off };
                 link.inject(ring, PlacedFault::Drive(drive, fault), Moment::Now);
             }
@@ -50,7 +50,7 @@ pub fn play(link: &mut SimulatedLink, case: &Case) -> Seen {
     }
     let end = link.now() + MOST_ROUND;
     while link.busy() && link.now() < end && link.wait(end) {}
-    Seen {
+    MasterView {
         received: std::iter::from_fn(|| link.receive_octet(ring)).collect(),
         took: link.now().since_start(),
     }

@@ -3,7 +3,7 @@
 use crate::explore::ExploreError;
 use crate::explore::Finding;
 use crate::explore::files::write_whole;
-use crate::explore::{Act, Case, Harm, What};
+use crate::explore::{Act, ActKind, Case, Harm};
 use crate::library::Entry;
 use crate::link::Link;
 use crate::manual::tables;
@@ -200,7 +200,7 @@ pub fn input(case: &Case, title: &str) -> String {
 
 /// The two bytes in front of an input: link and kind, and which byte; `None` where the target has no such case.
 fn damage(case: &Case) -> Option<[u8; 2]> {
-    let beyond = |act: &Act| matches!(act.what, What::Wait(_) | What::Power { .. });
+    let beyond = |act: &Act| matches!(act.what, ActKind::Wait(_) | ActKind::Power { .. });
     if case.acts.iter().any(beyond) {
         return None;
     }

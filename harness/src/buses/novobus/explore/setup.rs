@@ -1,10 +1,10 @@
 //! How the simulated rings of a case are made: the header lines that its scenario has, and the deviations that are planted.
 
 use super::case::Case;
-use super::play::{Seen, play};
+use super::play::{MasterView, play};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::plan::plan_header;
-use crate::buses::novobus::language::syntax::{Drives, Header, Setup as HeaderLine, SetupKind};
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup as HeaderLine, SetupKind};
 use crate::rig::Rig;
 use crate::scenario::expression::{Located, Scope};
 use crate::scenario::problem::Problems;
@@ -47,7 +47,7 @@ impl Planted {
     pub fn setup(&self) -> Option<HeaderLine> {
         let known = deviation::deviation(&self.name)?;
         Some(HeaderLine::deviates(
-            Drives::one(self.ring, self.drive),
+            DriveRange::one(self.ring, self.drive),
             known,
         ))
     }
@@ -56,7 +56,7 @@ impl Planted {
 /// What simulated rings are made of.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Setup {
+pub struct RingSetup {
     /// The header of the rings, without deviations; a list of its lines in a file.
     #[serde(default)]
     pub header: Header,
@@ -65,7 +65,7 @@ pub struct Setup {
     pub deviates: Vec<Planted>,
 }
 
-impl Setup {
+impl RingSetup {
     /// The rings of a simulated rig, with more deviations than its file plants. `sim:N` says nothing of its drives: they are plain,
     /// which the reference model knows too, unless a deviation needs a whole ND21 or `whole` asks for it.
     #[must_use]
@@ -170,7 +170,7 @@ impl Setup {
     ///
     /// # Errors
     /// The same.
-    pub fn model_answers(&self, case: &Case) -> Result<Seen, Box<Problems>> {
+    pub fn model_answers(&self, case: &Case) -> Result<MasterView, Box<Problems>> {
         Ok(play(&mut self.model(&case.sizes())?, case))
     }
 }
@@ -186,7 +186,7 @@ fn planted_by(setup: &HeaderLine, rig: &Rig) -> Vec<Planted> {
     let SetupKind::Deviates(deviation) = setup.what else {
         return Vec::new();
     };
-    let Drives { ring, from, to } = &setup.drives;
+    let DriveRange { ring, from, to } = &setup.drives;
     let drives = rig.rings().nth(*ring).map_or(0, |(_, own)| own.drives);
     let number = |end: &Located| {
         let value = end.value(Scope::new(drives.into())).ok();

@@ -4,10 +4,10 @@
 //! fixed, so the result is reproducible. On hardware the runs dominate the cost, so the steps that remove most come first: everything
 //! behind the differing byte, then acts, parts of acts, faults, drives, silence and values.
 
-use super::case::{Act, Beside, Case, Harm, MOST_NET, Talk, To, What};
+use super::case::{Act, ActKind, Case, Harm, MOST_NET, OtherRing, Talk, To};
 use super::oracle::Difference;
-use super::order::{Command, Order};
-use super::setup::Setup;
+use super::order::{Command, CommandSent};
+use super::setup::RingSetup;
 use crate::explore::ExploreError;
 use harness_proto::novobus::memory::RAM;
 use std::collections::BTreeSet;
@@ -18,7 +18,7 @@ pub struct Subject {
     /// The conversation.
     pub case: Case,
     /// What its rings are made of.
-    pub setup: Setup,
+    pub setup: RingSetup,
 }
 
 /// The result of shrinking.
@@ -139,7 +139,7 @@ impl Shrinker<'_, '_> {
         change: impl FnOnce(&mut Talk),
     ) -> Result<bool, ExploreError> {
         self.change_act(at, |act| {
-            if let What::Talk(talk) = &mut act.what {
+            if let ActKind::Talk(talk) = &mut act.what {
                 change(talk);
             }
         })
@@ -217,8 +217,8 @@ impl Shrinker<'_, '_> {
         let ring = self.best.case.ring();
         let smallest = match self.best.case.beside {
             None => return Ok(()),
-            Some(Beside::First(_)) => Beside::First(1),
-            Some(Beside::Second(_)) => Beside::Second(1),
+            Some(OtherRing::First(_)) => OtherRing::First(1),
+            Some(OtherRing::Second(_)) => OtherRing::Second(1),
         };
         let mut alone = self.best.clone();
         alone.case.beside = None;
@@ -250,7 +250,7 @@ impl Shrinker<'_, '_> {
         for cell in cells.into_iter().filter(|cell| *cell > FIRST_CELL) {
             self.change(|case| {
                 for act in &mut case.acts {
-                    if let What::Talk(talk) = &mut act.what {
+                    if let ActKind::Talk(talk) = &mut act.what {
                         let own = talk.orders.iter_mut();
                         own.for_each(|order| order.command = order.command.at(cell, FIRST_CELL));
                     }
@@ -306,25 +306,25 @@ impl Shrinker<'_, '_> {
             return Ok(());
         };
         match act.what {
-            What::Synco(count) | What::Pause(count) | What::Zeros(count) => {
+            ActKind::Synco(count) | ActKind::Pause(count) | ActKind::Zeros(count) => {
                 self.lowest(at, usize::from(count))
             }
-            What::Wait(ms) => {
+            ActKind::Wait(ms) => {
                 // Just beyond the times of ND21 9.9.
                 for ms in [1, 11, 21, ms / 2].into_iter().filter(|own| *own < ms) {
-                    if self.change_act(at, |act| act.what = What::Wait(ms))? {
+                    if self.change_act(at, |act| act.what = ActKind::Wait(ms))? {
                         break;
                     }
                 }
                 Ok(())
             }
-            What::Bytes(bytes) => self.bytes(at, bytes.len()),
-            What::Recover => {
-                self.change_act(at, |act| act.what = What::Sequence)?;
+            ActKind::Bytes(bytes) => self.bytes(at, bytes.len()),
+            ActKind::Recover => {
+                self.change_act(at, |act| act.what = ActKind::Sequence)?;
                 Ok(())
             }
-            What::Talk(talk) => self.talk(at, &talk),
-            What::Sequence | What::Power { .. } => Ok(()),
+            ActKind::Talk(talk) => self.talk(at, &talk),
+            ActKind::Sequence | ActKind::Power { .. } => Ok(()),
         }
     }
 
@@ -359,7 +359,7 @@ impl Shrinker<'_, '_> {
                     break;
                 }
                 let dropped = self.change_act(at, |act| {
-                    if let What::Bytes(bytes) = &mut act.what {
+                    if let ActKind::Bytes(bytes) = &mut act.what {
                         bytes.drain(from..from + length);
                     }
                 })?;
@@ -400,16 +400,17 @@ impl Shrinker<'_, '_> {
         Ok(())
     }
 
-    fn order(&self, at: usize, index: usize) -> Option<Order> {
+    fn order(&self, at: usize, index: usize) -> Option<CommandSent> {
         match &self.best.case.acts.get(at)?.what {
-            What::Talk(talk) => talk.orders.get(index).cloned(),
+            ActKind::Talk(talk) => talk.orders.get(index).cloned(),
             _ => None,
         }
     }
 
     /// Lowers values toward zero.
     fn values(&mut self, at: usize) -> Result<(), ExploreError> {
-        let Some(What::Talk(talk)) = self.best.case.acts.get(at).map(|act| act.what.clone()) else {
+        let Some(ActKind::Talk(talk)) = self.best.case.acts.get(at).map(|act| act.what.clone())
+        else {
             return Ok(());
         };
         if talk.process_data.is_some_and(|data| data > 1) {
@@ -441,11 +442,11 @@ impl Shrinker<'_, '_> {
 }
 
 /// Shortens an act to `length` bytes if it can be cut at any byte.
-fn shorten(what: &mut What, length: usize) {
+fn shorten(what: &mut ActKind, length: usize) {
     let count = u8::try_from(length).unwrap_or(u8::MAX);
     match what {
-        What::Synco(own) | What::Pause(own) | What::Zeros(own) => *own = count.min(*own),
-        What::Bytes(bytes) => bytes.truncate(length),
+        ActKind::Synco(own) | ActKind::Pause(own) | ActKind::Zeros(own) => *own = count.min(*own),
+        ActKind::Bytes(bytes) => bytes.truncate(length),
         _ => {}
     }
 }
@@ -494,8 +495,8 @@ fn on_ring(subject: &Subject, drives: u8) -> Subject {
     new.case.drives = drives;
     for act in &mut new.case.acts {
         match &mut act.what {
-            What::Power { drive, .. } => *drive = map(*drive),
-            What::Talk(talk) => {
+            ActKind::Power { drive, .. } => *drive = map(*drive),
+            ActKind::Talk(talk) => {
                 if let To::Drive(drive) = &mut talk.to {
                     *drive = map(*drive);
                 }

@@ -1,8 +1,8 @@
 //! A case as a scenario: every finding is one.
 
-use super::case::{Act, Case, Harm, Talk, To, What};
+use super::case::{Act, ActKind, Case, Harm, Talk, To};
 use super::oracle::{answered, sent};
-use super::play::Seen;
+use super::play::MasterView;
 use crate::buses::novobus::language::syntax::{
     Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
 };
@@ -27,7 +27,7 @@ const MOST_COMMENT: usize = 60;
 
 /// What stands around the steps.
 #[derive(Clone, Debug, Default)]
-pub struct Page<'a> {
+pub struct Surroundings<'a> {
     /// The title.
     pub title: &'a str,
     /// The tables that it pins, such as `nd21 9.7`.
@@ -37,14 +37,14 @@ pub struct Page<'a> {
     /// Remarks in front of the steps.
     pub remarks: &'a [String],
     /// What the master must receive.
-    pub expected: Option<Expected<'a>>,
+    pub expected: Option<ExpectedBytes<'a>>,
 }
 
 /// What the master must receive.
 #[derive(Clone, Copy, Debug)]
-pub struct Expected<'a> {
+pub struct ExpectedBytes<'a> {
     /// The bytes.
-    pub seen: &'a Seen,
+    pub seen: &'a MasterView,
     /// Indexes of bytes that may have any value: data that a drive measures, and their checking bytes.
     pub any: &'a [usize],
     /// The byte that must come at its time, by its index.
@@ -53,7 +53,7 @@ pub struct Expected<'a> {
 
 /// The text of a scenario.
 #[must_use]
-pub fn text(case: &Case, page: &Page<'_>) -> String {
+pub fn text(case: &Case, page: &Surroundings<'_>) -> String {
     let none = Header::default();
     let header = page.header.unwrap_or(&none);
     let header = Header::of_rings(&case.sizes()).and(header);
@@ -93,17 +93,17 @@ pub fn text(case: &Case, page: &Page<'_>) -> String {
 
 /// Whether the scenario expects every byte that the ring returns. This is not possible with unasked zeros (9.9), which drives send
 /// without end.
-fn is_strict(case: &Case, expected: Expected<'_>) -> bool {
+fn is_strict(case: &Case, expected: ExpectedBytes<'_>) -> bool {
     expected.seen.received.len() <= case.bytes().len()
 }
 
 fn steps(text: &mut Text, act: &Act, case: &Case) {
     let ring = case.ring();
     match act.what {
-        What::Wait(ms) => {
+        ActKind::Wait(ms) => {
             text.step(&Action::Wait(Duration::millis(ms.into())).into(), "");
         }
-        What::Power { drive, on } => {
+        ActKind::Power { drive, on } => {
             let power = if on { DriveFault::On } else { DriveFault::Off };
             let fault = Fault {
                 ring,
@@ -136,14 +136,16 @@ fn steps(text: &mut Text, act: &Act, case: &Case) {
 }
 
 /// What an act is, in the manual's words.
-fn words(what: &What) -> String {
+fn words(what: &ActKind) -> String {
     let mut words = match what {
-        What::Synco(_) => "SYNCO".to_owned(),
-        What::Pause(_) => "PAUSE".to_owned(),
-        What::Recover => "17 zeros and the check sequence".to_owned(),
-        What::Sequence => "the check sequence alone".to_owned(),
-        What::Talk(talk) => of_talk(talk),
-        What::Zeros(_) | What::Bytes(_) | What::Wait(_) | What::Power { .. } => String::new(),
+        ActKind::Synco(_) => "SYNCO".to_owned(),
+        ActKind::Pause(_) => "PAUSE".to_owned(),
+        ActKind::Recover => "17 zeros and the check sequence".to_owned(),
+        ActKind::Sequence => "the check sequence alone".to_owned(),
+        ActKind::Talk(talk) => of_talk(talk),
+        ActKind::Zeros(_) | ActKind::Bytes(_) | ActKind::Wait(_) | ActKind::Power { .. } => {
+            String::new()
+        }
     };
     if words.chars().count() > MOST_COMMENT {
         words = words.chars().take(MOST_COMMENT - 3).collect::<String>() + "...";
@@ -187,7 +189,7 @@ fn kind(harm: Harm) -> LinkFaultKind {
 }
 
 /// Lines with what must be received: act by act, where a byte comes for a byte.
-fn answers(text: &mut Text, case: &Case, expected: Expected<'_>) {
+fn answers(text: &mut Text, case: &Case, expected: ExpectedBytes<'_>) {
     let received = &expected.seen.received;
     let mut from = 0;
     let sent = sent(case);
@@ -211,7 +213,12 @@ fn answers(text: &mut Text, case: &Case, expected: Expected<'_>) {
     }
 }
 
-fn answer(text: &mut Text, case: &Case, range: std::ops::Range<usize>, expected: Expected<'_>) {
+fn answer(
+    text: &mut Text,
+    case: &Case,
+    range: std::ops::Range<usize>,
+    expected: ExpectedBytes<'_>,
+) {
     let received = &expected.seen.received;
     let word = |index: usize| match expected.any.contains(&index) {
         true => Byte::Any,

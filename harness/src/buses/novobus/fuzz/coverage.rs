@@ -76,7 +76,7 @@ pub enum CoverageError {
 
 /// An input, and how much it reaches.
 #[derive(Clone, Debug)]
-pub struct Played {
+pub struct InputReach {
     /// Target and file name.
     pub name: String,
     /// What it reaches.
@@ -102,7 +102,7 @@ pub struct Sum {
 #[derive(Clone, Debug)]
 pub struct Coverage {
     /// Each input of the targets that feed drives raw bytes, in order of names.
-    pub files: Vec<Played>,
+    pub files: Vec<InputReach>,
     /// Each target that has inputs, in order of names.
     pub targets: Vec<Sum>,
     /// What the inputs reach together.
@@ -182,7 +182,7 @@ impl Coverage {
             tally.add(data.len(), features);
             if let Some(reached) = reached {
                 corpus.join(&reached);
-                files.push(Played { name, reached });
+                files.push(InputReach { name, reached });
             }
         }
         if files.is_empty() {

@@ -27,7 +27,7 @@ const MOST_TRIES: usize = 20_000;
 
 /// Of what the inputs of a target are made: pieces that can be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pieces {
+pub enum InputPieces {
     /// Bytes behind a head, in records of a fixed length.
     Bytes {
         /// How many bytes stand in front of the records.
@@ -39,7 +39,7 @@ pub enum Pieces {
     Text(&'static str),
 }
 
-impl Pieces {
+impl InputPieces {
     /// Those of a target.
     #[must_use]
     pub fn of(target: &str) -> Self {
@@ -76,16 +76,16 @@ impl Distilled {
 
     /// The extension of its file: that of a text if the input is one, else `hex`.
     #[must_use]
-    pub fn ending(&self, pieces: Pieces) -> &'static str {
+    pub fn ending(&self, pieces: InputPieces) -> &'static str {
         match pieces {
-            Pieces::Text(ending) if is_text(&self.input) => ending,
+            InputPieces::Text(ending) if is_text(&self.input) => ending,
             _ => "hex",
         }
     }
 
     /// The content of its file: a text unchanged; for bytes, the new features as comments, then the bytes, one record per line.
     #[must_use]
-    pub fn content(&self, pieces: Pieces) -> Vec<u8> {
+    pub fn content(&self, pieces: InputPieces) -> Vec<u8> {
         if self.ending(pieces) != "hex" {
             return self.input.clone();
         }
@@ -98,7 +98,7 @@ impl Distilled {
             let _infallible = writeln!(text, "#   and {} more", self.new.len() - NAMED);
         }
         let (head, record) = match pieces {
-            Pieces::Bytes { head, record } if record > 1 => (head, record),
+            InputPieces::Bytes { head, record } if record > 1 => (head, record),
             _ => (0, BYTES_A_LINE),
         };
         let (head, records) = self.input.split_at(head.min(self.input.len()));
@@ -131,7 +131,7 @@ fn is_text(bytes: &[u8]) -> bool {
 /// An input, or a part of one, breaks a rule of the target.
 pub fn distil(
     body: Body,
-    pieces: Pieces,
+    pieces: InputPieces,
     inputs: &[Vec<u8>],
     kept: &BTreeSet<Feature>,
 ) -> Vec<Distilled> {
@@ -143,8 +143,8 @@ pub fn distil(
         .map(|input| (input, &features(body, input) - kept))
         .collect();
     let file = match pieces {
-        Pieces::Bytes { .. } => FILE,
-        Pieces::Text(_) => TEXT_FILE,
+        InputPieces::Bytes { .. } => FILE,
+        InputPieces::Text(_) => TEXT_FILE,
     };
     let mut chosen = Vec::new();
     loop {
@@ -169,10 +169,10 @@ pub fn distil(
 type Chosen = (Vec<u8>, BTreeSet<Feature>);
 
 /// Joins two inputs. The head of the first one serves both; a line that the first text already has is not repeated.
-fn together(pieces: Pieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>> {
+fn together(pieces: InputPieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>> {
     let (rest, most) = match pieces {
-        Pieces::Bytes { head, .. } => (second.get(head..)?.to_vec(), MOST_JOINED),
-        Pieces::Text(_) => {
+        InputPieces::Bytes { head, .. } => (second.get(head..)?.to_vec(), MOST_JOINED),
+        InputPieces::Text(_) => {
             let lines: BTreeSet<_> = first.split_inclusive(|byte| *byte == b'\n').collect();
             let own = second.split_inclusive(|byte| *byte == b'\n');
             let own: Vec<_> = own.filter(|line| !lines.contains(line)).collect();
@@ -186,7 +186,7 @@ fn together(pieces: Pieces, first: &[u8], second: &[u8]) -> Option<Vec<u8>> {
 /// Joins inputs if no feature is lost: one conversation is better than ten.
 fn joined(
     body: Body,
-    pieces: Pieces,
+    pieces: InputPieces,
     chosen: Vec<Chosen>,
     kept: &BTreeSet<Feature>,
 ) -> Vec<Chosen> {
@@ -290,9 +290,9 @@ impl<'w> Shrinking<'w> {
         self.tries > 0 && features(self.body, input).is_superset(self.wanted)
     }
 
-    fn shrunk(&mut self, pieces: Pieces, input: &[u8]) -> Vec<u8> {
+    fn shrunk(&mut self, pieces: InputPieces, input: &[u8]) -> Vec<u8> {
         match pieces {
-            Pieces::Bytes { head, record } => {
+            InputPieces::Bytes { head, record } => {
                 let (head, records) = input.split_at(head.min(input.len()));
                 let mut pieces: Vec<_> = records.chunks(record).map(<[u8]>::to_vec).collect();
                 self.leave_out(head, &mut pieces);
@@ -300,7 +300,7 @@ impl<'w> Shrinking<'w> {
                 self.plain(&mut input);
                 input
             }
-            Pieces::Text(_) if is_text(input) => {
+            InputPieces::Text(_) if is_text(input) => {
                 let text = String::from_utf8_lossy(input);
                 let mut lines: Vec<_> = text
                     .split_inclusive('\n')
@@ -313,7 +313,7 @@ impl<'w> Shrinking<'w> {
                 self.leave_out(&[], &mut words);
                 words.concat()
             }
-            Pieces::Text(_) => {
+            InputPieces::Text(_) => {
                 let mut bytes: Vec<_> = input.iter().map(|byte| vec![*byte]).collect();
                 self.leave_out(&[], &mut bytes);
                 bytes.concat()
@@ -354,7 +354,7 @@ mod tests {
     use super::*;
     use harness_sim::novobus::fuzz::NOTING;
 
-    const BYTES: Pieces = Pieces::Bytes { head: 1, record: 1 };
+    const BYTES: InputPieces = InputPieces::Bytes { head: 1, record: 1 };
 
     fn detector() -> Body {
         let target = NOTING.iter().find(|target| target.name == "detector");
@@ -423,7 +423,11 @@ mod tests {
         assert_eq!(together(BYTES, &[1, 2], &[3, 4]), Some(vec![1, 2, 4]));
         assert_eq!(together(BYTES, &[1, 2], &[3]), None);
         assert_eq!(together(BYTES, &[0; MOST_JOINED], &[0; 2]), None);
-        let both = together(Pieces::of("scenario"), b"ring 3\n> 80\n", b"ring 3\n> 81\n");
+        let both = together(
+            InputPieces::of("scenario"),
+            b"ring 3\n> 80\n",
+            b"ring 3\n> 81\n",
+        );
         assert_eq!(both.as_deref(), Some(&b"ring 3\n> 80\n> 81\n"[..]));
     }
 
@@ -457,7 +461,7 @@ mod tests {
             input: vec![3, 4, 1, 2, 3, 4, 5, 6, 7],
             new: Vec::new(),
         };
-        let text = String::from_utf8(one.content(Pieces::of("jobs"))).expect("a text");
+        let text = String::from_utf8(one.content(InputPieces::of("jobs"))).expect("a text");
         assert!(text.ends_with("\n03 04\n01 02 03 04 05 06\n07\n"), "{text}");
     }
 
@@ -468,7 +472,7 @@ mod tests {
             input: input.to_vec(),
             new: vec![Feature::new("", "a", "b")],
         };
-        let pieces = Pieces::of("scenario");
+        let pieces = InputPieces::of("scenario");
         assert_eq!(one(b"title x\n").ending(pieces), "scn");
         assert_eq!(one(b"title x\n").content(pieces), b"title x\n");
         assert_eq!(one(b"title \r\n").ending(pieces), "hex");

@@ -1,6 +1,6 @@
 //! What a guard with a `max_speed` has to know of drives, read from them.
 
-use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Width};
+use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, Width};
 use crate::guard::Guarded;
 use crate::link::Line;
 use harness_proto::nd21::{ee, ram};
@@ -43,7 +43,7 @@ impl<L: Line> Guarded<L> {
                 patience: PATIENCE,
                 ..Options::default()
             };
-            let bus = Bus::open(Box::new(&mut *self), &sizes, options)?;
+            let bus = OpenRings::open(Box::new(&mut *self), &sizes, options)?;
             let found = read(&bus, resets);
             bus.close();
             found
@@ -55,7 +55,7 @@ impl<L: Line> Guarded<L> {
     }
 }
 
-fn read(bus: &Bus<'_>, resets: bool) -> Result<Vec<(Axis, Found)>, Error> {
+fn read(bus: &OpenRings<'_>, resets: bool) -> Result<Vec<(Axis, Found)>, Error> {
     let axes = bus.axes();
     let cells = axes
         .iter()

@@ -1,6 +1,6 @@
 //! The safe state of a bench: every drive stopped, standing and blocked, and read back.
 
-use crate::buses::novobus::driver::{Axis, Bus, Error, Options, Order, recover};
+use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, OrderNumber, recover};
 use crate::counted::counted;
 use crate::guard::Safe;
 use crate::link::{Lead, Line, Octets, Trouble, wait_keeping};
@@ -30,7 +30,7 @@ pub enum SafeStep {
 
 /// How drives are taken to their safe state, and when they count as standing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Standing {
+pub struct Standstill {
     /// The steps, in this order.
     pub order: Vec<SafeStep>,
     /// The speed below which a motor counts as standing, in rpm.
@@ -39,7 +39,7 @@ pub struct Standing {
     pub within: Span,
 }
 
-impl Default for Standing {
+impl Default for Standstill {
     fn default() -> Self {
         Self {
             order: vec![SafeStep::Stop, SafeStep::Block],
@@ -109,7 +109,7 @@ impl fmt::Display for SafeState {
 /// (14.4.2) and it stands. A ring that does not answer gets the stops anyway, because drives in front of a break still receive them.
 ///
 /// It takes up to about 15 seconds per ring, plus the time to stand per step if a drive does not stop.
-pub fn safe_state(line: &mut dyn Line, rings: &[RingSize], standing: &Standing) -> SafeState {
+pub fn safe_state(line: &mut dyn Line, rings: &[RingSize], standing: &Standstill) -> SafeState {
     let mut not_safe = Vec::new();
     for (ring, &size) in rings.iter().enumerate() {
         not_safe.extend(ring_to_safe_state(line, ring, size, standing));
@@ -125,7 +125,7 @@ fn ring_to_safe_state(
     line: &mut dyn Line,
     ring: usize,
     size: RingSize,
-    standing: &Standing,
+    standing: &Standstill,
 ) -> Vec<NotSafe> {
     let all = |why: String| {
         let axes = (0..size.drives()).filter_map(|drive| Axis::new(ring, drive));
@@ -144,7 +144,7 @@ fn ring_to_safe_state(
         ..Options::default()
     };
     let line = OneRing { line, ring };
-    let bus = match Bus::open(Box::new(line), &[size], options) {
+    let bus = match OpenRings::open(Box::new(line), &[size], options) {
         Ok(bus) => bus,
         Err(error) => return all(error.to_string()),
     };
@@ -199,11 +199,15 @@ impl Told {
 
 /// Sends one command to every drive without waiting for each answer, so that the last drive of a long ring gets it without delay.
 /// After the first missing answer, the answers behind it are not waited for.
-fn together(bus: &Bus<'_>, drives: &[Told], command: Command) -> Vec<Result<Option<u32>, String>> {
+fn together(
+    bus: &OpenRings<'_>,
+    drives: &[Told],
+    command: Command,
+) -> Vec<Result<Option<u32>, String>> {
     let start = |drive: &Told| bus.start(drive.axis, |k| Job::new(k, command));
     let orders: Vec<_> = drives.iter().map(start).collect();
     let mut lost: Option<String> = None;
-    let result = |order: Result<Order, Error>| match (&lost, order) {
+    let result = |order: Result<OrderNumber, Error>| match (&lost, order) {
         (Some(lost), _) => Err(lost.clone()),
         (None, order) => order.and_then(|order| bus.result(order)).map_err(|error| {
             let text = error.to_string();
@@ -215,7 +219,7 @@ fn together(bus: &Bus<'_>, drives: &[Told], command: Command) -> Vec<Result<Opti
 }
 
 /// Waits until every drive stands and its `Flags` show the bits in `told`. A drive that failed before gets only [`FLAGS`] of time.
-fn wait_until_seen(bus: &Bus<'_>, drives: &mut [Told], told: u8, standing: &Standing) {
+fn wait_until_seen(bus: &OpenRings<'_>, drives: &mut [Told], told: u8, standing: &Standstill) {
     let read = |drives: &[Told], address, whole| {
         let command = match whole {
             true => Command::ReadWord { address },

@@ -19,7 +19,7 @@ const MAX_LENGTH: i64 = 256;
 
 /// Which of a drive's memories.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Memory {
+pub enum MemoryKind {
     /// RAM, ROM and registers, by their addresses (ND21 10.1).
     Ram,
     /// The EEPROM, behind its controller (ND21 14.10.5).
@@ -28,9 +28,9 @@ pub enum Memory {
 
 /// A cell, or a number of bytes from an address on.
 #[derive(Clone, Debug)]
-pub struct Location {
+pub struct MemoryRange {
     /// Where.
-    pub memory: Memory,
+    pub memory: MemoryKind,
     /// How many bytes.
     pub size: u16,
     /// The scale of the number that these bytes are, if the manual gives one.
@@ -38,10 +38,10 @@ pub struct Location {
     place: CellPlace,
 }
 
-impl Location {
+impl MemoryRange {
     /// All of a cell of the tables.
     #[must_use]
-    pub fn of(memory: Memory, cell: &'static Cell) -> Self {
+    pub fn of(memory: MemoryKind, cell: &'static Cell) -> Self {
         Self {
             memory,
             size: cell.size,
@@ -59,7 +59,7 @@ impl Location {
 
     /// The same number of bytes at another place.
     #[must_use]
-    pub fn moved(&self, memory: Memory, address: u16) -> Self {
+    pub fn moved(&self, memory: MemoryKind, address: u16) -> Self {
         let mut moved = self.clone();
         moved.memory = memory;
         moved.place.address = address;
@@ -70,7 +70,7 @@ impl Location {
     #[must_use]
     pub fn name(&self) -> String {
         let name = &self.place.name;
-        if self.memory == Memory::Ram || name.starts_with("EE_") {
+        if self.memory == MemoryKind::Ram || name.starts_with("EE_") {
             name.clone()
         } else {
             format!("ee:{name}")
@@ -104,7 +104,7 @@ impl Location {
         let last = u32::from(self.address()) + u32::from(self.size) - 1;
         let ram = harness_proto::novobus::memory::RAM;
         let inside = u32::from(*ram.start())..=u32::from(*ram.end());
-        if self.memory == Memory::Ram
+        if self.memory == MemoryKind::Ram
             && !(inside.contains(&self.address().into()) && inside.contains(&last))
         {
             let message = format!("`{name}` cannot be written: it is outside the RAM");
@@ -121,7 +121,7 @@ impl Location {
     ///
     /// # Errors
     /// The cell cannot hold the value.
-    pub fn bytes(&self, value: &Written, units: units::Drive) -> Result<Vec<u8>, Problem> {
+    pub fn bytes(&self, value: &Written, units: units::DriveUnits) -> Result<Vec<u8>, Problem> {
         let Written::Bytes(pattern) = value else {
             return number_bytes(self.scale, value, units);
         };
@@ -150,7 +150,7 @@ impl Location {
 ///
 /// # Errors
 /// All that are no cells.
-pub fn cells(texts: &[String]) -> Result<Vec<Location>, Problems> {
+pub fn cells(texts: &[String]) -> Result<Vec<MemoryRange>, Problems> {
     each(texts, location)
 }
 
@@ -159,7 +159,7 @@ pub fn cells(texts: &[String]) -> Result<Vec<Location>, Problems> {
 ///
 /// # Errors
 /// All that are none, or that cannot be written.
-pub fn assignments(texts: &[String]) -> Result<Vec<(Location, Written)>, Problems> {
+pub fn assignments(texts: &[String]) -> Result<Vec<(MemoryRange, Written)>, Problems> {
     each(texts, |scanner| {
         let text = scanner.rest();
         let location = location(scanner)?;
@@ -175,7 +175,7 @@ pub fn assignments(texts: &[String]) -> Result<Vec<(Location, Written)>, Problem
 fn own_value(
     scanner: &mut Scanner<'_>,
     scale: Option<Scale>,
-    (location, name): (&Location, &str),
+    (location, name): (&MemoryRange, &str),
 ) -> Result<Written, Problem> {
     let start = scanner.here();
     if scanner.eat("0x") {
@@ -212,8 +212,8 @@ fn own_value(
 /// All that their cells cannot hold.
 pub fn encode(
     texts: &[String],
-    assignments: &[(Location, Written)],
-    units: units::Drive,
+    assignments: &[(MemoryRange, Written)],
+    units: units::DriveUnits,
 ) -> Result<Vec<Vec<u8>>, Problems> {
     let found = assignments
         .iter()
@@ -225,7 +225,7 @@ pub fn encode(
 ///
 /// # Errors
 /// It is none.
-pub fn value_at(text: &str, offset: usize, location: &Location) -> Result<Written, Problem> {
+pub fn value_at(text: &str, offset: usize, location: &MemoryRange) -> Result<Written, Problem> {
     let mut scanner = Scanner::new(text, offset);
     let value = own_value(&mut scanner, location.scale, (location, &location.name()))?;
     scanner.expect_end()?;
@@ -249,13 +249,13 @@ pub fn duration(text: &str) -> Result<time::Span, String> {
     Ok(found.on(harness_proto::line::Rate::default().byte_time()))
 }
 
-fn location(scanner: &mut Scanner<'_>) -> Result<Location, Problem> {
+fn location(scanner: &mut Scanner<'_>) -> Result<MemoryRange, Problem> {
     let start = scanner.here();
     let prefixed = scanner.eat("ee:");
     let (memory, place) = if prefixed || scanner.rest().starts_with("EE_") {
-        (Memory::Eeprom, eeprom_place(scanner)?)
+        (MemoryKind::Eeprom, eeprom_place(scanner)?)
     } else {
-        (Memory::Ram, place(scanner)?)
+        (MemoryKind::Ram, place(scanner)?)
     };
     let own = place.cell.and_then(|cell| cell.scale);
     let mut scales = [place.scale(), own].into_iter().flatten();
@@ -281,17 +281,17 @@ fn location(scanner: &mut Scanner<'_>) -> Result<Location, Problem> {
         ..place
     };
     match memory {
-        Memory::Ram => in_memory(&place, usize::from(size))?,
-        Memory::Eeprom if place.address + size > 0x100 => {
+        MemoryKind::Ram => in_memory(&place, usize::from(size))?,
+        MemoryKind::Eeprom if place.address + size > 0x100 => {
             return Err(Problem::new(
                 place.span,
                 "the bytes go beyond the EEPROM",
                 "the EEPROM has the addresses 00 to FF (ND21 14.2.2)",
             ));
         }
-        Memory::Eeprom => {}
+        MemoryKind::Eeprom => {}
     }
-    Ok(Location {
+    Ok(MemoryRange {
         memory,
         size,
         scale: scales.find(|scale| scale.size() == size),

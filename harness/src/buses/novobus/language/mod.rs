@@ -8,10 +8,10 @@ pub(crate) mod scale;
 pub mod syntax;
 pub(crate) mod write;
 
-use self::plan::{Bench, Planner, RingAct, planner};
+use self::plan::{PlannedBench, Planner, RingAct, planner};
 use self::run::bytes;
-use self::run::record::Record;
-use self::run::state::{self, State};
+use self::run::record::CellRecord;
+use self::run::state::{self, RunState};
 use self::syntax::{Header, RingStep};
 use crate::buses::Bus;
 use crate::buses::novobus::simulate;
@@ -20,7 +20,7 @@ use crate::scenario::language::{Language, Opening};
 use crate::scenario::pattern::{self, Expected, Pattern};
 use crate::scenario::plan::{Plan, PlannedStep};
 use crate::scenario::problem::{Problem, Spanned};
-use crate::scenario::run::outcome::{Difference, Mismatch, Stop};
+use crate::scenario::run::outcome::{ByteDifference, Mismatch, Stop};
 use crate::scenario::run::player::Runner;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
@@ -40,12 +40,12 @@ impl Language for Novobus {
     type Header = Header;
     type Message = Pattern;
     type Step = RingStep;
-    type Setup = Bench;
+    type Setup = PlannedBench;
     type Sent = u8;
     type Wanted = Expected;
     type Act = RingAct;
     type Received = Received;
-    type State = State;
+    type State = RunState;
     type Planner = Planner;
 
     fn header_words() -> Vec<&'static str> {
@@ -85,7 +85,7 @@ impl Language for Novobus {
         planner::settle(scenario, size, found)
     }
 
-    fn resume(bench: &Bench) -> Planner {
+    fn resume(bench: &PlannedBench) -> Planner {
         planner::resume(bench)
     }
 
@@ -114,8 +114,8 @@ impl Language for Novobus {
         plan.rings.len()
     }
 
-    fn state(plan: &Plan<Self>, link: &dyn Link) -> State {
-        State::new(plan, link)
+    fn state(plan: &Plan<Self>, link: &dyn Link) -> RunState {
+        RunState::new(plan, link)
     }
 
     fn begin(runner: &mut Runner<'_>) -> Result<(), Stop> {
@@ -126,7 +126,7 @@ impl Language for Novobus {
         runner.act_of_ring(act, step)
     }
 
-    fn by_hand(state: &mut State, ring: usize) {
+    fn by_hand(state: &mut RunState, ring: usize) {
         state.by_hand(ring);
     }
 
@@ -134,15 +134,15 @@ impl Language for Novobus {
         link.send_octets(ring, bytes)
     }
 
-    fn sent(state: &mut State, ring: usize, bytes: &[u8], times: (Instant, Instant)) {
+    fn sent(state: &mut RunState, ring: usize, bytes: &[u8], times: (Instant, Instant)) {
         state.sent(ring, bytes, times);
     }
 
-    fn fetch(_: &mut State, link: &mut dyn Link, ring: usize) -> Option<(Instant, Received)> {
+    fn fetch(_: &mut RunState, link: &mut dyn Link, ring: usize) -> Option<(Instant, Received)> {
         link.receive_octet(ring)
     }
 
-    fn received(state: &mut State, ring: usize, all: &[(Instant, Received)]) {
+    fn received(state: &mut RunState, ring: usize, all: &[(Instant, Received)]) {
         state.received(ring, all);
     }
 
@@ -167,11 +167,11 @@ impl Language for Novobus {
         place: (usize, usize),
         wanted: &[Expected],
         received: &[(Instant, Received)],
-    ) -> Option<Difference> {
+    ) -> Option<ByteDifference> {
         Some(state::difference(ring, place, wanted, received))
     }
 
-    fn next_look(state: &State) -> Instant {
+    fn next_look(state: &RunState) -> Instant {
         state.recorder.next()
     }
 
@@ -179,7 +179,7 @@ impl Language for Novobus {
         runner.note();
     }
 
-    fn too_much(state: &State) -> Option<String> {
+    fn too_much(state: &RunState) -> Option<String> {
         state.recorder.too_much()
     }
 
@@ -195,7 +195,7 @@ impl Language for Novobus {
         runner.complete(finding);
     }
 
-    fn records(state: State) -> Vec<Record> {
+    fn records(state: RunState) -> Vec<CellRecord> {
         state.recorder.records
     }
 

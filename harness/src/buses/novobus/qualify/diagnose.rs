@@ -1,7 +1,7 @@
 //! Which known deviation explains how a ring differed from the model; and which one of the master does, where the bench's own master is wrong.
 
-use super::hypothesis::{Evidence, judge};
-use crate::buses::novobus::language::syntax::{Drives, Header, Setup};
+use super::hypothesis::{Fit, judge};
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::rig::Driven;
 use harness_sim::novobus::deviation::{
@@ -74,7 +74,7 @@ impl fmt::Display for Named {
 
 /// What a ring was seen to do, attempt by attempt.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'s> {
+pub struct RingSeen<'s> {
     /// How many drives the ring has.
     pub drives: u8,
     /// The drives that are tried one by one in a large ring.
@@ -99,8 +99,8 @@ struct Candidate {
 impl Candidate {
     /// What makes simulated drives behave so.
     fn header(&self) -> Header {
-        let whom = self.drive.map(|drive| Drives::one(0, drive));
-        let whom = whom.unwrap_or_else(|| Drives::all(0));
+        let whom = self.drive.map(|drive| DriveRange::one(0, drive));
+        let whom = whom.unwrap_or_else(|| DriveRange::all(0));
         Setup::deviates(whom, self.deviation).into()
     }
 }
@@ -112,7 +112,7 @@ impl Candidate {
 /// Simulated drives keep their state from earlier scenarios, which a fresh twin does not have, so no twin may give every byte. For them
 /// the deviation that explains the most attempts is named. Relatives of deviations with other numbers are tried only if no other
 /// deviation explains everything.
-pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&Header) -> Result<Twin, E>) -> Vec<Named> {
+pub fn name<E>(seen: &RingSeen<'_>, twin: &dyn Fn(&Header) -> Result<Twin, E>) -> Vec<Named> {
     let named = name_among(seen, candidates(seen, deviations()), twin);
     match named.is_empty() {
         true => name_among(seen, candidates(seen, relatives()), twin),
@@ -121,11 +121,11 @@ pub fn name<E>(seen: &Seen<'_>, twin: &dyn Fn(&Header) -> Result<Twin, E>) -> Ve
 }
 
 fn name_among<E>(
-    seen: &Seen<'_>,
+    seen: &RingSeen<'_>,
     mut candidates: Vec<Candidate>,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Vec<Named> {
-    let explains = |header: &Header, attempt: &[Conversation]| -> Option<Evidence> {
+    let explains = |header: &Header, attempt: &[Conversation]| -> Option<Fit> {
         judge(twin(header).ok()?, attempt, seen.exactness)
     };
     let manual = Header::default();
@@ -138,7 +138,7 @@ fn name_among<E>(
             break;
         }
         let right = explains(&manual, attempt);
-        let better = |own: &Evidence| right.is_none_or(|right| own.timely && !right.timely);
+        let better = |own: &Fit| right.is_none_or(|right| own.timely && !right.timely);
         if right.is_some_and(|right| right.timely) {
             continue;
         }
@@ -168,7 +168,7 @@ fn name_among<E>(
 }
 
 fn candidates(
-    seen: &Seen<'_>,
+    seen: &RingSeen<'_>,
     deviations: impl Iterator<Item = &'static Deviation>,
 ) -> Vec<Candidate> {
     let single: Vec<u8> = match seen.drives <= SMALL {

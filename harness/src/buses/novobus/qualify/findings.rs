@@ -1,7 +1,7 @@
 //! What a qualification compared with the model, and what differed.
 
 use super::blame::{Culprit, Meant, Sighting, Trial, agreed, culprit};
-use super::diagnose::{Named, Seen};
+use super::diagnose::{Named, RingSeen};
 use super::pinned::Pinned;
 use crate::buses::novobus::twin::{Conversation, Exactness};
 use crate::counted::counted;
@@ -224,8 +224,8 @@ impl Findings {
     }
 
     /// What is to be explained. Where the driver's part shows nothing new it is left out.
-    pub(super) fn seen(&self, drives: u8, exactness: Exactness) -> Seen<'_> {
-        Seen {
+    pub(super) fn seen(&self, drives: u8, exactness: Exactness) -> RingSeen<'_> {
+        RingSeen {
             drives,
             suspects: &self.suspects,
             differing: match self.differing.is_empty() {

@@ -15,7 +15,7 @@ pub struct Hypothesis {
 
 /// How well a hypothesis explains the bytes received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Evidence {
+pub struct Fit {
     /// All differences of times together.
     pub apart: Span,
     /// Whether every byte also came at the predicted time.
@@ -34,7 +34,7 @@ pub fn explaining<'h, E>(
     conversations: &[Conversation],
     exactness: Exactness,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
-) -> Result<Vec<(&'h Hypothesis, Evidence)>, E> {
+) -> Result<Vec<(&'h Hypothesis, Fit)>, E> {
     let mut explaining = Vec::new();
     for hypothesis in hypotheses {
         let twin = twin(&hypothesis.header)?;
@@ -53,10 +53,10 @@ pub(crate) fn judge(
     mut twin: Twin,
     conversations: &[Conversation],
     exactness: Exactness,
-) -> Option<Evidence> {
-    let mut evidence = Evidence {
+) -> Option<Fit> {
+    let mut evidence = Fit {
         timely: true,
-        ..Evidence::default()
+        ..Fit::default()
     };
     for comparison in twin.follow_while_alike(conversations, exactness) {
         if comparison.divergence.is_some() {

@@ -12,9 +12,9 @@ mod qualification;
 mod settle;
 
 pub use blame::{Culprit, Meant, Sighting, Trial, agreed, culprit, exchange};
-pub use diagnose::{Named, Seen, Whose, deviating_masters, name};
+pub use diagnose::{Named, RingSeen, Whose, deviating_masters, name};
 pub use eeprom::{dumps, marches};
-pub use hypothesis::{Evidence, Hypothesis, explaining};
+pub use hypothesis::{Fit, Hypothesis, explaining};
 pub use pinned::{Pinned, Question, questions};
 pub use probes::{Asked, Probe, conversations, hypotheses, probes, thorough};
 pub(crate) use qualification::{Bench, Facts, Qualification, Qualified};

@@ -2,8 +2,8 @@
 
 use super::hypothesis::Hypothesis;
 use crate::buses::novobus::language::plan::Exchange;
-use crate::buses::novobus::language::syntax::{Drives, Header, Influence, Setup, SetupKind};
-use crate::buses::novobus::twin::Look;
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Influence, Setup, SetupKind};
+use crate::buses::novobus::twin::DecidingBits;
 use crate::library::Entry;
 use crate::link::link_name;
 use crate::scenario::problem::Problems;
@@ -70,11 +70,11 @@ pub enum Asked {
     /// The whole ring: every drive answers with its end of the bus.
     Ring,
     /// One drive, by these cells.
-    Drive(u8, &'static [Look]),
+    Drive(u8, &'static [DecidingBits]),
 }
 
 /// The cells by which a drive is asked for a property of its own.
-const LOOKS: &[(&str, &[Look])] = &[
+const LOOKS: &[(&str, &[DecidingBits])] = &[
     ("eeprom-read-time", &[look(ram::EEPROM_CONTROL, 0x20)]),
     ("eeprom-write-time", &[look(ram::EEPROM_CONTROL, 0x10)]),
     ("self-test-time", &[look(ram::STATUS, status::RESET)]),
@@ -104,8 +104,8 @@ const LOOKS: &[(&str, &[Look])] = &[
     ),
 ];
 
-const fn look(address: u16, mask: u8) -> Look {
-    Look { address, mask }
+const fn look(address: u16, mask: u8) -> DecidingBits {
+    DecidingBits { address, mask }
 }
 
 /// The drives of a ring that are asked individually: the first ones, the middle one and the last one.
@@ -173,7 +173,7 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
 fn released(drive: u8) -> Setup {
     let high = |input| Stimulus::Input(input, true);
     let inputs = Influence::Stimuli(vec![high(Input::Gpin3), high(Input::Gpin5)]);
-    Setup::new(Drives::one(0, drive), SetupKind::Influence(inputs))
+    Setup::new(DriveRange::one(0, drive), SetupKind::Influence(inputs))
 }
 
 fn probe(name: &str, text: &str, drives: u8) -> Result<Entry, Box<Problems>> {
@@ -310,7 +310,7 @@ pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
     let places = places.take(if drives > 1 && !times { 1_000 } else { 0 });
     hypotheses.extend(places.map(|(value, other, drive)| {
         let (value, other) = (alike(&values[value]), &values[other]);
-        let own = Setup::new(Drives::one(0, drive), other.clone());
+        let own = Setup::new(DriveRange::one(0, drive), other.clone());
         Hypothesis {
             name: format!("{}, but drive {drive} {}", value.name, other.value()),
             header: value.header.and(&own.into()),
@@ -323,7 +323,7 @@ pub fn hypotheses(property: &str, drives: u8) -> Vec<Hypothesis> {
 fn alike(value: &SetupKind) -> Hypothesis {
     Hypothesis {
         name: value.value(),
-        header: Setup::new(Drives::all(0), value.clone()).into(),
+        header: Setup::new(DriveRange::all(0), value.clone()).into(),
     }
 }
 

@@ -1,8 +1,8 @@
 //! Settles a property from the answers to its probe.
 
-use super::hypothesis::{Evidence, Hypothesis, explaining};
+use super::hypothesis::{Fit, Hypothesis, explaining};
 use super::probes::{Asked, Probe, hypotheses};
-use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup, SetupKind};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::scenario::times::Duration;
 use harness_proto::novobus::role::Role;
@@ -95,7 +95,7 @@ fn of_the_drive<E>(
     exactness: Exactness,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
 ) -> Result<Answer, E> {
-    let header = |what: SetupKind| Header::from(Setup::new(Drives::one(0, drive), what));
+    let header = |what: SetupKind| Header::from(Setup::new(DriveRange::one(0, drive), what));
     let known = PROPERTIES.iter().find(|known| known.name == property);
     let explained = |what: SetupKind| -> Result<Explained, E> {
         Ok(explained(twin(&header(what))?, conversations, exactness))
@@ -138,10 +138,10 @@ fn explaining_all<E>(
     sets: &[Vec<Conversation>],
     exactness: Exactness,
     twin: &dyn Fn(&Header) -> Result<Twin, E>,
-) -> Result<Vec<(Hypothesis, Evidence)>, E> {
+) -> Result<Vec<(Hypothesis, Fit)>, E> {
     let mut found: Vec<_> = hypotheses
         .into_iter()
-        .map(|hypothesis| (hypothesis, Evidence::default()))
+        .map(|hypothesis| (hypothesis, Fit::default()))
         .collect();
     for set in sets {
         let all: Vec<_> = found.iter().map(|(h, _)| h.clone()).collect();
@@ -157,7 +157,7 @@ fn explaining_all<E>(
 
 /// The hypothesis whose times fit best. The first one, which has the manual's value, is preferred if it fits equally well within a sixth
 /// and `lateness`, because in real time the bench sees bytes a little late.
-fn best(found: &[(Hypothesis, Evidence)], lateness: Span) -> Option<&Hypothesis> {
+fn best(found: &[(Hypothesis, Fit)], lateness: Span) -> Option<&Hypothesis> {
     let (first, evidence) = found.first()?;
     let (best, better) = found.iter().min_by_key(|(_, evidence)| evidence.apart)?;
     match better.apart * 6 + lateness * 6 < evidence.apart * 5 {

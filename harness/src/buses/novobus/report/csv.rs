@@ -14,7 +14,7 @@
 //! | `section` | the section of the rule in the ND21 manual |
 //! | `mark` | what the sender remarked: `detected`, with the cause, `upstream`, `seventeenth`, `sequence`, `recovered` |
 
-use super::walk::{Reader, Seen, in_time};
+use super::walk::{ByteSeen, Reader, in_time};
 use crate::report::pcapng::name;
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
@@ -71,7 +71,7 @@ pub fn status(byte: &LineByte) -> &'static str {
 }
 
 /// What a byte is, in words.
-pub(crate) fn words(seen: &Seen<'_>, byte: &LineByte) -> String {
+pub(crate) fn words(seen: &ByteSeen<'_>, byte: &LineByte) -> String {
     seen.meaning.words(byte.received)
 }
 

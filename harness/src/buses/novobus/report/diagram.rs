@@ -7,8 +7,8 @@
 use crate::report::html::Html;
 use crate::report::pcapng::name;
 use crate::report::svg::cells::{Area, Columns, areas};
-use crate::report::svg::{MAX_AREAS, Scale, class};
-use crate::report::walk::State;
+use crate::report::svg::{MAX_AREAS, RowPlacing, class};
+use crate::report::walk::SenderState;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
 use serde::Serialize;
@@ -63,7 +63,7 @@ pub(crate) fn diagram(
     rate: Rate,
 ) {
     let columns = Columns::read(trace, None);
-    let all = areas(&columns, Scale::Index);
+    let all = areas(&columns, RowPlacing::Index);
     let cut = columns.cut || all.len() > MAX_AREAS;
     let drawn = &all[..all.len().min(MAX_AREAS)];
     let column = (WIDE / trace.channels.len().max(1)).clamp(NARROW, 48);
@@ -211,7 +211,7 @@ fn legend(html: &mut Html, areas: &[Area]) {
             ("aria-label", &"Colours of the diagram"),
         ],
         |html| {
-            for state in State::ALL {
+            for state in SenderState::ALL {
                 if areas.iter().any(|area| area.state == state) {
                     html.element("li", &[], |html| {
                         html.line(
@@ -294,7 +294,7 @@ fn data(ring: usize, trace: &Trace, areas: &[Area], frame: &Frame, rate: Rate) -
     let range = |range: &Range<usize>| [number(range.start), number(range.len())];
     let mut flat = Vec::with_capacity(areas.len() * 8);
     for area in areas {
-        let states = State::ALL.iter();
+        let states = SenderState::ALL.iter();
         let state = states.take_while(|state| **state != area.state).count();
         let state = if area.fault {
             -1 - number(state)

@@ -22,7 +22,7 @@
 //! | `samples` | what was found: `t_ns`, `raw` (the bytes in hexadecimal digits) and `value` (`null` where they have no meaning) |
 //! | `second` | the same object for the second ring, where there is one |
 
-use crate::scenario::run::Record;
+use crate::scenario::run::CellRecord;
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Span;
 use harness_sim::novobus::mark::Mark as _;
@@ -91,7 +91,7 @@ struct SampleObject {
 ///
 /// # Errors
 /// What the writer says.
-pub fn write(traces: &[Trace], records: &[Record], mut out: impl Write) -> std::io::Result<()> {
+pub fn write(traces: &[Trace], records: &[CellRecord], mut out: impl Write) -> std::io::Result<()> {
     let of = |ring| records.iter().filter(move |record| record.ring == ring);
     let second = traces
         .get(1)
@@ -106,7 +106,7 @@ pub fn write(traces: &[Trace], records: &[Record], mut out: impl Write) -> std::
 
 fn object<'a>(
     trace: &'a Trace,
-    records: impl Iterator<Item = &'a Record>,
+    records: impl Iterator<Item = &'a CellRecord>,
     second: Option<Box<Object<'a>>>,
 ) -> Object<'a> {
     Object {
@@ -119,10 +119,10 @@ fn object<'a>(
     }
 }
 
-fn record(record: &Record) -> RecordObject<'_> {
+fn record(record: &CellRecord) -> RecordObject<'_> {
     let samples = record.samples.iter().map(|sample| SampleObject {
         t_ns: sample.at.since_start().as_nanos(),
-        raw: Record::raw(sample),
+        raw: CellRecord::raw(sample),
         value: record.value(sample),
     });
     RecordObject {

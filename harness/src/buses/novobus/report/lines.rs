@@ -2,7 +2,7 @@
 
 use crate::report::html::Html;
 use crate::scenario::quantity::figures;
-use crate::scenario::run::{Record, Sample};
+use crate::scenario::run::{CellRecord, Sample};
 use harness_proto::nd21::bits;
 use std::fmt::Write as _;
 
@@ -23,7 +23,7 @@ const STEPS: usize = 600;
 const ROWS: usize = 100;
 
 /// Writes the curves.
-pub(crate) fn lines(html: &mut Html, id: &str, records: &[Record]) {
+pub(crate) fn lines(html: &mut Html, id: &str, records: &[CellRecord]) {
     let times = records.iter().flat_map(|record| &record.samples);
     let ends = times.fold(None, |ends: Option<(f64, f64)>, sample| {
         let at = ms(sample);
@@ -221,7 +221,7 @@ fn path(
     out
 }
 
-fn table(html: &mut Html, record: &Record) {
+fn table(html: &mut Html, record: &CellRecord) {
     let samples = &record.samples;
     if samples.is_empty() {
         return;
@@ -240,7 +240,7 @@ fn table(html: &mut Html, record: &Record) {
             for sample in samples.iter().step_by(every) {
                 html.element("tr", &[], |html| {
                     html.line("td", &[("class", &"n")], sample.at);
-                    html.line("td", &[("class", &"n")], Record::raw(sample));
+                    html.line("td", &[("class", &"n")], CellRecord::raw(sample));
                     let value = record.value(sample).map_or_else(
                         || "-".to_owned(),
                         |value| format!("{} {}", figures(value, record.unit()), record.unit()),

@@ -5,7 +5,7 @@
 //! become its answer (9.5).
 
 use harness_proto::line::LineError;
-use harness_proto::novobus::check_sequence::{Progress, Watch};
+use harness_proto::novobus::check_sequence::{SequenceProgress, SequenceWatch};
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Field, Layout, PAGE, Reply, layout};
 use harness_proto::novobus::error_mode::UPSTREAM_ZEROS;
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 /// What a byte is on its link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum ByteRole {
     /// SYNCO (9.2).
     Synco,
     /// PAUSE (9.2).
@@ -48,7 +48,7 @@ pub enum Role {
     Lost,
 }
 
-impl Role {
+impl ByteRole {
     /// The word that tables and dissectors use.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -76,7 +76,7 @@ impl Role {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Meaning {
     /// What it is.
-    pub role: Role,
+    pub role: ByteRole,
     /// The number that the telegram means, whether the ring has such a drive or not.
     pub drive: Option<u8>,
     /// Whether the drive that is meant has been passed: a command has become its answer.
@@ -90,7 +90,7 @@ pub struct Meaning {
 }
 
 impl Meaning {
-    const fn of(role: Role) -> Self {
+    const fn of(role: ByteRole) -> Self {
         Self {
             role,
             drive: None,
@@ -111,16 +111,18 @@ impl Meaning {
     #[must_use]
     pub fn section(&self) -> &'static str {
         match self.role {
-            Role::Synco | Role::Pause | Role::Sync => "9.2",
-            Role::Address => "9.3",
-            Role::ProcessData => "9.4",
-            Role::Command | Role::Parameter | Role::Data => {
+            ByteRole::Synco | ByteRole::Pause | ByteRole::Sync => "9.2",
+            ByteRole::Address => "9.3",
+            ByteRole::ProcessData => "9.4",
+            ByteRole::Command | ByteRole::Parameter | ByteRole::Data => {
                 self.command.map_or("9.5", |layout| layout.section)
             }
-            Role::Net => "9.5",
-            Role::Check => "9.6",
-            Role::ErrorZero | Role::ErrorAddress | Role::Foreign | Role::Lost => "9.7",
-            Role::CheckSequence => "9.8",
+            ByteRole::Net => "9.5",
+            ByteRole::Check => "9.6",
+            ByteRole::ErrorZero | ByteRole::ErrorAddress | ByteRole::Foreign | ByteRole::Lost => {
+                "9.7"
+            }
+            ByteRole::CheckSequence => "9.8",
         }
     }
 
@@ -136,18 +138,18 @@ impl Meaning {
             .cell
             .map_or_else(String::new, |cell| format!(" of {cell:04X}"));
         let text = match self.role {
-            Role::Synco => "SYNCO".to_owned(),
-            Role::Pause => "PAUSE".to_owned(),
-            Role::Sync => byte.map_or_else(String::new, sync_words),
-            Role::Address => format!("address byte{to}"),
-            Role::ProcessData if self.answer => {
+            ByteRole::Synco => "SYNCO".to_owned(),
+            ByteRole::Pause => "PAUSE".to_owned(),
+            ByteRole::Sync => byte.map_or_else(String::new, sync_words),
+            ByteRole::Address => format!("address byte{to}"),
+            ByteRole::ProcessData if self.answer => {
                 format!("process data from{}", &to[to.len().min(4)..])
             }
-            Role::ProcessData => format!("process data{to}"),
-            Role::Command => format!("{side} {name}{to}"),
-            Role::Parameter => format!("{side} {name}{cell}{to}: parameter"),
-            Role::Data => format!("{side} {name}{cell}{to}: data"),
-            Role::Check => {
+            ByteRole::ProcessData => format!("process data{to}"),
+            ByteRole::Command => format!("{side} {name}{to}"),
+            ByteRole::Parameter => format!("{side} {name}{cell}{to}: parameter"),
+            ByteRole::Data => format!("{side} {name}{cell}{to}: data"),
+            ByteRole::Check => {
                 let fits = if self.fits == Some(false) {
                     " that does not fit"
                 } else {
@@ -155,12 +157,12 @@ impl Meaning {
                 };
                 format!("{side} {name}{cell}{to}: checking byte{fits}")
             }
-            Role::Net => format!("net byte{to}"),
-            Role::ErrorZero => "zero of the error mode".to_owned(),
-            Role::ErrorAddress => "number spelled out in the error mode".to_owned(),
-            Role::CheckSequence => "check sequence".to_owned(),
-            Role::Foreign => "no telegram: the receiver is in the error mode".to_owned(),
-            Role::Lost => "nothing arrived".to_owned(),
+            ByteRole::Net => format!("net byte{to}"),
+            ByteRole::ErrorZero => "zero of the error mode".to_owned(),
+            ByteRole::ErrorAddress => "number spelled out in the error mode".to_owned(),
+            ByteRole::CheckSequence => "check sequence".to_owned(),
+            ByteRole::Foreign => "no telegram: the receiver is in the error mode".to_owned(),
+            ByteRole::Lost => "nothing arrived".to_owned(),
         };
         text.trim_start().to_owned()
     }
@@ -210,7 +212,7 @@ pub struct Observer {
     upstream: bool,
     /// Whether there were zeros enough for a number to follow: seven where a ring is broken (9.9).
     spelling: bool,
-    watch: Watch,
+    watch: SequenceWatch,
 }
 
 impl Observer {
@@ -230,14 +232,14 @@ impl Observer {
             zeros: 0,
             upstream: to.is_none(),
             spelling: false,
-            watch: Watch::default(),
+            watch: SequenceWatch::default(),
         }
     }
 
     /// Takes the next byte of the link, and what its receiver noticed.
     pub fn see(&mut self, received: Option<u8>, error: Option<LineError>) -> Meaning {
         let Some(byte) = received else {
-            return Meaning::of(Role::Lost);
+            return Meaning::of(ByteRole::Lost);
         };
         let good = error.is_none();
         if !self.foreign {
@@ -261,21 +263,21 @@ impl Observer {
         self.spelling |= self.zeros >= UPSTREAM_ZEROS - 1;
         if self.upstream {
             match self.watch.see(byte, good) {
-                Progress::None => {}
-                Progress::Complete => {
+                SequenceProgress::None => {}
+                SequenceProgress::Complete => {
                     *self = Self::new(self.from, self.to);
-                    return Meaning::of(Role::CheckSequence);
+                    return Meaning::of(ByteRole::CheckSequence);
                 }
-                Progress::Started | Progress::Continued => {
-                    return Meaning::of(Role::CheckSequence);
+                SequenceProgress::Started | SequenceProgress::Continued => {
+                    return Meaning::of(ByteRole::CheckSequence);
                 }
             }
         }
         Meaning::of(match byte {
-            _ if !good => Role::Foreign,
-            0 => Role::ErrorZero,
-            _ if self.spelling && self.from.is_some() => Role::ErrorAddress,
-            _ => Role::Foreign,
+            _ if !good => ByteRole::Foreign,
+            0 => ByteRole::ErrorZero,
+            _ if self.spelling && self.from.is_some() => ByteRole::ErrorAddress,
+            _ => ByteRole::Foreign,
         })
     }
 
@@ -284,38 +286,38 @@ impl Observer {
         if self.address_next {
             self.address_next = false;
             self.target = Some(byte.wrapping_add(self.behind));
-            return Some(self.with_target(Role::Address));
+            return Some(self.with_target(ByteRole::Address));
         }
         if self.net > 0 {
             self.net -= 1;
             if self.process_data > 0 {
                 self.process_data -= 1;
-                return Some(self.with_target(Role::ProcessData));
+                return Some(self.with_target(ByteRole::ProcessData));
             }
             return self.parameter(byte);
         }
         match SyncByte::decode(byte).ok()? {
-            SyncByte::Synco => Some(Meaning::of(Role::Synco)),
-            SyncByte::Pause => Some(Meaning::of(Role::Pause)),
+            SyncByte::Synco => Some(Meaning::of(ByteRole::Synco)),
+            SyncByte::Pause => Some(Meaning::of(ByteRole::Pause)),
             SyncByte::Telegram(header) => {
                 self.net = header.net_length();
                 self.process_data = if header.process_data() { 2 } else { 0 };
                 match header.addressing() {
                     Addressing::AddressFollows => {
                         self.address_next = true;
-                        return Some(Meaning::of(Role::Sync));
+                        return Some(Meaning::of(ByteRole::Sync));
                     }
                     Addressing::SameDrive => {}
                     Addressing::NextDrive => {
                         self.target = self.target.map(|target| target.wrapping_add(1));
                     }
                 }
-                Some(self.with_target(Role::Sync))
+                Some(self.with_target(ByteRole::Sync))
             }
         }
     }
 
-    fn with_target(&self, role: Role) -> Meaning {
+    fn with_target(&self, role: ByteRole) -> Meaning {
         Meaning {
             drive: self.target,
             answer: self.answered(),
@@ -335,17 +337,17 @@ impl Observer {
 
     fn parameter(&mut self, byte: u8) -> Option<Meaning> {
         let Some(target) = self.target else {
-            return Some(Meaning::of(Role::Net));
+            return Some(Meaning::of(ByteRole::Net));
         };
         let looked_at = self.looked_at();
-        let mut meaning = self.with_target(Role::Net);
+        let mut meaning = self.with_target(ByteRole::Net);
         let Some(begun) = self.begun.get_mut(&target) else {
             let Some(layout) = layout(byte, ReadLongAnswer::default()) else {
                 return (!looked_at).then_some(meaning);
             };
             let bytes = vec![byte];
             self.begun.insert(target, Begun { layout, bytes });
-            meaning.role = Role::Command;
+            meaning.role = ByteRole::Command;
             meaning.command = Some(layout);
             return Some(meaning);
         };
@@ -357,15 +359,15 @@ impl Observer {
         meaning.cell = cell(layout, &begun.bytes, meaning.answer);
         let (role, fits) = if meaning.answer {
             match layout.answer[place] {
-                Reply::Echo => (Role::Parameter, None),
-                Reply::Data(_) => (Role::Data, None),
-                Reply::Check => (Role::Check, Some(before.minus() == byte)),
+                Reply::Echo => (ByteRole::Parameter, None),
+                Reply::Data(_) => (ByteRole::Data, None),
+                Reply::Check => (ByteRole::Check, Some(before.minus() == byte)),
             }
         } else {
             match layout.command[place] {
-                Field::Check => (Role::Check, Some(before.plus() == byte)),
+                Field::Check => (ByteRole::Check, Some(before.plus() == byte)),
                 Field::Fixed(due) if due != byte && looked_at => return None,
-                _ => (Role::Parameter, None),
+                _ => (ByteRole::Parameter, None),
             }
         };
         if begun.bytes.len() == layout.length() {

@@ -11,7 +11,7 @@
 //! ```
 
 use crate::scenario::quantity::figures;
-use crate::scenario::run::{Record, Sample};
+use crate::scenario::run::{CellRecord, Sample};
 use harness_proto::nd21::bits;
 use std::fmt::Write as _;
 
@@ -26,7 +26,7 @@ const CHANGES: usize = 60;
 
 /// A record as text; empty if nothing was seen.
 #[must_use]
-pub fn plot(record: &Record) -> String {
+pub fn plot(record: &CellRecord) -> String {
     let prefix = if record.ring == 0 { "" } else { "2:" };
     let name = format!("drive {prefix}{} {}", record.drive, record.name);
     match record.every {
@@ -37,14 +37,14 @@ pub fn plot(record: &Record) -> String {
 
 /// All records of a run, each behind an empty line.
 #[must_use]
-pub fn plots(records: &[Record]) -> String {
+pub fn plots(records: &[CellRecord]) -> String {
     records
         .iter()
         .map(|record| format!("\n{}", plot(record)))
         .collect()
 }
 
-fn curve(record: &Record) -> String {
+fn curve(record: &CellRecord) -> String {
     let values: Vec<_> = record
         .samples
         .iter()
@@ -119,13 +119,17 @@ fn round(row: f64) -> usize {
     row.round() as usize
 }
 
-fn table(record: &Record) -> String {
+fn table(record: &CellRecord) -> String {
     let changes = &record.samples;
     if changes.is_empty() {
         return "  nothing was seen\n".to_owned();
     }
     let line = |sample: &Sample| {
-        let mut line = format!("{:>16}  {:>8}", sample.at.to_string(), Record::raw(sample));
+        let mut line = format!(
+            "{:>16}  {:>8}",
+            sample.at.to_string(),
+            CellRecord::raw(sample)
+        );
         if record.scale.is_some() {
             let value = record.value(sample);
             let value = value.map_or("-".to_owned(), |value| figures(value, record.unit()));
@@ -153,19 +157,19 @@ fn table(record: &Record) -> String {
 mod tests {
     use super::*;
     use harness_proto::nd21::ram;
-    use harness_proto::nd21::units::{Device, Drive, Scale, SpeedRange};
+    use harness_proto::nd21::units::{DriveType, DriveUnits, Scale, SpeedRange};
     use harness_proto::time::{Instant, Span};
 
-    fn record(address: u16, scale: Option<Scale>, every: Option<Span>) -> Record {
-        Record {
+    fn record(address: u16, scale: Option<Scale>, every: Option<Span>) -> CellRecord {
+        CellRecord {
             ring: 0,
             drive: 0,
             name: "cell".to_owned(),
             address,
             size: 2,
             scale,
-            units: Drive {
-                device: Device::Nd5610,
+            units: DriveUnits {
+                device: DriveType::Nd5610,
                 range: SpeedRange::To8000,
             },
             every,

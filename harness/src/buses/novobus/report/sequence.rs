@@ -3,7 +3,7 @@
 
 use crate::report::csv::{remark, status};
 use crate::report::html::Html;
-use crate::report::meaning::Role;
+use crate::report::meaning::ByteRole;
 use crate::report::pcapng::name;
 use crate::report::walk::Reader;
 use harness_proto::novobus::error_mode::Marks;
@@ -127,10 +127,14 @@ fn said(link: &Channel, mut reader: Reader<'_>, events: &mut Vec<Event>) {
         };
         let whom = meaning.drive.map_or(Who::Ring, Who::Drive);
         let begun = match meaning.role {
-            Role::Command | Role::Parameter | Role::Data | Role::Check | Role::ProcessData => {
-                let key = (meaning.drive, meaning.role == Role::ProcessData);
-                let begins = meaning.role == Role::Command
-                    || meaning.role == Role::ProcessData && before != Some(key);
+            ByteRole::Command
+            | ByteRole::Parameter
+            | ByteRole::Data
+            | ByteRole::Check
+            | ByteRole::ProcessData => {
+                let key = (meaning.drive, meaning.role == ByteRole::ProcessData);
+                let begins = meaning.role == ByteRole::Command
+                    || meaning.role == ByteRole::ProcessData && before != Some(key);
                 if begins {
                     open.remove(&key);
                 }
@@ -159,7 +163,7 @@ fn said(link: &Channel, mut reader: Reader<'_>, events: &mut Vec<Event>) {
                 format!("{}{cell}", layout.printed_name)
             };
         }
-        if let (Role::Data, Some(value)) = (meaning.role, value) {
+        if let (ByteRole::Data, Some(value)) = (meaning.role, value) {
             let gap = if event.result.is_empty() {
                 "data "
             } else {
@@ -197,15 +201,15 @@ fn told(at: Instant, master: bool, whom: Who, process_data: bool) -> Event {
 }
 
 /// Zeros, numbers and check sequences: bytes of a kind one behind another are one event.
-fn open_run(role: Role, master: bool, at: Instant, events: &mut Vec<Event>) -> Option<usize> {
+fn open_run(role: ByteRole, master: bool, at: Instant, events: &mut Vec<Event>) -> Option<usize> {
     let (kind, what) = match role {
-        Role::ErrorZero if master => (Kind::Sequence, "zeros"),
-        Role::CheckSequence if master => (Kind::Sequence, CHECK),
-        Role::CheckSequence => (Kind::Sequence, "check sequence is back"),
-        Role::ErrorZero => (Kind::Trouble, "zeros: a drive is in the error mode"),
-        Role::ErrorAddress => (Kind::Trouble, "number spelled out"),
-        Role::Foreign => (Kind::Trouble, "no telegram"),
-        Role::Lost => (Kind::Trouble, "nothing arrived"),
+        ByteRole::ErrorZero if master => (Kind::Sequence, "zeros"),
+        ByteRole::CheckSequence if master => (Kind::Sequence, CHECK),
+        ByteRole::CheckSequence => (Kind::Sequence, "check sequence is back"),
+        ByteRole::ErrorZero => (Kind::Trouble, "zeros: a drive is in the error mode"),
+        ByteRole::ErrorAddress => (Kind::Trouble, "number spelled out"),
+        ByteRole::Foreign => (Kind::Trouble, "no telegram"),
+        ByteRole::Lost => (Kind::Trouble, "nothing arrived"),
         _ => return None,
     };
     let (from, to) = if master {

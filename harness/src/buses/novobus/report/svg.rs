@@ -1,13 +1,13 @@
 //! A trace as a space-time diagram: the drives across, time down, a colour for what each was doing (SVG 1.1).
 //!
-//! A column is a link, headed by its sender, as in the manual's tables (ND21 9.7, 9.8). With [`Scale::Index`] row n is the n-th byte of
-//! each link. With [`Scale::Time`] a byte is placed at its time, which shows how it goes round. A tooltip gives the meaning of a byte, its
+//! A column is a link, headed by its sender, as in the manual's tables (ND21 9.7, 9.8). With [`RowPlacing::Index`] row n is the n-th byte of
+//! each link. With [`RowPlacing::Time`] a byte is placed at its time, which shows how it goes round. A tooltip gives the meaning of a byte, its
 //! rule and section. Equal neighbouring bytes are one rectangle. There are no scripts; colours follow the reader's light or dark scheme. A
 //! long run is cut, and the picture says so.
 
 pub(crate) mod cells;
 
-use super::walk::State;
+use super::walk::SenderState;
 use crate::report::pcapng::name;
 use cells::{Area, Columns, areas};
 use harness_proto::line::Rate;
@@ -23,7 +23,7 @@ pub const MAX_AREAS: usize = 6_500;
 
 /// How rows are placed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Scale {
+pub enum RowPlacing {
     /// Row n is the n-th byte of each link.
     #[default]
     Index,
@@ -39,7 +39,7 @@ pub struct Options<'o> {
     /// In front of the names of the picture's parts, where several stand in one page: letters and digits.
     pub id: &'o str,
     /// How rows are placed.
-    pub scale: Scale,
+    pub scale: RowPlacing,
     /// The rate of the line.
     pub rate: Rate,
     /// The rows, counted from 0; all where `None`.
@@ -108,15 +108,15 @@ const STYLE: &str = "\
 .nb .f{fill:#5d3f8f}.nb .g{fill:#474e57}.nb .x{stroke:#ff8a80}}";
 
 /// The class of a state's colour.
-pub(crate) fn class(state: State) -> char {
+pub(crate) fn class(state: SenderState) -> char {
     match state {
-        State::Idle => 'a',
-        State::Forwarding => 'b',
-        State::Addressed => 'c',
-        State::Zero => 'd',
-        State::Counting => 'e',
-        State::Sequence => 'f',
-        State::Other => 'g',
+        SenderState::Idle => 'a',
+        SenderState::Forwarding => 'b',
+        SenderState::Addressed => 'c',
+        SenderState::Zero => 'd',
+        SenderState::Counting => 'e',
+        SenderState::Sequence => 'f',
+        SenderState::Other => 'g',
     }
 }
 
@@ -176,7 +176,7 @@ fn diagram(ring: usize, trace: &Trace, most: usize, options: &Options<'_>) -> Di
 
 /// Where things stand.
 struct Placing {
-    scale: Scale,
+    scale: RowPlacing,
     column: f64,
     /// The first row, or the time of the upper edge.
     first: usize,
@@ -202,8 +202,8 @@ impl Placing {
         let span = (until.saturating_sub(from)) as f64;
         let units = (byte as f64 / 8.0).max(span / TALLEST);
         let height = match options.scale {
-            Scale::Index => (last - first) as f64 * ROW,
-            Scale::Time => span / units,
+            RowPlacing::Index => (last - first) as f64 * ROW,
+            RowPlacing::Time => span / units,
         };
         Self {
             scale: options.scale,
@@ -224,11 +224,11 @@ impl Placing {
         let x = LEFT + self.column * area.links.start as f64;
         let width = self.column * area.links.len() as f64;
         match self.scale {
-            Scale::Index => {
+            RowPlacing::Index => {
                 let y = TOP + (area.rows.start - self.first) as f64 * ROW;
                 (x, y, width, area.rows.len() as f64 * ROW)
             }
-            Scale::Time => {
+            RowPlacing::Time => {
                 let from = area.from.saturating_sub(self.byte).max(self.from) - self.from;
                 let y = TOP + from as f64 / self.units;
                 let until = TOP + area.to.saturating_sub(self.from) as f64 / self.units;
@@ -269,8 +269,8 @@ fn heads(out: &mut String, trace: &Trace, column: f64) {
 fn axis(out: &mut String, place: &Placing) {
     let height = place.bottom - TOP;
     let head = match place.scale {
-        Scale::Index => "byte",
-        Scale::Time => "ms",
+        RowPlacing::Index => "byte",
+        RowPlacing::Time => "ms",
     };
     let mut label = |y: f64, text: &str| {
         put(
@@ -284,7 +284,7 @@ fn axis(out: &mut String, place: &Placing) {
     label(TOP - 24.0, head);
     let step = (height / 200.0).ceil().max(1.0);
     match place.scale {
-        Scale::Index => {
+        RowPlacing::Index => {
             let rows = (height / ROW) as usize;
             for row in (0..rows).step_by((step * 5.0) as usize) {
                 label(
@@ -293,7 +293,7 @@ fn axis(out: &mut String, place: &Placing) {
                 );
             }
         }
-        Scale::Time => {
+        RowPlacing::Time => {
             let mut y = 0.0;
             while y <= height {
                 let at = Span::from_units(place.from + (y * place.units) as u64);
@@ -341,7 +341,7 @@ fn rectangle(out: &mut String, ring: usize, trace: &Trace, area: &Area, place: &
             escape(&remark),
         ),
     );
-    if place.column >= LETTERS && place.scale == Scale::Index {
+    if place.column >= LETTERS && place.scale == RowPlacing::Index {
         put(
             out,
             format_args!(
@@ -356,7 +356,7 @@ fn rectangle(out: &mut String, ring: usize, trace: &Trace, area: &Area, place: &
 
 fn legend(out: &mut String, y: f64) {
     let (mut x, mut y) = (12.0, y);
-    for state in State::ALL {
+    for state in SenderState::ALL {
         put(
             out,
             format_args!(
@@ -369,7 +369,7 @@ fn legend(out: &mut String, y: f64) {
             ),
         );
         x += 34.0 + 6.7 * f64::from(u8::try_from(state.name().len()).unwrap_or(u8::MAX));
-        if state == State::Addressed {
+        if state == SenderState::Addressed {
             (x, y) = (12.0, y + 20.0);
         }
     }
@@ -389,8 +389,8 @@ fn description(traces: &[Trace], drawn: &[Diagram], options: &Options<'_>) -> St
     let mut text =
         String::from("Space-time diagram: the links of the ring across, headed by their senders; ");
     text.push_str(match options.scale {
-        Scale::Index => "downwards the bytes, row n the n-th byte of each link.",
-        Scale::Time => "downwards the time.",
+        RowPlacing::Index => "downwards the bytes, row n the n-th byte of each link.",
+        RowPlacing::Time => "downwards the time.",
     });
     for (trace, diagram) in traces.iter().zip(drawn) {
         let bytes = trace

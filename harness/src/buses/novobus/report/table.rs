@@ -33,7 +33,7 @@ const FOLD: usize = 4;
 
 /// What part of a table is wanted.
 #[derive(Clone, Debug, Default)]
-pub struct Part {
+pub struct TablePart {
     /// The rows, counted from 0; all where `None`.
     pub rows: Option<Range<usize>>,
     /// A row that is pointed at, counted from 0; what the master received there stands in brackets.
@@ -49,7 +49,7 @@ const ROWS: usize = 20_000;
 
 /// A trace as a table.
 #[must_use]
-pub fn table(trace: &Trace, part: &Part) -> String {
+pub fn table(trace: &Trace, part: &TablePart) -> String {
     let rows = rows(trace, part);
     let mut columns = columns(trace, &rows);
     if let Some(pointed) = rows
@@ -96,7 +96,7 @@ pub fn table(trace: &Trace, part: &Part) -> String {
 }
 
 /// The rows to show; `None` stands for rows left out.
-fn rows(trace: &Trace, part: &Part) -> Vec<Option<usize>> {
+fn rows(trace: &Trace, part: &TablePart) -> Vec<Option<usize>> {
     let all = trace
         .channels
         .iter()

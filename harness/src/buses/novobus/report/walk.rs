@@ -1,6 +1,6 @@
 //! The bytes of a trace in order of time, and what its drives were doing at each.
 
-use super::meaning::{Meaning, Observer, Role};
+use super::meaning::{ByteRole, Meaning, Observer};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::time::Instant;
 use harness_sim::novobus::mark::Mark as _;
@@ -30,7 +30,7 @@ pub(crate) fn in_time(links: &[Channel]) -> impl Iterator<Item = (usize, usize)>
 
 /// What the sender of a byte was doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
+pub enum SenderState {
     /// It passed on SYNCO or PAUSE.
     Idle,
     /// It passed on a telegram for another drive.
@@ -47,7 +47,7 @@ pub enum State {
     Other,
 }
 
-impl State {
+impl SenderState {
     /// All of them, in the order of a legend.
     pub const ALL: [Self; 7] = [
         Self::Idle,
@@ -76,13 +76,13 @@ impl State {
 
 /// What a byte is, and what its sender was doing.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Seen<'t> {
+pub struct ByteSeen<'t> {
     /// What it is to its receiver.
     pub meaning: Meaning,
     /// The meaning of the byte to its sender; the same as for the receiver if nothing more is known.
     pub sent: Meaning,
     /// What its sender was doing.
-    pub state: State,
+    pub state: SenderState,
     /// What its sender remarked at it.
     pub mark: Option<&'t Remark>,
 }
@@ -124,7 +124,7 @@ impl<'t> Reader<'t> {
     }
 
     /// Reads the next byte.
-    pub fn see(&mut self, byte: &LineByte) -> Seen<'t> {
+    pub fn see(&mut self, byte: &LineByte) -> ByteSeen<'t> {
         let mut meaning = self.observer.see(byte.received, byte.error);
         let mut shown: Option<&Remark> = None;
         let mut leaves = false;
@@ -139,12 +139,12 @@ impl<'t> Reader<'t> {
             }
         }
         self.next += 1;
-        if self.in_error == Some(true) && meaning.role != Role::CheckSequence {
+        if self.in_error == Some(true) && meaning.role != ByteRole::CheckSequence {
             meaning.role = match byte.received {
-                None => Role::Lost,
-                Some(0) => Role::ErrorZero,
-                Some(_) if byte.error.is_none() => Role::ErrorAddress,
-                Some(_) => Role::Foreign,
+                None => ByteRole::Lost,
+                Some(0) => ByteRole::ErrorZero,
+                Some(_) if byte.error.is_none() => ByteRole::ErrorAddress,
+                Some(_) => ByteRole::Foreign,
             };
             meaning.drive = None;
         }
@@ -157,7 +157,7 @@ impl<'t> Reader<'t> {
             self.in_error = Some(false);
             self.sender = Observer::new(self.from, self.to);
         }
-        Seen {
+        ByteSeen {
             state: self.state(&sent),
             sent,
             meaning,
@@ -165,18 +165,18 @@ impl<'t> Reader<'t> {
         }
     }
 
-    fn state(&self, meaning: &Meaning) -> State {
+    fn state(&self, meaning: &Meaning) -> SenderState {
         match meaning.role {
-            Role::Synco | Role::Pause => State::Idle,
-            Role::CheckSequence => State::Sequence,
+            ByteRole::Synco | ByteRole::Pause => SenderState::Idle,
+            ByteRole::CheckSequence => SenderState::Sequence,
             // The zeros in front of the check sequence.
-            Role::ErrorZero if self.from.is_none() => State::Sequence,
-            Role::ErrorZero => State::Zero,
-            Role::ErrorAddress => State::Counting,
-            Role::Foreign | Role::Lost => State::Other,
-            Role::Sync | Role::Address => State::Forwarding,
-            _ if meaning.drive.is_some() && meaning.drive == self.from => State::Addressed,
-            _ => State::Forwarding,
+            ByteRole::ErrorZero if self.from.is_none() => SenderState::Sequence,
+            ByteRole::ErrorZero => SenderState::Zero,
+            ByteRole::ErrorAddress => SenderState::Counting,
+            ByteRole::Foreign | ByteRole::Lost => SenderState::Other,
+            ByteRole::Sync | ByteRole::Address => SenderState::Forwarding,
+            _ if meaning.drive.is_some() && meaning.drive == self.from => SenderState::Addressed,
+            _ => SenderState::Forwarding,
         }
     }
 }

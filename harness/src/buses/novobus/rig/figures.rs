@@ -1,7 +1,7 @@
 //! The properties of a rig: the identities of its drives, how long a byte takes round its rings, and what went wrong meanwhile.
 
 use super::line_test;
-use crate::buses::novobus::driver::{self, Axis, Bus, Identity, State};
+use crate::buses::novobus::driver::{self, Axis, Identity, OpenRings, State};
 use crate::link::Octets;
 use crate::rig::Rig;
 use crate::rig::session::{End, Session};
@@ -150,7 +150,7 @@ fn drives(
     sizes: &[RingSize],
     told: &mut dyn FnMut(Axis),
 ) -> Result<(Vec<DriveFigures>, u64), driver::Error> {
-    let bus = Bus::open(Box::new(shared.line()), sizes, driver::Options::default())?;
+    let bus = OpenRings::open(Box::new(shared.line()), sizes, driver::Options::default())?;
     let mut drives = Vec::new();
     for some in bus.axes().chunks(SIDE_BY_SIDE) {
         for (axis, identity) in some.iter().zip(bus.identities(some)?) {

@@ -172,7 +172,7 @@ fn shown(bytes: &[Received]) -> String {
 mod tests {
     use super::*;
     use crate::buses::SimulatedLink;
-    use crate::buses::novobus::driver::{Bus, Options};
+    use crate::buses::novobus::driver::{OpenRings, Options};
     use crate::buses::novobus::link::BesideTheBus as _;
     use crate::guard::{Guarded, Limits};
     use crate::library::Entry;
@@ -212,7 +212,8 @@ mod tests {
             assert!(!line_test::lacks_marks(&mut link, 0));
             let recovery = recover(&mut link, 0);
             assert_eq!((recovery.before, recovery.drives), (None, Some(size)));
-            let bus = Bus::open(Box::new(&mut link), &[size], Options::default()).expect("a bus");
+            let bus =
+                OpenRings::open(Box::new(&mut link), &[size], Options::default()).expect("a bus");
             assert_eq!((drives, bus.counters()[0].disturbed), (drives, 0));
         }
     }

@@ -9,7 +9,7 @@ use crate::scenario::run::read_byte;
 use harness_proto::nd21::cells::Cell;
 use harness_proto::nd21::io::Input;
 use harness_proto::nd21::ram;
-use harness_proto::nd21::units::{Drive, SpeedRange, Value};
+use harness_proto::nd21::units::{DriveUnits, SpeedRange, Value};
 use harness_proto::time::{Instant, Span};
 
 /// The interlocks of a rig, and when each is looked at next.
@@ -30,7 +30,7 @@ struct Entry {
     next: Instant,
     message: Option<String>,
     /// What the scale of the cell depends on: the type of the device.
-    units: Drive,
+    units: DriveUnits,
     /// And the range of speeds, for which the drive is asked once (14.3.2).
     range: Option<SpeedRange>,
 }
@@ -133,7 +133,7 @@ impl Entry {
             let byte = self.read(line, ram::SW_VERSION2)?;
             self.range = Some(SpeedRange::from_sw_version2(byte));
         }
-        let units = Drive {
+        let units = DriveUnits {
             range: self.range?,
             ..self.units
         };

@@ -1,15 +1,15 @@
 //! The verdict of an attempt, compared with its twin.
 
 use super::left_open::{self, Explanation};
-use crate::buses::novobus::language::syntax::{Drives, Header, Setup};
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
-use crate::link::{Event, Recording};
+use crate::link::{LinkEvent, Recording};
 use crate::rig::check::Rig;
 use crate::rig::file::Deviation;
 use crate::rig::run::{Way, play_one, twin};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::Plan;
-use crate::scenario::run::{Difference, Mismatch, Outcome};
+use crate::scenario::run::{ByteDifference, Mismatch, Outcome};
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::novobus::deviation;
@@ -204,7 +204,7 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
                 .to_owned(),
         );
     } else if let Some(untimely) = untimely
-        && (finding.difference.as_ref()).is_none_or(Difference::is_absence)
+        && (finding.difference.as_ref()).is_none_or(ByteDifference::is_absence)
         && heard.exactness.tolerance > Span::ZERO
     {
         outcome.verdict = Verdict::Inconclusive;
@@ -222,7 +222,7 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
 /// The outcome of the scenario on a rig's model with drives that have just been switched on and have these known deviations.
 fn switched_on(rig: &Rig, header: &Header, heard: &Heard<'_>) -> Option<Outcome> {
     let mut link = twin(rig, header).ok()?.into_link();
-    let mut forgotten: Vec<Event> = Vec::new();
+    let mut forgotten: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::new(&mut link, &mut forgotten);
     play_one(&mut recording, heard.plan, heard.way).ok()
 }
@@ -310,8 +310,11 @@ pub(crate) fn known(rig: &Rig) -> Header {
         };
         let ring = usize::from(entry.ring - 1);
         let whom = match entry.drives.as_slice() {
-            [] => vec![Drives::all(ring)],
-            some => some.iter().map(|drive| Drives::one(ring, *drive)).collect(),
+            [] => vec![DriveRange::all(ring)],
+            some => some
+                .iter()
+                .map(|drive| DriveRange::one(ring, *drive))
+                .collect(),
         };
         let deviates = |whom| Setup::deviates(whom, deviation);
         whom.into_iter().map(deviates).collect()

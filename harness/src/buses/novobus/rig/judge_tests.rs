@@ -4,7 +4,7 @@ use super::{Heard, judge, known};
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Unasked};
 use crate::library::{Entry, sources};
-use crate::link::{Capability, Event, Link, Octets, Recording};
+use crate::link::{Capability, Link, LinkEvent, Octets, Recording};
 use crate::rig::check::parse;
 use crate::rig::run::{Way, play_one, twin};
 use crate::scenario::plan::Plan;
@@ -73,7 +73,7 @@ pub(super) fn judged_on(
     );
     let rig = parse(&source(rig)).expect("a rig");
     let byte_time = link.byte_time();
-    let mut events: Vec<Event> = Vec::new();
+    let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::new(link, &mut events);
     let mut outcome = play_one(&mut recording, plan, way).expect("it is not examined");
     let exactness = Exactness {
@@ -461,7 +461,7 @@ fn no_right_drive_is_accused() {
         for (number, drives) in RIGHT.iter().enumerate() {
             let lines = drives.lines().map(|line| format!("drive 0..last {line}\n"));
             let mut link = link_of(size.drives(), &lines.collect::<String>());
-            let mut events: Vec<Event> = Vec::new();
+            let mut events: Vec<LinkEvent> = Vec::new();
             let seen = Recording::new(&mut link, &mut events);
             if plan.needs.contains(&Capability::Interposer) || lacks(&plan, &seen).is_some() {
                 break;
@@ -519,7 +519,7 @@ fn judged_simulated(setup: &[&str], before: &str, scenario: &str) -> Outcome {
     let mut last = None;
     for steps in [before, scenario] {
         let plan = plan(format!("title x\nring 3\n{steps}"));
-        let mut events: Vec<Event> = Vec::new();
+        let mut events: Vec<LinkEvent> = Vec::new();
         let byte_time = link.byte_time();
         let mut recording = Recording::new(&mut link, &mut events);
         let mut outcome = play_one(&mut recording, &plan, &way).expect("it is not examined");

@@ -3,7 +3,7 @@
 //! A drive may have any value of an open property. A difference that such a value explains is no drive's fault.
 
 use super::judge::{Heard, known};
-use crate::buses::novobus::language::syntax::{Drives, Header, Setup, SetupKind};
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup, SetupKind};
 use crate::buses::novobus::language::write::ring_prefix;
 use crate::buses::novobus::twin::{Comparison, Conversation, Divergence};
 use crate::rig::check::Rig;
@@ -119,9 +119,9 @@ fn candidates<'c>(
     heard: &Heard<'_>,
 ) -> Vec<(&'c Choice, String, Header)> {
     let rings = || heard.way.rings.iter().enumerate();
-    let setup = |whom: Drives, choice: &Choice| Setup::new(whom, choice.setting.clone());
+    let setup = |whom: DriveRange, choice: &Choice| Setup::new(whom, choice.setting.clone());
     let every = |choice: &Choice| -> Header {
-        let all = rings().map(|(ring, _)| setup(Drives::all(ring), choice));
+        let all = rings().map(|(ring, _)| setup(DriveRange::all(ring), choice));
         all.collect()
     };
     let mut all: Vec<_> = open
@@ -139,7 +139,7 @@ fn candidates<'c>(
         }
         for (ring, size) in rings().filter(|(_, size)| (2..=SMALL).contains(&size.drives())) {
             let single = (0..size.drives()).map(|drive| {
-                let own = setup(Drives::one(ring, drive), choice);
+                let own = setup(DriveRange::one(ring, drive), choice);
                 let words = format!(" in drive {}{drive}", ring_prefix(ring));
                 (choice, words, own.into())
             });

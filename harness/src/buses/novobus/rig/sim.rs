@@ -2,7 +2,7 @@
 
 use crate::buses::novobus::language::parse::drive::DEVICES;
 use crate::buses::novobus::language::plan::plan_header;
-use crate::buses::novobus::language::syntax::{Drives, Header, Influence, Setup, SetupKind};
+use crate::buses::novobus::language::syntax::{DriveRange, Header, Influence, Setup, SetupKind};
 use crate::rig::check::Rig;
 use crate::rig::file::{DriveEntry, Hooks, Retry, RigFile};
 use crate::rig::limits;
@@ -106,6 +106,6 @@ pub(crate) fn mistakes(
 fn device(drive: &DriveEntry) -> Option<Setup> {
     let model = drive.model.as_deref()?.strip_prefix("ND21-")?;
     let (_, device) = DEVICES.iter().find(|(name, _)| model.starts_with(name))?;
-    let whom = Drives::one(usize::from(drive.ring - 1), drive.address);
+    let whom = DriveRange::one(usize::from(drive.ring - 1), drive.address);
     Some(Setup::new(whom, SetupKind::Type(*device)))
 }

@@ -1,8 +1,8 @@
 //! Byte for byte: what a ring sent back, and what its twin says.
 
 use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, Symptom, Unasked};
-use super::follow::{Conversation, Expected};
-use super::known::{Knowledge, Place, Reading, writes};
+use super::follow::{Conversation, TwinBytes};
+use super::known::{ByteRead, CellByte, Knowledge, writes};
 use super::unasked::Sent;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::changes_by_itself;
@@ -84,7 +84,7 @@ impl Comparer<'_> {
         ring: usize,
         size: RingSize,
         conversation: &Conversation,
-        answer: &Expected,
+        answer: &TwinBytes,
     ) {
         let expected = &answer.bytes[..];
         let sent = conversation.sent_in(ring);
@@ -288,7 +288,7 @@ impl Comparer<'_> {
     }
 
     /// Whether a cell may hold a value, where the model's holds `wanted`; `None` where it must be the model's.
-    fn data_are_right(&mut self, place: Place, (wanted, value): (u8, u8)) -> Option<bool> {
+    fn data_are_right(&mut self, place: CellByte, (wanted, value): (u8, u8)) -> Option<bool> {
         let (ring, drive, address) = place;
         if let Some((asked, looks)) = self.exactness.looks
             && let Some(look) = looks.iter().find(|look| look.address == address)
@@ -301,14 +301,14 @@ impl Comparer<'_> {
         }
         match self.knowledge.read(place, wanted, value) {
             _ if self.is_recorded(place) => self.comparison.measured += 1,
-            Reading::Wrong => return Some(false),
-            Reading::Own => self.comparison.measured += 1,
-            Reading::Right => {
+            ByteRead::Wrong => return Some(false),
+            ByteRead::Own => self.comparison.measured += 1,
+            ByteRead::Right => {
                 let written = self.knowledge.written_now(place, value);
                 self.comparison.against += u64::from(value != wanted && written == 0xFF);
             }
-            Reading::Learned if value == wanted => {}
-            Reading::Learned => self.comparison.adopted.push(Adopted {
+            ByteRead::Learned if value == wanted => {}
+            ByteRead::Learned => self.comparison.adopted.push(Adopted {
                 ring,
                 drive,
                 address,
@@ -319,7 +319,7 @@ impl Comparer<'_> {
     }
 
     /// Whether a drive's oscilloscope may be writing to a cell (ND21 14.10.6).
-    fn is_recorded(&self, (ring, drive, address): Place) -> bool {
+    fn is_recorded(&self, (ring, drive, address): CellByte) -> bool {
         own::is_of_the_scope(address) && self.recording.contains(&(ring, drive))
     }
 

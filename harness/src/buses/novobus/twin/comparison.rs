@@ -16,12 +16,12 @@ pub struct Exactness {
     /// Whether the twin knows the content of every cell: true for a rig whose drives are simulated too.
     pub knows_cells: bool,
     /// Cells of a drive that are compared although it writes them itself.
-    pub looks: Option<(u8, &'static [Look])>,
+    pub looks: Option<(u8, &'static [DecidingBits])>,
 }
 
 /// Bits of a cell that decide a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Look {
+pub struct DecidingBits {
     /// The address of the byte.
     pub address: u16,
     /// The bits.

@@ -5,7 +5,7 @@ use super::comparison::{Comparison, Exactness};
 use super::known::Knowledge;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::link::BesideTheBus;
-use crate::link::{Event, Line, Link, Moment, Octets, PlacedFault};
+use crate::link::{Line, Link, LinkEvent, Moment, Octets, PlacedFault};
 use harness_proto::line::Received;
 use harness_proto::nd21::bits::{flags2, scope_status, status as status_bits};
 use harness_proto::nd21::ram;
@@ -43,20 +43,20 @@ impl Conversation {
     /// The conversations of a record; `byte_time` is that of its line. What SYNCO and answers of a probe were is part of
     /// the conversation, but a simulated link probes a copy of itself (`probes_a_copy`).
     #[must_use]
-    pub fn all(events: &[Event], byte_time: Span, probes_a_copy: bool) -> Vec<Self> {
+    pub fn all(events: &[LinkEvent], byte_time: Span, probes_a_copy: bool) -> Vec<Self> {
         let mut all = Vec::new();
         let mut open = Self::default();
         for event in events {
             match event {
-                Event::Begin(at) => {
+                LinkEvent::Begin(at) => {
                     let end = open.end.max(*at);
                     all.push(Self {
                         end,
                         ..std::mem::take(&mut open)
                     });
                 }
-                Event::Step(place) => open.done.push((0, Done::Step(*place))),
-                Event::Sent(ring, end, sent) => {
+                LinkEvent::Step(place) => open.done.push((0, Done::Step(*place))),
+                LinkEvent::Sent(ring, end, sent) => {
                     let bytes = sent.as_out().octets();
                     let mut start = *end - byte_time * bytes.len() as u64;
                     for byte in bytes {
@@ -65,15 +65,15 @@ impl Conversation {
                     }
                     open.end = open.end.max(*end);
                 }
-                Event::Received(ring, at, heard) => {
+                LinkEvent::Received(ring, at, heard) => {
                     open.received
                         .extend(heard.octet().map(|byte| (*ring, *at, byte)));
                     open.end = open.end.max(*at);
                 }
-                Event::Fault(ring, at, fault, moment) => {
+                LinkEvent::Fault(ring, at, fault, moment) => {
                     open.done.push((*ring, Done::Fault(*at, *fault, *moment)));
                 }
-                Event::Probe(ring, at, sent, came) if !probes_a_copy => {
+                LinkEvent::Probe(ring, at, sent, came) if !probes_a_copy => {
                     let mut start = *at;
                     for byte in sent {
                         open.done.push((*ring, Done::Sent(start, *byte)));
@@ -83,8 +83,8 @@ impl Conversation {
                     let received = came.iter().map(|byte| (*ring, start, *byte));
                     open.received.extend(received);
                 }
-                Event::Look(look) => open.end = open.end.max(look.at),
-                Event::Probe(..) | Event::Tapped(..) | Event::Trouble(_) => {}
+                LinkEvent::Look(look) => open.end = open.end.max(look.at),
+                LinkEvent::Probe(..) | LinkEvent::Tapped(..) | LinkEvent::Trouble(_) => {}
             }
         }
         all.push(open);
@@ -155,14 +155,14 @@ impl Conversation {
 
 /// What a twin received from a ring in a conversation.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Expected {
+pub(crate) struct TwinBytes {
     /// The bytes, and when each came.
     pub(crate) bytes: Vec<(Instant, Received)>,
     /// The place of the first one that a drive sent unasked (ND21 9.9).
     pub(crate) unasked: Option<usize>,
 }
 
-impl Expected {
+impl TwinBytes {
     /// Reads the bytes received from a ring of the link.
     fn fetch(&mut self, link: &mut SimulatedLink, ring: usize) {
         while let Some((at, byte, asked)) = link.receive_with_cause(ring) {
@@ -302,7 +302,7 @@ impl Twin {
     }
 
     /// Plays a conversation and `slack` more, and returns what the twin received, ring by ring.
-    fn answer(&mut self, conversation: &Conversation, slack: Span) -> Vec<Expected> {
+    fn answer(&mut self, conversation: &Conversation, slack: Span) -> Vec<TwinBytes> {
         self.link.begin();
         let byte_time = self.link.byte_time();
         let mut done = conversation.done.iter().peekable();
@@ -336,7 +336,7 @@ impl Twin {
             }
         }
         self.link.run_until(conversation.end + slack);
-        let mut received = vec![Expected::default(); self.sizes.len()];
+        let mut received = vec![TwinBytes::default(); self.sizes.len()];
         for (ring, received) in received.iter_mut().enumerate() {
             received.fetch(&mut self.link, ring);
         }
@@ -345,8 +345,8 @@ impl Twin {
 
     /// Adds what the twin would receive until `tolerance` behind the end of a conversation, where more bytes came than it received itself:
     /// a drive may be that much earlier than the model. The twin itself stays where it is.
-    fn add_later(&self, conversation: &Conversation, tolerance: Span, received: &mut [Expected]) {
-        let more = |(ring, own): (usize, &Expected)| {
+    fn add_later(&self, conversation: &Conversation, tolerance: Span, received: &mut [TwinBytes]) {
+        let more = |(ring, own): (usize, &TwinBytes)| {
             conversation.received_in(ring).len() > own.bytes.len()
         };
         if !received.iter().enumerate().any(more) {

@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const SURVIVALS: usize = 3;
 
 /// A byte of a drive: its ring, counted from 0, the drive, and the address.
-pub(crate) type Place = (usize, u8, u16);
+pub(crate) type CellByte = (usize, u8, u16);
 
 /// What the master does to a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +106,7 @@ struct Known {
 
 /// What a byte that was read says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Reading {
+pub(crate) enum ByteRead {
     /// It is as it must be.
     Right,
     /// It is not.
@@ -128,7 +128,7 @@ fn is_lost(address: u16) -> bool {
 /// What is known of all drives.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Knowledge {
-    cells: BTreeMap<Place, Known>,
+    cells: BTreeMap<CellByte, Known>,
     /// Parts of drives that the master has started: from then on they write their cells until the next reset.
     started: BTreeSet<(usize, u8, Worker)>,
     /// What the manual decides of the cells of each drive's program.
@@ -138,9 +138,9 @@ pub(crate) struct Knowledge {
     /// The present conversation has faults: a drive may have been switched off and on.
     disturbed: bool,
     /// What cells held before the last reset, if the master wrote all of it in the present attempt.
-    before_reset: BTreeMap<Place, u8>,
+    before_reset: BTreeMap<CellByte, u8>,
     /// The values with which cells came out of resets, as long as they came out of each with the value that was written before it.
-    survived: BTreeMap<Place, BTreeSet<u8>>,
+    survived: BTreeMap<CellByte, BTreeSet<u8>>,
     /// Drives whose EEPROM may have been written in the present attempt.
     saved: BTreeSet<(usize, u8)>,
 }
@@ -167,8 +167,8 @@ impl Knowledge {
     /// A drive was reset (ND21 10.5): its cells are loaded from its EEPROM, and how long the drive took to write that is its choice
     /// (14.10.5).
     pub(crate) fn reset(&mut self, ring: usize, drive: u8) {
-        let of_it = |place: &Place| (place.0, place.1) == (ring, drive);
-        let lost = |place: &Place, own: &Known| {
+        let of_it = |place: &CellByte| (place.0, place.1) == (ring, drive);
+        let lost = |place: &CellByte, own: &Known| {
             own.now == 0xFF && !self.saved.contains(&(ring, drive)) && is_lost(place.2)
         };
         let cells = self.cells.iter();
@@ -186,7 +186,7 @@ impl Knowledge {
     }
 
     /// The master has written to a byte.
-    pub(crate) fn write(&mut self, place: Place, write: Write) {
+    pub(crate) fn write(&mut self, place: CellByte, write: Write) {
         let (ring, drive, address) = place;
         let started = match address {
             ram::FLAGS2 => write.sets(flags2::ORDERS | flags2::TEACH_IN),
@@ -237,7 +237,7 @@ impl Knowledge {
     }
 
     /// The same as [`Self::write`] where it is not known whether the drive took it.
-    pub(crate) fn may_write(&mut self, place: Place, write: Write) {
+    pub(crate) fn may_write(&mut self, place: CellByte, write: Write) {
         self.write(place, write);
         self.cells.remove(&place);
         self.programs.remove(&(place.0, place.1));
@@ -251,7 +251,7 @@ impl Knowledge {
     }
 
     /// The bits of a byte that the drive does not change by itself now; `value` is what was read.
-    fn kept(&self, place: Place, value: u8) -> u8 {
+    fn kept(&self, place: CellByte, value: u8) -> u8 {
         let (ring, drive, address) = place;
         let kept = own::kept(address, value);
         match kept.unless {
@@ -284,21 +284,21 @@ impl Knowledge {
     }
 
     /// The bits of a byte that hold what the master has written in the present attempt.
-    pub(crate) fn written_now(&self, place: Place, value: u8) -> u8 {
+    pub(crate) fn written_now(&self, place: CellByte, value: u8) -> u8 {
         let written = self.cells.get(&place).map_or(0, |own| own.now);
         written & self.kept(place, value)
     }
 
     /// Judges a byte that was read, where the model holds `wanted`.
-    pub(crate) fn read(&mut self, place: Place, wanted: u8, value: u8) -> Reading {
+    pub(crate) fn read(&mut self, place: CellByte, wanted: u8, value: u8) -> ByteRead {
         let program = self.programs.entry((place.0, place.1)).or_default();
         match program.read(place.2, wanted, value) {
-            Some(true) => return Reading::Right,
-            Some(false) => return Reading::Wrong,
+            Some(true) => return ByteRead::Right,
+            Some(false) => return ByteRead::Wrong,
             None => {}
         }
         if place.2 == ram::STATUS && self.is_in_reset_by_itself((place.0, place.1), wanted, value) {
-            return Reading::Wrong;
+            return ByteRead::Wrong;
         }
         let kept = self.kept(place, value);
         let own = self.cells.entry(place).or_default();
@@ -307,9 +307,9 @@ impl Knowledge {
         let mut differ = (value ^ wanted) & (value ^ own.value) & written;
         if kept != 0xFF || own::is_own(place.2) && !own::is_of_the_scope(place.2) {
             return match (differ, written) {
-                (0, 0xFF) => Reading::Right,
-                (0, _) => Reading::Own,
-                _ => Reading::Wrong,
+                (0, 0xFF) => ByteRead::Right,
+                (0, _) => ByteRead::Own,
+                _ => ByteRead::Wrong,
             };
         }
         if own.written == 0 && !own.learned {
@@ -322,25 +322,25 @@ impl Knowledge {
                 _ => survived.clear(),
             }
             if survived.len() >= SURVIVALS {
-                return Reading::Wrong;
+                return ByteRead::Wrong;
             }
         }
         if own.learned {
             differ |= (value ^ own.value) & !written;
         }
         if differ != 0 {
-            return Reading::Wrong;
+            return ByteRead::Wrong;
         }
         if own.learned || written == 0xFF {
-            return Reading::Right;
+            return ByteRead::Right;
         }
         // In the place of data a drive that refuses the rest of the command sends 00 (9.7): nothing is learned from it.
         if (wanted, value) == (0, 0) {
-            return Reading::Right;
+            return ByteRead::Right;
         }
         own.learned = true;
         own.value = value;
-        Reading::Learned
+        ByteRead::Learned
     }
 }
 
@@ -348,27 +348,27 @@ impl Knowledge {
 mod tests {
     use super::*;
 
-    const CELL: Place = (0, 1, 0xFF74);
+    const CELL: CellByte = (0, 1, 0xFF74);
 
     /// ND21 10.3: And and Or decide the bits of their masks, and no others.
     #[test]
     fn masks_decide_their_bits_only() {
         let mut known = Knowledge::default();
         known.write(CELL, Write::Or(0x0F));
-        assert_eq!(known.read(CELL, 0x0F, 0x5E), Reading::Wrong);
-        assert_eq!(known.read(CELL, 0x0F, 0x5F), Reading::Learned);
-        assert_eq!(known.read(CELL, 0x0F, 0x5F), Reading::Right);
-        assert_eq!(known.read(CELL, 0x0F, 0x4F), Reading::Wrong);
+        assert_eq!(known.read(CELL, 0x0F, 0x5E), ByteRead::Wrong);
+        assert_eq!(known.read(CELL, 0x0F, 0x5F), ByteRead::Learned);
+        assert_eq!(known.read(CELL, 0x0F, 0x5F), ByteRead::Right);
+        assert_eq!(known.read(CELL, 0x0F, 0x4F), ByteRead::Wrong);
         known.write(CELL, Write::And(0xF0));
-        assert_eq!(known.read(CELL, 0x00, 0x50), Reading::Right);
-        assert_eq!(known.read(CELL, 0x00, 0x51), Reading::Wrong);
+        assert_eq!(known.read(CELL, 0x00, 0x50), ByteRead::Right);
+        assert_eq!(known.read(CELL, 0x00, 0x51), ByteRead::Wrong);
         known.write(CELL, Write::Set(0x12));
         // What was learned before is replaced.
-        assert_eq!(known.read(CELL, 0x12, 0x50), Reading::Wrong);
-        assert_eq!(known.read(CELL, 0x12, 0x12), Reading::Right);
+        assert_eq!(known.read(CELL, 0x12, 0x50), ByteRead::Wrong);
+        assert_eq!(known.read(CELL, 0x12, 0x12), ByteRead::Right);
         known.reset(0, 1);
-        assert_eq!(known.read(CELL, 0x00, 0x00), Reading::Right);
-        assert_eq!(known.read(CELL, 0x00, 0x77), Reading::Learned);
+        assert_eq!(known.read(CELL, 0x00, 0x00), ByteRead::Right);
+        assert_eq!(known.read(CELL, 0x00, 0x77), ByteRead::Learned);
     }
 
     /// ND21 10.4: `WriteIO` decides the outputs that the drive's configuration leaves to the bus, once the master has read it.
@@ -390,26 +390,26 @@ mod tests {
         };
         let mut known = configured(0x80, 0xFF);
         // The other bits of the port are the drive's.
-        assert_eq!(known.read(outputs, 0x80, 0x9F), Reading::Own);
-        assert_eq!(known.read(outputs, 0x80, 0x00), Reading::Wrong);
-        assert_eq!(known.read(outputs, 0x80, 0x20), Reading::Wrong);
+        assert_eq!(known.read(outputs, 0x80, 0x9F), ByteRead::Own);
+        assert_eq!(known.read(outputs, 0x80, 0x00), ByteRead::Wrong);
+        assert_eq!(known.read(outputs, 0x80, 0x20), ByteRead::Wrong);
         known.write(outputs, Write::Or(GPO2));
-        assert_eq!(known.read(outputs, 0xA0, 0xA0), Reading::Own);
-        assert_eq!(known.read(outputs, 0xA0, 0x80), Reading::Wrong);
+        assert_eq!(known.read(outputs, 0xA0, 0xA0), ByteRead::Own);
+        assert_eq!(known.read(outputs, 0xA0, 0x80), ByteRead::Wrong);
         // GPO2 shows a message, GPO1 the analogue output, the cycle control or a completed positioning.
         for (hardware, hardware2) in [(0x80, 0xBF), (0x88, 0xFF), (0x84, 0xFF)] {
             assert_eq!(
                 configured(hardware, hardware2).read(outputs, 0x80, 0x00),
-                Reading::Own
+                ByteRead::Own
             );
         }
         let mut shows = configured(0xC0, 0xFF);
         shows.write(outputs, Write::Or(GPO2));
-        assert_eq!(shows.read(outputs, 0xA0, 0x80), Reading::Own);
+        assert_eq!(shows.read(outputs, 0xA0, 0x80), ByteRead::Own);
         // Nothing is known of the configuration, or a reset may have activated another one.
         known.reset(0, 1);
         known.write(outputs, Write::Or(GPO1));
-        assert_eq!(known.read(outputs, 0x80, 0x00), Reading::Own);
+        assert_eq!(known.read(outputs, 0x80, 0x00), ByteRead::Own);
     }
 
     /// ND21 14.4.1: bit 6 of `Status` comes back only with another reset.
@@ -418,18 +418,18 @@ mod tests {
         let status = (0, 1, ram::STATUS);
         let mut known = Knowledge::default();
         // The drive's self-test is longer than the model's.
-        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
-        assert_eq!(known.read(status, 0x00, 0x01), Reading::Own);
-        assert_eq!(known.read(status, 0x00, 0x40), Reading::Wrong);
+        assert_eq!(known.read(status, 0x00, 0x40), ByteRead::Own);
+        assert_eq!(known.read(status, 0x00, 0x01), ByteRead::Own);
+        assert_eq!(known.read(status, 0x00, 0x40), ByteRead::Wrong);
         known.reset(0, 1);
-        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
+        assert_eq!(known.read(status, 0x00, 0x40), ByteRead::Own);
         // Its power may have been switched.
-        assert_eq!(known.read(status, 0x00, 0x00), Reading::Own);
+        assert_eq!(known.read(status, 0x00, 0x00), ByteRead::Own);
         known.converse(true);
-        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
-        assert_eq!(known.read(status, 0x00, 0x00), Reading::Own);
+        assert_eq!(known.read(status, 0x00, 0x40), ByteRead::Own);
+        assert_eq!(known.read(status, 0x00, 0x00), ByteRead::Own);
         known.converse(false);
-        assert_eq!(known.read(status, 0x00, 0x40), Reading::Own);
+        assert_eq!(known.read(status, 0x00, 0x40), ByteRead::Own);
     }
 
     /// ND21 10.5: what was not saved in the EEPROM is lost with a reset. One value may be what the drive loads; three are not.
@@ -448,10 +448,10 @@ mod tests {
             });
             readings[2]
         };
-        assert_eq!(outlives([1, 2, 3], &|own| own, false), Reading::Wrong);
-        assert_eq!(outlives([1, 2, 3], &|_| 2, false), Reading::Learned);
-        assert_eq!(outlives([2, 2, 2], &|own| own, false), Reading::Learned);
-        assert_eq!(outlives([1, 2, 3], &|own| own, true), Reading::Learned);
+        assert_eq!(outlives([1, 2, 3], &|own| own, false), ByteRead::Wrong);
+        assert_eq!(outlives([1, 2, 3], &|_| 2, false), ByteRead::Learned);
+        assert_eq!(outlives([2, 2, 2], &|own| own, false), ByteRead::Learned);
+        assert_eq!(outlives([1, 2, 3], &|own| own, true), ByteRead::Learned);
     }
 
     /// ND21 14.10.3: where process data go is known from a write by any command, and from a read.
@@ -463,20 +463,20 @@ mod tests {
         known.write(data_in, Write::Set(0xF4));
         known.write(data_in, Write::And(0x7F));
         known.take_process_data(0, 1, [1, 2]);
-        assert_eq!(known.read(CELL, 1, 1), Reading::Right);
+        assert_eq!(known.read(CELL, 1, 1), ByteRead::Right);
         assert_eq!(written(&known), 0xFF);
         known.reset(0, 1);
-        assert_eq!(known.read(data_in, 0, 0x74), Reading::Learned);
+        assert_eq!(known.read(data_in, 0, 0x74), ByteRead::Learned);
         known.take_process_data(0, 1, [3, 4]);
-        assert_eq!(known.read(CELL, 3, 2), Reading::Wrong);
+        assert_eq!(known.read(CELL, 3, 2), ByteRead::Wrong);
         // The model's own DataIn points elsewhere.
-        assert_eq!(known.read(CELL, 0, 3), Reading::Right);
+        assert_eq!(known.read(CELL, 0, 3), ByteRead::Right);
         // Where nothing is known of `DataIn`, any cell of the page may have been written.
         known.reset(0, 1);
         known.write(CELL, Write::Set(9));
         known.take_process_data(0, 1, [5, 6]);
         assert_eq!(written(&known), 0);
-        assert_eq!(known.read(CELL, 9, 5), Reading::Learned);
+        assert_eq!(known.read(CELL, 9, 5), ByteRead::Learned);
     }
 
     /// ND21 13.3, 14.4: what the master wrote to cells of the drive's own program stays until that program is started.
@@ -485,18 +485,18 @@ mod tests {
         let position = (0, 1, ram::PS_POSITION_H);
         let mut known = Knowledge::default();
         known.write(position, Write::Set(0x12));
-        assert_eq!(known.read(position, 0x12, 0x13), Reading::Wrong);
+        assert_eq!(known.read(position, 0x12, 0x13), ByteRead::Wrong);
         known.write((0, 1, ram::PS_STATUS), Write::Set(0x40));
-        assert_eq!(known.read(position, 0x12, 0x13), Reading::Own);
+        assert_eq!(known.read(position, 0x12, 0x13), ByteRead::Own);
         let flags = (0, 1, ram::FLAGS2);
         known.write(flags, Write::Or(flags2::MONITORING));
-        assert_eq!(known.read(flags, 0x04, 0x00), Reading::Wrong);
-        assert_eq!(known.read(flags, 0x04, 0xFF), Reading::Own);
+        assert_eq!(known.read(flags, 0x04, 0x00), ByteRead::Wrong);
+        assert_eq!(known.read(flags, 0x04, 0xFF), ByteRead::Own);
         // A drive in error may block itself.
         let status = (0, 1, ram::STATUS);
         known.write(status, Write::Set(0x01));
-        assert_eq!(known.read(status, 0x01, 0x80), Reading::Wrong);
-        assert_eq!(known.read(status, 0x01, 0xA0), Reading::Own);
-        assert_eq!(known.read(status, 0x01, 0x05), Reading::Own);
+        assert_eq!(known.read(status, 0x01, 0x80), ByteRead::Wrong);
+        assert_eq!(known.read(status, 0x01, 0xA0), ByteRead::Own);
+        assert_eq!(known.read(status, 0x01, 0x05), ByteRead::Own);
     }
 }

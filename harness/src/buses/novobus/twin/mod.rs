@@ -13,5 +13,7 @@ mod program;
 mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};
-pub use comparison::{Adopted, Comparison, Divergence, Exactness, Look, Own, Symptom, Unasked};
+pub use comparison::{
+    Adopted, Comparison, DecidingBits, Divergence, Exactness, Own, Symptom, Unasked,
+};
 pub use follow::{Conversation, Done, Twin};

@@ -4,7 +4,7 @@
 //! knows. From the first unasked byte to the next byte of the master, only properties that hold for every order are checked.
 
 use super::comparison::Symptom;
-use super::follow::Expected;
+use super::follow::TwinBytes;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::{Instant, Span};
@@ -46,7 +46,7 @@ impl Sent<'_> {
     pub(crate) fn judge(
         &self,
         size: RingSize,
-        (answer, received): (&Expected, &[Heard]),
+        (answer, received): (&TwinBytes, &[Heard]),
         tolerance: Span,
     ) -> Option<Race> {
         let expected = &answer.bytes[..];

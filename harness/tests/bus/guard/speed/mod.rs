@@ -5,14 +5,14 @@ mod random;
 
 use super::size;
 use harness::buses::SimulatedLink;
-use harness::buses::novobus::driver::{Bus, Options};
+use harness::buses::novobus::driver::{OpenRings, Options};
 use harness::buses::novobus::link::BesideTheBus as _;
 use harness::guard::{Guarded, Limits};
 use harness::link::{Line, Link, Moment, Octets, PlacedFault};
 use harness_proto::line::Rate;
 use harness_proto::nd21::bits::status;
 use harness_proto::nd21::io::Input;
-use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::units::{SpeedRange, speed_from_raw};
 use harness_proto::nd21::{ee, ram};
 use harness_proto::novobus::properties::Properties;
@@ -108,7 +108,8 @@ fn bench(left: &Left, limits: Limits) -> Guarded<SimulatedLink> {
     });
     let mut link = SimulatedLink::new(Bench::one(ring));
     {
-        let bus = Bus::open(Box::new(&mut link), &[size(1)], Options::default()).expect("open");
+        let bus =
+            OpenRings::open(Box::new(&mut link), &[size(1)], Options::default()).expect("open");
         let drive = super::axis(0);
         bus.run(Span::from_millis(200));
         for (address, word) in &left.cells {
@@ -215,7 +216,8 @@ fn motion_within_the_limit_passes() {
     };
     let mut line = bench(&left, limits());
     {
-        let bus = Bus::open(Box::new(&mut line), &[size(1)], Options::default()).expect("open");
+        let bus =
+            OpenRings::open(Box::new(&mut line), &[size(1)], Options::default()).expect("open");
         let drive = super::axis(0);
         let within = 1_132;
         bus.write_word(drive, ram::NSOLL, 0).expect("0 rpm");
@@ -227,7 +229,7 @@ fn motion_within_the_limit_passes() {
         bus.run(Span::from_millis(300));
         bus.write_word(drive, ram::NSOLL, 0).expect("0 rpm");
         bus.run(Span::from_millis(300));
-        let way = Position::new(Mode::Relative, 65_536).expect("a way");
+        let way = Position::new(PositionMode::Relative, 65_536).expect("a way");
         bus.write_ps(drive, way).expect("calculated");
         bus.start_ps(drive).expect("started");
         bus.wait_for_end(drive).expect("there");

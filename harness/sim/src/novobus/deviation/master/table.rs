@@ -6,7 +6,7 @@ use harness_proto::line::Received;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Command, Field, Reply};
 use harness_proto::novobus::master::{
-    Data, End, Event, Fault, Job, JobId, Options, Outcome, Phase, Repeat, RingLink,
+    Data, Event, Fault, Job, JobId, LinkEnd, Options, Outcome, Phase, Repeat, RingLink,
 };
 use harness_proto::novobus::sync::{Addressing, SYNCO};
 
@@ -431,8 +431,8 @@ fn renamed(event: Event, link: impl Fn(u8) -> RingLink) -> Event {
         return event;
     };
     let into = |named: RingLink| match named.to {
-        End::Drive(drive) => link(drive),
-        End::Master => named,
+        LinkEnd::Drive(drive) => link(drive),
+        LinkEnd::Master => named,
     };
     let fault = match fault {
         Fault::Damaged(named) => Fault::Damaged(into(named)),

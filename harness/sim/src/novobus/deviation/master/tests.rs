@@ -8,7 +8,7 @@ use crate::novobus::master::AnyMaster;
 use crate::novobus::ring::Ring;
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::master::{Event, Pace};
+use harness_proto::novobus::master::{CyclePace, Event};
 
 static NEUTRAL: [MasterDeviation; 3] = [
     MasterDeviation {
@@ -45,7 +45,7 @@ fn run(
     let mut master = AnyMaster::new(size, rate, work.options(), deviates);
     if work.exchange {
         master
-            .set_exchange(&[0], Pace::Continuous)
+            .set_exchange(&[0], CyclePace::Continuous)
             .expect("drive 0");
     }
     let (mut sent, mut events) = (Vec::new(), Vec::new());

@@ -1,13 +1,13 @@
 //! Judges whether the reports of a master are true.
 
 use super::wire;
-use super::work::{BITS, Order, Work, constant, nominal};
+use super::work::{BITS, JobOrder, Work, constant, nominal};
 use crate::novobus::counted::Counted;
 use crate::novobus::ring::Ring;
 use harness_proto::line::Received;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::command::Command;
-use harness_proto::novobus::master::{End, Event, Fault, JobId, Outcome, RingLink};
+use harness_proto::novobus::master::{Event, Fault, JobId, LinkEnd, Outcome, RingLink};
 use std::borrow::Cow;
 use std::fmt;
 
@@ -59,7 +59,7 @@ pub(super) struct Judge<'w> {
     pub(super) stopped: bool,
     /// When the ring was back for the last time; `None` while something is wrong.
     runs_since: Option<u64>,
-    jobs: Vec<(JobId, Order, bool)>,
+    jobs: Vec<(JobId, JobOrder, bool)>,
 }
 
 impl<'w> Judge<'w> {
@@ -82,7 +82,7 @@ impl<'w> Judge<'w> {
         self.heard_in.push(self.steps);
     }
 
-    pub(super) fn given(&mut self, id: JobId, order: Order) {
+    pub(super) fn given(&mut self, id: JobId, order: JobOrder) {
         self.jobs.push((id, order, false));
     }
 
@@ -140,8 +140,8 @@ impl<'w> Judge<'w> {
         };
         let drives = usize::from(self.work.drives);
         let place = |named: RingLink| match named.to {
-            End::Master => drives,
-            End::Drive(drive) => drives - 1 - usize::from(drive),
+            LinkEnd::Master => drives,
+            LinkEnd::Drive(drive) => drives - 1 - usize::from(drive),
         };
         match fault {
             Fault::Damaged(named) if place(named) == link => Ok(()),
@@ -152,7 +152,7 @@ impl<'w> Judge<'w> {
         }
     }
 
-    fn ended(&self, order: &Order, outcome: &Outcome, ring: &Ring<Counted>) -> Result<(), Lie> {
+    fn ended(&self, order: &JobOrder, outcome: &Outcome, ring: &Ring<Counted>) -> Result<(), Lie> {
         let job = &order.job;
         let Some(drive) = ring.drive(job.drive) else {
             return Ok(());
@@ -243,7 +243,7 @@ impl<'w> Judge<'w> {
         for k in 0..self.work.drives {
             let Some(drive) = ring.drive(k) else { continue };
             let asked = |address: u16| {
-                let by_job = |order: &Order| {
+                let by_job = |order: &JobOrder| {
                     let width = u16::from(order.job.command.kind().width());
                     order.job.drive == k
                         && (order.address..order.address + width).contains(&address)
@@ -281,7 +281,7 @@ impl<'w> Judge<'w> {
 }
 
 /// Whether the cell of a write holds what the write must leave there.
-fn holds(order: &Order, drive: &Counted) -> bool {
+fn holds(order: &JobOrder, drive: &Counted) -> bool {
     let cell = drive.memory.peek(order.address);
     match order.job.command {
         Command::WriteByte { data, .. } => cell == data,

@@ -10,7 +10,7 @@ mod wire;
 mod work;
 
 pub use judge::Lie;
-pub use work::{Fault, Order, Work};
+pub use work::{JobFault, JobOrder, Work};
 
 use super::features::Notebook;
 use crate::novobus::deviation::MasterDeviation;

@@ -2,7 +2,7 @@
 
 use super::super::features::{Feature, Notebook};
 use super::super::words;
-use super::work::{Order, Work};
+use super::work::{JobOrder, Work};
 use crate::fault::LinkFault;
 use crate::novobus::counted::Counted;
 use crate::novobus::ring::Ring;
@@ -32,7 +32,7 @@ impl<'a, 'n> Watch<'a, 'n> {
         }
     }
 
-    pub(super) fn given(&mut self, id: JobId, order: &Order, phase: Phase) {
+    pub(super) fn given(&mut self, id: JobId, order: &JobOrder, phase: Phase) {
         if self.notes.wanted() {
             self.given.insert(id, (order.job.command.kind(), phase));
         }

@@ -12,7 +12,7 @@ use crate::novobus::ring::Ring;
 use harness_proto::line::Rate;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
-use harness_proto::novobus::master::{Pace, Phase};
+use harness_proto::novobus::master::{CyclePace, Phase};
 
 /// Byte times after the last order in which every job must have ended: more than 8 recoveries of a ring of six take.
 const BOUND: u64 = 6_000;
@@ -57,7 +57,7 @@ fn do_all(
 ) -> Result<(), Lie> {
     if work.exchange {
         let all: Vec<u8> = (0..work.drives).collect();
-        let _all_of_the_ring = master.set_exchange(&all, Pace::Continuous);
+        let _all_of_the_ring = master.set_exchange(&all, CyclePace::Continuous);
         for k in 0..work.drives {
             let _of_the_ring = master.set_nominal(k, nominal(k));
         }

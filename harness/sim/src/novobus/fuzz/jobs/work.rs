@@ -20,7 +20,7 @@ pub(super) const CONSTANT_CELLS: u16 = 0x60;
 
 /// A job, and when it is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Order {
+pub struct JobOrder {
     /// The job.
     pub job: Job,
     /// The first cell that it reads or writes.
@@ -31,7 +31,7 @@ pub struct Order {
 
 /// A fault on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fault {
+pub struct JobFault {
     /// Which link, counted from the master's outgoing one.
     pub link: usize,
     /// The byte on it, counted from 1.
@@ -75,9 +75,9 @@ pub struct Work {
     /// Whether the drives report a time-out (9.9).
     pub monitoring: bool,
     /// The jobs, in order.
-    pub orders: Vec<Order>,
+    pub orders: Vec<JobOrder>,
     /// The faults.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<JobFault>,
 }
 
 impl<'a> Arbitrary<'a> for Work {
@@ -118,7 +118,7 @@ impl<'a> Arbitrary<'a> for Work {
         }
         // A replaced byte with good parity can pass the 8-bit check in combination with other faults, so it must be the only fault.
         if let (Some((byte, other)), true) = (replaced, work.faults.is_empty()) {
-            work.faults.push(Fault {
+            work.faults.push(JobFault {
                 link: usize::from(work.drives),
                 byte,
                 what: LinkFault::Replace(other),
@@ -183,7 +183,7 @@ impl Work {
             }
         };
         let job = Job::new(drive, command);
-        self.orders.push(Order {
+        self.orders.push(JobOrder {
             job: if last & 1 == 1 { job.once() } else { job },
             address,
             gap: u16::from(at % 64),
@@ -216,7 +216,7 @@ impl Work {
             (_, 6) => LinkFault::Duplicate,
             _ => LinkFault::Delay(Span::from_micros(100 * u64::from(last))),
         };
-        self.faults.push(Fault {
+        self.faults.push(JobFault {
             link: usize::from(place) % (usize::from(self.drives) + 1),
             byte: 1 + u64::from(u16::from_be_bytes([data[0] & 1, at])),
             what,
@@ -241,20 +241,20 @@ impl Work {
 
     /// Whether the master may stop the bus: a link is cut, or delays follow one another, of which the bytes behind them stay late.
     pub(super) fn may_stop(&self) -> bool {
-        let late = |fault: &&Fault| matches!(fault.what, LinkFault::Delay(_));
+        let late = |fault: &&JobFault| matches!(fault.what, LinkFault::Delay(_));
         self.is_cut() || self.faults.iter().filter(late).count() > 1
     }
 
     /// Whether bytes are lost or come twice. The 8-bit check misses that about once in ten thousand times, so a long fuzz run finds
     /// such a case: the reported outcome of jobs cannot be judged then.
     pub(super) fn may_fool(&self) -> bool {
-        let fools = |fault: &Fault| matches!(fault.what, LinkFault::Drop | LinkFault::Duplicate);
+        let fools = |fault: &JobFault| matches!(fault.what, LinkFault::Drop | LinkFault::Duplicate);
         self.faults.iter().any(fools)
     }
 
     /// Whether what has no check of its own, process data and the data of `ReadLong`, can come wrong and unnoticed.
     pub(super) fn unchecked(&self) -> bool {
-        let other = |fault: &Fault| matches!(fault.what, LinkFault::Replace(_));
+        let other = |fault: &JobFault| matches!(fault.what, LinkFault::Replace(_));
         self.may_fool() || self.faults.iter().any(other)
     }
 
@@ -262,7 +262,7 @@ impl Work {
     pub(super) fn damaged(&self) -> Option<usize> {
         match self.faults.as_slice() {
             [
-                Fault {
+                JobFault {
                     link,
                     what: LinkFault::Flip(_),
                     ..

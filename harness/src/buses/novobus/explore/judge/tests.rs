@@ -2,14 +2,14 @@
 
 use super::*;
 use crate::buses::novobus::explore::case::{Act, Case};
-use crate::buses::novobus::explore::generate::{RingScope, Scope};
-use crate::buses::novobus::explore::setup::Setup;
+use crate::buses::novobus::explore::generate::{CaseScope, RingScope};
+use crate::buses::novobus::explore::setup::RingSetup;
 use crate::explore::Dice;
 use crate::explore::ExploreError;
 use crate::explore::Finding;
 use crate::explore::Pool;
-use crate::explore::{About, Progress};
-use crate::explore::{Bounds, Campaign, End, Watcher};
+use crate::explore::{Bounds, FuzzRun, RunEnd, Watcher};
+use crate::explore::{FuzzSettings, Progress};
 use crate::explore::{Rehearsal, Target, Tried};
 use crate::explore::{Spice, Swarm};
 use harness_proto::nd21::own;
@@ -129,7 +129,7 @@ impl AnyRing {
 
     /// What comes back for a case.
     fn play(&mut self, case: &Case) -> Vec<Received> {
-        let exchange = Exchange::of(case, Vec::new());
+        let exchange = BytesExchanged::of(case, Vec::new());
         let mut counts = vec![0; self.drives.len() + 1];
         let mut received = Vec::new();
         for (byte, _) in exchange.sent {
@@ -181,7 +181,7 @@ impl Target for AnyRing {
             self.history.clear();
             let prologue = prologue(case.drives, None);
             let received = self.play(&prologue);
-            let difference = self.judge.see(Exchange::of(&prologue, received));
+            let difference = self.judge.see(BytesExchanged::of(&prologue, received));
             assert!(difference.is_none(), "{difference:?}");
         }
         let mut tried = Tried {
@@ -195,7 +195,7 @@ impl Target for AnyRing {
         let received = self.play(case);
         tried.before = Some(self.history.clone());
         self.history.extend(case.acts.iter().cloned());
-        tried.difference = self.judge.see(Exchange::of(case, received));
+        tried.difference = self.judge.see(BytesExchanged::of(case, received));
         self.stale = tried.difference.is_some()
             || case.orders().any(|order| order.command == Command::Reset);
         Ok(tried)
@@ -222,7 +222,7 @@ fn run(mut ring: AnyRing, seed: u64, cases: u64, without: &[Spice]) -> (Vec<Find
     let (first, second) = RingScope::both(3, None, |_, _| true);
     let not_on_ports = [Spice::Power, Spice::Silence, Spice::Late, Spice::Eeprom];
     let spices = Spice::NAMES.iter().map(|(_, spice)| *spice);
-    let scope = Scope {
+    let scope = CaseScope {
         first,
         second,
         spices: spices
@@ -231,8 +231,8 @@ fn run(mut ring: AnyRing, seed: u64, cases: u64, without: &[Spice]) -> (Vec<Find
         limits: Limits::unlimited(),
         spare_eeprom: true,
     };
-    let about = About {
-        schema: About::SCHEMA,
+    let about = FuzzSettings {
+        schema: FuzzSettings::SCHEMA,
         rig: "any".to_owned(),
         drives: 3,
         second: None,
@@ -240,7 +240,7 @@ fn run(mut ring: AnyRing, seed: u64, cases: u64, without: &[Spice]) -> (Vec<Find
         seed,
         confirm: 1,
         of: 2,
-        setup: Setup::default(),
+        setup: RingSetup::default(),
         spices: Vec::new(),
     };
     let bounds = Bounds {
@@ -249,10 +249,10 @@ fn run(mut ring: AnyRing, seed: u64, cases: u64, without: &[Spice]) -> (Vec<Find
         findings: 1,
         every: u64::MAX,
     };
-    let mut campaign = Campaign::new(about, scope);
+    let mut campaign = FuzzRun::new(about, scope);
     let mut heard = Heard::default();
     let end = campaign.run(&mut ring, None, &bounds, &mut heard);
-    assert!(!matches!(end, Ok(End::Over(_)) | Err(_)));
+    assert!(!matches!(end, Ok(RunEnd::Over(_)) | Err(_)));
     (heard.0, campaign.progress().not_sent)
 }
 

@@ -1,7 +1,7 @@
 //! What a drive must not take, and what it does then: wrong bytes at each place, and the way back (ND21 9.2 to 9.8, 10.4, 10.5).
 
-use super::super::case::{Act, Damage, Harm, Talk, To, What};
-use super::super::order::{Command, Order};
+use super::super::case::{Act, ActKind, Damage, Harm, Talk, To};
+use super::super::order::{Command, CommandSent};
 use super::{Tour, page_cell, recover, shuffled, spare, spoiled, talk};
 use crate::explore::Dice;
 use harness_proto::novobus::check_sequence::SEQUENCE;
@@ -38,7 +38,7 @@ pub(crate) fn refused(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
                 5 => Command::ReadWord { cell },
                 _ => Command::ReadLong { cell },
             };
-            let bytes = Order::sound(command).bytes();
+            let bytes = CommandSent::sound(command).bytes();
             let last = bytes.len() - 1;
             // The checking byte as often as all others together.
             for at in (1..=last).chain(vec![last; last - 1]) {
@@ -78,23 +78,23 @@ fn wrong_byte(right: u8, (round, check): (u8, bool), dice: &mut Dice) -> u8 {
 
 /// What a ring hears until it is brought back: zeros that count or not, and SYNCO long enough to see which drive it names.
 fn between_error_and_recovery(tour: &Tour<'_>, dice: &mut Dice) -> Vec<Act> {
-    let zeros = |count: usize| Act::sound(What::Zeros(count as u8));
+    let zeros = |count: usize| Act::sound(ActKind::Zeros(count as u8));
     match dice.below(6) {
         0 => vec![tour.spell(), recover()],
         1 => vec![
             zeros(1 + dice.below(12)),
-            Act::sound(What::Sequence),
+            Act::sound(ActKind::Sequence),
             tour.spell(),
             recover(),
         ],
         2 => vec![
             zeros(1 + dice.below(9)),
-            Act::sound(What::Synco(1)),
+            Act::sound(ActKind::Synco(1)),
             zeros(1 + dice.below(9)),
             tour.spell(),
             recover(),
         ],
-        3 => vec![Act::sound(What::Sequence), recover()],
+        3 => vec![Act::sound(ActKind::Sequence), recover()],
         _ => vec![recover()],
     }
 }
@@ -117,7 +117,7 @@ pub(crate) fn codes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>
         let length = command.len() as u8;
         let mut bytes = vec![0x80 | length << 1, drive.wrapping_sub(tour.ring.drives)];
         bytes.extend(command);
-        let mut acts = vec![Act::sound(What::Bytes(bytes))];
+        let mut acts = vec![Act::sound(ActKind::Bytes(bytes))];
         acts.extend(between_error_and_recovery(tour, dice));
         if form > 0 {
             let cell = if form == 1 {
@@ -140,7 +140,7 @@ pub(crate) fn outputs(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
     let groups = shuffled(all, dice).into_iter().map(|code| {
         let mut acts = vec![talk(drive, &[Command::WriteIo { code }])];
         if code > 3 {
-            acts.extend([Act::sound(What::Synco(2)), recover()]);
+            acts.extend([Act::sound(ActKind::Synco(2)), recover()]);
         }
         acts
     });
@@ -177,7 +177,7 @@ pub(crate) fn sums_of_zero(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<V
         groups.push(vec![
             talk(drive, &[other]),
             spoiled(drive, zero, 9, wrong),
-            Act::sound(What::Synco(1)),
+            Act::sound(ActKind::Synco(1)),
             recover(),
             talk(drive, &[read]),
         ]);
@@ -192,7 +192,7 @@ pub(crate) fn sync_bytes(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec
     let groups = shuffled(own, dice).into_iter().map(|byte| {
         let mut acts = vec![
             talk(drive, &[Command::ReadByte { cell: spare(dice) }]),
-            Act::sound(What::Bytes(vec![byte])),
+            Act::sound(ActKind::Bytes(vec![byte])),
         ];
         acts.extend(between_error_and_recovery(tour, dice));
         acts
@@ -220,11 +220,11 @@ pub(crate) fn broken_sequences(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> V
         bytes.extend(&SEQUENCE[from..]);
         let read = talk(drive, &[Command::ReadByte { cell: spare(dice) }]);
         vec![
-            Act::sound(What::Bytes(vec![dice.byte() & 0x7F])),
-            Act::sound(What::Zeros(zeros)),
-            Act::sound(What::Bytes(bytes)),
+            Act::sound(ActKind::Bytes(vec![dice.byte() & 0x7F])),
+            Act::sound(ActKind::Zeros(zeros)),
+            Act::sound(ActKind::Bytes(bytes)),
             read.clone(),
-            Act::sound(What::Synco(6)),
+            Act::sound(ActKind::Synco(6)),
             recover(),
             read,
         ]
@@ -269,7 +269,7 @@ pub(crate) fn cuts(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Act>>
                             data: dice.word(),
                         }],
                     ),
-                    Act::sound(What::Talk(cut)),
+                    Act::sound(ActKind::Talk(cut)),
                     talk(drive, &[Command::ReadWord { cell }]),
                 ]);
             }
@@ -342,7 +342,7 @@ pub(crate) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
             ];
             if at == 7 {
                 // A bad zero among those that are counted.
-                let mut zeros = Act::sound(What::Zeros(12));
+                let mut zeros = Act::sound(ActKind::Zeros(12));
                 let place = dice.below(9) as u16;
                 zeros.damages.push(Damage {
                     link,
@@ -350,9 +350,9 @@ pub(crate) fn damaged(tour: &Tour<'_>, drive: u8, dice: &mut Dice) -> Vec<Vec<Ac
                     harm,
                 });
                 acts.extend([
-                    Act::sound(What::Bytes(vec![4])),
+                    Act::sound(ActKind::Bytes(vec![4])),
                     zeros,
-                    Act::sound(What::Sequence),
+                    Act::sound(ActKind::Sequence),
                 ]);
             }
             acts.extend(between_error_and_recovery(tour, dice));

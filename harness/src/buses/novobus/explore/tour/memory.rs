@@ -1,6 +1,6 @@
 //! What a drive's memory must do: each cell, each value, each mask, and the ends of what commands may touch (ND21 9.4, 10.1 to 10.3).
 
-use super::super::case::{Act, What};
+use super::super::case::{Act, ActKind};
 use super::super::order::Command;
 use super::{Tour, exchange, page_cell, recover, shuffled, spare, talk};
 use crate::explore::Dice;
@@ -211,7 +211,7 @@ fn beside(tour: &Tour<'_>, drive: u8, command: Command, dice: &mut Dice) -> Vec<
     if !in_range(kind, address) {
         acts.push(match dice.percent(30) {
             true => tour.spell(),
-            false => Act::sound(What::Synco(2)),
+            false => Act::sound(ActKind::Synco(2)),
         });
         acts.push(recover());
     }

@@ -4,9 +4,9 @@
 mod bus;
 mod memory;
 
-use super::case::{Act, Case, Talk, To, What};
-use super::generate::{RingScope, Scope};
-use super::order::{Command, Order, Spoil};
+use super::case::{Act, ActKind, Case, Talk, To};
+use super::generate::{CaseScope, RingScope};
+use super::order::{Command, CommandSent, Spoil};
 use crate::explore::Dice;
 use crate::explore::Spice;
 use harness_proto::nd21::{own, ram};
@@ -53,7 +53,7 @@ struct Tour<'s> {
 
 /// The cases for a ring, in the order in which they are tried.
 #[must_use]
-pub(crate) fn tour(scope: &Scope, ring: &RingScope, seed: u64) -> Vec<Case> {
+pub(crate) fn tour(scope: &CaseScope, ring: &RingScope, seed: u64) -> Vec<Case> {
     let own = Tour {
         ring,
         drives: visited(ring.drives),
@@ -112,7 +112,7 @@ impl Tour<'_> {
     /// SYNCO until a ring in the error mode has spelled out an address (ND21 9.7).
     fn spell(&self) -> Act {
         let count = 27 + usize::from(self.ring.drives);
-        Act::sound(What::Synco(u8::try_from(count).unwrap_or(u8::MAX)))
+        Act::sound(ActKind::Synco(u8::try_from(count).unwrap_or(u8::MAX)))
     }
 
     /// This drive's share of what is tried with one drive each.
@@ -128,10 +128,10 @@ impl Tour<'_> {
 }
 
 fn talk(drive: u8, commands: &[Command]) -> Act {
-    Act::sound(What::Talk(Talk {
+    Act::sound(ActKind::Talk(Talk {
         orders: commands
             .iter()
-            .map(|command| Order::sound(*command))
+            .map(|command| CommandSent::sound(*command))
             .collect(),
         ..Talk::one(To::Drive(drive), Command::Reset)
     }))
@@ -139,18 +139,18 @@ fn talk(drive: u8, commands: &[Command]) -> Act {
 
 fn exchange(drive: u8, data: u16, commands: &[Command]) -> Act {
     let mut act = talk(drive, commands);
-    if let What::Talk(talk) = &mut act.what {
+    if let ActKind::Talk(talk) = &mut act.what {
         talk.process_data = Some(data);
     }
     act
 }
 
 fn spoiled(drive: u8, command: Command, at: u8, byte: u8) -> Act {
-    let order = Order {
+    let order = CommandSent {
         command,
         spoil: Some(Spoil { at, byte }),
     };
-    Act::sound(What::Talk(Talk {
+    Act::sound(ActKind::Talk(Talk {
         orders: vec![order],
         ..Talk::one(To::Drive(drive), command)
     }))
@@ -165,7 +165,7 @@ fn page_cell(dice: &mut Dice) -> u16 {
 }
 
 fn recover() -> Act {
-    Act::sound(What::Recover)
+    Act::sound(ActKind::Recover)
 }
 
 /// Numbers in any order.

@@ -4,7 +4,7 @@ use super::drive;
 use super::job;
 use super::step;
 use super::words::{drives, named, required};
-use crate::buses::novobus::language::syntax::{Check, Drives, Ending};
+use crate::buses::novobus::language::syntax::{Check, DriveRange, Ending};
 use crate::scenario::expression::{self, Located};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
@@ -103,7 +103,7 @@ fn zeros(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
     Ok(zeros)
 }
 
-fn one_drive(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
+fn one_drive(scanner: &mut Scanner<'_>) -> Result<DriveRange, Problem> {
     let drives = drives(scanner)?;
     match &drives.to {
         None => Ok(drives),

@@ -4,7 +4,7 @@
 use super::value::{assigned, bytes, cell_by_name, cell_check, cell_names, eeprom_place, place};
 use super::words::{deviates, drives, equals, named, required};
 use crate::buses::novobus::language::syntax::{
-    Condition, DriveCheck, Drives, Influence, SetupKind, Showing,
+    Condition, DriveCheck, DriveRange, Influence, SetupKind, Showing,
 };
 use crate::scenario::expression;
 use crate::scenario::problem::{Problem, Spanned};
@@ -13,7 +13,7 @@ use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
 use harness_proto::nd21::errors::ErrorCode;
 use harness_proto::nd21::io::Input;
-use harness_proto::nd21::units::{Device, INCREMENTS_PER_TURN};
+use harness_proto::nd21::units::{DriveType, INCREMENTS_PER_TURN};
 use harness_proto::novobus::properties::PROPERTIES;
 use harness_sim::nd21;
 use harness_sim::nd21::{Mode, Stimulus};
@@ -28,11 +28,11 @@ const MAX_TURNS: i32 = 16_384;
 /// Maximum resistance in ohms: more is an open circuit.
 const MAX_OHM: i32 = 10_000_000;
 
-pub(crate) const DEVICES: [(&str, Device); 4] = [
-    ("5605", Device::Nd5605),
-    ("5610", Device::Nd5610),
-    ("5615", Device::Nd5615),
-    ("5620", Device::Nd5620),
+pub(crate) const DEVICES: [(&str, DriveType); 4] = [
+    ("5605", DriveType::Nd5605),
+    ("5610", DriveType::Nd5610),
+    ("5615", DriveType::Nd5615),
+    ("5620", DriveType::Nd5620),
 ];
 
 /// What stands behind the drives.
@@ -120,7 +120,7 @@ const CONDITIONS: [(&str, Held); 11] = [
 ];
 
 /// Reads the text after `drive`.
-pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(Drives, DriveLine), Problem> {
+pub(crate) fn line(scanner: &mut Scanner<'_>) -> Result<(DriveRange, DriveLine), Problem> {
     let drives = drives(scanner)?;
     let before = scanner.clone();
     let word = scanner.word().map_or("", |word| word.value);

@@ -4,7 +4,7 @@ use super::master;
 use super::value::{assigned, place, tolerance};
 use super::words::{drives, equals};
 use crate::buses::novobus::language::syntax::{
-    CellPlace, Drives, Job, JobKind, MasterCall, Written,
+    CellPlace, DriveRange, Job, JobKind, MasterCall, Written,
 };
 use crate::scenario::expression;
 use crate::scenario::pattern::{self, Pattern};
@@ -149,7 +149,7 @@ fn operands(
 pub(crate) fn driver_command(
     name: &str,
     scanner: &mut Scanner<'_>,
-) -> Option<Result<(Drives, MasterCall), Problem>> {
+) -> Option<Result<(DriveRange, MasterCall), Problem>> {
     let form = FORMS.iter().find(|form| form.name == name)?;
     let job = drives(scanner).and_then(|drives| {
         let (place, data) = operands(*form, scanner)?;
@@ -175,7 +175,7 @@ fn command(form: Form, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     })
 }
 
-fn one(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
+fn one(scanner: &mut Scanner<'_>) -> Result<DriveRange, Problem> {
     let drives = drives(scanner)?;
     match &drives.to {
         None => Ok(drives),

@@ -3,7 +3,7 @@
 use super::job::{driver_command, process_data, which_ring};
 use super::value::eeprom_place;
 use super::words::{drives, equals};
-use crate::buses::novobus::language::syntax::{Drives, Job, MasterCall, Target};
+use crate::buses::novobus::language::syntax::{DriveRange, Job, MasterCall, WrittenTarget};
 use crate::scenario::expression;
 use crate::scenario::pattern;
 use crate::scenario::problem::Problem;
@@ -47,7 +47,9 @@ pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
             let message = "`once` is for jobs that are one command";
             return Err(Problem::new(span, message, "a command expected here"));
         }
-        let first = calls.first().map(|(drives, _): &(Drives, _)| drives.ring);
+        let first = calls
+            .first()
+            .map(|(drives, _): &(DriveRange, _)| drives.ring);
         if first.is_some_and(|ring| ring != drives.ring) {
             let message = "jobs that go out together are for one ring";
             return Err(Problem::new(
@@ -66,7 +68,7 @@ pub(crate) fn call(scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     }
 }
 
-fn one_call(scanner: &mut Scanner<'_>) -> Result<(Drives, MasterCall), Problem> {
+fn one_call(scanner: &mut Scanner<'_>) -> Result<(DriveRange, MasterCall), Problem> {
     let before = scanner.clone();
     let name = scanner.word().map_or("", |word| word.value);
     if let Some(job) = driver_command(name, scanner) {
@@ -113,17 +115,17 @@ fn one_call(scanner: &mut Scanner<'_>) -> Result<(Drives, MasterCall), Problem> 
     Ok((drives, call))
 }
 
-fn target(scanner: &mut Scanner<'_>, relative: bool) -> Result<Target, Problem> {
+fn target(scanner: &mut Scanner<'_>, relative: bool) -> Result<WrittenTarget, Problem> {
     equals(scanner)?;
     if relative && scanner.eat_word("by") {
-        return Ok(Target::By(quantity::quantity(
+        return Ok(WrittenTarget::By(quantity::quantity(
             scanner,
             Some(Dimension::Angle),
         )?));
     }
     if quantity::ahead(scanner) {
         let turns = quantity::quantity(scanner, Some(Dimension::Angle))?;
-        return Ok(Target::At(turns));
+        return Ok(WrittenTarget::At(turns));
     }
-    Ok(Target::Bytes(pattern::pattern(scanner)?))
+    Ok(WrittenTarget::Bytes(pattern::pattern(scanner)?))
 }

@@ -4,7 +4,7 @@ use super::drive::{self, DriveLine};
 use super::value::place as cell;
 use super::words::{drives, named, required, ring_prefix};
 use crate::buses::novobus::language::syntax::{
-    Check, DriveCheck, Drives, Fault, FaultKind, LinkEnds, LinkFaultKind, Looks, Recording,
+    CellRecording, Check, DriveCheck, DriveRange, Fault, FaultKind, LinkEnds, LinkFaultKind, Looks,
     RingStep, SetupKind,
 };
 use crate::scenario::expression::{self, Located};
@@ -42,7 +42,7 @@ fn drive_step(word: &Spanned<&str>, scanner: &mut Scanner<'_>) -> Result<RingSte
 }
 
 /// A line that begins with `drive`, as a step.
-fn drive_action(drives: Drives, line: DriveLine, span: Span) -> Result<RingStep, Problem> {
+fn drive_action(drives: DriveRange, line: DriveLine, span: Span) -> Result<RingStep, Problem> {
     match line {
         DriveLine::Setup(what) => Err(not_a_step(span, &what)),
         DriveLine::Influence(influence) => Ok(RingStep::Influence(drives, influence)),
@@ -76,7 +76,7 @@ fn until(scanner: &mut Scanner<'_>) -> Result<RingStep, Problem> {
 }
 
 /// `record drive 0 nist every 10ms`
-fn record(scanner: &mut Scanner<'_>) -> Result<Recording, Problem> {
+fn record(scanner: &mut Scanner<'_>) -> Result<CellRecording, Problem> {
     required(scanner, &drive::WORDS)?;
     let drives = drives(scanner)?;
     let place = cell(scanner)?;
@@ -86,7 +86,7 @@ fn record(scanner: &mut Scanner<'_>) -> Result<Recording, Problem> {
         1 => Looks::Changes,
         _ => Looks::Off,
     };
-    Ok(Recording {
+    Ok(CellRecording {
         drives,
         place,
         looks,

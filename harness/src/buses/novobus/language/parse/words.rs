@@ -1,6 +1,6 @@
 //! What stands in several kinds of lines: words of a list, drives.
 
-use super::super::syntax::Drives;
+use super::super::syntax::DriveRange;
 use crate::scenario::expression;
 pub(crate) use crate::scenario::parse::words::{equals, named, required};
 use crate::scenario::problem::Problem;
@@ -49,7 +49,7 @@ fn one_of<T>(
 }
 
 /// `95..99`, `N-1`, `2:0..last`.
-pub(crate) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
+pub(crate) fn drives(scanner: &mut Scanner<'_>) -> Result<DriveRange, Problem> {
     let ring = ring_prefix(scanner);
     let from = expression::sum(scanner)?;
     let to = if scanner.eat("..") {
@@ -57,7 +57,7 @@ pub(crate) fn drives(scanner: &mut Scanner<'_>) -> Result<Drives, Problem> {
     } else {
         None
     };
-    Ok(Drives { ring, from, to })
+    Ok(DriveRange { ring, from, to })
 }
 
 /// `2:` in front of a drive or a link of the second ring. The colon of `drive 2: off` is another one:

@@ -6,8 +6,8 @@ use super::types::{
     CellTest, LOOK, PlannedCell, PlannedCondition, PlannedDriveCheck, PlannedLooks, PlannedRecord,
 };
 use crate::buses::novobus::language::syntax::{
-    CellCheck, CellPlace, Condition, DriveCheck, Drives, Influence, Looks, Recording, Relation,
-    Written,
+    CellCheck, CellPlace, CellRecording, Condition, DriveCheck, DriveRange, Influence, Looks,
+    Relation, Written,
 };
 use crate::link::Capability;
 use crate::scenario::language::Settle as _;
@@ -57,7 +57,7 @@ impl Planner {
         })
     }
 
-    fn cell(&self, drives: &Drives, check: &CellCheck) -> Result<PlannedCell, Problem> {
+    fn cell(&self, drives: &DriveRange, check: &CellCheck) -> Result<PlannedCell, Problem> {
         let place = &check.place;
         let own = place.cell.map_or(1, |cell| usize::from(cell.size));
         let whole = place.scale().map_or(own, |scale| usize::from(scale.size()));
@@ -88,7 +88,7 @@ impl Planner {
         Ok(PlannedCell::new(place, size, test))
     }
 
-    fn number_test(&self, drives: &Drives, check: &CellCheck) -> Result<CellTest, Problem> {
+    fn number_test(&self, drives: &DriveRange, check: &CellCheck) -> Result<CellTest, Problem> {
         let scale = check.place.scale();
         if check.relation == Relation::Equal {
             for (units, _) in self.alike(drives.ring, self.drives(drives)?) {
@@ -114,7 +114,7 @@ impl Planner {
 
     fn masked(
         &self,
-        drives: &Drives,
+        drives: &DriveRange,
         place: &CellPlace,
         mask: &Pattern,
         value: &Pattern,
@@ -138,7 +138,7 @@ impl Planner {
     /// As many known bytes as the cell has, and no more than a number has.
     fn raw(
         &self,
-        drives: &Drives,
+        drives: &DriveRange,
         place: &CellPlace,
         pattern: &Pattern,
     ) -> Result<Vec<u8>, Problem> {
@@ -161,7 +161,7 @@ impl Planner {
     /// Refuses what happens from outside the bus to a drive that has no outside.
     pub(crate) fn influence(
         &self,
-        drives: &Drives,
+        drives: &DriveRange,
         influence: &Influence,
         span: Span,
     ) -> Result<(), Problem> {
@@ -171,7 +171,7 @@ impl Planner {
         }
     }
 
-    pub(crate) fn record(&self, recording: &Recording) -> Result<PlannedRecord, Problem> {
+    pub(crate) fn record(&self, recording: &CellRecording) -> Result<PlannedRecord, Problem> {
         let place = &recording.place;
         let scale = place.scale();
         let own = place.cell.map_or(1, |cell| usize::from(cell.size));

@@ -2,7 +2,7 @@
 
 use super::planner::Planner;
 use super::setup::number_bytes;
-use super::types::{CellTest, PlannedCell, Reading, RingAct, setups_of};
+use super::types::{CellTest, NumberCheck, PlannedCell, RingAct, setups_of};
 use crate::buses::novobus::language::syntax::{CellPlace, Job, JobKind, Relation, Written};
 use crate::scenario::pattern::{Expected, MAX_CELLS, Pattern};
 use crate::scenario::problem::{Problem, Span};
@@ -87,7 +87,7 @@ impl Planner {
                 }
                 let form = self.read_long(ring, k);
                 let answer = expected_answer(&command, &read, form);
-                let reading = cell.map(|cell| Reading {
+                let reading = cell.map(|cell| NumberCheck {
                     drive: k,
                     bytes: data_places(&command, width, form),
                     cell,
@@ -361,7 +361,7 @@ fn data_places(command: &Command, width: usize, form: ReadLongAnswer) -> Vec<usi
     (0..width).filter_map(place).map(|i| i + 2).collect()
 }
 
-fn with_reading(action: RingAct, reading: Option<Reading>) -> RingAct {
+fn with_reading(action: RingAct, reading: Option<NumberCheck>) -> RingAct {
     match action {
         RingAct::Telegram(ring, bytes, expected, _) => {
             RingAct::Telegram(ring, bytes, expected, reading)

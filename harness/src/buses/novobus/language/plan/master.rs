@@ -3,18 +3,18 @@
 use super::planner::Planner;
 use super::types::{PlannedCall, RingAct};
 use crate::buses::novobus::language::syntax::{
-    CellPlace, Drives, JobKind, MasterCall, Target, Written,
+    CellPlace, DriveRange, JobKind, MasterCall, Written, WrittenTarget,
 };
 use crate::scenario::pattern::{Expected, Pattern};
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::Quantity;
-use harness_proto::nd21::position::{Mode, Position};
+use harness_proto::nd21::position::{Position, PositionMode};
 use harness_proto::nd21::units::turns_to_raw;
 
 impl Planner {
     pub(crate) fn master(
         &self,
-        calls: &[(Drives, MasterCall)],
+        calls: &[(DriveRange, MasterCall)],
         once: bool,
     ) -> Result<RingAct, Problem> {
         let ring = calls.first().map_or(0, |(drives, _)| drives.ring);
@@ -52,14 +52,16 @@ impl Planner {
             MasterCall::RamToEeprom => PlannedCall::RamToEeprom,
             MasterCall::Reference => PlannedCall::Reference,
             MasterCall::SetActualValue(target) => PlannedCall::SetActualValue(match target {
-                Target::Bytes(pattern) => self.long(pattern, ring)?,
-                Target::At(turns) | Target::By(turns) => increments(*turns)?.cast_unsigned(),
+                WrittenTarget::Bytes(pattern) => self.long(pattern, ring)?,
+                WrittenTarget::At(turns) | WrittenTarget::By(turns) => {
+                    increments(*turns)?.cast_unsigned()
+                }
             }),
             MasterCall::InitPs => PlannedCall::InitPs,
             MasterCall::WritePs(target) => PlannedCall::WritePs(match target {
-                Target::Bytes(pattern) => Position::decode(self.long(pattern, ring)?),
-                Target::At(turns) => position(Mode::Absolute, *turns)?,
-                Target::By(turns) => position(Mode::Relative, *turns)?,
+                WrittenTarget::Bytes(pattern) => Position::decode(self.long(pattern, ring)?),
+                WrittenTarget::At(turns) => position(PositionMode::Absolute, *turns)?,
+                WrittenTarget::By(turns) => position(PositionMode::Relative, *turns)?,
             }),
             MasterCall::Exchange(send, receive) => {
                 let sent = self.known(send, 2, ring)?;
@@ -111,7 +113,7 @@ fn increments(turns: Quantity) -> Result<i32, Problem> {
     turns_to_raw(turns.value).map_err(|error| wrong(turns, &error.to_string()))
 }
 
-fn position(mode: Mode, turns: Quantity) -> Result<Position, Problem> {
+fn position(mode: PositionMode, turns: Quantity) -> Result<Position, Problem> {
     Position::from_turns(mode, turns.value).map_err(|error| wrong(turns, &error.to_string()))
 }
 

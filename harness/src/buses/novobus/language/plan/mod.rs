@@ -14,6 +14,6 @@ pub use planner::plan_header;
 pub(crate) use setup::{in_memory, number_bytes};
 pub(crate) use types::PlannedSetupKind;
 pub use types::{
-    Bench, CellTest, LOOK, PlannedCall, PlannedCell, PlannedCheck, PlannedCondition,
-    PlannedDriveCheck, PlannedLooks, PlannedRecord, Reading, RingAct,
+    CellTest, LOOK, NumberCheck, PlannedBench, PlannedCall, PlannedCell, PlannedCheck,
+    PlannedCondition, PlannedDriveCheck, PlannedLooks, PlannedRecord, RingAct,
 };

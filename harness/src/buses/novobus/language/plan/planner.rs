@@ -2,12 +2,12 @@
 
 use super::drive::Running;
 use super::setup::model_unless_said;
-use super::types::{Bench, PlannedCheck, RingAct};
+use super::types::{PlannedBench, PlannedCheck, RingAct};
 use crate::buses::Stimulus;
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::parse::header::parse_lines;
 use crate::buses::novobus::language::syntax::{
-    Check, Drives, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
+    Check, DriveRange, Fault, FaultKind, Header, LinkEnds, LinkFaultKind, RingStep,
 };
 use crate::link::{Capability, Moment, PlacedFault, needs_line_errors, only_simulated};
 use crate::scenario::expression::{Located, Scope};
@@ -80,7 +80,7 @@ pub(crate) fn settle(
 ) -> Result<Planner, Problem> {
     let header = &scenario.header;
     let mut planner = Planner {
-        bench: Bench {
+        bench: PlannedBench {
             rings: sizes(scenario, size)?,
             rate: header.rate.unwrap_or_default(),
             master: header.master.as_ref().map(|master| master.value),
@@ -97,7 +97,7 @@ pub(crate) fn settle(
 }
 
 /// Settles one more step for rings that are settled.
-pub(crate) fn resume(bench: &Bench) -> Planner {
+pub(crate) fn resume(bench: &PlannedBench) -> Planner {
     Planner {
         bench: bench.clone(),
         // The model of every drive is settled.
@@ -110,7 +110,7 @@ pub(crate) fn resume(bench: &Bench) -> Planner {
 /// Settles the lines of a scenario for rings of given sizes.
 #[derive(Debug)]
 pub struct Planner {
-    pub(crate) bench: Bench,
+    pub(crate) bench: PlannedBench,
     /// The model of drives of which the header does not say it.
     pub(crate) model: Model,
     /// The counters of the loops around the step in hand.
@@ -119,15 +119,15 @@ pub struct Planner {
 }
 
 impl Deref for Planner {
-    type Target = Bench;
+    type Target = PlannedBench;
 
-    fn deref(&self) -> &Bench {
+    fn deref(&self) -> &PlannedBench {
         &self.bench
     }
 }
 
 impl DerefMut for Planner {
-    fn deref_mut(&mut self) -> &mut Bench {
+    fn deref_mut(&mut self) -> &mut PlannedBench {
         &mut self.bench
     }
 }
@@ -190,7 +190,7 @@ impl Settle<Novobus> for Planner {
         two.into_iter().chain(setups).chain(master).collect()
     }
 
-    fn finish(self) -> Bench {
+    fn finish(self) -> PlannedBench {
         self.bench
     }
 }
@@ -226,7 +226,7 @@ impl Planner {
         }
     }
 
-    pub(crate) fn drives(&self, drives: &Drives) -> Result<RangeInclusive<u8>, Problem> {
+    pub(crate) fn drives(&self, drives: &DriveRange) -> Result<RangeInclusive<u8>, Problem> {
         let from = self.drive(drives.ring, &drives.from)?;
         let to = match &drives.to {
             Some(to) => self.drive(drives.ring, to)?,
@@ -235,7 +235,7 @@ impl Planner {
         Ok(from.min(to)..=from.max(to))
     }
 
-    pub(crate) fn one(&self, drives: &Drives) -> Result<(usize, u8), Problem> {
+    pub(crate) fn one(&self, drives: &DriveRange) -> Result<(usize, u8), Problem> {
         Ok((drives.ring, self.drive(drives.ring, &drives.from)?))
     }
 
@@ -299,7 +299,7 @@ impl Planner {
                         "a time expected here, as in `@20ms`",
                     ));
                 }
-                let drives = Drives {
+                let drives = DriveRange {
                     ring: fault.ring,
                     from: drive.clone(),
                     to: None,

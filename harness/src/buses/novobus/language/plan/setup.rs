@@ -4,7 +4,7 @@ use super::planner::Planner;
 use super::types::{PlannedSetup, PlannedSetupKind, setups_of};
 use crate::buses::novobus::language::Novobus;
 use crate::buses::novobus::language::syntax::{
-    CellPlace, Check, Condition, DriveCheck, Drives, FaultKind, Influence, RingStep, Setup,
+    CellPlace, Check, Condition, DriveCheck, DriveRange, FaultKind, Influence, RingStep, Setup,
     SetupKind, Written,
 };
 use crate::scenario::language::Settle as _;
@@ -12,7 +12,7 @@ use crate::scenario::pattern::MAX_CELLS;
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::syntax::{Action, Scenario};
 use harness_proto::nd21;
-use harness_proto::nd21::units::{self, Device, Scale, SpeedRange, Value};
+use harness_proto::nd21::units::{self, DriveType, Scale, SpeedRange, Value};
 use harness_proto::novobus::memory;
 use harness_proto::novobus::properties::{Properties, Setting};
 use harness_sim::nd21::{Nd21Properties, PROPERTIES};
@@ -119,8 +119,8 @@ impl Planner {
         &self,
         ring: usize,
         drives: RangeInclusive<u8>,
-    ) -> Vec<(units::Drive, RangeInclusive<u8>)> {
-        let mut runs: Vec<(units::Drive, RangeInclusive<u8>)> = Vec::new();
+    ) -> Vec<(units::DriveUnits, RangeInclusive<u8>)> {
+        let mut runs: Vec<(units::DriveUnits, RangeInclusive<u8>)> = Vec::new();
         for drive in drives {
             let units = self.units_of(ring, drive);
             match runs.last_mut() {
@@ -132,7 +132,7 @@ impl Planner {
     }
 
     /// What a drive's scales depend on.
-    pub(crate) fn units_of(&self, ring: usize, drive: u8) -> units::Drive {
+    pub(crate) fn units_of(&self, ring: usize, drive: u8) -> units::DriveUnits {
         let of_ring = self.units.get(ring);
         let units = of_ring.and_then(|drives| drives.get(usize::from(drive)));
         units.copied().unwrap_or(DEFAULT_UNITS)
@@ -160,7 +160,7 @@ impl Planner {
 
     /// The type and the range of speeds as the header sets them. RAM is set after it has been loaded from
     /// the EEPROM.
-    fn read_units(&self, ring: usize, drive: u8) -> units::Drive {
+    fn read_units(&self, ring: usize, drive: u8) -> units::DriveUnits {
         let mut units = DEFAULT_UNITS;
         let (mut ram, mut eeprom) = (None, None);
         for setup in setups_of(&self.setups, ring, drive) {
@@ -202,7 +202,12 @@ impl Planner {
     }
 
     /// Refuses settings that only the nd21 model has, for a drive with another model.
-    pub(crate) fn only_nd21(&self, drives: &Drives, what: &str, span: Span) -> Result<(), Problem> {
+    pub(crate) fn only_nd21(
+        &self,
+        drives: &DriveRange,
+        what: &str,
+        span: Span,
+    ) -> Result<(), Problem> {
         let model = |drive: &u8| {
             let of_ring = self.models.get(drives.ring);
             of_ring.and_then(|models| models.get(usize::from(*drive)))
@@ -260,8 +265,8 @@ const MAX_SETUPS: usize = 100_000;
 pub(crate) const OUTSIDE: &str = "plugs, motor and display";
 
 /// The units of a drive without settings in the header (LANGUAGE.md, "Types and ranges").
-const DEFAULT_UNITS: units::Drive = units::Drive {
-    device: Device::Nd5610,
+const DEFAULT_UNITS: units::DriveUnits = units::DriveUnits {
+    device: DriveType::Nd5610,
     range: SpeedRange::To8000,
 };
 
@@ -277,7 +282,7 @@ fn has_number(setup: &Setup) -> bool {
 pub(crate) fn number_bytes(
     scale: Option<Scale>,
     value: &Written,
-    units: units::Drive,
+    units: units::DriveUnits,
 ) -> Result<Vec<u8>, Problem> {
     let (value, span) = match value {
         Written::Number(number) => (Value::Exact(number.value), number.span),

@@ -9,7 +9,7 @@ use crate::scenario::problem::Span;
 use crate::scenario::quantity::{Quantity, Tolerance};
 use harness_proto::line::Rate;
 use harness_proto::nd21::position::Position;
-use harness_proto::nd21::units::{self, Device, Scale};
+use harness_proto::nd21::units::{self, DriveType, Scale};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::error::BusError;
@@ -27,7 +27,7 @@ pub const LOOK: time::Span = time::Span::from_micros(108);
 
 /// What a bench is before anything is sent: the header of a scenario, settled for rings of given sizes.
 #[derive(Clone, Debug)]
-pub struct Bench {
+pub struct PlannedBench {
     /// The rings; one or two.
     pub rings: Vec<RingSize>,
     /// The rate of the line.
@@ -36,7 +36,7 @@ pub struct Bench {
     pub master: Option<&'static MasterDeviation>,
     pub(crate) setups: Vec<PlannedSetup>,
     /// What the scales of each ring's drives depend on.
-    pub(crate) units: Vec<Vec<units::Drive>>,
+    pub(crate) units: Vec<Vec<units::DriveUnits>>,
     /// The model of each ring's drives.
     pub(crate) models: Vec<Vec<Model>>,
 }
@@ -53,7 +53,7 @@ pub(crate) enum PlannedSetupKind {
     Memory(u16, Vec<u8>),
     Eeprom(u8, Vec<u8>),
     Model(Model),
-    Type(Device),
+    Type(DriveType),
     Influence(Influence),
     Word(String, String),
     Time(String, time::Span),
@@ -120,7 +120,7 @@ pub enum RingAct {
     /// A check.
     Check(PlannedCheck),
     /// A telegram and its answer, and what the number in the answer must be.
-    Telegram(usize, Vec<u8>, Vec<Expected>, Option<Reading>),
+    Telegram(usize, Vec<u8>, Vec<Expected>, Option<NumberCheck>),
     /// 17 zeros and the check sequence.
     Recover(usize),
     /// The driver does this of these drives; whether its commands must not run twice, and may end in any way.
@@ -137,7 +137,7 @@ pub enum RingAct {
 
 /// What the number in an answer must be.
 #[derive(Clone, Debug)]
-pub struct Reading {
+pub struct NumberCheck {
     /// Which drive answers.
     pub drive: u8,
     /// Which bytes of the answer it is, the first byte of the cell first.
@@ -344,7 +344,7 @@ impl Plan<Novobus> {
     }
 }
 
-impl Bench {
+impl PlannedBench {
     /// The model of drive `drive`.
     #[must_use]
     pub fn model(&self, ring: usize, drive: u8) -> Model {
@@ -358,7 +358,7 @@ impl Bench {
     /// # Panics
     /// There is no such drive: planning has refused it.
     #[must_use]
-    pub fn units(&self, ring: usize, drive: u8) -> units::Drive {
+    pub fn units(&self, ring: usize, drive: u8) -> units::DriveUnits {
         self.units[ring][usize::from(drive)]
     }
 

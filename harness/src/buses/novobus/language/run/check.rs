@@ -7,7 +7,7 @@ use crate::buses::novobus::locate::{self, Location};
 use crate::scenario::problem::Span;
 use crate::scenario::run::outcome::Stop;
 use crate::scenario::run::player::Runner;
-use harness_proto::novobus::master::{End, Fault, RingLink};
+use harness_proto::novobus::master::{Fault, LinkEnd, RingLink};
 use harness_proto::novobus::sync::SYNCO;
 
 /// SYNCO sent to let a ring spell out an address: the bound of 25 zeros, and enough behind it to see
@@ -131,8 +131,8 @@ impl Runner<'_> {
         };
         let drives = usize::from(self.link.drives(ring));
         let place = |named: RingLink| match named.to {
-            End::Master => drives,
-            End::Drive(drive) => drives.saturating_sub(1 + usize::from(drive)),
+            LinkEnd::Master => drives,
+            LinkEnd::Drive(drive) => drives.saturating_sub(1 + usize::from(drive)),
         };
         let right = match fault {
             Fault::Damaged(named) => !broken && place(*named) == link,

@@ -2,7 +2,7 @@
 
 use super::look::{Miss, judge};
 use crate::buses::Stimulus;
-use crate::buses::novobus::language::plan::{LOOK, PlannedDriveCheck, Reading};
+use crate::buses::novobus::language::plan::{LOOK, NumberCheck, PlannedDriveCheck};
 use crate::buses::novobus::language::syntax::Influence;
 use crate::link::{DriveFault, Link, Moment, PlacedFault};
 use crate::scenario::problem::Span;
@@ -86,7 +86,7 @@ impl Runner<'_> {
         &self,
         ring: usize,
         answer: usize,
-        reading: Option<&Reading>,
+        reading: Option<&NumberCheck>,
         span: Span,
     ) -> Result<(), Stop> {
         let Some(reading) = reading else {

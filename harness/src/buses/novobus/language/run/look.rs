@@ -12,7 +12,7 @@ use crate::scenario::run::player::Runner;
 use harness_proto::line::Received;
 use harness_proto::nd21::bits;
 use harness_proto::nd21::units::{self, Scale, Value};
-use harness_sim::nd21::{Mode, Shown};
+use harness_sim::nd21::{Mode, OutputLevels};
 use std::ops::RangeInclusive;
 
 /// The difference that two computed numbers may have by rounding alone, as a part of the larger.
@@ -165,7 +165,11 @@ fn list(ring: usize, drives: &[u8]) -> String {
 }
 
 /// Checks the bytes of a cell; the error is a sentence that says what they are instead.
-pub(crate) fn judge(cell: &PlannedCell, found: &[u8], units: units::Drive) -> Result<(), String> {
+pub(crate) fn judge(
+    cell: &PlannedCell,
+    found: &[u8],
+    units: units::DriveUnits,
+) -> Result<(), String> {
     let name = &cell.name;
     match &cell.test {
         CellTest::Bytes(expected) => {
@@ -237,7 +241,7 @@ fn number_holds(
     scale: Scale,
     found: &[u8],
     (relation, expected, tolerance): (Relation, Quantity, Option<Tolerance>),
-    units: units::Drive,
+    units: units::DriveUnits,
 ) -> bool {
     if relation == Relation::Equal && tolerance.is_none() {
         return nearest(scale, expected, units).is_some_and(|raw| raw == found);
@@ -256,14 +260,14 @@ fn number_holds(
 }
 
 /// The bytes nearest to a number.
-fn nearest(scale: Scale, number: Quantity, units: units::Drive) -> Option<Vec<u8>> {
+fn nearest(scale: Scale, number: Quantity, units: units::DriveUnits) -> Option<Vec<u8>> {
     let raw = scale.encode(Value::Exact(number.value), units)?.ok()?;
     let bytes = raw.to_be_bytes();
     Some(bytes[bytes.len() - usize::from(scale.size())..].to_vec())
 }
 
 /// The number that the bytes of a cell are; `None` where they are none.
-pub(crate) fn physical(scale: Scale, bytes: &[u8], units: units::Drive) -> Option<f64> {
+pub(crate) fn physical(scale: Scale, bytes: &[u8], units: units::DriveUnits) -> Option<f64> {
     match scale.value(bytes, units)?.ok()? {
         Value::Exact(ratio) => Some(ratio.to_f64()),
         Value::Approximate(value) => Some(value),
@@ -272,7 +276,7 @@ pub(crate) fn physical(scale: Scale, bytes: &[u8], units: units::Drive) -> Optio
 }
 
 /// The bytes of a cell as a number in a unit, and as they are.
-fn show(scale: Scale, bytes: &[u8], units: units::Drive, unit: &Unit) -> String {
+fn show(scale: Scale, bytes: &[u8], units: units::DriveUnits, unit: &Unit) -> String {
     match (physical(scale, bytes, units), scale.value(bytes, units)) {
         (Some(value), _) => format!("{} ({})", unit.show(value), hex(bytes)),
         (None, Some(Ok(Value::Off))) => format!("off ({})", hex(bytes)),
@@ -280,7 +284,7 @@ fn show(scale: Scale, bytes: &[u8], units: units::Drive, unit: &Unit) -> String 
     }
 }
 
-fn shows(showing: Showing, shown: &Shown) -> Result<(), String> {
+fn shows(showing: Showing, shown: &OutputLevels) -> Result<(), String> {
     let level = |name: &str, found: bool, expected: bool, [low, high]: [&str; 2]| {
         let word = |level| if level { high } else { low };
         if found == expected {

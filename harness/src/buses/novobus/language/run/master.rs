@@ -1,7 +1,7 @@
 //! The driver's part of a scenario: calls over the same line that the scenario plays on, so that what is
 //! recorded, limited and shown is all the same.
 
-use crate::buses::novobus::driver::{Axis, Bus, Error, Options, conduct, count_drives};
+use crate::buses::novobus::driver::{Axis, Error, OpenRings, Options, conduct, count_drives};
 use crate::buses::novobus::language::plan::PlannedCall;
 use crate::buses::novobus::language::syntax::Ending;
 use crate::link::{Lead, Line, Octets, Trouble};
@@ -113,7 +113,7 @@ impl Runner<'_> {
             left: None,
         };
         let (mut events, mut ended) = (Vec::new(), Vec::new());
-        let result = Bus::open(Box::new(line), &[size], options)
+        let result = OpenRings::open(Box::new(line), &[size], options)
             .map_err(failed)
             .and_then(|bus| {
                 let result = do_all(&bus, calls, once, &mut ended)
@@ -204,7 +204,7 @@ impl Runner<'_> {
 
 /// Does it all; how commands have ended is added to `ended`. With `once` they must not run twice, and may end in any way.
 fn do_all(
-    bus: &Bus<'_>,
+    bus: &OpenRings<'_>,
     calls: &[(u8, PlannedCall)],
     once: bool,
     ended: &mut Vec<Ending>,
@@ -256,7 +256,7 @@ fn do_all(
 }
 
 /// Exchanges process data with all of these drives in one round.
-fn exchange(bus: &Bus<'_>, values: &[(Axis, u16, &Vec<Expected>)]) -> Result<(), String> {
+fn exchange(bus: &OpenRings<'_>, values: &[(Axis, u16, &Vec<Expected>)]) -> Result<(), String> {
     if values.is_empty() {
         return Ok(());
     }
@@ -275,7 +275,7 @@ fn job(command: Command) -> Job {
     Job::new(0, command)
 }
 
-fn do_one(bus: &Bus<'_>, axis: Axis, call: &PlannedCall) -> Result<(), Error> {
+fn do_one(bus: &OpenRings<'_>, axis: Axis, call: &PlannedCall) -> Result<(), Error> {
     match call {
         PlannedCall::Command(..) | PlannedCall::Exchange(..) => Ok(()),
         PlannedCall::ReadEeprom(address, expected) => {

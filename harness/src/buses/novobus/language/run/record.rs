@@ -11,7 +11,7 @@ pub const MAX_SAMPLES: usize = 1_000_000;
 
 /// What was recorded of a cell of a drive.
 #[derive(Clone, Debug)]
-pub struct Record {
+pub struct CellRecord {
     /// In which ring, counted from 0.
     pub ring: usize,
     /// Of which drive.
@@ -25,7 +25,7 @@ pub struct Record {
     /// The scale of its bytes, if the manual gives one.
     pub scale: Option<Scale>,
     /// What that scale depends on.
-    pub units: units::Drive,
+    pub units: units::DriveUnits,
     /// How often it was noted; `None` where its changes were.
     pub every: Option<Span>,
     /// What was found, in order of time.
@@ -60,7 +60,7 @@ impl Sample {
     }
 }
 
-impl Record {
+impl CellRecord {
     /// The unit of the values; empty where they are plain numbers.
     #[must_use]
     pub fn unit(&self) -> &'static str {
@@ -92,7 +92,7 @@ impl Record {
 #[derive(Default)]
 pub(crate) struct Recorder {
     /// Every record, in order of their beginnings.
-    pub(crate) records: Vec<Record>,
+    pub(crate) records: Vec<CellRecord>,
     /// The records that go on: which, and when the cell is looked at next.
     running: Vec<(usize, Instant)>,
     samples: usize,
@@ -140,7 +140,7 @@ impl Runner<'_> {
             recorder
                 .running
                 .push((recorder.records.len(), self.link.now()));
-            recorder.records.push(Record {
+            recorder.records.push(CellRecord {
                 ring: record.ring,
                 drive,
                 name: record.name.clone(),

@@ -10,7 +10,7 @@ use crate::link::{Link, Moment};
 use crate::scenario::pattern::Expected;
 use crate::scenario::plan::{Plan, PlannedAction, PlannedStep, PlannedWhen};
 use crate::scenario::problem::Span;
-use crate::scenario::run::outcome::{Difference, Mismatch, Stop};
+use crate::scenario::run::outcome::{ByteDifference, Mismatch, Stop};
 use crate::scenario::run::player::Runner;
 use harness_proto::line::Received;
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
@@ -39,7 +39,7 @@ pub(crate) struct RingState {
 }
 
 /// What is kept of all rings.
-pub struct State {
+pub struct RunState {
     pub(crate) rings: Vec<RingState>,
     pub(crate) recorder: Recorder,
     /// Cells that were read over the bus, where the link does not show them.
@@ -62,7 +62,7 @@ pub struct State {
     pub(crate) sent_to: Instant,
 }
 
-impl State {
+impl RunState {
     pub(crate) fn new(plan: &Plan<Novobus>, link: &dyn Link) -> Self {
         let ring = |_| RingState {
             asked: Some(Vec::new()),
@@ -126,7 +126,7 @@ pub(crate) fn difference(
     (first, index): (usize, usize),
     wanted: &[Expected],
     received: &[(Instant, Received)],
-) -> Difference {
+) -> ByteDifference {
     let shown = match wanted {
         [] => UNASKED,
         _ => usize::MAX,
@@ -136,7 +136,7 @@ pub(crate) fn difference(
         let before = received.get(..i);
         before.map_or(*own, |before| resolve(*own, before))
     });
-    Difference {
+    ByteDifference {
         ring,
         byte: first + index + 1,
         at: received.get(index).map(|(at, _)| *at),

@@ -1,7 +1,7 @@
 //! What a scenario can check.
 
 use super::cell::{CellCheck, CellPlace};
-use crate::buses::novobus::language::syntax::{Drives, LinkEnds};
+use crate::buses::novobus::language::syntax::{DriveRange, LinkEnds};
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
 use crate::scenario::problem::Span;
@@ -16,7 +16,7 @@ pub enum Check {
     /// The ring spells out the drive that saw the fault (ND21 9.7), after a limited number of zeros.
     Located {
         /// Which drive.
-        drive: Drives,
+        drive: DriveRange,
         /// Maximum number of zeros; any number if `None`.
         within: Option<Located>,
     },
@@ -29,7 +29,7 @@ pub enum Check {
         /// The cause.
         error: BusError,
         /// Which drive.
-        drive: Drives,
+        drive: DriveRange,
     },
     /// This number of check sequences came back whole.
     Corrected(Located),
@@ -93,7 +93,7 @@ impl Ending {
 #[derive(Clone, Debug)]
 pub struct DriveCheck {
     /// Which drives.
-    pub drives: Drives,
+    pub drives: DriveRange,
     /// What.
     pub condition: Condition,
     /// Where it stands.

@@ -8,7 +8,7 @@ use crate::scenario::problem::{Problems, Span, Spanned};
 use crate::scenario::source::Source;
 use crate::scenario::times::Duration;
 use harness_proto::line::Rate;
-use harness_proto::nd21::units::Device;
+use harness_proto::nd21::units::DriveType;
 use harness_sim::nd21::Stimulus;
 use harness_sim::novobus::deviation::{Deviation, MasterDeviation};
 use harness_sim::novobus::drive::Model;
@@ -94,7 +94,7 @@ impl Header {
     /// Every drive of this number of rings is a whole ND21.
     #[must_use]
     pub fn whole(rings: usize) -> Self {
-        let setup = |ring| Setup::new(Drives::all(ring), SetupKind::Model(Model::Nd21));
+        let setup = |ring| Setup::new(DriveRange::all(ring), SetupKind::Model(Model::Nd21));
         (0..rings).map(setup).collect()
     }
 
@@ -190,7 +190,7 @@ impl RingRange {
 
 /// Drives: one, or all from one to another, in ring 1 or ring 2.
 #[derive(Clone, Debug)]
-pub struct Drives {
+pub struct DriveRange {
     /// Which ring, counted from 0.
     pub ring: usize,
     /// From.
@@ -199,7 +199,7 @@ pub struct Drives {
     pub to: Option<Located>,
 }
 
-impl Drives {
+impl DriveRange {
     /// One drive of a ring, counted from 0.
     #[must_use]
     pub fn one(ring: usize, drive: u8) -> Self {
@@ -228,7 +228,7 @@ impl Drives {
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Which drives.
-    pub drives: Drives,
+    pub drives: DriveRange,
     /// What.
     pub what: SetupKind,
     /// Where it stands.
@@ -245,14 +245,14 @@ impl fmt::Display for Setup {
 impl Setup {
     /// A setup that stands in no text.
     #[must_use]
-    pub fn new(drives: Drives, what: SetupKind) -> Self {
+    pub fn new(drives: DriveRange, what: SetupKind) -> Self {
         let span = Span::default();
         Self { drives, what, span }
     }
 
     /// `deviates NAME`
     #[must_use]
-    pub fn deviates(drives: Drives, deviation: &'static Deviation) -> Self {
+    pub fn deviates(drives: DriveRange, deviation: &'static Deviation) -> Self {
         Self::new(drives, SetupKind::Deviates(deviation))
     }
 
@@ -276,7 +276,7 @@ pub enum SetupKind {
     /// `model NAME`
     Model(Model),
     /// `type NUMBER`
-    Type(Device),
+    Type(DriveType),
     /// Something from outside the bus, before anything is sent.
     Influence(Influence),
     /// `property NAME = WORD`

@@ -1,7 +1,7 @@
 //! The jobs of the master that a scenario can give.
 
 use super::cell::{CellPlace, Written};
-use crate::buses::novobus::language::syntax::Drives;
+use crate::buses::novobus::language::syntax::DriveRange;
 use crate::link::Capability;
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
@@ -15,7 +15,7 @@ pub enum Job {
     /// `exchange K SEND = RECEIVE`: process data (ND21 9.4).
     Exchange {
         /// Which drive.
-        drive: Drives,
+        drive: DriveRange,
         /// What is sent.
         send: Pattern,
         /// What must come back.
@@ -26,7 +26,7 @@ pub enum Job {
         /// Which command.
         kind: JobKind,
         /// Which drive.
-        drive: Drives,
+        drive: DriveRange,
         /// The cell, where the command has one.
         place: Option<CellPlace>,
         /// The data that are written, or that must be read.
@@ -37,7 +37,7 @@ pub enum Job {
     /// `master ...`: the driver does it, of one drive or of several at once (ND21 11 to 13).
     Master {
         /// What, and of which drives.
-        calls: Vec<(Drives, MasterCall)>,
+        calls: Vec<(DriveRange, MasterCall)>,
         /// Whether its commands must not run twice, and may end in any way: `master once`.
         once: bool,
     },
@@ -59,11 +59,11 @@ pub enum MasterCall {
     /// `reference K` (13.2.1.1)
     Reference,
     /// `set-actual-value K = TURNS` (13.2.1.2)
-    SetActualValue(Target),
+    SetActualValue(WrittenTarget),
     /// `init-ps K` (13.2.1.3)
     InitPs,
     /// `write-ps K = TURNS` or `= by TURNS` (13.2.2)
-    WritePs(Target),
+    WritePs(WrittenTarget),
     /// `exchange K HHHH [= HHHH]` (9.4)
     Exchange(Pattern, Option<Pattern>),
     /// `start-ps K` (13.2.3)
@@ -74,7 +74,7 @@ pub enum MasterCall {
 
 /// A position as written.
 #[derive(Clone, Debug)]
-pub enum Target {
+pub enum WrittenTarget {
     /// Four bytes: of a target in the format of 13.1.9.
     Bytes(Pattern),
     /// Turns from the zero point.

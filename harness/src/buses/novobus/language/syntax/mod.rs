@@ -8,6 +8,6 @@ pub(crate) mod step;
 
 pub use cell::{CellCheck, CellPlace, Relation, Written};
 pub use check::{Check, Condition, DriveCheck, Ending, Showing};
-pub use header::{Drives, Header, Influence, RingRange, Setup, SetupKind};
-pub use job::{Job, JobKind, MasterCall, Target};
-pub use step::{Fault, FaultKind, LinkEnds, LinkFaultKind, Looks, Recording, RingStep};
+pub use header::{DriveRange, Header, Influence, RingRange, Setup, SetupKind};
+pub use job::{Job, JobKind, MasterCall, WrittenTarget};
+pub use step::{CellRecording, Fault, FaultKind, LinkEnds, LinkFaultKind, Looks, RingStep};

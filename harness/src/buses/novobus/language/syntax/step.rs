@@ -2,7 +2,7 @@
 
 use super::cell::CellPlace;
 use super::check::{Check, DriveCheck};
-use super::header::{Drives, Influence};
+use super::header::{DriveRange, Influence};
 use super::job::Job;
 use crate::buses::novobus::language::Novobus;
 use crate::scenario::expression::Located;
@@ -21,9 +21,9 @@ pub enum RingStep {
     /// `until`: time passes until a check holds, at most this long.
     Until(DriveCheck, Duration),
     /// `drive ...`: something happens to drives from outside the bus.
-    Influence(Drives, Influence),
+    Influence(DriveRange, Influence),
     /// `record`: cells are recorded from here on, or no longer.
-    Record(Recording),
+    Record(CellRecording),
     /// A job of the master.
     Job(Job),
 }
@@ -37,9 +37,9 @@ impl From<RingStep> for Step<Novobus> {
 
 /// A cell that is recorded: `record drive 0 nist every 10ms`.
 #[derive(Clone, Debug)]
-pub struct Recording {
+pub struct CellRecording {
     /// Of which drives.
-    pub drives: Drives,
+    pub drives: DriveRange,
     /// Which cell.
     pub place: CellPlace,
     /// When it is looked at.

@@ -2,7 +2,7 @@
 
 use super::{cell, drives, link, named, which_ring};
 use crate::buses::novobus::language::syntax::{
-    Check, Condition, DriveCheck, Looks, Recording, Showing,
+    CellRecording, Check, Condition, DriveCheck, Looks, Showing,
 };
 use harness_sim::nd21::Mode;
 
@@ -34,7 +34,7 @@ pub(crate) fn check(check: &Check) -> String {
 }
 
 /// `record drive 0 nist every 10ms`
-pub(crate) fn record(recording: &Recording) -> String {
+pub(crate) fn record(recording: &CellRecording) -> String {
     let looks = match recording.looks {
         Looks::Every(time) => format!("every {time}"),
         Looks::Changes => "changes".to_owned(),

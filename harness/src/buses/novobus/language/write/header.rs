@@ -3,7 +3,7 @@
 use super::{cell, drives, named};
 use crate::buses::novobus::language::parse::drive::DEVICES;
 use crate::buses::novobus::language::syntax::header::{
-    Drives, Header, Influence, RingRange, Setup, SetupKind,
+    DriveRange, Header, Influence, RingRange, Setup, SetupKind,
 };
 use harness_proto::nd21::units::INCREMENTS_PER_TURN;
 use harness_sim::nd21::Stimulus;
@@ -80,7 +80,7 @@ fn kind(what: &SetupKind) -> String {
 }
 
 /// What happens to drives from outside the bus: `drive 3 power off`.
-pub(crate) fn influence_on(whom: &Drives, what: &Influence) -> String {
+pub(crate) fn influence_on(whom: &DriveRange, what: &Influence) -> String {
     format!("drive {} {}", drives(whom), influence(what))
 }
 

@@ -3,7 +3,7 @@
 use super::{cell, drives, which_ring};
 use crate::buses::novobus::language::parse::job::FORMS;
 use crate::buses::novobus::language::syntax::{
-    CellPlace, Drives, Job, JobKind, MasterCall, Target, Written,
+    CellPlace, DriveRange, Job, JobKind, MasterCall, Written, WrittenTarget,
 };
 use crate::scenario::pattern::Pattern;
 use crate::scenario::quantity::Tolerance;
@@ -38,14 +38,14 @@ pub(crate) fn job(job: &Job) -> String {
     }
 }
 
-fn exchange(drive: &Drives, send: &Pattern, receive: Option<&Pattern>) -> String {
+fn exchange(drive: &DriveRange, send: &Pattern, receive: Option<&Pattern>) -> String {
     let answer = receive.map(|pattern| format!(" = {pattern}"));
     format!("{} {send}{}", drives(drive), answer.unwrap_or_default())
 }
 
 fn command(
     kind: JobKind,
-    drive: &Drives,
+    drive: &DriveRange,
     (place, data): (Option<&CellPlace>, Option<&Written>),
     tolerance: Option<&Tolerance>,
 ) -> String {
@@ -62,7 +62,7 @@ fn command(
     cell::tolerated(text, tolerance)
 }
 
-fn call(drive: &Drives, call: &MasterCall) -> String {
+fn call(drive: &DriveRange, call: &MasterCall) -> String {
     let simple = |name: &str| format!("{name} {}", drives(drive));
     let eeprom = |name: &str, place: &CellPlace, data: Option<&Pattern>| {
         let data = data.map(|data| format!(" = {data}"));
@@ -94,10 +94,10 @@ fn call(drive: &Drives, call: &MasterCall) -> String {
     }
 }
 
-fn target(target: &Target) -> String {
+fn target(target: &WrittenTarget) -> String {
     match target {
-        Target::Bytes(bytes) => bytes.to_string(),
-        Target::At(turns) => turns.written(),
-        Target::By(turns) => format!("by {}", turns.written()),
+        WrittenTarget::Bytes(bytes) => bytes.to_string(),
+        WrittenTarget::At(turns) => turns.written(),
+        WrittenTarget::By(turns) => format!("by {}", turns.written()),
     }
 }

@@ -8,7 +8,7 @@ mod job;
 
 pub(crate) use header::{devices, header, lines, setup};
 
-use super::syntax::{Drives, LinkEnds, RingStep};
+use super::syntax::{DriveRange, LinkEnds, RingStep};
 
 /// A step, with its symbol or its word.
 pub(crate) fn step(step: &RingStep) -> String {
@@ -30,7 +30,7 @@ pub(crate) const fn ring_prefix(ring: usize) -> &'static str {
 }
 
 /// `95..99`, `2:0..last`
-pub(super) fn drives(drives: &Drives) -> String {
+pub(super) fn drives(drives: &DriveRange) -> String {
     let prefix = ring_prefix(drives.ring);
     match &drives.to {
         None => format!("{prefix}{}", drives.from),

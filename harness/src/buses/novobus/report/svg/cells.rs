@@ -1,8 +1,8 @@
 //! The bytes of a diagram, and equal neighbours put together.
 
-use super::{MAX_ROWS, Scale};
+use super::{MAX_ROWS, RowPlacing};
 use crate::report::csv::{remark, status};
-use crate::report::walk::{Reader, State};
+use crate::report::walk::{Reader, SenderState};
 use harness_proto::novobus::error_mode::Marks;
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::LineByte;
@@ -13,7 +13,7 @@ use std::ops::Range;
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Cell {
     at: u64,
-    state: State,
+    state: SenderState,
     /// What was sent and what arrived.
     status: String,
     letters: String,
@@ -115,7 +115,7 @@ pub(crate) struct Area {
     /// When the first one and the last one had passed.
     pub(crate) from: u64,
     pub(crate) to: u64,
-    pub(crate) state: State,
+    pub(crate) state: SenderState,
     pub(crate) status: String,
     pub(crate) letters: String,
     pub(crate) words: String,
@@ -125,7 +125,7 @@ pub(crate) struct Area {
 }
 
 /// Every byte is in one area; side by side only where rows are aligned. In order of rows.
-pub(crate) fn areas(columns: &Columns, scale: Scale) -> Vec<Area> {
+pub(crate) fn areas(columns: &Columns, scale: RowPlacing) -> Vec<Area> {
     let links = &columns.links;
     let height = links.iter().map(Vec::len).max().unwrap_or(0);
     let mut taken: Vec<Vec<bool>> = links.iter().map(|l| vec![false; l.len()]).collect();
@@ -139,7 +139,7 @@ pub(crate) fn areas(columns: &Columns, scale: Scale) -> Vec<Area> {
                 links[link].get(row).is_some_and(|other| cell.like(other)) && !taken[link][row]
             };
             let mut end = link + 1;
-            while scale == Scale::Index && end < links.len() && free(end, row) {
+            while scale == RowPlacing::Index && end < links.len() && free(end, row) {
                 end += 1;
             }
             let mut below = row + 1;
@@ -171,8 +171,8 @@ pub(crate) fn areas(columns: &Columns, scale: Scale) -> Vec<Area> {
 }
 
 /// By time, bytes with a gap between them are not drawn as one.
-fn near(columns: &Columns, scale: Scale, link: usize, row: usize) -> bool {
+fn near(columns: &Columns, scale: RowPlacing, link: usize, row: usize) -> bool {
     const LONGEST: u64 = 2 * 11 * 312_500;
     let at = |row: usize| columns.links[link].get(row).map_or(0, |cell| cell.at);
-    scale == Scale::Index || at(row).saturating_sub(at(row - 1)) < LONGEST
+    scale == RowPlacing::Index || at(row).saturating_sub(at(row - 1)) < LONGEST
 }
