@@ -189,19 +189,23 @@ impl Bus {
     }
 }
 
-/// Serves simulated drives of a bus of frames; `None` if the bus carries no frames, or is not built.
+/// Serves simulated drives of a bus of frames: as many, with what a header says of them. `None` if the bus carries no frames, or is not
+/// built.
+///
+/// # Errors
+/// The header has mistakes.
 pub(crate) fn serve_frames(
     bus: Bus,
-    drives: u8,
+    (drives, header): (Option<u8>, Option<&Source>),
     job: &FrameJob,
     host: &mut dyn Host,
-) -> Option<Result<End, ServeError>> {
+) -> Result<Option<Result<End, ServeError>>, Problems> {
     match bus {
         Bus::Unitek => {
-            let setup = unitek::simulate::Setup::of(drives);
-            Some(unitek::serve::serve(&setup, job, host))
+            let plan = unitek::serve::bench(drives, header)?;
+            Ok(Some(unitek::serve::serve(plan, job, host)))
         }
-        Bus::Novobus | Bus::Nordac => None,
+        Bus::Novobus | Bus::Nordac => Ok(None),
     }
 }
 

@@ -81,7 +81,7 @@ impl Server {
 }
 
 /// The first mistake in a line, and where it stands: characters counted from 1.
-fn first(line: &str, problems: &Problems) -> String {
+pub(crate) fn first(line: &str, problems: &Problems) -> String {
     let Some(problem) = problems.all().first() else {
         return problems.to_string();
     };

@@ -16,6 +16,7 @@ mod shell;
 mod tcp;
 
 pub use control::Answer;
+pub(crate) use control::first;
 pub use place::{ClientRole, ControlPlace, Inner, ServedAt};
 pub use server::{Marks, Pace, Server};
 pub use shell::{End, Host, Job, ServeError, serve};

@@ -250,3 +250,35 @@ fn the_bench_s_own_link_talks_to_a_drive() {
         assert_eq!(listener.refused(), 1, "{place:?}");
     }
 }
+
+/// Header lines describe the drives, and lines of control act on them while a client listens (ex 10-1).
+#[test]
+fn drives_are_set_up_and_acted_on() {
+    let setup = path("can-setup.scn");
+    std::fs::write(&setup, "rate 250\ndrive 3 rx 210 tx 190\n").expect("room");
+    let setup = setup.to_str().expect("text");
+    let places = ["--slcan", "127.0.0.1:0", "--control", "127.0.0.1:0"];
+    let mut sim = start(&[&["--setup", setup][..], &places].concat());
+    let line = sim.line();
+    assert!(
+        line.starts_with("slcan: 1 drive, 250 kbit/s at 127.0.0.1:"),
+        "{line}"
+    );
+    let mut slcan = connect(line.split(' ').next_back().expect("a word"));
+    let mut control = connect(&sim.address());
+    slcan
+        .write_all(b"S5\rO\rt2103520C00\rt2103511000\rt21033D5100\r")
+        .expect("sent");
+    assert_eq!(until(&mut slcan, "00\r"), "\r\rz\rz\rz\rt190451100000\r");
+    control
+        .write_all(b"drive 3 input limit1 high\nstate 3 MODE\n")
+        .expect("sent");
+    assert_eq!(until(&mut control, "\n"), "ok\n");
+    assert_eq!(until(&mut control, "\n"), "ok MODE=0010\n");
+    assert_eq!(until(&mut slcan, "\r"), "t1906400501000000\r");
+    let wrong = path("can-wrong.scn");
+    std::fs::write(&wrong, "drive 1 colour = red\n").expect("room");
+    let wrong = wrong.to_str().expect("text");
+    let mut sim = start(&["--setup", wrong, "--slcan", "127.0.0.1:0"]);
+    assert_eq!(sim.code(), Some(2));
+}

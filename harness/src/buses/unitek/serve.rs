@@ -1,81 +1,170 @@
 //! Simulated UNITEK drives that clients share, in real time.
 
-use super::simulate::{Bench, Setup};
+use super::language::now::{NotNow, now};
+use super::language::{Unitek, plan};
+use super::simulate::{Bench, DriveSetup, Setup};
+use crate::counted::counted;
+use crate::scenario::parse::header::{Part, parse_step, read};
+use crate::scenario::plan::{Plan, plan as settle, plan_step};
+use crate::scenario::problem::Problems;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Scenario;
 use crate::serve::frames::{FrameJob, MOST_CLIENTS, SharedBus, serve_frames};
-use crate::serve::{Answer, End, Host, ServeError};
+use crate::serve::{Answer, End, Host, ServeError, first};
 use harness_proto::can::BitRate;
 use harness_proto::time::Instant;
+use harness_proto::unitek::Register;
 use harness_sim::segment;
 use harness_sim::unitek::Member;
 
-/// Serves the drives of a setup until the job is done.
+/// The registers that `state` shows without others: MODE, STATUS, errors, ready, speed, position.
+const STATE: [u8; 6] = [0x51, 0x40, 0x8F, 0xE2, 0x30, 0x6D];
+
+/// Serves drives until the job is done.
 ///
 /// # Errors
 /// A place cannot be opened, or the system fails.
-pub(crate) fn serve(setup: &Setup, job: &FrameJob, host: &mut dyn Host) -> Result<End, ServeError> {
-    serve_frames(shared(setup), job, host)
+pub(crate) fn serve(
+    plan: Plan<Unitek>,
+    job: &FrameJob,
+    host: &mut dyn Host,
+) -> Result<End, ServeError> {
+    serve_frames(Shared::new(plan), job, host)
 }
 
-/// A bench with places for clients. Its own host neither sends nor acknowledges.
-pub(crate) fn shared(setup: &Setup) -> Bench {
-    let mut bench = Bench::with_guests(setup, MOST_CLIENTS);
-    bench.segment.keep_no_record();
-    if let Some(host) = bench.host() {
-        *host = segment::Host::listener();
+/// The bench of a header, and nodes 1 to `drives` on it. By default that is node 1, if the header has no drive.
+///
+/// # Errors
+/// The header has mistakes. Steps behind it are ignored.
+pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<Unitek>, Problems> {
+    let empty = Source {
+        name: "setup".to_owned(),
+        text: "".into(),
+    };
+    let header = header.unwrap_or(&empty);
+    let mut scenario: Scenario<Unitek> = read(header, Part::Header)?;
+    scenario.steps.clear();
+    let mut plan = settle(&scenario, header, None)?;
+    let own: &mut plan::Bench = &mut plan.setup;
+    let least = u8::from(own.setup.drives.is_empty());
+    for node in 1..=drives.unwrap_or(least) {
+        if !own.setup.drives.iter().any(|drive| drive.node == node) {
+            own.setup.drives.push(DriveSetup::new(node));
+        }
     }
-    bench
+    Ok(plan)
 }
 
-impl Bench {
+/// A simulated bench that clients share.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    bench: Bench,
+    plan: Plan<Unitek>,
+}
+
+impl Shared {
+    /// A bench with places for clients. Its own host neither sends nor acknowledges.
+    pub(crate) fn new(plan: Plan<Unitek>) -> Self {
+        let setup: &Setup = &plan.setup.setup;
+        let mut bench = Bench::with_guests(setup, MOST_CLIENTS);
+        bench.segment.keep_no_record();
+        if let Some(host) = bench.host() {
+            *host = segment::Host::listener();
+        }
+        Self { bench, plan }
+    }
+
     /// The place of a client: behind the bench's host and the drives.
     fn guest(&self, client: usize) -> usize {
-        1 + self.nodes.len() + client
+        1 + self.bench.nodes.len() + client
+    }
+
+    /// What registers of a drive hold, in hexadecimal digits.
+    fn state(&self, mut words: std::str::SplitWhitespace<'_>) -> Result<String, String> {
+        let node = words.next().and_then(|word| word.parse().ok());
+        let drive = node.and_then(|node| self.bench.drive(node)).ok_or(
+            "`state` and a drive of the bus expected: `state 1`, `state 1 SPEED_ACTUAL 6E`",
+        )?;
+        let named = words.map(|word| Register::named(word).map_err(|error| error.to_string()));
+        let named: Vec<_> = named.collect::<Result<_, _>>()?;
+        let usual = || STATE.map(Register::of).to_vec();
+        let registers = if named.is_empty() { usual() } else { named };
+        let shown = registers.iter().map(|register| {
+            let digits = register.width.bits() as usize / 4;
+            let raw = drive.register(register.number);
+            format!("{}={raw:0digits$X}", register.name)
+        });
+        Ok(shown.collect::<Vec<_>>().join(" "))
     }
 }
 
-impl SharedBus for Bench {
+impl SharedBus for Shared {
     fn rate(&self) -> BitRate {
-        self.segment.rate()
+        self.bench.segment.rate()
     }
 
     fn about(&self) -> String {
-        let drives = crate::counted::counted(self.nodes.len() as u64, "drive");
-        format!("{drives}, {}", self.segment.rate())
+        let drives = counted(self.bench.nodes.len() as u64, "drive");
+        format!("{drives}, {}", self.rate())
     }
 
     fn now(&self) -> Instant {
-        self.now
+        self.bench.now
     }
 
     fn advance(&mut self, to: Instant) {
-        while let Some(&(at, _)) = self.scheduled.front()
+        while let Some(&(at, _)) = self.bench.scheduled.front()
             && at <= to
         {
-            self.run_to(at);
+            self.bench.run_to(at);
         }
-        self.run_to(to);
-        if let Some(host) = self.host() {
+        self.bench.run_to(to);
+        if let Some(host) = self.bench.host() {
             host.forget();
         }
     }
 
     fn next_event(&self) -> Option<Instant> {
-        let scheduled = self.scheduled.front().map(|(at, _)| *at);
-        self.segment.next_event().into_iter().chain(scheduled).min()
+        let scheduled = self.bench.scheduled.front().map(|(at, _)| *at);
+        let event = self.bench.segment.next_event();
+        event.into_iter().chain(scheduled).min()
     }
 
     fn host(&mut self, client: usize) -> Option<&mut segment::Host> {
         let place = self.guest(client);
-        self.segment.station_mut(place).host_mut()
+        self.bench.segment.station_mut(place).host_mut()
     }
 
     fn put(&mut self, client: usize, host: segment::Host) {
         let place = self.guest(client);
-        *self.segment.station_mut(place) = Member::Host(host);
-        self.segment.restart(place);
+        *self.bench.segment.station_mut(place) = Member::Host(host);
+        self.bench.segment.restart(place);
     }
 
-    fn control(&mut self, _line: &str) -> Option<Answer> {
-        None
+    /// A fault (`! frame 3: lost`), something that happens to a drive from outside the bus (`drive 1 input limit1 high`), or a check of a
+    /// register (`? drive 1 register 6E = 0`). `state 1` asks what a drive shows, `state 1 SPEED_ACTUAL 6E` for these registers.
+    fn control(&mut self, line: &str) -> Option<Answer> {
+        let said = line.trim();
+        if said.is_empty() || said.starts_with('#') {
+            return None;
+        }
+        let source = match Source::from_bytes("control".to_owned(), line.trim_end().into()) {
+            Ok(source) => source,
+            Err(error) => return Some(Answer::Error(error.to_string())),
+        };
+        let mut words = said.split_whitespace();
+        if words.next() == Some("state") {
+            return Some(self.state(words).map_or_else(Answer::Error, Answer::State));
+        }
+        let step =
+            parse_step::<Unitek>(&source).and_then(|step| plan_step(&self.plan, &step, &source));
+        Some(match step {
+            Err(problems) => Answer::Error(first(&source.text, &problems)),
+            Ok(step) => match now(&mut self.bench, &step) {
+                Ok(()) => Answer::Ok,
+                Err(NotNow::Otherwise(found)) => Answer::No(found),
+                Err(NotNow::Refused(why)) => Answer::Error(why.to_owned()),
+            },
+        })
     }
 }

@@ -1,8 +1,8 @@
 //! Clients of a simulated bus in virtual time: nothing here depends on the speed of a machine.
 
-use super::serve::shared;
-use super::simulate::{Bench, Setup};
-use crate::link::{DriveFault, Link, Moment, PlacedFault};
+use super::serve::{Shared, bench};
+use crate::scenario::source::Source;
+use crate::serve::Answer;
 use crate::serve::frames::{FrameServer, MOST_CLIENTS, Protocol, SharedBus};
 use harness_proto::time::{Instant, Span};
 use std::time::Duration;
@@ -12,20 +12,21 @@ fn at(micros: u64) -> Instant {
 }
 
 /// A server with drives as delivered; its time began 1000.5 s after 1970.
-fn server(drives: u8) -> FrameServer<Bench> {
+fn server(drives: u8) -> FrameServer<Shared> {
     let started = Duration::from_millis(1_000_500);
-    FrameServer::new(shared(&Setup::of(drives)), started)
+    let plan = bench(Some(drives), None).expect("no header");
+    FrameServer::new(Shared::new(plan), started)
 }
 
 /// A client that has opened its channel.
-fn slcan(server: &mut FrameServer<Bench>, opening: &str) -> usize {
+fn slcan(server: &mut FrameServer<Shared>, opening: &str) -> usize {
     let client = server.come(Protocol::Slcan).expect("a place");
     assert_eq!(server.receive(client, opening.as_bytes()), [""; 0]);
     took(server, client);
     client
 }
 
-fn socketcand(server: &mut FrameServer<Bench>) -> usize {
+fn socketcand(server: &mut FrameServer<Shared>) -> usize {
     let client = server.come(Protocol::Socketcand).expect("a place");
     assert_eq!(took(server, client), "< hi >");
     assert_eq!(
@@ -37,14 +38,14 @@ fn socketcand(server: &mut FrameServer<Bench>) -> usize {
 }
 
 /// What the client reads now.
-fn took(server: &mut FrameServer<Bench>, client: usize) -> String {
+fn took(server: &mut FrameServer<Shared>, client: usize) -> String {
     let text = String::from_utf8_lossy(server.transmit(client)).into_owned();
     server.transmitted(client, text.len());
     text
 }
 
 /// Lets time pass as the shell does: from deadline to deadline.
-fn run(server: &mut FrameServer<Bench>, until: Instant) {
+fn run(server: &mut FrameServer<Shared>, until: Instant) {
     server.advance(server.deadline().min(until));
     while server.deadline() < until {
         server.advance(server.deadline());
@@ -100,8 +101,7 @@ fn a_frame_that_nobody_acknowledges() {
     let mut server = server(1);
     let one = slcan(&mut server, "O\r");
     let listener = slcan(&mut server, "L\r");
-    let off = PlacedFault::Drive(1, DriveFault::Off);
-    server.bus().inject(0, off, Moment::Now);
+    assert_eq!(server.bus().control("! drive 1: off"), Some(Answer::Ok));
     server.receive(one, b"t20133D1B00\r");
     run(&mut server, at(50_000));
     assert_eq!(took(&mut server, one), "z\r");
@@ -228,4 +228,84 @@ fn an_idle_bus_rests_and_a_late_server_resumes() {
     server.advance(at(3_600_000_000));
     let came = took(&mut server, one).matches("t181").count();
     assert!((9..=10).contains(&came), "a second was made up for: {came}");
+}
+
+/// Lines of control act on drives beside the clients, and an event is sent for what they do (ex 10-1).
+#[test]
+fn lines_of_control_act_on_drives() {
+    let mut server = server(1);
+    let one = slcan(&mut server, "O\r");
+    server.receive(one, b"t2013520C00\rt2013511000\r");
+    run(&mut server, at(10_000));
+    took(&mut server, one);
+    let mut control = |line: &str| server.bus().control(line).map(|answer| answer.to_string());
+    assert_eq!(control("drive 1 input limit1 high").as_deref(), Some("ok"));
+    assert_eq!(
+        control("? drive 1 register 52 = 0000000C").as_deref(),
+        Some("ok")
+    );
+    let no = control("? drive 1 register 51 = 0").expect("an answer");
+    assert!(no.starts_with("no: register 51 (MODE) reads 0010"), "{no}");
+    assert_eq!(
+        control("state 1 MODE 52").as_deref(),
+        Some("ok MODE=0010 STATUS_MASK=0000000C")
+    );
+    let state = control("state 1").expect("an answer");
+    assert!(
+        state.starts_with("ok MODE=0010 STATUS=00000105 ERR_BITMAP1=00000000 "),
+        "{state}"
+    );
+    for line in [
+        "state 2",
+        "state",
+        "state 1 NONSENSE",
+        "? drive 2 register 51 = 0",
+        "> 201 51 00 00",
+        "+5ms drive 1 restart",
+        "hello",
+        "read 1 MODE",
+    ] {
+        let answer = control(line).expect("an answer");
+        assert!(answer.starts_with("error: "), "{line}: {answer}");
+    }
+    assert_eq!((control("  "), control("# nothing")), (None, None));
+    run(&mut server, at(20_000));
+    assert_eq!(took(&mut server, one), "t1816400501000000\r");
+    assert_eq!(server.bus().control("! frame 1: lost"), Some(Answer::Ok));
+    server.receive(one, b"t20133D1B00\rt20133D5100\r");
+    run(&mut server, at(30_000));
+    assert_eq!(took(&mut server, one), "z\rz\rt181451100000\r");
+}
+
+/// A header describes the drives; those that `--drives` asks for are added.
+#[test]
+fn a_header_describes_the_drives() {
+    let source = |text: &str| Source {
+        name: "desk.scn".to_owned(),
+        text: text.into(),
+    };
+    let nodes = |drives, text: &str| {
+        let plan = bench(drives, Some(&source(text))).expect("a header");
+        let own = plan.setup.setup.drives.iter();
+        own.map(|own| (own.node, own.identifiers.0))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(nodes(None, "rate 250\n"), [(1, 0x201)]);
+    assert_eq!(nodes(None, "drive 3 rx 210 tx 190\n"), [(3, 0x210)]);
+    assert_eq!(
+        nodes(Some(2), "drive 2 rx 210 tx 190\n> 210 51 04 00\n"),
+        [(2, 0x210), (1, 0x201)]
+    );
+    let plan = bench(
+        None,
+        Some(&source("rate 250\ndrive 1 register 1B = 0200\n")),
+    )
+    .expect("a header");
+    let mut server = FrameServer::new(Shared::new(plan), Duration::ZERO);
+    assert_eq!(server.about(), "1 drive, 250 kbit/s");
+    let one = slcan(&mut server, "S5\rO\r");
+    server.receive(one, b"t20133D1B00\r");
+    run(&mut server, at(10_000));
+    assert_eq!(took(&mut server, one), "z\rt18141B000200\r");
+    assert!(bench(None, Some(&source("drive 1 colour = red\n"))).is_err());
 }

@@ -153,6 +153,11 @@ impl Bench {
         Some(drive.drive())
     }
 
+    /// How many frames have won the bus so far.
+    pub(super) const fn frames(&self) -> u64 {
+        self.segment.frames()
+    }
+
     fn place(&self, node: u8) -> Option<usize> {
         let place = self.nodes.iter().position(|own| *own == node)?;
         Some(place + 1)

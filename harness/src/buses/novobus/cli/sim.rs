@@ -9,6 +9,7 @@ use crate::cli::frames::FrameArguments;
 use crate::cli::output::Output;
 use crate::file::values::Wire;
 use crate::scenario::argument::duration;
+use crate::scenario::source::Source;
 use crate::serve::frames::FrameJob;
 use crate::serve::{
     ClientRole, ControlPlace, End, Host, Inner, Job, Marks, Pace, ServeError, ServedAt, Server,
@@ -26,7 +27,8 @@ place of a CAN bus, such as `slcan: 1 drive, 500 kbit/s at 127.0.0.1:40123`, and
 
 Drives on CAN: `sim --bus unitek --drives 2 --slcan 127.0.0.1:4100 --socketcand 127.0.0.1:29536`. All clients share the
 bus: each frame goes through the arbitration and reaches the other clients. With SLCAN a client opens its channel with
-the rate of the bus (S6 is 500 kbit/s) or none; with socketcand any name of a bus is taken.
+the rate of the bus (S6 is 500 kbit/s) or none; with socketcand any name of a bus is taken. The header lines of --setup
+describe the drives: `rate 250`, `drive 1 profile fw472`, `drive 3 rx 210 tx 190`, `drive 1 input run low`.
 
 A control line is a line of the scenario language that sends no byte of the master. It takes effect at once:
   ! 1->0: flip 0                  a fault; `byte n` and times count from the start; if that byte has passed, the
@@ -34,6 +36,11 @@ A control line is a line of the scenario language that sends no byte of the mast
   drive 0 input GPIN5 low         an event outside the bus
   ? drive 0 nist = 0rpm +-5rpm    a check of drives or of the error mode
   state 0                         mode, outputs, bus error; `state 2:0 nist FF08:2`: these cells
+On CAN:
+  ! frame 3: lost                 a fault of a frame; frames count from the start
+  drive 1 input limit1 high       an event outside the bus
+  ? drive 1 register 6E = 0       a check of a register
+  state 1                         what the drive shows; `state 1 SPEED_ACTUAL 6E`: these registers
 The answer to each is one line: `ok` (and the state), `no: ` and what was found, or `error: ` and the reason.
 
 --tap and --cut take a link, `=`, and a place: a path (with a `/` in it) for a pseudo terminal, HOST:PORT for a socket.
@@ -228,8 +235,6 @@ fn frames(
         ("--pace", arguments.pace != Speed::Line),
         ("--marks", arguments.marks != MarksForm::None),
         ("--rig", arguments.rig.rig.is_some()),
-        ("--setup", arguments.rig.setup.is_some()),
-        ("--control", arguments.control.is_some()),
     ];
     if let Some((option, _)) = rings.iter().find(|(_, given)| *given) {
         return Err(Failure::refused(format!(
@@ -244,8 +249,10 @@ fn frames(
         once: arguments.once,
         length: arguments.length,
     };
-    let served = buses::serve_frames(bus, arguments.frames.drives, &job, output);
-    served.ok_or_else(|| {
+    let header = arguments.rig.setup.as_deref().map(Source::read).transpose();
+    let header = header.map_err(|error| Failure::File(error.into()))?;
+    let drives = (arguments.frames.drives, header.as_ref());
+    buses::serve_frames(bus, drives, &job, output)?.ok_or_else(|| {
         Failure::refused(format!(
             "the bus {} is not built yet; novobus or unitek expected",
             bus.name()

@@ -1,5 +1,6 @@
 //! The words of the scenario language that belong to UNITEK drives on CAN: drives, frames, registers, jobs.
 
+pub(crate) mod now;
 mod parse;
 pub mod plan;
 mod play;

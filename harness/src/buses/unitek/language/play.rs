@@ -162,10 +162,15 @@ impl WantedValue {
 
     /// Compares what a reply says.
     fn judge(&self, span: Span, reply: &Reply) -> Result<(), Stop> {
-        self.compare(span, reply.number(), reply.data.bits())
+        self.compared(span, reply.number(), reply.data.bits())
     }
 
-    fn compare(&self, span: Span, number: i64, raw: u32) -> Result<(), Stop> {
+    /// Compares the contents of the register itself.
+    pub(super) fn compare(&self, span: Span, raw: u32) -> Result<(), Stop> {
+        self.compared(span, Register::of(self.register).number_of(raw), raw)
+    }
+
+    fn compared(&self, span: Span, number: i64, raw: u32) -> Result<(), Stop> {
         if self.is_met(number) {
             return Ok(());
         }
@@ -255,7 +260,7 @@ pub(super) fn act(
     Ok(())
 }
 
-fn from_outside(node: u8, stimulus: unitek::Stimulus) -> PlacedFault {
+pub(super) fn from_outside(node: u8, stimulus: unitek::Stimulus) -> PlacedFault {
     PlacedFault::Stimulus(node, Stimulus::Unitek(stimulus))
 }
 
@@ -281,9 +286,7 @@ fn look(
     let bench = runner.link.beside();
     let drive = bench.and_then(|own| own.downcast_ref::<Bench>()?.drive(node));
     if let Some(drive) = drive {
-        let raw = drive.register(wanted.register);
-        let number = Register::of(wanted.register).number_of(raw);
-        return wanted.compare(span, number, raw);
+        return wanted.compare(span, drive.register(wanted.register));
     }
     let drives = &runner.plan.setup.setup.drives;
     let own = drives.iter().find(|own| own.node == node);
