@@ -3,6 +3,7 @@
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcsetwinsize};
 use std::io::Read as _;
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 fn command(arguments: &[&str]) -> Command {
@@ -196,16 +197,52 @@ fn bash_completes_names() {
     assert!(completed("--color ").starts_with("auto\n"));
 }
 
+/// The scripts for the other shells, each run by its own shell.
 #[test]
-fn there_are_scripts_for_three_shells() {
-    for (shell, words) in [
-        ("bash", "complete -o filenames -F _drivebench drivebench"),
-        ("zsh", "#compdef drivebench"),
-        ("fish", "complete -c drivebench"),
-    ] {
+fn zsh_and_fish_complete_names() {
+    // zsh completes in an editor only: the two calls by which the script gives names are printed.
+    let in_zsh = "compdef() { }\ncompadd() { shift; print -l -- \"$@\" }\n_files() { local f; for f in \"${words[CURRENT]}\"*(N); do print -- $f; done }\n";
+    let zsh = |script: &str, line: &str| {
+        let count = line.split(' ').count();
+        let script =
+            format!("{in_zsh}{script}\nwords=({line}\"\")\nCURRENT={count}\n_drivebench\n");
+        vec!["-f".to_owned(), "-c".to_owned(), script]
+    };
+    let fish = |script: &str, line: &str| {
+        let script = format!("{script}\ncomplete -C '{line}'\n");
+        vec!["--no-config".to_owned(), "-c".to_owned(), script]
+    };
+    let shells: [(&str, &dyn Fn(&str, &str) -> Vec<String>); 2] = [("zsh", &zsh), ("fish", &fish)];
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("9.7-own.scn"), "").expect("room");
+    let program = Path::new(env!("CARGO_BIN_EXE_drivebench"));
+    let path = std::env::var("PATH").unwrap_or_default();
+    let path = format!("{}:{path}", program.parent().expect("a folder").display());
+    for (shell, arguments) in shells {
+        if Command::new(shell).arg("--version").output().is_err() {
+            eprintln!("skipped: {shell} is not installed (.ci/tools)");
+            continue;
+        }
         let script = stdout(&drivebench(&["completions", shell]));
-        assert!(script.contains(words), "{script}");
-        assert!(script.contains(" complete -- "), "{script}");
+        let completed = |line: &str| {
+            let mut command = Command::new(shell);
+            command
+                .args(arguments(&script, &format!("drivebench {line}")))
+                .env("PATH", &path)
+                .env("HOME", folder.path())
+                .current_dir(folder.path());
+            let output = command.output().expect("the shell");
+            assert_eq!(stderr(&output), "", "{shell}: {line}");
+            stdout(&output)
+        };
+        let names = completed("run --ring 100 9.7-");
+        assert!(names.contains("9.7-parity-error\n"), "{shell}: {names}");
+        assert!(names.contains("9.7-own.scn\n"), "{shell}: {names}");
+        assert_eq!(completed("read 0 nsollr"), "nsollrampe\n", "{shell}");
+        assert_eq!(completed("deviat"), "deviations\n", "{shell}");
+        assert_eq!(completed("run --rig sim:1"), "sim:1\n", "{shell}");
+        let deviation = completed("fuzz run --deviates 1=writes-ig");
+        assert_eq!(deviation, "1=writes-ignored\n", "{shell}");
     }
 }
 
