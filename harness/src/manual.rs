@@ -1,10 +1,35 @@
-//! The manual's tables and examples, which scenario pins each, and the errata ledger.
+//! The manuals' tables and examples, which scenario pins each, and the errata ledgers.
 
+use crate::buses::{Bus, MANUALS};
 use crate::library::Entry;
 use serde::Deserialize;
 
-const TABLES: &str = include_str!("../../corpora/manual/nd21-tables.toml");
-const ERRATA: &str = include_str!("../../corpora/manual/errata.toml");
+/// The manual of a bus.
+#[derive(Clone, Copy, Debug)]
+pub struct Manual {
+    /// The bus.
+    pub bus: Bus,
+    /// What it is called.
+    pub title: &'static str,
+    /// The document in a `source` line.
+    pub document: &'static str,
+    pub(crate) tables: &'static str,
+    pub(crate) errata: &'static str,
+    pub(crate) open: fn() -> Vec<Open>,
+}
+
+/// What a manual leaves open: a property of a drive.
+#[derive(Clone, Debug)]
+pub struct Open {
+    /// The section.
+    pub section: &'static str,
+    /// The name of the property.
+    pub name: &'static str,
+    /// What it can be, the default first.
+    pub values: String,
+    /// What it decides.
+    pub about: &'static str,
+}
 
 /// What a ledger says of an erratum that no scenario shows yet.
 pub const NOT_YET: &str = "not yet";
@@ -13,7 +38,7 @@ pub const NOT_YET: &str = "not yet";
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ManualTable {
-    /// The reference that a scenario's `source` line gives: `nd21 9.7`.
+    /// The reference that a scenario's `source` line gives: the document, a section, and an item where the section has several.
     pub id: String,
     /// The section.
     pub section: String,
@@ -55,20 +80,50 @@ struct Errata {
     erratum: Vec<Erratum>,
 }
 
-/// The tables and examples, in order of the manual.
-///
-/// # Errors
-/// The embedded catalogue is damaged; a test keeps it whole.
-pub fn tables() -> Result<Vec<ManualTable>, toml::de::Error> {
-    Ok(toml::from_str::<Tables>(TABLES)?.table)
+impl Manual {
+    /// Every manual.
+    #[must_use]
+    pub const fn all() -> &'static [Self] {
+        &MANUALS
+    }
+
+    /// The tables and examples, in order of the manual.
+    ///
+    /// # Errors
+    /// The embedded catalogue is damaged; a test keeps it whole.
+    pub fn tables(&self) -> Result<Vec<ManualTable>, toml::de::Error> {
+        Ok(toml::from_str::<Tables>(self.tables)?.table)
+    }
+
+    /// The errata ledger, in order of the manual.
+    ///
+    /// # Errors
+    /// The embedded ledger is damaged; a test keeps it whole.
+    pub fn errata(&self) -> Result<Vec<Erratum>, toml::de::Error> {
+        Ok(toml::from_str::<Errata>(self.errata)?.erratum)
+    }
+
+    /// What it leaves open.
+    #[must_use]
+    pub fn open(&self) -> Vec<Open> {
+        (self.open)()
+    }
 }
 
-/// The errata ledger, in order of the manual.
+/// The tables and examples of the manual of [`Bus::DEFAULT`].
 ///
 /// # Errors
-/// The embedded ledger is damaged; a test keeps it whole.
+/// As of [`Manual::tables`].
+pub fn tables() -> Result<Vec<ManualTable>, toml::de::Error> {
+    MANUALS[0].tables()
+}
+
+/// The errata ledger of the manual of [`Bus::DEFAULT`].
+///
+/// # Errors
+/// As of [`Manual::errata`].
 pub fn errata() -> Result<Vec<Erratum>, toml::de::Error> {
-    Ok(toml::from_str::<Errata>(ERRATA)?.erratum)
+    MANUALS[0].errata()
 }
 
 /// The scenarios that pin a table.

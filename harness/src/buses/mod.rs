@@ -28,6 +28,7 @@ pub use novobus::language::Novobus as DefaultBus;
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
 
 use crate::link::{InnerLink, Link, PortLink};
+use crate::manual::Manual;
 use crate::port::Wire;
 use crate::rig::port_file::Node;
 use crate::scenario::plan::Plan;
@@ -46,6 +47,9 @@ use std::io::Write;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+
+/// The manuals of the buses; that of [`Bus::DEFAULT`] first.
+pub(crate) const MANUALS: [Manual; 2] = [novobus::manual::MANUAL, unitek::manual::MANUAL];
 
 /// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
 type Found = Result<(Scenario, Arc<dyn Settled>), Problems>;

@@ -12,6 +12,7 @@ mod import;
 mod junit;
 mod list;
 mod man;
+mod manual;
 pub(crate) mod output;
 mod page;
 mod promote;
@@ -70,7 +71,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Import(arguments) => import::import(&arguments, output),
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector => import::dissector(output),
-        Command::Manual(arguments) => crate::buses::commands::manual::manual(&arguments, output),
+        Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => crate::buses::commands::cells::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify(arguments) => verify::verify(&arguments, output),

@@ -12,4 +12,5 @@ mod guard;
 mod language;
 mod naming;
 mod twin;
+mod unitek;
 mod vectors;

@@ -12,6 +12,7 @@ pub mod guard;
 pub mod language;
 pub mod link;
 pub mod locate;
+pub(crate) mod manual;
 pub mod qualify;
 pub mod report;
 pub mod rig;

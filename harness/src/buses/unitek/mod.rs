@@ -3,6 +3,7 @@
 pub mod driver;
 pub mod gate;
 pub mod language;
+pub(crate) mod manual;
 pub mod report;
 pub mod rig;
 pub mod safe_state;

@@ -10,7 +10,6 @@ pub(crate) mod distil;
 mod failure;
 mod file;
 mod info;
-pub(crate) mod manual;
 mod params;
 mod params_file;
 mod position;

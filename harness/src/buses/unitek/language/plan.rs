@@ -89,8 +89,19 @@ pub enum Act {
         /// What it must read, if that matters.
         wanted: Option<WantedValue>,
     },
-    /// A job of the driver, and what it must read.
-    Driver(u8, master::Job, Option<WantedValue>),
+    /// A job of the driver, and how it must end.
+    Driver(u8, master::Job, WantedOutcome),
+}
+
+/// How a job of the driver must end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WantedOutcome {
+    /// It is done.
+    Done,
+    /// It has read this.
+    Reads(WantedValue),
+    /// The drive did not become ready, and is not released.
+    NotReady,
 }
 
 /// What settles the steps.
@@ -404,7 +415,7 @@ impl Planner {
                 register: register(name, self.scope)?.number,
             },
             JobKind::Lock => mode(harness_proto::unitek::words::MODE_LOCK),
-            JobKind::Release | JobKind::StartUp => mode(0),
+            JobKind::Release | JobKind::StartUp(_) => mode(0),
         };
         Ok(Act::Send(encoded(request)?))
     }
@@ -437,10 +448,14 @@ impl Planner {
                 let register = number(name)?;
                 (master::Job::Stop { register }, None)
             }
-            JobKind::StartUp | JobKind::Lock | JobKind::Release => {
+            JobKind::StartUp(_) | JobKind::Lock | JobKind::Release => {
                 let patience = PATIENCE;
                 (master::Job::StartUp { patience }, None)
             }
+        };
+        let wanted = match job.what {
+            JobKind::StartUp(true) => WantedOutcome::NotReady,
+            _ => wanted.map_or(WantedOutcome::Done, WantedOutcome::Reads),
         };
         Ok(Act::Driver(drive.node, own, wanted))
     }

@@ -1,7 +1,7 @@
 //! Plays the steps of this bus.
 
 use super::Unitek;
-use super::plan::{Act, WantedFrame, WantedValue};
+use super::plan::{Act, WantedFrame, WantedOutcome, WantedValue};
 use super::syntax::DriveHarm;
 use super::write::identifier;
 use crate::buses::Stimulus;
@@ -254,7 +254,7 @@ pub(super) fn act(
         }
         Act::Driver(node, job, wanted) => {
             let outcome = drive(runner, span, *node, *job)?;
-            judge(span, job, outcome, wanted.as_ref())?;
+            judge(span, outcome, *wanted)?;
         }
     }
     Ok(())
@@ -368,6 +368,7 @@ fn drive(runner: &mut Runner<'_, Unitek>, span: Span, node: u8, job: Job) -> Res
             runner.transmit(0, &frames);
         }
         if let Some(outcome) = ended {
+            runner.line_before = runner.line_before.max(now);
             return Ok(outcome);
         }
         if now >= end {
@@ -380,19 +381,21 @@ fn drive(runner: &mut Runner<'_, Unitek>, span: Span, node: u8, job: Job) -> Res
 }
 
 /// Whether a job of the driver has ended as it should.
-fn judge(
-    span: Span,
-    job: &Job,
-    outcome: Outcome,
-    wanted: Option<&WantedValue>,
-) -> Result<(), Stop> {
-    let message = match (outcome, job) {
-        (Outcome::Read(reply), _) => {
-            return wanted.map_or(Ok(()), |wanted| wanted.judge(span, &reply));
+fn judge(span: Span, outcome: Outcome, wanted: WantedOutcome) -> Result<(), Stop> {
+    let message = match (outcome, wanted) {
+        (Outcome::NotReady(_), WantedOutcome::NotReady) => return Ok(()),
+        (_, WantedOutcome::NotReady) => "the start-up has not ended as not ready".to_owned(),
+        (Outcome::Read(reply), WantedOutcome::Reads(wanted)) => {
+            return wanted.judge(span, &reply);
         }
-        (Outcome::Written(_) | Outcome::Sent | Outcome::Started(_) | Outcome::Released, _) => {
-            return Ok(());
-        }
+        (
+            Outcome::Read(_)
+            | Outcome::Written(_)
+            | Outcome::Sent
+            | Outcome::Started(_)
+            | Outcome::Released,
+            _,
+        ) => return Ok(()),
         (Outcome::Differs { wrote, reads }, _) => format!(
             "the driver wrote {:X} to register {:02X} and reads {}",
             wrote.bits(),

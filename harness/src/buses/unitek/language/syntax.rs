@@ -211,6 +211,6 @@ pub enum JobKind {
     Lock,
     /// `release 1`.
     Release,
-    /// `start-up 1`: a job of the driver only.
-    StartUp,
+    /// `start-up 1`: a job of the driver only. With `= not-ready`, which is true here, it must end without a release.
+    StartUp(bool),
 }

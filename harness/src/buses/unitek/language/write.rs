@@ -173,6 +173,7 @@ fn job(job: &Job) -> String {
         JobKind::StopEvery(name) => format!("stop-every {drive} {}", register(name)),
         JobKind::Lock => format!("lock {drive}"),
         JobKind::Release => format!("release {drive}"),
-        JobKind::StartUp => format!("start-up {drive}"),
+        JobKind::StartUp(false) => format!("start-up {drive}"),
+        JobKind::StartUp(true) => format!("start-up {drive} = not-ready"),
     }
 }

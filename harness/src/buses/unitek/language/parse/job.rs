@@ -3,7 +3,7 @@
 use super::super::syntax::{Job, JobKind};
 use super::value;
 use crate::scenario::expression;
-use crate::scenario::parse::words::{equals, named};
+use crate::scenario::parse::words::{equals, named, required};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
@@ -32,7 +32,13 @@ fn one(name: &str, scanner: &mut Scanner<'_>) -> Result<Job, Problem> {
     let what = match name {
         "lock" => JobKind::Lock,
         "release" => JobKind::Release,
-        "start-up" => JobKind::StartUp,
+        "start-up" => {
+            let fails = scanner.eat("=");
+            if fails {
+                required(scanner, &["not-ready"])?;
+            }
+            JobKind::StartUp(fails)
+        }
         name => {
             let register = value::register(scanner)?;
             match name {

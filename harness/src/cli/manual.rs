@@ -1,28 +1,19 @@
-//! `drivebench manual`: which tables are pinned, the errata ledger, and what the manual leaves open.
+//! `drivebench manual`: which tables are pinned, the errata ledgers, and what the manuals leave open.
 
-use crate::cli::args::{ManualArguments, Selection};
-use crate::cli::exit::Exit;
-use crate::cli::output::Output;
-use crate::cli::run::select;
+use super::args::{ManualArguments, Selection};
+use super::exit::Exit;
+use super::output::Output;
+use super::run::select;
 use crate::library::Entry;
-use crate::manual::{Erratum, ManualTable, NOT_YET, errata, pinned_by, tables};
-use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::nd21;
+use crate::manual::{Erratum, Manual, ManualTable, NOT_YET, pinned_by};
 use std::fmt::Write as _;
 
-/// Shows the coverage of the manual and the ledger.
+/// Shows the coverage of the manuals and the ledgers.
 pub(crate) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::io::Result<Exit> {
     let entries = match select(&Selection::default(), None) {
         Ok(entries) => entries,
         Err(errors) => {
             errors.iter().for_each(|error| output.library_error(error));
-            return Ok(Exit::RigError);
-        }
-    };
-    let (tables, errata) = match (tables(), errata()) {
-        (Ok(tables), Ok(errata)) => (tables, errata),
-        (Err(error), _) | (_, Err(error)) => {
-            output.complain(&format!("the catalogue of the manual is damaged: {error}"));
             return Ok(Exit::RigError);
         }
     };
@@ -32,44 +23,64 @@ pub(crate) fn manual(arguments: &ManualArguments, output: &mut Output) -> std::i
         .unwrap_or_default()
         .to_lowercase();
     let wanted = |text: &str| text.to_lowercase().contains(&filter);
-    let mut text = coverage(&tables, &entries, arguments.missing, &wanted);
-    text.push('\n');
-    text.push_str(&ledger(&errata, &entries, arguments.missing, &wanted));
-    text.push('\n');
-    text.push_str(&open_points(&wanted));
-    output.result(&text)?;
+    let mut parts = Vec::new();
+    for manual in Manual::all() {
+        let (tables, errata) = match (manual.tables(), manual.errata()) {
+            (Ok(tables), Ok(errata)) => (tables, errata),
+            (Err(error), _) | (_, Err(error)) => {
+                let title = manual.title;
+                output.complain(&format!("the catalogue of the {title} is damaged: {error}"));
+                return Ok(Exit::RigError);
+            }
+        };
+        let own = [
+            coverage(manual, &tables, &entries, arguments.missing, &wanted),
+            ledger(&errata, &entries, arguments.missing, &wanted),
+            open_points(manual, &wanted),
+        ];
+        // Of a manual of which nothing is wanted, nothing is shown.
+        if filter.is_empty() || own.iter().any(|(found, _)| *found) {
+            parts.push(own.map(|(_, text)| text).join("\n"));
+        }
+    }
+    if parts.is_empty() {
+        output.complain(
+            "no table, erratum or open point has this text; `drivebench manual` shows all",
+        );
+        return Ok(Exit::NothingSelected);
+    }
+    output.result(&parts.join("\n"))?;
     Ok(Exit::Passed)
 }
 
-/// What the manual leaves open, and the properties that settle it.
-fn open_points(wanted: &dyn Fn(&str) -> bool) -> String {
+/// What a manual leaves open, and the properties that settle it; and whether there is anything.
+fn open_points(manual: &Manual, wanted: &dyn Fn(&str) -> bool) -> (bool, String) {
     let mut text = String::from(
         "Open: what only hardware can settle, as properties of a drive, the default first\n",
     );
-    let bus = PROPERTIES.iter().map(|property| {
-        let values = property.values.join(" or ");
-        (property.section, property.name, values, property.about)
-    });
-    let own = nd21::PROPERTIES.iter().map(|property| {
-        let values = property.values();
-        (property.section, property.name, values, property.about)
-    });
-    for (section, name, values, about) in bus.chain(own) {
-        let line = format!("nd21 {section:8} {name:22} {values:27} {about}\n");
+    let mut found = false;
+    for open in manual.open() {
+        let line = format!(
+            "{} {:8} {:22} {:27} {}\n",
+            manual.document, open.section, open.name, open.values, open.about
+        );
         if wanted(&line) {
+            found = true;
             text.push_str(&line);
         }
     }
-    text
+    (found, text)
 }
 
 fn coverage(
+    manual: &Manual,
     tables: &[ManualTable],
     entries: &[Entry],
     missing: bool,
     wanted: &dyn Fn(&str) -> bool,
-) -> String {
-    let mut text = String::from("Tables and examples of the ND21 User Manual 1/96\n");
+) -> (bool, String) {
+    let mut text = format!("Tables and examples of the {}\n", manual.title);
+    let mut found = false;
     let mut pinned = 0;
     for table in tables {
         let by: Vec<_> = pinned_by(&table.id, entries)
@@ -87,13 +98,14 @@ fn coverage(
             .unwrap_or_default();
         let line = format!("{:28} {page:7} {:66} {by}", table.id, table.title);
         if wanted(&line) && !(missing && by != NOT_YET) {
+            found = true;
             text.push_str(&line);
             text.push('\n');
         }
     }
     // Writing to a String cannot fail.
     let _infallible = writeln!(text, "{pinned} of {} pinned", tables.len());
-    text
+    (found, text)
 }
 
 fn ledger(
@@ -101,7 +113,8 @@ fn ledger(
     entries: &[Entry],
     missing: bool,
     wanted: &dyn Fn(&str) -> bool,
-) -> String {
+) -> (bool, String) {
+    let mut found = false;
     let mut text =
         String::from("Errata: where the manual contradicts itself or cannot be meant as printed\n");
     for erratum in errata {
@@ -126,9 +139,10 @@ fn ledger(
             erratum.why
         );
         if wanted(&entry) {
+            found = true;
             text.push_str(&entry);
         }
     }
     let _infallible = writeln!(text, "{} errata", errata.len());
-    text
+    (found, text)
 }
