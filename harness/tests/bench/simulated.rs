@@ -51,8 +51,37 @@ fn have_none(sizes: &[u8], resets: &[bool]) {
             };
             assert!(said(&output).contains(words), "{name}: {}", said(&output));
             assert!(!said(&output).contains(": a byte differed"), "{name}");
+            let unexplained = said(&output).contains("no value of it gives the bytes");
+            assert!(!unexplained, "{name}: {}", said(&output));
             ended(&verify(&folder.path().join(&name)), 0, "0 things wrong");
         }
+    }
+}
+
+/// ND21 9.2, 10.1: drives that are not reset hold what earlier scenarios have left, and perhaps already what a probe writes.
+#[test]
+fn probes_settle_the_bus_without_resets() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let held = ", \"drive 0..last memory FE12 = 12 34 56 78\"";
+    for (read_long, empty) in [("four-data", "error"), ("as-printed", "accepted")] {
+        let setup = format!(
+            "{held}, \"drive 0..last property read-long = {read_long}\", \"drive 0..last property empty-short-telegram = {empty}\""
+        );
+        let path = folder.path().join("rig.toml");
+        std::fs::write(&path, rig(2, false, "", &setup)).expect("room");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command.args(["qualify", "10.2-write-byte", "--allow-motion", "--rig"]);
+        command.arg(path);
+        let kept = folder.path().join(read_long);
+        let output = command.arg("--evidence").arg(&kept).output();
+        let said = said(&output.expect("the program"));
+        for settled in [
+            format!("read-long (nd21 10.1): {read_long}"),
+            format!("empty-short-telegram (nd21 9.2): {empty}"),
+        ] {
+            assert!(said.contains(&settled), "{said}");
+        }
+        ended(&verify(&kept), 0, "0 things wrong");
     }
 }
 

@@ -378,7 +378,12 @@ impl Qualification {
         probe: &Probe,
         known: &Header,
     ) -> Result<Result<Answer, String>, B::Stop> {
-        let exactness = self.facts.exactness;
+        let own = self.facts.exactness;
+        let exactness = Exactness {
+            // A fresh twin does not hold what earlier scenarios have left in drives that are not reset.
+            knows_cells: own.knows_cells && self.facts.resets,
+            ..own
+        };
         // Simulated drives answer alike each time.
         let most = match exactness.tolerance {
             Span::ZERO => 1,
