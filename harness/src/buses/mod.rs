@@ -27,9 +27,16 @@ pub use novobus::language::Novobus as DefaultBus;
 
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
 
+use crate::cli::args::CellsArguments;
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::cli::rig::ListFormat;
+use crate::cli::rig_failure::find_any_rig;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
+use crate::rig::find::{find, folder};
 use crate::rig::port_file::Node;
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
@@ -38,6 +45,8 @@ use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::serve::frames::FrameJob;
 use crate::serve::{End, Host, ServeError};
+use commands::rig_check::CheckRigArguments;
+use commands::{DriveCommand, RigName};
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::{Carried, Trace};
@@ -148,6 +157,70 @@ pub(crate) fn write_frames(
     match form {
         FrameForm::Json => unitek::report::json::write(Bus::Unitek, traces, out),
         FrameForm::Candump => unitek::report::json::candump(traces, out),
+    }
+}
+
+/// Runs a command on drives, in the words of the bus of its bench.
+pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
+    let named = match command.rig().and_then(|arguments| arguments.rig.as_ref()) {
+        Some(RigName::Named(name)) => find(name, &folder()).ok(),
+        _ => None,
+    };
+    let Some((rig, bus)) =
+        named.and_then(|rig| rig.port().map(|port| port.bus).map(|bus| (rig, bus)))
+    else {
+        // Where there is no such bench, this reports it.
+        return novobus::cli::drive(command, output);
+    };
+    let end = match bus {
+        PortBus::Unitek => unitek::cli::drive(&rig, command, output),
+    };
+    told(end, output)
+}
+
+/// Runs `rig check`.
+pub(crate) fn check_rig(
+    arguments: &CheckRigArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let Some(rig) = find_any_rig(&arguments.rig, output) else {
+        return Ok(Exit::Usage);
+    };
+    let for_tools = arguments.format == ListFormat::Json;
+    match rig.port().map(|port| port.bus) {
+        None => novobus::cli::rig_check::check(&rig, arguments, output),
+        Some(PortBus::Unitek) => {
+            let end = unitek::cli::check(&rig, &arguments.options(), for_tools, output);
+            told(end, output)
+        }
+    }
+}
+
+/// Lists what the drives of a bus hold.
+pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+    match arguments.bus {
+        Bus::Novobus => novobus::cli::cells::cells(arguments, output),
+        Bus::Unitek if arguments.eeprom => {
+            output.complain("--eeprom is for the bus novobus; a UNITEK drive keeps its RW registers in its EEPROM");
+            Ok(Exit::Usage)
+        }
+        Bus::Unitek => {
+            let filter = arguments.filter.as_deref();
+            unitek::cli::cells::cells(filter.unwrap_or_default(), output)
+        }
+        Bus::Nordac => {
+            output.complain("the bus nordac is not built yet");
+            Ok(Exit::Usage)
+        }
+    }
+}
+
+/// Reports the error of a command.
+fn told(end: Result<Exit, Failure>, output: &mut Output) -> std::io::Result<Exit> {
+    match end {
+        Ok(exit) => Ok(exit),
+        Err(Failure::Output(error)) => Err(error),
+        Err(failure) => Ok(failure.tell(output)),
     }
 }
 

@@ -350,6 +350,9 @@ pub struct CellsArguments {
     /// List the EEPROM instead of the RAM.
     #[arg(long)]
     pub eeprom: bool,
+    /// The bus: novobus for the cells of an ND21, unitek for the registers of a UNITEK drive.
+    #[arg(long, value_enum, default_value_t = crate::buses::Bus::Novobus)]
+    pub bus: crate::buses::Bus,
 }
 
 /// For `campaign`.

@@ -5,6 +5,8 @@ mod campaign;
 mod check;
 mod complete;
 pub(crate) mod exit;
+pub(crate) mod failure;
+pub(crate) mod file;
 pub(crate) mod frames;
 pub(crate) mod fuzz;
 mod help;
@@ -72,7 +74,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector => import::dissector(output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
-        Command::Cells(arguments) => crate::buses::commands::cells::cells(&arguments, output),
+        Command::Cells(arguments) => crate::buses::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),
         Command::Verify(arguments) => verify::verify(&arguments, output),
         Command::Report(arguments) => report::report(&arguments, output),
@@ -85,7 +87,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Deviations(arguments) => {
             crate::buses::commands::deviations::deviations(&arguments, output)
         }
-        Command::Drive(command) => crate::buses::commands::drive(&command, output),
+        Command::Drive(command) => crate::buses::drive(&command, output),
         Command::Completions { shell } => complete::completions(shell, output),
         Command::Complete { words } => complete::complete(&words, output),
         Command::Man { folder } => man::man(folder.as_deref(), output),

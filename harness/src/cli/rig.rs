@@ -2,7 +2,8 @@
 
 use super::exit::Exit;
 use super::output::Output;
-use crate::buses::commands::rig_check::{CheckRigArguments, check};
+use crate::buses::check_rig as check;
+use crate::buses::commands::rig_check::CheckRigArguments;
 use crate::rig::file::Quarantine;
 use crate::rig::find::{self, FindError, RigPlace};
 use crate::rig::lock::{self, LockError, Standing};

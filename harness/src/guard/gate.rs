@@ -29,7 +29,12 @@ pub trait Gate: Any + Send + fmt::Debug {
     fn admit(&mut self, now: Instant, what: Out<'_>) -> (usize, Option<Denied>);
 
     /// Whether all of this would be admitted now.
-    fn permits(&self, now: Instant, what: Out<'_>) -> bool;
+    fn permits(&self, now: Instant, what: Out<'_>) -> bool {
+        self.denies(now, what).is_none()
+    }
+
+    /// Why not all of this would be admitted now; `None` if it would.
+    fn denies(&self, now: Instant, what: Out<'_>) -> Option<Denied>;
 
     /// Judges octets of a [probe](crate::link::Link::probe). With `copy` they go to a copy of the drives and do not count as sent.
     ///

@@ -232,6 +232,16 @@ impl<L: Line> Line for Guarded<L> {
         self.trouble().is_none() && gate.is_some_and(|gate| gate.permits(now, what))
     }
 
+    fn denied(&self, port: usize, what: Out<'_>) -> Option<String> {
+        if let Some(trouble) = self.trouble() {
+            return Some(trouble.to_string());
+        }
+        let now = self.guard_time();
+        let gate = self.gates.get(port);
+        let denied = gate.map_or_else(|| Some(no_port(port)), |gate| gate.denies(now, what));
+        denied.map(|denied| denied.why)
+    }
+
     fn refused(&self) -> usize {
         self.refused
     }

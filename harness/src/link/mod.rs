@@ -171,6 +171,12 @@ pub trait Line: Send {
         true
     }
 
+    /// Why this may not be sent now, in a sentence; `None` if it may. Nothing is sent.
+    fn denied(&self, port: usize, what: Out<'_>) -> Option<String> {
+        let _any = (port, what);
+        None
+    }
+
     /// How many of the pieces of the last [`Self::send`] were not taken: those from the first that was denied on.
     fn refused(&self) -> usize {
         0
@@ -238,6 +244,10 @@ impl<L: Line + ?Sized> Line for &mut L {
 
     fn permits(&self, port: usize, what: Out<'_>) -> bool {
         (**self).permits(port, what)
+    }
+
+    fn denied(&self, port: usize, what: Out<'_>) -> Option<String> {
+        (**self).denied(port, what)
     }
 
     fn refused(&self) -> usize {

@@ -26,7 +26,7 @@ mod session_error;
 pub(crate) mod shared;
 pub mod state;
 pub(crate) mod taken;
-mod watchdog;
+pub(crate) mod watchdog;
 
 pub use crate::buses::novobus::rig::health::{Health, Unhealthy, examine};
 pub use crate::buses::novobus::rig::line_test::Cause;

@@ -1,7 +1,7 @@
 //! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
 
 use super::Rig;
-use super::around::{self, Around};
+use super::around::Around;
 use super::ends::Ends;
 use super::file;
 use super::lock::{PortLock, RigLock};
@@ -10,7 +10,7 @@ use super::permitted::{limits, standing};
 use super::session_error::SessionError;
 use super::state;
 use super::taken::take;
-use super::watchdog::{Alarm, Watchdog};
+use super::watchdog::{Alarm, Watchdog, watch_over};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
 use crate::guard::{Guarded, Safe, Watch, blind_stop, safe_state};
@@ -419,16 +419,7 @@ impl Session {
         let stop = |ring: usize| Pieces::Octets(stop(ring));
         let beats = ports.beats();
         let words = ports.last_words(&stop).map_err(SessionError::Watchdog)?;
-        let safe_state = &self.rig.file.safe_state;
-        let limit = safe_state.watchdog.0;
-        let cut = safe_state.order.contains(&file::SafeStep::PowerOff);
-        let rig = self.rig.clone();
-        let then = move || match cut {
-            true => around::power_off(&rig),
-            false => Vec::new(),
-        };
-        let started = Watchdog::start(beats, limit, words, then, alarm);
-        started.map(Some).map_err(SessionError::Watchdog)
+        watch_over(&self.rig, beats, words, alarm).map(Some)
     }
 
     /// Whether the rig was left at rest and its drives answer: then they are asked nothing more, and go on as they are.

@@ -110,6 +110,12 @@ impl Line for SharedLine {
         self.with(false, |line| line.wait(until))
     }
 
+    fn denied(&self, port: usize, what: Out<'_>) -> Option<String> {
+        let mut session = lock(&self.session);
+        let session = session.as_mut();
+        session.and_then(|session| session.link().denied(port, what))
+    }
+
     fn permits(&self, ring: usize, what: Out<'_>) -> bool {
         lock(&self.session)
             .as_mut()

@@ -1,6 +1,10 @@
 //! A thread that stops the drives when the program shows no sign of life: a terminal that is held, a disk that does not answer, a bug. It
 //! does not help against `kill -9` or a computer that hangs.
 
+use super::Rig;
+use super::around::power_off;
+use super::file::SafeStep;
+use super::session_error::SessionError;
 use crate::port::LastWords;
 use std::fmt;
 use std::sync::Arc;
@@ -99,6 +103,26 @@ impl Watchdog {
             })?;
         Ok(Self { _leash: leash })
     }
+}
+
+/// Watches over a rig as its file says: where the count of `beats` stands still for too long, the ports get their last words, and power
+/// that belongs to the safe state is switched off.
+pub(crate) fn watch_over(
+    rig: &Rig,
+    beats: Arc<AtomicU64>,
+    words: Vec<LastWords>,
+    alarm: Alarm,
+) -> Result<Watchdog, SessionError> {
+    let safe_state = &rig.file.safe_state;
+    let limit = safe_state.watchdog.0;
+    let cut = safe_state.order.contains(&SafeStep::PowerOff);
+    let rig = rig.clone();
+    let then = move || match cut {
+        true => power_off(&rig),
+        false => Vec::new(),
+    };
+    let started = Watchdog::start(beats, limit, words, then, alarm);
+    started.map_err(SessionError::Watchdog)
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 mod bench;
 #[path = "../common/debian.rs"]
 mod debian;
+mod drives_on_can;
 #[path = "../common/edits.rs"]
 mod edits;
 mod embedded;

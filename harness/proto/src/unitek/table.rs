@@ -294,7 +294,7 @@ registers! {
     0xE5 RO u16 0x0000 Flag       "dump" "I_END2" "(in) Limit2" "Digital input END2";
     0xE6 RO u16 0x0000 Flag       "dump" "I_DIN1" "(in) Din1" "Digital input DIN1";
     0xE7 RO u16 0x0000 Flag       "dump" "I_DIN2" "(in) Din2" "Digital input DIN2";
-    0xE8 RO u16 0x0000 Flag       "ex 11" "in)  Run (Frg" "" "(I_FRG ) Digital input RUN";
+    0xE8 RO u16 0x0000 Flag       "ex 11" "I_FRG" "(in) Run (Frg)" "Digital input RUN";
     0xE9 RO u16 0x0000 Flag       "dump" "I_FAULT" "I Fault" "internal error message of the power part";
     0xEA RO u16 0x0000 Flag       "dump" "I_BALLAST" "I Regen" "message regen circuit";
     0xEB RO u16 0x0001 Raw        "dump" "DC_BUS" "Vdc-Bus" "DC-Bus voltage";

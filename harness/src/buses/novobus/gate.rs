@@ -113,11 +113,17 @@ impl RingGate {
     }
 }
 
+fn no_frames() -> Denied {
+    Denied {
+        why: NO_FRAMES.to_owned(),
+        settings: Vec::new(),
+    }
+}
+
 impl Gate for RingGate {
     fn admit(&mut self, now: Instant, what: Out<'_>) -> (usize, Option<Denied>) {
         if !what.frames().is_empty() {
-            let (why, settings) = (NO_FRAMES.to_owned(), Vec::new());
-            return (0, Some(Denied { why, settings }));
+            return (0, Some(no_frames()));
         }
         for (admitted, &byte) in what.octets().iter().enumerate() {
             if let Err(denial) = self.admit_byte(now, byte) {
@@ -127,10 +133,14 @@ impl Gate for RingGate {
         (what.len(), None)
     }
 
-    fn permits(&self, now: Instant, what: Out<'_>) -> bool {
+    fn denies(&self, now: Instant, what: Out<'_>) -> Option<Denied> {
+        if !what.frames().is_empty() {
+            return Some(no_frames());
+        }
         let mut guard = self.guard.clone();
-        let mut admits = |byte: &u8| guard.admit(now, *byte, false).is_ok();
-        what.frames().is_empty() && what.octets().iter().all(&mut admits)
+        let mut admit = |byte: &u8| guard.admit(now, *byte, false);
+        let judged = what.octets().iter().try_for_each(&mut admit);
+        judged.err().map(|denial| self.denied(denial))
     }
 
     fn probe(&mut self, now: Instant, octets: &[u8], copy: bool) -> Result<(), Denied> {

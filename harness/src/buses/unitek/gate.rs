@@ -99,8 +99,8 @@ impl Gate for SegmentGate {
         (what.len(), None)
     }
 
-    fn permits(&self, now: Instant, what: Out<'_>) -> bool {
-        self.clone().admit(now, what).1.is_none()
+    fn denies(&self, now: Instant, what: Out<'_>) -> Option<Denied> {
+        self.clone().admit(now, what).1
     }
 
     fn probe(&mut self, _now: Instant, octets: &[u8], _copy: bool) -> Result<(), Denied> {
@@ -235,7 +235,7 @@ mod tests {
         assert_eq!(
             send(&mut line, "201#510000").as_deref(),
             Some(
-                "201#510000 is not sent: a write to register 51 (MODE) needs allow_motion in the rig file"
+                "201#510000 is not sent: a write to register 51 (MODE) needs `allow_motion` in the rig's [limits] and --allow-motion"
             )
         );
         assert_eq!(line.denying(), [LimitSetting::Motion]);

@@ -1,5 +1,6 @@
 //! UNITEK DS/BAMOCAR on CAN: what the bench knows of this bus alone.
 
+pub(crate) mod cli;
 pub mod driver;
 pub mod gate;
 pub mod language;
@@ -11,3 +12,4 @@ pub(crate) mod serve;
 #[cfg(test)]
 mod serve_tests;
 pub mod simulate;
+pub mod value;

@@ -2,6 +2,7 @@
 
 mod params;
 mod scope;
+mod unitek;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -37,12 +37,16 @@ impl Missing {
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Motion => "allow_motion",
-            Self::Eeprom => "allow_eeprom",
-            Self::BusSettings => "allow_bus_settings",
-            Self::WayBack => "a stated way back from another bit rate",
-            Self::All => "allow_motion, allow_eeprom and allow_bus_settings",
-            Self::Named => "the register in its list of named registers",
+            Self::Motion => "`allow_motion` in the rig's [limits] and --allow-motion",
+            Self::Eeprom => "`allow_eeprom` in the rig's [limits]",
+            Self::BusSettings => "`allow_bus_settings` in the rig's [limits]",
+            Self::WayBack => {
+                "`bit_rate_way_back` in the rig's [limits], which says how the drive is reached again"
+            }
+            Self::All => {
+                "`allow_motion`, `allow_eeprom` and `allow_bus_settings` in the rig's [limits], and --allow-motion"
+            }
+            Self::Named => "the register in `allow_registers` of the rig's [limits]",
         }
     }
 }
@@ -129,11 +133,11 @@ impl fmt::Display for Denial {
         let name = |register: u8| Register::of(register).name;
         match *self {
             Self::Identifier => f.write_str(
-                "no drive of the rig file receives on this identifier: add the drive to the rig file, or allow_other_identifiers to its [limits]",
+                "no drive of the rig file receives on this identifier: add the drive to the rig file, or `allow_other_identifiers` to its [limits]",
             ),
             Self::NotPermitted { register, missing } => write!(
                 f,
-                "a write to register {register:02X} ({}) needs {} in the rig file",
+                "a write to register {register:02X} ({}) needs {}",
                 name(register),
                 missing.name()
             ),
@@ -148,7 +152,7 @@ impl fmt::Display for Denial {
                 name(register)
             ),
             Self::Speed { register, fast } => {
-                write!(f, "a write to register {register:02X} ({}) is not sent: {fast}", name(register))
+                write!(f, "a write to register {register:02X} ({}) could turn the motor too fast: {fast}", name(register))
             }
             Self::Load { permille } => write!(
                 f,
@@ -160,7 +164,7 @@ impl fmt::Display for Denial {
                 f.write_str("the EEPROM was written less than a minute ago: wait before the next write of 84")
             }
             Self::LostDrive => f.write_str(
-                "new identifiers or a new bit rate would be stored, and the drive may then answer on RS232 only: confirm it in the rig file",
+                "new identifiers or a new bit rate would be stored, and the drive may then answer on RS232 only: confirm it with `store_bus_settings` in the rig file",
             ),
         }
     }

@@ -58,6 +58,8 @@ impl Speed {
         let size = sure.then(|| value.cast_signed().unsigned_abs());
         match register {
             0x31 => self.command = size,
+            // No torque turns no motor.
+            0x90 if value == 0 => self.command = size,
             0x6E | 0x78 | 0x90 => self.command = None,
             0x34 => self.limit = size,
             0x83 | 0xC8 => *self = Self::default(),

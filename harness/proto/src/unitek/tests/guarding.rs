@@ -225,6 +225,8 @@ fn the_highest_speed() {
     ] {
         assert_eq!(denied(&mut share, text), unknown(register), "{text}");
     }
+    assert_eq!(denied(&mut share, "201#900000"), None);
+    assert_eq!(denied(&mut share, "201#510000"), None, "no torque");
     assert_eq!(denied(&mut share, "201#31CD0C"), None);
     assert_eq!(denied(&mut share, "201#510000"), None, "31 is within it");
     assert_eq!(denied(&mut share, "201#340080"), above(0x34));

@@ -88,11 +88,35 @@ pub enum DriveCommand {
     Sim(SimArguments),
 }
 
+impl DriveCommand {
+    /// The bench of a command; `None` for `sim`, which is one.
+    pub(crate) const fn rig(&self) -> Option<&RigArguments> {
+        Some(match self {
+            Self::Read(arguments) => &arguments.rig,
+            Self::Write(arguments) => &arguments.rig,
+            Self::Info(arguments) => &arguments.rig,
+            Self::Watch(arguments) => &arguments.rig,
+            Self::Top(arguments) => &arguments.rig,
+            Self::Params(ParamsCommand::Save(arguments) | ParamsCommand::Diff(arguments)) => {
+                &arguments.rig
+            }
+            Self::Params(ParamsCommand::Load(arguments)) => &arguments.params.rig,
+            Self::Scope(arguments) => &arguments.rig,
+            Self::Position(arguments) => &arguments.rig,
+            Self::Go(arguments) | Self::Reset(arguments) => &arguments.select.rig,
+            Self::Stop(arguments) | Self::Block(arguments) => &arguments.rig,
+            Self::DeleteError(arguments) => &arguments.select.rig,
+            Self::Recover(arguments) => &arguments.rig,
+            Self::Sim(_) => return None,
+        })
+    }
+}
+
 /// Which bench.
 #[derive(Clone, Debug, Args)]
 pub struct RigArguments {
-    /// The rig: a file, a name that `rig list` shows, sim:N for a simulated ring of N drives, or sim:N,M for two rings; by
-    /// default sim:3.
+    /// The rig: a file, a name that `rig list` shows, sim:N for a simulated ring of N drives, sim:N,M for two rings, or sim:unitek:N for
+    /// UNITEK drives on CAN; by default sim:3.
     #[arg(long, value_name = "RIG")]
     pub rig: Option<RigName>,
     /// Put the rig sim:N into the state that the header of a scenario describes; its steps are ignored. By default the inputs

@@ -2,10 +2,10 @@
 
 use super::args::{DeleteErrorArguments, MoveArguments, SelectArguments};
 use super::axes;
-use super::failure::Failure;
 use super::rig::{self, OpenBench, RigName, Use};
 use crate::buses::novobus::driver::{Axis, Error, OpenRings};
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::link::Line;
 use crate::rig::Session;

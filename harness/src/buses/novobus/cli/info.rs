@@ -2,13 +2,13 @@
 
 use super::args::{InfoArguments, OutputForm};
 use super::axes;
-use super::failure::Failure;
 use super::read::columns;
 use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::buses::novobus::driver::{Axis, Identity, State};
 use crate::buses::novobus::language::scale::shown;
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::run::progress_bar;
 use crate::counted::counted;

@@ -7,8 +7,6 @@ mod control;
 pub(crate) mod coverage;
 pub(crate) mod deviations;
 pub(crate) mod distil;
-mod failure;
-mod file;
 mod info;
 mod params;
 mod params_file;
@@ -25,11 +23,20 @@ mod top;
 mod watch;
 mod write;
 
-pub(crate) use args::DriveCommand;
+pub(crate) use args::{
+    DeleteErrorArguments, DriveCommand, InfoArguments, LoadArguments, MoveArguments, OutputForm,
+    ParamsArguments, ParamsCommand, PositionArguments, ReadArguments, RigArguments,
+    SelectArguments, WatchArguments, WatchForm, WriteArguments,
+};
+pub(crate) use axes::Axes;
+pub(crate) use read::columns;
+pub(crate) use rig::{RigName, Use};
+pub(crate) use watch::MOST as MOST_LINES;
 
+use crate::buses::novobus::driver;
 use crate::cli::exit::Exit;
+use crate::cli::failure::{Failure, exit_of_trouble};
 use crate::cli::output::Output;
-use failure::Failure;
 
 /// Runs a command and reports its errors.
 pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
@@ -54,5 +61,28 @@ pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
         Ok(exit) => Ok(exit),
         Err(Failure::Output(error)) => Err(error),
         Err(failure) => Ok(failure.tell(output)),
+    }
+}
+
+/// The exit code of an error: caused by a drive, by the bench or by the user.
+fn exit(error: &driver::Error) -> Exit {
+    match error {
+        driver::Error::DriveError { .. }
+        | driver::Error::InReset { .. }
+        | driver::Error::Interrupted { .. }
+        | driver::Error::NotSet { .. }
+        | driver::Error::TimeOut { .. } => Exit::Failed,
+        driver::Error::Refused(_) | driver::Error::Value(_) | driver::Error::Open(_) => Exit::Usage,
+        driver::Error::Link(trouble) => exit_of_trouble(trouble),
+        driver::Error::Unknown(_)
+        | driver::Error::Disturbed { .. }
+        | driver::Error::Stopped(_)
+        | driver::Error::NoSuchOrder => Exit::RigError,
+    }
+}
+
+impl From<driver::Error> for Failure {
+    fn from(error: driver::Error) -> Self {
+        Self::Bus(exit(&error), error.to_string())
     }
 }

@@ -1,13 +1,14 @@
 //! `drivebench params`: the parameters of a drive are saved, loaded and compared.
 
 use super::args::{LoadArguments, ParamsArguments, ParamsCommand};
-use super::failure::Failure;
+use super::axes;
 use super::params_file::{self, FileParameter, parameters};
 use super::rig::{self, OpenBench, Use};
-use super::{axes, file};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{self, CellFound, find, hex};
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::file;
 use crate::cli::output::Output;
 use crate::counted::counted;
 use crate::scenario::argument::{MemoryKind, MemoryRange};

@@ -2,11 +2,11 @@
 
 use super::args::PositionArguments;
 use super::axes;
-use super::failure::Failure;
 use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::find;
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::scenario::argument::{MemoryRange, cells};
 use crate::scenario::quantity::Quantity;

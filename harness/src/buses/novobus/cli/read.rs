@@ -2,10 +2,10 @@
 
 use super::args::{OutputForm, ReadArguments};
 use super::axes;
-use super::failure::Failure;
 use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::scenario::argument::{MemoryKind, MemoryRange, cells};
 use serde_json::json;

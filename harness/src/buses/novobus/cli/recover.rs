@@ -2,10 +2,10 @@
 //! (9.3).
 
 use super::args::{OutputForm, RecoverArguments};
-use super::failure::Failure;
 use super::rig::{self, RigName, Use};
 use crate::buses::novobus::driver::{self, Axis, Recovery};
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::counted::counted;
 use crate::link::Line;

@@ -3,15 +3,16 @@
 
 use super::args::RigArguments;
 use super::axes;
-use super::failure::Failure;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::driver::{Axis, OpenRings, Options};
 use crate::buses::novobus::drives;
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
 use crate::counted::counted;
 use crate::link::{Line, Trouble};
+use crate::rig::find::simulated_port;
 use crate::rig::{self, Rig, Session, Shared};
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::Plan;
@@ -46,6 +47,10 @@ impl FromStr for RigName {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let port = text.strip_prefix("sim:").and_then(simulated_port);
+        if let Some((_, drives)) = port {
+            return drives.map(|_| Self::Named(text.to_owned()));
+        }
         match text.strip_prefix("sim:") {
             Some(sizes) => crate::rig::find::sizes(sizes).map(Self::Simulated),
             None => Ok(Self::Named(text.to_owned())),
@@ -72,6 +77,11 @@ impl Use {
             moves: false,
             holds: true,
         }
+    }
+
+    /// Whether it changes nothing, so that a failure leaves the drives as they are.
+    pub(crate) const fn looks_only(&self) -> bool {
+        self.holds && !self.moves
     }
 }
 

@@ -4,7 +4,7 @@ use crate::buses::novobus::driver::Error;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::rig::ListFormat;
-use crate::cli::rig_failure::{alarm, exit_of, find_rig, tell_end};
+use crate::cli::rig_failure::{alarm, exit_of, tell_end};
 use crate::cli::run::progress_bar;
 use crate::counted::counted;
 use crate::link::Trouble;
@@ -30,20 +30,27 @@ pub struct CheckRigArguments {
     pub format: ListFormat,
 }
 
+impl CheckRigArguments {
+    /// How the bench is used.
+    pub(crate) fn options(&self) -> Options {
+        Options {
+            purpose: "rig check".to_owned(),
+            wait: self.wait.unwrap_or_default(),
+            keeps_lines: true,
+            interrupt: interrupt_flag(),
+            alarm: alarm(),
+            ..Options::default()
+        }
+    }
+}
+
 /// Opens a bench and says what it shows.
-pub(crate) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let Some(rig) = find_rig(&arguments.rig, output) else {
-        return Ok(Exit::Usage);
-    };
-    let options = Options {
-        purpose: "rig check".to_owned(),
-        wait: arguments.wait.unwrap_or_default(),
-        keeps_lines: true,
-        interrupt: interrupt_flag(),
-        alarm: alarm(),
-        ..Options::default()
-    };
-    let session = match Session::open(&rig, &options) {
+pub(crate) fn check(
+    rig: &Rig,
+    arguments: &CheckRigArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let session = match Session::open(rig, &arguments.options()) {
         Ok(session) => session,
         Err(error) => {
             output.complain(&error.to_string());
@@ -74,8 +81,8 @@ pub(crate) fn check(arguments: &CheckRigArguments, output: &mut Output) -> std::
         }
     };
     let text = match arguments.format {
-        ListFormat::Text => text(&rig, &figures),
-        ListFormat::Json => format!("{:#}\n", object(&rig, &figures)),
+        ListFormat::Text => text(rig, &figures),
+        ListFormat::Json => format!("{:#}\n", object(rig, &figures)),
     };
     let mut exit = match output.result(&text) {
         Ok(()) => Exit::Passed,

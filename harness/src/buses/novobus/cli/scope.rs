@@ -1,15 +1,16 @@
 //! `drivebench scope`: the drive's oscilloscope is programmed, records and is plotted (ND21 14.10.6).
 
 use super::args::{Edge, ScopeArguments};
-use super::failure::Failure;
+use super::axes;
 use super::rig::{self, OpenBench, Use};
 use super::signal::Signal;
 use super::write::Orders;
-use super::{axes, file};
 use crate::buses::novobus::driver::cell::CellFound;
 use crate::buses::novobus::driver::{Axis, Error, Measurement, ScopeSettings, Trigger};
 use crate::buses::novobus::language::syntax::Written;
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::file;
 use crate::cli::output::Output;
 use crate::report::plot::plot;
 use crate::scenario::argument::{MemoryRange, assignments};

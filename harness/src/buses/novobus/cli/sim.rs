@@ -1,10 +1,10 @@
 //! `drivebench sim`: simulated rings for anyone's master.
 
 use super::args::RigArguments;
-use super::failure::Failure;
 use super::rig;
 use crate::buses::{self, Bus};
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::frames::FrameArguments;
 use crate::cli::output::Output;
 use crate::file::values::Wire;

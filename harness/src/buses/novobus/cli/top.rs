@@ -4,10 +4,10 @@
 //! after 10 ms without a byte (ND21 9.9). This one reads drives and lets the bus work, the other draws and takes keys.
 
 use super::args::TopArguments;
-use super::failure::Failure;
 use super::rig::{self, OpenBench, RigName, Use};
 use crate::buses::novobus::driver::{Axis, Error, State, Width};
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::counted::counted;
 use crate::link::Trouble;
@@ -231,7 +231,7 @@ fn pump(
     news: &SyncSender<Snapshot>,
     asked: &Receiver<Leave>,
 ) -> Result<Exit, Failure> {
-    let interrupt = || Failure::Bus(Error::Link(Trouble::Interrupted));
+    let interrupt = || Failure::from(Error::Link(Trouble::Interrupted));
     let begun = Moment::now();
     let mut next = reader.start;
     loop {

@@ -2,18 +2,18 @@
 
 use super::args::{WatchArguments, WatchForm};
 use super::axes;
-use super::failure::Failure;
 use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{CellFound, find};
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::scenario::argument::{MemoryRange, cells};
 use harness_proto::nd21::units::DriveUnits;
 use harness_proto::time::Span;
 
 /// Maximum number of lines of one command.
-const MOST: u64 = 1_000_000;
+pub(crate) const MOST: u64 = 1_000_000;
 
 /// Shows values, a line each time.
 pub(crate) fn watch(arguments: &WatchArguments, output: &mut Output) -> Result<Exit, Failure> {

@@ -2,12 +2,12 @@
 
 use super::args::WriteArguments;
 use super::axes;
-use super::failure::Failure;
 use super::rig::{self, OpenBench, Use};
 use crate::buses::novobus::driver::Axis;
 use crate::buses::novobus::driver::cell::{self, CellFound, find, hex};
 use crate::buses::novobus::language::syntax::Written;
 use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::scenario::argument::{MemoryKind, MemoryRange, assignments, encode};
 use harness_proto::nd21::bits::status;

@@ -216,6 +216,20 @@ impl<'l> Driver<'l> {
         frame.is_some_and(|frame| self.line.permits(0, Out::Frames(&[frame])))
     }
 
+    /// Why the first of some jobs that the line denies is denied; `None` if the line lets all of them pass, one behind the other. Nothing is
+    /// sent.
+    #[must_use]
+    pub fn denied(&self, jobs: &[(Axis, Job)]) -> Option<String> {
+        let mut frames = Vec::new();
+        for (axis, job) in jobs {
+            let drive = self.drives.iter().find(|drive| drive.axis == *axis)?;
+            let mut master = drive.master.clone();
+            let _taken = master.submit(*job).ok()?;
+            frames.extend(master.poll_transmit(self.line.now()));
+        }
+        self.line.denied(0, Out::Frames(&frames))
+    }
+
     /// Runs a job to its end.
     fn run_job(&mut self, axis: Axis, job: Job) -> Result<Outcome, Error> {
         let place = self.drives.iter().position(|drive| drive.axis == axis);

@@ -1,16 +1,20 @@
 //! A rig of UNITEK drives in use: locked, opened, found to answer, guarded, and taken to its safe state on every way out.
 
-use super::{Axis, axes, limits, setup};
+use super::{Axis, axes, limits, rate, setup};
 use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::gate::guarded;
-use crate::buses::unitek::safe_state::safe_state;
+use crate::buses::unitek::safe_state::{last_words, safe_state};
 use crate::buses::unitek::simulate::Bench;
 use crate::guard::Guarded;
+use crate::link::frames::{AdapterPlace, AdapterSettings, FrameLink};
 use crate::link::{Line, Trouble};
-use crate::medium::Heard;
+use crate::medium::{Heard, Pieces};
+use crate::rig::file::SafeStep;
+use crate::rig::lock::PortLock;
 use crate::rig::taken::{Taken, take};
-use crate::rig::{End, Ends, Options, Rig, SessionError, standing};
-use harness_proto::can;
+use crate::rig::watchdog::{Watchdog, watch_over};
+use crate::rig::{Alarm, End, Ends, Options, Rig, SessionError, standing};
+use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
 
 /// How long a bus is listened to before anything is sent.
@@ -33,6 +37,8 @@ pub struct Session {
     /// The drives are as they are to be left.
     ended: bool,
     // Given back in this order.
+    watchdog: Option<Watchdog>,
+    _locks: Vec<PortLock>,
     taken: Taken,
 }
 
@@ -46,12 +52,12 @@ impl Session {
             return Err(failed(rig, "it has no [port.1]"));
         };
         let taken = take(rig, options)?;
-        let ends = if rig.is_simulated() {
-            Ends::Simulated(Box::new(Bench::new(&setup)))
-        } else {
-            return Err(failed(rig, "no link over an adapter is built yet"));
-        };
         let axes = axes(port);
+        let (ends, locks) = if rig.is_simulated() {
+            (Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new())
+        } else {
+            open(rig, &axes, options)?
+        };
         let identifiers: Vec<_> = axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
         let limits = limits(rig, options.allow_motion);
         let mut session = Self {
@@ -62,6 +68,8 @@ impl Session {
             listen_only: port.listen_only,
             // Nothing has been sent: there is nothing to make safe.
             ended: true,
+            watchdog: None,
+            _locks: locks,
             taken,
         };
         if rig.is_simulated() {
@@ -80,6 +88,7 @@ impl Session {
         }
         session.taken.around.used();
         session.ended = session.listen_only || rig.is_simulated();
+        session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
     }
 
@@ -187,6 +196,20 @@ impl Session {
         })
     }
 
+    /// Lets a thread watch that the program lives.
+    fn watched(&mut self, alarm: Alarm) -> Result<Option<Watchdog>, SessionError> {
+        if self.listen_only {
+            return Ok(None);
+        }
+        let frames = last_words(&self.axes);
+        let Some(ports) = self.link.inner_mut().ports_mut() else {
+            return Ok(None);
+        };
+        let words = |_| Pieces::Frames(frames.clone());
+        let words = ports.last_words(&words).map_err(SessionError::Watchdog)?;
+        watch_over(&self.rig, ports.beats(), words, alarm).map(Some)
+    }
+
     /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
     #[must_use]
     pub fn close(mut self, error: bool) -> End {
@@ -218,7 +241,8 @@ impl Session {
                 let axes = self.axes.clone();
                 end.safe = Some(safe_state(&mut self.link, &axes, self.patience, &standing));
             }
-            if wanted.order.contains(&crate::rig::file::SafeStep::PowerOff) {
+            self.watchdog = None;
+            if wanted.order.contains(&SafeStep::PowerOff) {
                 end.power = self.taken.around.power_off();
             }
         }
@@ -234,6 +258,43 @@ impl Drop for Session {
             let _told_by_nobody = self.end(true);
         }
     }
+}
+
+/// Opens the adapter of a rig, and locks its port. Nothing is sent to the bus.
+fn open(
+    rig: &Rig,
+    axes: &[Axis],
+    options: &Options,
+) -> Result<(Ends, Vec<PortLock>), SessionError> {
+    let port = rig
+        .port()
+        .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
+    let place = match (&port.slcan, &port.socketcand) {
+        (Some(place), _) => AdapterPlace::slcan(place),
+        (None, Some(address)) => AdapterPlace::Socketcand {
+            address: address.clone(),
+            channel: port.channel.clone().unwrap_or_else(|| "can0".to_owned()),
+        },
+        (None, None) => return Err(failed(rig, "its port has no adapter")),
+    };
+    let settings = AdapterSettings {
+        place,
+        rate: rate(port),
+        listen_only: port.listen_only,
+    };
+    let senders = axes
+        .iter()
+        .filter_map(|axis| Some((Id::base(axis.tx)?, axis.node)));
+    let link = FrameLink::open(&settings, senders.collect(), options.interrupt.clone());
+    options.unless_interrupted(rig)?;
+    let link = link.map_err(|error| failed(rig, &error.to_string()))?;
+    let device = port.slcan.as_ref().filter(|place| place.contains('/'));
+    let lock = device.map(|place| {
+        let lock = PortLock::acquire(link.fd());
+        lock.map_err(|error| failed(rig, &format!("{place}: {error}")))
+    });
+    let locks = lock.transpose()?.into_iter().collect();
+    Ok((Ends::Ports(Box::new(link)), locks))
 }
 
 fn failed(rig: &Rig, why: &str) -> SessionError {

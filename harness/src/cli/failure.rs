@@ -1,6 +1,5 @@
 //! Why a command on a bus came to no good end, and which exit code that is.
 
-use crate::buses::novobus::driver;
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::library::LibraryError;
@@ -18,8 +17,8 @@ pub(crate) enum Failure {
     Told(Exit),
     /// There is no file, or it has mistakes.
     File(LibraryError),
-    /// The driver gave up.
-    Bus(driver::Error),
+    /// The driver gave up: the error message with its exit code.
+    Bus(Exit, String),
 }
 
 impl Failure {
@@ -37,7 +36,7 @@ impl Failure {
     pub(crate) fn tell(&self, output: &mut Output) -> Exit {
         match self {
             Self::Output(error) => output.unwritable(error),
-            Self::Said(exit, message) => {
+            Self::Said(exit, message) | Self::Bus(exit, message) => {
                 output.complain(message);
                 *exit
             }
@@ -46,37 +45,17 @@ impl Failure {
                 output.library_error(error);
                 Exit::Usage
             }
-            Self::Bus(error) => {
-                output.complain(&error.to_string());
-                exit(error)
-            }
         }
     }
 }
 
-/// The exit code of an error: caused by a drive, by the bench or by the user.
-fn exit(error: &driver::Error) -> Exit {
-    match error {
-        driver::Error::DriveError { .. }
-        | driver::Error::InReset { .. }
-        | driver::Error::Interrupted { .. }
-        | driver::Error::NotSet { .. }
-        | driver::Error::TimeOut { .. } => Exit::Failed,
-        driver::Error::Refused(_) | driver::Error::Value(_) | driver::Error::Open(_) => Exit::Usage,
-        driver::Error::Link(Trouble::Interrupted) => Exit::Interrupted,
-        driver::Error::Link(Trouble::Interlock(_)) => Exit::Interlock,
-        driver::Error::Link(Trouble::Denied(_)) => Exit::Usage,
-        driver::Error::Link(_)
-        | driver::Error::Unknown(_)
-        | driver::Error::Disturbed { .. }
-        | driver::Error::Stopped(_)
-        | driver::Error::NoSuchOrder => Exit::RigError,
-    }
-}
-
-impl From<driver::Error> for Failure {
-    fn from(error: driver::Error) -> Self {
-        Self::Bus(error)
+/// The exit code of a line in trouble.
+pub(crate) const fn exit_of_trouble(trouble: &Trouble) -> Exit {
+    match trouble {
+        Trouble::Interrupted => Exit::Interrupted,
+        Trouble::Interlock(_) => Exit::Interlock,
+        Trouble::Denied(_) => Exit::Usage,
+        Trouble::Lost(_) | Trouble::Garbled(_) => Exit::RigError,
     }
 }
 

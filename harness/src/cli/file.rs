@@ -1,7 +1,7 @@
 //! Files that are there whole or not at all.
 
+use super::exit::Exit;
 use super::failure::Failure;
-use crate::cli::exit::Exit;
 use crate::regular;
 use std::path::Path;
 

@@ -1,0 +1,163 @@
+//! `drivebench go`, `stop`, `block` and `delete-error` on UNITEK drives.
+
+use super::bench::{named, on, select};
+use super::write::{Order, refuse_denied};
+use crate::buses::commands::{DeleteErrorArguments, MoveArguments, SelectArguments, Use};
+use crate::buses::unitek::driver::{Driver, Error, Stopped};
+use crate::buses::unitek::rig::{Axis, Session};
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::rig::Rig;
+use harness_proto::time::Span;
+use harness_proto::unitek::Register;
+use harness_proto::unitek::frame::Data;
+use harness_proto::unitek::words::{ERRORS, MODE_LOCK, set_bits};
+
+/// What a drive needs to take notice: some of its scans of 1 ms.
+const SCANS: Span = Span::from_millis(5);
+
+/// The register that clears errors, and the value that clients write.
+const CANCEL: (u8, u16) = (0x8E, 0x4D44);
+
+/// Releases drives: their motors may turn.
+pub(super) fn go(
+    rig: &Rig,
+    arguments: &MoveArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let as_what = Use {
+        purpose: "go",
+        moves: arguments.leave,
+        holds: arguments.hold.hold,
+    };
+    let select = &arguments.select;
+    on(rig, &select.rig, as_what, output, |session, output| {
+        let drives = super::bench::select(&select.drives, session)?;
+        let warning = format!("go: {}: motors may turn", named(&drives));
+        if !arguments.leave {
+            return Err(Failure::refused(format!(
+                "{warning}; nothing was done, add --move to allow it"
+            )));
+        }
+        let has_ports = !session.rig().is_simulated();
+        let orders: Vec<_> = drives.iter().flat_map(|axis| start_up(*axis)).collect();
+        refuse_denied(&mut session.driver(), &orders)?;
+        output.say(&format!("{warning}\n"));
+        let exit = each(session, &drives, output, |driver, axis| {
+            driver.release(axis).map(|()| "released")
+        })?;
+        if has_ports && !arguments.hold.hold {
+            output.say(
+                "this command ends in the safe state; add --hold to leave the drives released: their motors may then turn without supervision\n",
+            );
+        }
+        Ok(exit)
+    })
+}
+
+/// What the routine of ex 11 writes: lock, commands 0, release.
+fn start_up(axis: Axis) -> [Order; 4] {
+    let writes = [(0x51, MODE_LOCK), (0x31, 0), (0x90, 0), (0x51, 0)];
+    writes.map(|(register, value)| (axis, Register::of(register), Data::Short(value)))
+}
+
+/// Stops drives: a speed command of 0, or a lock where no command is permitted.
+pub(super) fn stop(
+    rig: &Rig,
+    arguments: &SelectArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let as_what = Use {
+        moves: true,
+        ..Use::look("stop")
+    };
+    on(rig, &arguments.rig, as_what, output, |session, output| {
+        let drives = select(&arguments.drives, session)?;
+        each(session, &drives, output, |driver, axis| {
+            Ok(match driver.stop(axis)? {
+                Stopped::OnRamp => "its speed command is 0",
+                Stopped::Locked => {
+                    "it is locked and coasts: the rig's file permits no speed command"
+                }
+            })
+        })
+    })
+}
+
+/// Locks drives: no torque.
+pub(super) fn block(
+    rig: &Rig,
+    arguments: &SelectArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    on(
+        rig,
+        &arguments.rig,
+        Use::look("block"),
+        output,
+        |session, output| {
+            let drives = select(&arguments.drives, session)?;
+            each(session, &drives, output, |driver, axis| {
+                driver.lock(axis).map(|()| "locked, with commands 0")
+            })
+        },
+    )
+}
+
+/// Clears errors.
+pub(super) fn delete_error(
+    rig: &Rig,
+    arguments: &DeleteErrorArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let as_what = Use {
+        moves: arguments.leave,
+        ..Use::look("delete-error")
+    };
+    let select = &arguments.select;
+    on(rig, &select.rig, as_what, output, |session, output| {
+        let drives = super::bench::select(&select.drives, session)?;
+        let order = |axis: &Axis| (*axis, Register::of(CANCEL.0), Data::Short(CANCEL.1));
+        let orders: Vec<_> = drives.iter().map(order).collect();
+        refuse_denied(&mut session.driver(), &orders)?;
+        each(session, &drives, output, |driver, axis| {
+            let _never_answered = driver.write(axis, CANCEL.0, Data::Short(CANCEL.1))?;
+            Ok("errors cleared")
+        })
+    })
+}
+
+/// Does it to every drive first, and then reports the state of each. A drive that does not answer does not keep the others from it.
+fn each(
+    session: &mut Session,
+    drives: &[Axis],
+    output: &mut Output,
+    call: impl Fn(&mut Driver<'_>, Axis) -> Result<&'static str, Error>,
+) -> Result<Exit, Failure> {
+    let mut driver = session.driver();
+    let done: Vec<_> = drives.iter().map(|axis| call(&mut driver, *axis)).collect();
+    driver.run(SCANS)?;
+    let mut exit = Exit::Passed;
+    for (axis, done) in drives.iter().zip(done) {
+        let state = done.and_then(|done| {
+            let errors = driver.read(*axis, 0x8F)?.data.bits();
+            let ready = driver.read(*axis, 0xE2)?.data.bits() & 1;
+            Ok((done, ready, errors))
+        });
+        match state {
+            Err(error) => exit = exit.max(Failure::from(error).tell(output)),
+            Ok((done, ready, errors)) => {
+                let ready = ["not ready", "ready"][ready as usize];
+                let errors: Vec<_> = set_bits(ERRORS, errors).map(|bit| bit.name).collect();
+                let errors = match errors.is_empty() {
+                    true => String::new(),
+                    false => format!(", errors {}", errors.join(" ")),
+                };
+                let node = axis.node;
+                output.result(&format!("drive {node}: {done}; {ready}{errors}\n"))?;
+            }
+        }
+    }
+    Ok(exit)
+}

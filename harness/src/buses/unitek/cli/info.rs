@@ -1,0 +1,97 @@
+//! `drivebench info` on UNITEK drives: identity, state, errors, speed and position.
+
+use super::bench::{on, select};
+use super::read::{Found, find};
+use crate::buses::commands::{InfoArguments, OutputForm, Use, columns};
+use crate::buses::unitek::value::hex;
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::rig::Rig;
+use harness_proto::unitek::Register;
+use serde_json::{Map, Value, json};
+
+/// What is shown of a drive: the heading, and the register.
+const SHOWN: [(&str, u8); 11] = [
+    ("firmware", 0x1B),
+    ("serial", 0x62),
+    ("ready", 0xE2),
+    ("enable", 0xE8),
+    ("mode", 0x51),
+    ("status", 0x40),
+    ("errors", 0x8F),
+    ("speed", 0x30),
+    ("position", 0x6D),
+    ("current", 0x20),
+    ("bus voltage", 0xEB),
+];
+
+/// Lists drives.
+pub(super) fn info(
+    rig: &Rig,
+    arguments: &InfoArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    on(
+        rig,
+        &arguments.rig,
+        Use::look("info"),
+        output,
+        |session, output| {
+            let drives = select(std::slice::from_ref(&arguments.drives), session)?;
+            let registers = SHOWN.map(|(_, register)| Register::of(register));
+            let found = find(session, &drives, &registers)?;
+            let drives: Vec<_> = found.chunks_exact(SHOWN.len()).collect();
+            match arguments.format {
+                OutputForm::Text => output.result(&output.fitted(&text(&drives)))?,
+                OutputForm::Json => {
+                    let drives: Vec<_> = drives.into_iter().map(object).collect();
+                    let whole = json!({"schema": 1, "drives": drives});
+                    output.result(&format!("{whole}\n"))?;
+                }
+            }
+            Ok(Exit::Passed)
+        },
+    )
+}
+
+/// A value in words: of a flag `yes` or `no`, of a word the names of its bits, of a number with its unit.
+fn words(found: &Found) -> String {
+    let raw = found.reply.data.bits();
+    match found.reply.register {
+        0x1B | 0x62 | 0xEB => found.reply.number().to_string(),
+        0xE2 | 0xE8 => if raw & 1 == 1 { "yes" } else { "no" }.to_owned(),
+        0x51 if raw & 4 == 0 => "released".to_owned(),
+        0x8F if raw == 0 => "none".to_owned(),
+        _ => match found.words() {
+            words if words.is_empty() => hex(found.reply.data),
+            words => words,
+        },
+    }
+}
+
+fn text(drives: &[&[Found]]) -> String {
+    let rows: Vec<_> = drives
+        .iter()
+        .flat_map(|drive| {
+            drive.iter().zip(SHOWN).map(|(found, (name, register))| {
+                [
+                    found.axis.node.to_string(),
+                    name.to_owned(),
+                    words(found),
+                    format!("{register:02X} {}", found.register().name),
+                ]
+            })
+        })
+        .collect();
+    columns(&["drive", "what", "value", "register"], &rows)
+}
+
+fn object(drive: &[Found]) -> Value {
+    let mut object = Map::new();
+    for (found, (name, _)) in drive.iter().zip(SHOWN) {
+        object.insert("drive".to_owned(), json!(found.axis.node));
+        object.insert(name.replace(' ', "_"), json!(words(found)));
+    }
+    Value::Object(object)
+}

@@ -1,0 +1,134 @@
+//! `drivebench position` on UNITEK drives: homing, and a move to a destination (ex 12).
+
+use super::bench::{on, single};
+use super::write::refuse_denied;
+use crate::buses::commands::{PositionArguments, Use};
+use crate::buses::unitek::driver::Driver;
+use crate::buses::unitek::rig::Axis;
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::rig::Rig;
+use crate::scenario::quantity::Quantity;
+use harness_proto::time::Span;
+use harness_proto::unitek::Register;
+use harness_proto::unitek::frame::Data;
+use harness_proto::unitek::words::status;
+
+/// Increments of a revolution (UNITEK 6.1).
+const TURN: f64 = 65_536.0;
+
+/// How often a drive is asked whether it has arrived.
+const POLL: Span = Span::from_millis(20);
+
+/// How long a drive may show no movement on its way.
+const STALLED: Span = Span::from_millis(2_000);
+
+/// Homes a drive, or moves it, and waits until it has arrived.
+pub(super) fn position(
+    rig: &Rig,
+    arguments: &PositionArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    if arguments.init || arguments.speed.is_some() {
+        return Err(Failure::refused(
+            "--init and --speed are for rings of ND21; the speed of a UNITEK drive is bounded by SPEED_LIMIT (0x34)",
+        ));
+    }
+    let as_what = Use {
+        purpose: "position",
+        moves: arguments.leave,
+        holds: arguments.hold.hold,
+    };
+    on(rig, &arguments.rig, as_what, output, |session, output| {
+        let axis = single(&arguments.drive, session)?;
+        if !arguments.leave {
+            return Err(Failure::refused(format!(
+                "position: drive {}: its motor will turn; nothing was done, add --move to allow it",
+                axis.node
+            )));
+        }
+        let mut driver = session.driver();
+        if arguments.reference {
+            home(&mut driver, axis)?;
+            output.result(&format!("drive {}: homed\n", axis.node))?;
+        }
+        let actual = f64::from(read(&mut driver, axis, 0x6D)?.cast_signed());
+        let target = match (&arguments.to, &arguments.by) {
+            (Some(to), _) => increments(to),
+            (None, Some(by)) => actual + increments(by),
+            (None, None) => return Ok(Exit::Passed),
+        };
+        if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&target) {
+            let message = "the destination is out of range: -32768 to 32767 turns expected";
+            return Err(Failure::refused(message));
+        }
+        let data = Data::Long((target.round() as i32).cast_unsigned());
+        refuse_denied(&mut driver, &[(axis, Register::of(0x6E), data)])?;
+        driver.write(axis, 0x6E, data)?;
+        output.say(&format!("drive {}: its motor turns\n", axis.node));
+        let at = arrive(&mut driver, axis)?;
+        let turns = f64::from(at) / TURN;
+        output.result(&format!(
+            "drive {}: arrived at {turns:.3} turns\n",
+            axis.node
+        ))?;
+        Ok(Exit::Passed)
+    })
+}
+
+fn increments(of: &Quantity) -> f64 {
+    of.value.to_f64() * TURN
+}
+
+fn read(driver: &mut Driver<'_>, axis: Axis, register: u8) -> Result<u32, Failure> {
+    Ok(driver.read(axis, register)?.data.bits())
+}
+
+/// Starts homing, and waits until the drive is calibrated.
+fn home(driver: &mut Driver<'_>, axis: Axis) -> Result<(), Failure> {
+    let start = Data::Short(1);
+    refuse_denied(driver, &[(axis, Register::of(0x78), start)])?;
+    driver.write(axis, 0x78, start)?;
+    let mut end = driver.now() + STALLED;
+    let mut last = 0;
+    loop {
+        let word = read(driver, axis, 0x40)?;
+        if word & status::CALIBRATED != 0 {
+            return Ok(());
+        }
+        let at = read(driver, axis, 0x6D)?;
+        if at != last {
+            (last, end) = (at, driver.now() + STALLED);
+        }
+        if driver.now() >= end {
+            return Err(Failure::drive(format!(
+                "drive {} is not calibrated, and does not move (STATUS {word:X}); is it released? `drivebench go` releases it",
+                axis.node
+            )));
+        }
+        driver.run(POLL)?;
+    }
+}
+
+/// Waits until a drive is in tolerance of its destination. Returns where it is.
+fn arrive(driver: &mut Driver<'_>, axis: Axis) -> Result<i32, Failure> {
+    let mut end = driver.now() + STALLED;
+    let mut last = None;
+    loop {
+        driver.run(POLL)?;
+        let at = read(driver, axis, 0x6D)?;
+        if read(driver, axis, 0xF4)? & 1 == 1 {
+            return Ok(at.cast_signed());
+        }
+        if last != Some(at) {
+            (last, end) = (Some(at), driver.now() + STALLED);
+        }
+        if driver.now() >= end {
+            return Err(Failure::drive(format!(
+                "drive {} has not arrived, and does not move; is it released? `drivebench go` releases it",
+                axis.node
+            )));
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! The commands on UNITEK drives that another process serves: over SLCAN on a socket and a pseudo terminal, and over socketcand.
+
+use crate::program::{ended, said};
+use crate::serve::{Sim, connect};
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+
+/// A served segment of two drives, and a folder with a rig file for it.
+struct Desk {
+    sim: Sim,
+    folder: tempfile::TempDir,
+    /// The address of SLCAN on a socket.
+    slcan: String,
+}
+
+const SAFE: &str = "safe state: every drive is locked and stands, with commands 0";
+
+const MOTION: &str = "allow_motion = true\n";
+
+impl Desk {
+    /// A rig at one of the ways in: `slcan`, `pty` or `socketcand`.
+    fn new(way: &str, limits: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let terminal = folder.path().join("terminal");
+        let mut sim = Sim::start(&[
+            "--bus",
+            "unitek",
+            "--drives",
+            "2",
+            "--slcan",
+            "127.0.0.1:0",
+            "--socketcand",
+            "127.0.0.1:0",
+            "--slcan-pty",
+            terminal.to_str().expect("text"),
+        ]);
+        let (slcan, socketcand, terminal) = (sim.address(), sim.address(), sim.address());
+        let port = match way {
+            "slcan" => format!("slcan = \"{slcan}\""),
+            "pty" => format!("slcan = \"{terminal}\""),
+            _ => format!("socketcand = \"{socketcand}\""),
+        };
+        let text = format!(
+            "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"unitek\"\n{port}\npatience = \"2s\"\n\
+             drives = [{{ node = 1 }}, {{ node = 2 }}]\n[limits]\n{limits}"
+        );
+        std::fs::write(folder.path().join("desk.toml"), text).expect("room");
+        Self { sim, folder, slcan }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+        command
+            .args(line.split(' '))
+            .current_dir(self.folder.path())
+            .env("DRIVEBENCH_STATE", self.path("state"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    }
+
+    fn run(&self, line: &str) -> Output {
+        let mut command = self.command(line);
+        command.args(["--rig", "desk.toml"]);
+        command.output().expect("the program")
+    }
+
+    #[track_caller]
+    fn shows(&self, line: &str, words: &str) {
+        ended(&self.run(line), 0, words);
+    }
+
+    /// Starts a move that lasts for minutes, and waits until the motor turns.
+    fn moving(&self) -> (Child, BufReader<std::process::ChildStderr>) {
+        let mut command = self.command("position 1 --to 30000turns --move --rig desk.toml");
+        let mut child = command.spawn().expect("the program");
+        let mut said = BufReader::new(child.stderr.take().expect("a pipe"));
+        let mut line = String::new();
+        said.read_line(&mut line).expect("a line");
+        assert!(line.contains("its motor turns"), "{line}");
+        (child, said)
+    }
+}
+
+/// What only looks leaves drives as they are; what changes them ends in the safe state.
+#[test]
+fn every_command_over_every_way_in() {
+    for way in ["slcan", "pty", "socketcand"] {
+        let desk = Desk::new(way, MOTION);
+        desk.shows("read all SPEED_ACTUAL STATUS", "Ena N-I");
+        assert!(!said(&desk.run("read 1 MODE")).contains("safe state"));
+        desk.shows("info", "ERR_BITMAP1");
+        desk.shows("watch 2 SPEED_ACTUAL --for 20ms --every 10ms", "0.0%");
+        desk.shows("write 1 SPEED_CMD=10% --move", "0CCD 10.0% (360.0 rpm)");
+        desk.shows("read 1 MODE", "0004");
+        ended(&desk.run("go 1"), 2, "add --move");
+        desk.shows("go 1 --move", "drive 1: released; ready");
+        desk.shows("go 1 --move", SAFE);
+        let kept = desk.run("go all --move --hold");
+        ended(&kept, 0, "drive 2: released");
+        assert!(!said(&kept).contains("safe state"), "{}", said(&kept));
+        desk.shows("read 1 STATUS", "Ena");
+        desk.shows("position 1 --by 1turns --move", "drive 1: arrived at");
+        desk.shows("stop all", "drive 2: its speed command is 0");
+        desk.shows("block all", "drive 1: locked, with commands 0");
+        desk.shows("params save 1 saved.toml", "118 parameters");
+        desk.shows("params diff 1 saved.toml", "");
+        ended(&desk.run("params diff 2 saved.toml"), 1, "CAN_ID_RX");
+        let load = desk.run("params load 2 saved.toml --yes");
+        ended(&load, 1, "2 of them identify the device");
+        let check = desk.command("rig check desk.toml").output();
+        ended(
+            &check.expect("the program"),
+            0,
+            "drive 2 (202, 182): firmware 472",
+        );
+        ended(&desk.run("read 3 MODE"), 2, "the rig has no drive 3");
+        ended(&desk.run("read 1 SPED_CMD"), 2, "did you mean `SPEED_CMD`?");
+        ended(&desk.run("qualify"), 2, "this command serves rings only");
+    }
+}
+
+/// What the rig's file does not permit is refused before the first frame of the command, and a speed above the highest too.
+#[test]
+fn limits_are_kept_before_anything_is_sent() {
+    let desk = Desk::new("slcan", "max_speed = \"20%\"\n");
+    let line = "write 1 STATUS_MASK=0C SPEED_CMD=10% --move";
+    ended(&desk.run(line), 2, "nothing was written: 201#31CD0C");
+    desk.shows("read 1 STATUS_MASK", "3000");
+    ended(&desk.run("go 1 --move"), 2, "needs `allow_motion`");
+    desk.shows("stop 1", "it is locked and coasts");
+    ended(
+        &desk.run("write 1 CAN_ID_RX=210"),
+        2,
+        "needs `allow_bus_settings`",
+    );
+    let desk = Desk::new(
+        "socketcand",
+        "allow_motion = true\nmax_speed = \"360rpm\"\n",
+    );
+    ended(
+        &desk.run("write 1 SPEED_CMD=11% --move"),
+        2,
+        "above `max_speed`",
+    );
+    desk.shows("write 1 SPEED_CMD=10% --move", SAFE);
+    ended(
+        &desk.run("write 1 TORQUE_SETPOI=10% --move"),
+        2,
+        "SPEED_LIMIT",
+    );
+    desk.shows("write 1 SPEED_LIMIT=10% TORQUE_SETPOI=10% --move", SAFE);
+}
+
+/// Every signal that ends the program ends a motion in the safe state.
+#[test]
+fn a_signal_ends_a_motion_in_the_safe_state() {
+    let desk = Desk::new("slcan", MOTION);
+    for signal in ["-INT", "-TERM", "-HUP", "-QUIT"] {
+        let (child, mut rest) = desk.moving();
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args([signal, &id]).status();
+        assert!(sent.expect("kill").success());
+        let output = child.wait_with_output().expect("its end");
+        let mut said = String::new();
+        std::io::Read::read_to_string(&mut rest, &mut said).expect("text");
+        assert_eq!(output.status.code(), Some(130), "{signal}: {said}");
+        assert!(said.contains(SAFE), "{signal}: {said}");
+        desk.shows("read 1 MODE", "0004");
+    }
+}
+
+/// Where the bus is gone, nothing confirms the safe state.
+#[test]
+fn a_lost_adapter_is_not_safe() {
+    let mut desk = Desk::new("slcan", MOTION);
+    let (child, mut rest) = desk.moving();
+    desk.sim.signal("-KILL");
+    desk.sim.code();
+    let output = child.wait_with_output().expect("its end");
+    let mut said = String::new();
+    std::io::Read::read_to_string(&mut rest, &mut said).expect("text");
+    assert_eq!(output.status.code(), Some(7), "{said}");
+    assert!(said.contains("use the emergency stop"), "{said}");
+    ended(&desk.run("read 1 MODE"), 3, "rig desk: ");
+}
+
+/// A bench does not send where another master does; one that only listens sends nothing at all.
+#[test]
+fn another_master_is_left_alone() {
+    let desk = Desk::new("socketcand", MOTION);
+    let mut other = connect(&desk.slcan);
+    other.write_all(b"S6\rO\r").expect("sent");
+    let (end, ended_here) = std::sync::mpsc::channel::<()>();
+    let talking = std::thread::spawn(move || {
+        use std::sync::mpsc::RecvTimeoutError::Timeout;
+        let pause = std::time::Duration::from_millis(5);
+        while ended_here.recv_timeout(pause) == Err(Timeout) {
+            other.write_all(b"t20133D1B00\r").expect("sent");
+        }
+    });
+    ended(
+        &desk.run("read 1 MODE"),
+        3,
+        "another master sends to drive 1 (201#3D1B00)",
+    );
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig");
+    let text = text.replace("[limits]", "listen_only = true\n[limits]");
+    std::fs::write(&path, text).expect("room");
+    ended(&desk.run("read 1 MODE"), 2, "listen_only");
+    let check = desk.command("rig check desk.toml").output();
+    ended(
+        &check.expect("the program"),
+        0,
+        "not asked: the bench only listens",
+    );
+    drop(end);
+    talking.join().expect("the other master");
+}
