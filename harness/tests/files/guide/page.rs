@@ -59,7 +59,9 @@ pub(super) struct Page {
 }
 
 /// Languages whose blocks are not commands.
-const OTHER: [&str; 6] = ["text", "toml", "yaml", "json", "xml", "markdown"];
+const OTHER: [&str; 8] = [
+    "text", "toml", "yaml", "json", "xml", "markdown", "python", "c",
+];
 
 impl Page {
     /// Reads a page; a mistake in its form is a panic that names the line.

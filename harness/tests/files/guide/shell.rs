@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 /// A page that hangs is ended; no page is judged by how long it takes.
 const PATIENCE: Duration = Duration::from_secs(300);
 
+/// What a page needs whose commands call `python3` with python-can.
+const PYTHON_CAN: &str = "python-can";
+
 /// Runs the steps and returns the differences from the page.
 pub(super) fn differences(steps: &[Step], page: &str) -> String {
     let home = tempfile::tempdir().expect("a folder");
@@ -25,6 +28,11 @@ pub(super) fn differences(steps: &[Step], page: &str) -> String {
 
     let mut script = "cd work\n".to_owned();
     let mut commands: Vec<&Shown> = Vec::new();
+    let python = Mode::Needs(PYTHON_CAN.to_owned());
+    let python = (steps.iter())
+        .any(|step| matches!(step, Step::Command(mode, _) if *mode == python))
+        .then(|| debian::python_can(page))
+        .flatten();
     for (number, step) in steps.iter().enumerate() {
         match step {
             Step::File { name, text } => {
@@ -44,7 +52,7 @@ pub(super) fn differences(steps: &[Step], page: &str) -> String {
         }
     }
     std::fs::write(home.path().join("script"), script).expect("a file");
-    let ended = run(home.path());
+    let ended = run(home.path(), python.as_deref());
     let mut text = String::new();
     if !ended {
         let _written = writeln!(text, "{page}: did not end in {PATIENCE:?}");
@@ -59,7 +67,10 @@ fn wanted(mode: &Mode, page: &str) -> bool {
     let Mode::Needs(tool) = mode else {
         return *mode == Mode::Run;
     };
-    debian::has(tool, page)
+    match tool.as_str() {
+        PYTHON_CAN => debian::python_can(page).is_some(),
+        tool => debian::has(tool, page),
+    }
 }
 
 /// One command of the script. One in the background has begun when it has said its first line.
@@ -76,9 +87,11 @@ fn one(command: &str, number: usize) -> String {
 }
 
 /// Runs the script in a process group of its own, and ends whatever of it is still there. `false`: it hung.
-fn run(home: &Path) -> bool {
+/// `python3` is that one, where it is given.
+fn run(home: &Path, python: Option<&Path>) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let folders = std::iter::once(home.join("bin")).chain(std::env::split_paths(&path));
+    let own = python.and_then(Path::parent).map(Path::to_owned);
+    let folders = (std::iter::once(home.join("bin")).chain(own)).chain(std::env::split_paths(&path));
     let mut child = Command::new("sh")
         .arg("script")
         .current_dir(home)
