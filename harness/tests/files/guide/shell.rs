@@ -91,7 +91,8 @@ fn one(command: &str, number: usize) -> String {
 fn run(home: &Path, python: Option<&Path>) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let own = python.and_then(Path::parent).map(Path::to_owned);
-    let folders = (std::iter::once(home.join("bin")).chain(own)).chain(std::env::split_paths(&path));
+    let folders =
+        (std::iter::once(home.join("bin")).chain(own)).chain(std::env::split_paths(&path));
     let mut child = Command::new("sh")
         .arg("script")
         .current_dir(home)
