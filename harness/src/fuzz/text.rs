@@ -1,6 +1,7 @@
 //! The bodies of the fuzz targets for texts: scenarios and rig files.
 
 use crate::rig;
+use crate::scenario::language::Language;
 use crate::scenario::parse::parse;
 use crate::scenario::plan::plan;
 use crate::scenario::problem::{Problem, Problems};
@@ -47,19 +48,20 @@ pub fn scenario(data: &[u8]) {
 ///
 /// # Panics
 /// It is another one.
-pub fn written(scenario: &Scenario) {
+pub fn written<L: Language>(scenario: &Scenario<L>) {
     let text = write(scenario);
     let source = Source {
         name: "written.scn".to_owned(),
         text: text.as_str().into(),
     };
-    let again = parse(&source).unwrap_or_else(|problems| panic!("{problems:#?}\n{text}"));
+    let again: Scenario<L> =
+        parse(&source).unwrap_or_else(|problems| panic!("{problems:#?}\n{text}"));
     assert_eq!(said(scenario), said(&again), "{text}");
     assert_eq!(text, write(&again));
 }
 
 /// All that a scenario says, without the places where it says it.
-fn said(scenario: &Scenario) -> String {
+fn said<L: Language>(scenario: &Scenario<L>) -> String {
     let text = format!("{scenario:?}");
     let mut pieces = text.split("Span { start: ");
     let first = pieces.next().unwrap_or_default().to_owned();

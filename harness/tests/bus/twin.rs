@@ -45,7 +45,9 @@ fn a_ring_is_its_own_twin() {
     for source in sources(&[]).expect("the built-in scenarios") {
         let name = source.name.clone();
         let entry = Entry::new(source, None).expect("no mistakes");
-        let plan = entry.plan.expect("novobus");
+        let Some(plan) = entry.plan else {
+            continue;
+        };
         if plan.rings[0].drives() > 10 {
             continue;
         }
@@ -99,8 +101,9 @@ fn a_record_is_played_again() {
     let mut played = 0;
     for source in sources(&[]).expect("the built-in scenarios") {
         let name = source.name.clone();
-        let plan = Entry::new(source, None).expect("no mistakes").plan;
-        let plan = plan.expect("novobus");
+        let Some(plan) = Entry::new(source, None).expect("no mistakes").plan else {
+            continue;
+        };
         if plan.rings[0].drives() > 10 {
             continue;
         }

@@ -7,7 +7,6 @@ use super::syntax::{
 };
 use crate::scenario::expression::Located;
 use harness_proto::can::Id;
-use harness_proto::unitek::Register;
 use std::fmt::Display;
 
 /// The header lines: those of one word, and those about devices.
@@ -60,13 +59,10 @@ fn outside(what: &Outside) -> String {
 
 fn register(name: &RegisterName) -> String {
     match name {
-        RegisterName::Known { register, by_name } => {
-            // A name of the dump that several registers have stands for none of them.
-            match Register::named(register.name) {
-                Ok(_) if *by_name => register.name.to_owned(),
-                _ => format!("{:02X}", register.number),
-            }
-        }
+        RegisterName::Known { register, by_name } => match by_name {
+            true => register.name.to_owned(),
+            false => format!("{:02X}", register.number),
+        },
         RegisterName::Counted(number) => counted(number),
     }
 }
@@ -87,12 +83,7 @@ fn value(value: &Value) -> String {
             );
             let (whole, fraction) = digits.split_at(digits.len() - places);
             let sign = if decimal.digits < 0 { "-" } else { "" };
-            // `5A` would be hexadecimal digits.
-            let point = match (places, given.name()) {
-                (0, "A") => ".0",
-                (0, _) => "",
-                _ => ".",
-            };
+            let point = if places == 0 { "" } else { "." };
             format!("{sign}{whole}{point}{fraction}{}", given.name())
         }
         ValueKind::Counted(number) => counted(number),

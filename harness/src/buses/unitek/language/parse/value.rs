@@ -54,9 +54,11 @@ pub(super) fn register(scanner: &mut Scanner<'_>) -> Result<RegisterName, Proble
         return Err(scanner.unexpected("a register: two hexadecimal digits, or a name"));
     }
     match Register::named(text) {
+        // A name of the dump that several registers have stands for none of them.
         Ok(register) => Ok(RegisterName::Known {
             register,
-            by_name: u8::from_str_radix(text.trim_start_matches("0x"), 16).is_err(),
+            by_name: u8::from_str_radix(text.trim_start_matches("0x"), 16).is_err()
+                && Register::named(register.name).is_ok(),
         }),
         Err(bad) => {
             *scanner = before;
@@ -173,6 +175,14 @@ fn kind(scanner: &mut Scanner<'_>, unit: Option<Unit>) -> Result<ValueKind, Prob
             return Err(before
                 .clone()
                 .unexpected("a decimal number of at most 12 digits"));
+        };
+        // `5A` would be hexadecimal digits, so amperes are kept with a point.
+        let decimal = match (given, decimal.places) {
+            (Given::Ampere, 0) => Decimal {
+                digits: decimal.digits * 10,
+                places: 1,
+            },
+            _ => decimal,
         };
         return Ok(ValueKind::Given(decimal, given));
     }
