@@ -47,6 +47,7 @@ use crate::serve::frames::FrameJob;
 use crate::serve::{End, Host, ServeError};
 use commands::rig_check::CheckRigArguments;
 use commands::{DriveCommand, RigName};
+use harness_proto::can::Frame;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::record::{Carried, Trace};
@@ -136,6 +137,20 @@ pub(crate) fn rows(
         .then(|| unitek::report::table::table(trace, wanted, at_most))
 }
 
+/// The drive that sends a frame, by its identifier; `None` for a frame of a host.
+pub(crate) fn sender_of(frame: &Frame) -> Option<u8> {
+    unitek::report::sender_of(frame)
+}
+
+/// The dissector of a bus for Wireshark; `None` if it is not built.
+pub(crate) fn dissector(bus: Bus) -> Option<String> {
+    match bus {
+        Bus::Novobus => Some(novobus::report::DISSECTOR.to_owned()),
+        Bus::Unitek => Some(unitek::dissector::dissector()),
+        Bus::Nordac => None,
+    }
+}
+
 /// A form in which frames are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameForm {
@@ -143,6 +158,10 @@ pub(crate) enum FrameForm {
     Json,
     /// The log of candump.
     Candump,
+    /// A row a frame, for spreadsheets.
+    Csv,
+    /// A capture for Wireshark.
+    Pcapng,
 }
 
 /// Writes traces of a bus of frames.
@@ -157,6 +176,8 @@ pub(crate) fn write_frames(
     match form {
         FrameForm::Json => unitek::report::json::write(Bus::Unitek, traces, out),
         FrameForm::Candump => unitek::report::json::candump(traces, out),
+        FrameForm::Csv => unitek::report::csv::write(traces, out),
+        FrameForm::Pcapng => crate::report::pcapng_frames::write(traces, out),
     }
 }
 

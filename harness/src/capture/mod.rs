@@ -1,6 +1,6 @@
 //! Captures: what the links of a ring carried, read from a file of any program.
 //!
-//! [`read`] takes pcapng of link type 250 and the JSON of `drivebench trace`. A capture can be shown in every form that a run can,
+//! [`read`] takes pcapng of link types 250 and 227, the JSON of `drivebench trace` and the log of candump. A capture can be shown in every form that a run can,
 //! compared with another ([`diff()`]), turned into a scenario ([`scenario`]), and so be judged against the model
 //! ([`judge`]): what the master sent and what was damaged on the way is done to a simulated ring, and what came back is
 //! compared.
@@ -10,6 +10,8 @@
 
 pub(crate) mod diff;
 pub(crate) mod faults;
+pub mod frame_diff;
+mod frames;
 pub mod fuzz;
 mod pcapng;
 
@@ -50,8 +52,8 @@ pub enum CaptureError {
     TooLong,
     /// It is of another kind.
     #[error(
-        "neither pcapng nor a trace in JSON: the file begins with {0}; Wireshark writes pcapng with \"Save As\", \
-         `drivebench trace --format json` the other"
+        "neither pcapng, nor a trace in JSON, nor a log of candump: the file begins with {0}; Wireshark writes pcapng with \
+         \"Save As\", `drivebench trace --format json` a trace, `candump -L` a log"
     )]
     Foreign(String),
     /// Something in it cannot be.
@@ -98,6 +100,10 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
     let text = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
     if bytes.starts_with(&[0x0A, 0x0D, 0x0D, 0x0A]) {
         pcapng::read(bytes, rate)
+    } else if text == Some(&b'(') {
+        frames::candump(bytes)
+    } else if text == Some(&b'{') && frames::is_json(bytes) {
+        frames::json(bytes)
     } else if text == Some(&b'{') {
         crate::buses::novobus::capture::json::read(bytes, rate)
     } else {
@@ -115,7 +121,7 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
 pub fn is_capture(path: &Path) -> bool {
     let mut start = [0; 4];
     let read = regular::open(path, Links::Follow).and_then(|mut file| file.read(&mut start));
-    matches!(read, Ok(1..)) && (start == [0x0A, 0x0D, 0x0D, 0x0A] || start[0] == b'{')
+    matches!(read, Ok(1..)) && (start == [0x0A, 0x0D, 0x0D, 0x0A] || b"{(".contains(&start[0]))
 }
 
 /// The ends of a link by its name: `98->97`, `master->99`, `2:0->master`; with the ring, counted from 0.

@@ -1,14 +1,17 @@
-//! Captures in pcapng, link type 250: those of [`crate::report::pcapng`], and those of others with one interface a link.
+//! Captures in pcapng, link types 250 and 227: those of [`crate::report::pcapng`], and those of others with one interface a link.
 //!
 //! Both orders of bytes, every resolution of time, several sections; blocks and options of other kinds are passed over. A
 //! packet may hold several bytes: the time is that of the first, the others follow without a gap. Where the first
 //! packet is later than a day, times count from a byte time before it.
 
+use super::frames::{FrameRead, Sender, assemble, packet};
 use super::{Assembly, Capture, CaptureError, ends, line_byte};
 use crate::report::pcapng::{
     COMMENT, END, ERRORS, HEADER, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST, MAGIC,
     NANOSECONDS, PACKET, SECTION,
 };
+use crate::report::pcapng_frames;
+use harness_proto::can::BitRate;
 use harness_proto::line::{LineError, Rate};
 
 /// Option of an interface: seconds to be added to its times.
@@ -23,11 +26,18 @@ const DAY: u64 = 86_400_000_000_000;
 const MAX_INTERFACES: usize = 65_536;
 
 struct Interface {
-    ring: usize,
-    from: Option<u8>,
-    to: Option<u8>,
+    carries: Carries,
     resolution: u8,
     offset: i64,
+}
+
+/// What an interface stands for.
+#[derive(Clone, Copy)]
+enum Carries {
+    /// A link of a ring: the ring, and the ends of the link.
+    Link(usize, Option<u8>, Option<u8>),
+    /// Frames of a bus.
+    Frames(Sender),
 }
 
 /// What packets say.
@@ -47,7 +57,9 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
         interfaces: Vec::new(),
         section: 0,
         speed: None,
+        bit_rate: None,
         found: Vec::new(),
+        frames: Vec::new(),
     };
     let mut offset = 0;
     while offset < bytes.len() {
@@ -57,9 +69,20 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
     if !known.iter().any(Option::is_some) {
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
-            what: "no interface is of link type 250 (RTAC serial): such captures have one for each link of a ring, \
-                   named as in `98->97`"
+            what: "no interface is of link type 250 (RTAC serial) or 227 (CAN): captures of a ring have one of the former for each \
+                   link, named as in `98->97`"
                 .to_owned(),
+        });
+    }
+    let is_link = |own: &Interface| matches!(own.carries, Carries::Link(..));
+    let links = known.iter().flatten().filter(|own| is_link(own)).count();
+    if links == 0 {
+        return Ok(assemble(reader.frames, reader.bit_rate));
+    }
+    if !reader.frames.is_empty() {
+        return Err(CaptureError::Link {
+            place: "the capture".to_owned(),
+            what: "it has frames of CAN and bytes of a ring: write them into two files".to_owned(),
         });
     }
     let byte_time = rate.or(reader.speed).unwrap_or_default().byte_time();
@@ -68,17 +91,21 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
         .filter(|first| *first > DAY)
         .map_or(0, |first| first - byte_time.as_nanos());
     let mut assembly = Assembly::default();
-    for interface in known.iter().flatten() {
-        assembly.link(interface.ring, interface.from, interface.to);
+    let link = |interface: &Option<Interface>| match interface.as_ref()?.carries {
+        Carries::Link(ring, from, to) => Some((ring, from, to)),
+        Carries::Frames(_) => None,
+    };
+    for (ring, from, to) in known.iter().filter_map(link) {
+        assembly.link(ring, from, to);
     }
     // Bytes of one packet and of one link are in order already; other tools may write packets late.
     let mut found = reader.found;
     found.sort_by_key(|byte| byte.nanos);
     for byte in found {
-        let Some(Some(interface)) = known.get(byte.interface) else {
+        let Some((ring, from, to)) = known.get(byte.interface).and_then(link) else {
             continue;
         };
-        let link = assembly.link(interface.ring, interface.from, interface.to);
+        let link = assembly.link(ring, from, to);
         let nanos = byte.nanos - base;
         link.bytes
             .push(line_byte(nanos, byte.sent, byte.received, byte.error));
@@ -99,7 +126,9 @@ struct Reader<'b> {
     /// The first interface of the present section.
     section: usize,
     speed: Option<Rate>,
+    bit_rate: Option<BitRate>,
     found: Vec<Byte>,
+    frames: Vec<FrameRead>,
 }
 
 impl Reader<'_> {
@@ -240,7 +269,8 @@ impl Reader<'_> {
         if self.interfaces.len() >= MAX_INTERFACES {
             return self.wrong(start, format!("more than {MAX_INTERFACES} interfaces"));
         }
-        if self.u16(start, end)? != LINK_TYPE {
+        let link_type = self.u16(start, end)?;
+        if ![LINK_TYPE, pcapng_frames::LINK_TYPE].contains(&link_type) {
             self.interfaces.push(None);
             return Ok(());
         }
@@ -256,6 +286,22 @@ impl Reader<'_> {
             }
             Ok(())
         })?;
+        if link_type == pcapng_frames::LINK_TYPE {
+            let name = name.map_or("".into(), |(from, to)| {
+                String::from_utf8_lossy(&self.bytes[from..to])
+            });
+            let carries = Carries::Frames(Sender::named(name.trim_end_matches('\0')));
+            let bits = speed.and_then(|speed| u32::try_from(speed).ok());
+            self.bit_rate = self
+                .bit_rate
+                .or(bits.and_then(BitRate::from_bits_per_second));
+            self.interfaces.push(Some(Interface {
+                carries,
+                resolution,
+                offset,
+            }));
+            return Ok(());
+        }
         let Some((from, to)) = name else {
             return self.wrong(
                 start,
@@ -275,9 +321,7 @@ impl Reader<'_> {
         let known = speed.and_then(|speed| u32::try_from(speed).ok());
         self.speed = self.speed.or(known.and_then(Rate::from_bits_per_second));
         self.interfaces.push(Some(Interface {
-            ring,
-            from: link_from,
-            to: link_to,
+            carries: Carries::Link(ring, link_from, link_to),
             resolution,
             offset,
         }));
@@ -301,6 +345,9 @@ impl Reader<'_> {
         };
         let captured = usize::try_from(self.u32(start + 12, end)?).unwrap_or(usize::MAX);
         let data = start + 20;
+        if let Carries::Frames(sender) = known.carries {
+            return self.frame((data, captured, end), nanos, sender);
+        }
         if captured < HEADER || captured > end - data.min(end) {
             return self.wrong(start + 12, format!("a packet of {captured} bytes: at least the {HEADER} of its header, and at most its block, are expected"));
         }
@@ -315,6 +362,41 @@ impl Reader<'_> {
             Ok(())
         })?;
         self.bytes_of(data + 8, event, payload, (interface, nanos), comment)
+    }
+
+    /// The frame of a packet.
+    fn frame(
+        &mut self,
+        (data, captured, end): (usize, usize, usize),
+        nanos: u64,
+        sender: Sender,
+    ) -> Result<(), CaptureError> {
+        if captured > end - data.min(end) {
+            return self.wrong(
+                data,
+                format!("a packet of {captured} bytes does not fit into its block"),
+            );
+        }
+        let mut comment = None;
+        let options = data + captured.next_multiple_of(4);
+        self.options((options, end), |code, from, to| {
+            if code == COMMENT {
+                comment = Some(String::from_utf8_lossy(&self.bytes[from..to]));
+            }
+            Ok(())
+        })?;
+        let read = packet(&self.bytes[data..data + captured], comment.as_deref());
+        let found = match read {
+            Ok(found) => found,
+            Err(what) => return self.wrong(data, what),
+        };
+        self.frames.extend(found.map(|(frame, ended)| FrameRead {
+            nanos,
+            sender,
+            frame,
+            ended,
+        }));
+        Ok(())
     }
 
     /// The bytes that a packet speaks of.

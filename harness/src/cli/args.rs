@@ -6,6 +6,7 @@ use super::fuzz::FuzzCommand;
 use super::promote::PromoteArguments;
 use super::rig::RigCommand;
 use super::shrink::ShrinkArguments;
+use crate::buses::Bus;
 use crate::buses::commands::DriveCommand;
 use crate::file::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
@@ -74,7 +75,11 @@ pub enum Command {
     /// The exit code is 1 if they differ.
     Diff(DiffArguments),
     /// Print the Wireshark dissector for `trace --format pcapng`.
-    Dissector,
+    Dissector {
+        /// The bus.
+        #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
+        bus: Bus,
+    },
     /// List the manual's tables with the scenarios that test them, and the errata.
     Manual(ManualArguments),
     /// List the drive's memory cells: address, access, unit, meaning, section.
@@ -291,7 +296,7 @@ pub struct TraceOutput {
 /// For `import`.
 #[derive(Clone, Debug, Args)]
 pub struct ImportArguments {
-    /// The capture: pcapng with one interface per link, named as in 98->97, or the JSON of `trace`.
+    /// The capture: pcapng with one interface per link, named as in 98->97, or of CAN; the JSON of `trace`; the log of candump.
     pub file: PathBuf,
     /// Show the capture in this format instead of comparing it.
     #[arg(long, value_enum, conflicts_with = "scenario")]
@@ -430,7 +435,7 @@ pub enum TraceFormat {
     Vcd,
     /// A capture for Wireshark; `drivebench dissector` prints the dissector.
     Pcapng,
-    /// One row per byte.
+    /// One row per byte, or per frame of CAN.
     Csv,
     /// The log of candump: a line per frame of CAN.
     Candump,

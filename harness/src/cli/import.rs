@@ -4,7 +4,9 @@ use super::args::{DiffArguments, ImportArguments};
 use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
-use super::trace::{ShownRun, fits_output, show};
+use super::trace::{ShownRun, fits_bus, fits_output, show};
+use crate::buses::{self, Bus, carry_frames};
+use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
     Capture, ComparedRun, Judged, Options, diff as compare, is_capture, judge, read_file, scenario,
 };
@@ -23,8 +25,15 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Prints the dissector.
-pub(crate) fn dissector(output: &mut Output) -> std::io::Result<Exit> {
-    output.result(crate::report::DISSECTOR)?;
+pub(crate) fn dissector(bus: Bus, output: &mut Output) -> std::io::Result<Exit> {
+    let Some(text) = buses::dissector(bus) else {
+        output.complain(&format!(
+            "there is no dissector for {}: the bus is not built yet",
+            bus.name()
+        ));
+        return Ok(Exit::Usage);
+    };
+    output.result(&text)?;
     Ok(Exit::Passed)
 }
 
@@ -42,7 +51,9 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
             rate: capture.rate,
             records: &[],
         };
-        if !fits_output(format, &arguments.showing, output) {
+        if !fits_output(format, &arguments.showing, output)
+            || !fits_bus(format, &capture.traces, output)
+        {
             return Ok(Exit::Usage);
         }
         let written = show(&shown, format, &arguments.showing, output)?;
@@ -51,6 +62,14 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
         } else {
             Exit::RigError
         });
+    }
+    if carry_frames(&capture.traces) {
+        output.complain(&format!(
+            "{}: frames of CAN are not compared with a model; `--format table` shows them, and `drivebench diff` compares them with another \
+             capture or with a scenario",
+            path.display()
+        ));
+        return Ok(Exit::Usage);
     }
     let setup = match arguments.setup.as_deref().map(Source::read).transpose() {
         Ok(setup) => setup,
@@ -187,6 +206,21 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
         return Ok(Exit::Usage);
     };
     let names = [title(&arguments.left), title(&arguments.right)];
+    match [&left, &right].map(|side| carry_frames(&side.traces)) {
+        [true, true] => {
+            let summary = frame_diff(&left, &right, span(arguments.tolerance));
+            output.result(&summary.show([&names[0], &names[1]]))?;
+            return Ok(match summary.same() {
+                true => Exit::Passed,
+                false => Exit::Failed,
+            });
+        }
+        [false, false] => {}
+        _ => {
+            output.complain("one side has frames of CAN and the other bytes of a ring; two of one kind expected");
+            return Ok(Exit::Usage);
+        }
+    }
     let summary = compare(
         ComparedRun {
             name: &names[0],

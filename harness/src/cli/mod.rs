@@ -72,7 +72,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Trace(arguments) => trace::trace(&arguments, output),
         Command::Import(arguments) => import::import(&arguments, output),
         Command::Diff(arguments) => import::diff(&arguments, output),
-        Command::Dissector => import::dissector(output),
+        Command::Dissector { bus } => import::dissector(bus, output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => crate::buses::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),

@@ -172,6 +172,8 @@ fn frames(
     match format {
         TraceFormat::Json => write_frames(traces, FrameForm::Json, out),
         TraceFormat::Candump => write_frames(traces, FrameForm::Candump, out),
+        TraceFormat::Csv => write_frames(traces, FrameForm::Csv, out),
+        TraceFormat::Pcapng => write_frames(traces, FrameForm::Pcapng, out),
         _ => {
             for trace in traces {
                 let text = rows(trace, wanted.clone(), None).unwrap_or_default();
@@ -184,13 +186,12 @@ fn frames(
 
 /// Whether a form can show what was carried. One that cannot is reported.
 pub(crate) fn fits_bus(format: TraceFormat, traces: &[Trace], output: &mut Output) -> bool {
-    const OF_FRAMES: [TraceFormat; 3] =
-        [TraceFormat::Table, TraceFormat::Json, TraceFormat::Candump];
+    const OF_RINGS: [TraceFormat; 2] = [TraceFormat::Svg, TraceFormat::Vcd];
     let name = format.to_possible_value();
     let name = name.as_ref().map_or("", |value| value.get_name());
     let why = match (carry_frames(traces), format) {
-        (true, format) if !OF_FRAMES.contains(&format) => {
-            format!("`--format {name}` shows bytes of a ring, and this bus carries frames; use table, json or candump")
+        (true, format) if OF_RINGS.contains(&format) => {
+            format!("`--format {name}` shows bytes of a ring, and this bus carries frames; use table, json, csv, candump or pcapng")
         }
         (false, TraceFormat::Candump) => {
             "`--format candump` shows frames of CAN, and this bus carries bytes; use table, json or csv".to_owned()

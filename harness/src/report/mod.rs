@@ -5,8 +5,9 @@ pub mod html;
 pub mod mismatch;
 pub mod page;
 pub mod pcapng;
+pub mod pcapng_frames;
 pub mod vcd;
 
-pub(crate) use crate::buses::novobus::report::{DISSECTOR, diagram, lines, sequence};
 /// How the one bus that is shown today reads its bytes, and its own tables and pictures.
 pub use crate::buses::novobus::report::{csv, json, meaning, plot, svg, table, walk};
+pub(crate) use crate::buses::novobus::report::{diagram, lines, sequence};

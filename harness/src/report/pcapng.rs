@@ -58,13 +58,7 @@ pub(crate) const ERRORS: [(LineError, u8); 4] = [
 /// What the writer says.
 pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Result<()> {
     let mut block = Block::default();
-    block.begin(SECTION);
-    block.put(&MAGIC.to_le_bytes());
-    block.put(&[1, 0, 0, 0]);
-    block.put(&u64::MAX.to_le_bytes());
-    block.option(USER_APPLICATION, b"drivebench");
-    block.option(END, &[]);
-    block.end(&mut out)?;
+    block.section(&mut out)?;
     let mut links: Vec<Channel> = Vec::new();
     for (ring, trace) in traces.iter().enumerate() {
         for link in &trace.channels {
@@ -136,27 +130,38 @@ pub fn name(ring: usize, link: &Channel) -> String {
 
 /// A block that is being written; its length is at both of its ends.
 #[derive(Default)]
-struct Block {
+pub(crate) struct Block {
     bytes: Vec<u8>,
 }
 
 impl Block {
-    fn begin(&mut self, kind: u32) {
+    /// Writes the header of a section.
+    pub(crate) fn section(&mut self, out: &mut impl Write) -> std::io::Result<()> {
+        self.begin(SECTION);
+        self.put(&MAGIC.to_le_bytes());
+        self.put(&[1, 0, 0, 0]);
+        self.put(&u64::MAX.to_le_bytes());
+        self.option(USER_APPLICATION, b"drivebench");
+        self.option(END, &[]);
+        self.end(out)
+    }
+
+    pub(crate) fn begin(&mut self, kind: u32) {
         self.bytes.clear();
         self.put(&kind.to_le_bytes());
         self.put(&[0; 4]);
     }
 
-    fn put(&mut self, bytes: &[u8]) {
+    pub(crate) fn put(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
-    fn pad(&mut self) {
+    pub(crate) fn pad(&mut self) {
         let length = self.bytes.len().next_multiple_of(4);
         self.bytes.resize(length, 0);
     }
 
-    fn option(&mut self, code: u16, value: &[u8]) {
+    pub(crate) fn option(&mut self, code: u16, value: &[u8]) {
         self.put(&code.to_le_bytes());
         let length = u16::try_from(value.len()).unwrap_or(0);
         self.put(&length.to_le_bytes());
@@ -164,7 +169,7 @@ impl Block {
         self.pad();
     }
 
-    fn end(&mut self, out: &mut impl Write) -> std::io::Result<()> {
+    pub(crate) fn end(&mut self, out: &mut impl Write) -> std::io::Result<()> {
         let length = u32::try_from(self.bytes.len() + 4).unwrap_or(u32::MAX);
         self.bytes[4..8].copy_from_slice(&length.to_le_bytes());
         self.put(&length.to_le_bytes());

@@ -90,8 +90,8 @@ fn refusals_name_the_place_and_the_remedy() {
     let [capture, _] = small();
     assert_eq!(
         refusal(b"title a scenario\n"),
-        "neither pcapng nor a trace in JSON: the file begins with 74 69 74 6C 65 20 61 20; Wireshark writes pcapng with \
-         \"Save As\", `drivebench trace --format json` the other"
+        "neither pcapng, nor a trace in JSON, nor a log of candump: the file begins with 74 69 74 6C 65 20 61 20; Wireshark writes \
+         pcapng with \"Save As\", `drivebench trace --format json` a trace, `candump -L` a log"
     );
     assert!(refusal(b"").contains("it is empty"));
     let cut = refusal(&capture[..capture.len() - 2]);

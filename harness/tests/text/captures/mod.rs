@@ -1,6 +1,7 @@
 //! What a run leaves for other tools, and captures that are read back.
 
 mod forms;
+mod frames;
 mod hostile;
 mod judged;
 mod program;

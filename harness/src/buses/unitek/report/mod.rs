@@ -1,5 +1,6 @@
 //! How frames of UNITEK drives read: a row a frame, JSON, the log of candump.
 
+pub mod csv;
 pub mod json;
 pub mod table;
 
@@ -9,6 +10,15 @@ use harness_proto::unitek::register::Unit;
 use harness_proto::unitek::units::{Scaling, shown, usual};
 use harness_proto::unitek::words::{Bit, ERRORS, IO, MODE, STATUS, set_bits};
 use harness_proto::unitek::{Data, Register, Reply, Request};
+
+/// The drive that sends a frame where identifiers are those of 3.1: 180 + n is drive n. `None` for other frames.
+#[must_use]
+pub fn sender_of(frame: &Frame) -> Option<u8> {
+    let number = frame.id().number();
+    let of_drive =
+        (0x181..=0x1FF).contains(&number) && !frame.id().is_extended() && !frame.is_remote();
+    u8::try_from(number & 0x7F).ok().filter(|_| of_drive)
+}
 
 /// What a frame says: of the bench to a drive, or of a drive.
 #[must_use]

@@ -1,0 +1,410 @@
+//! Captures of frames: link type 227 of pcapng, the log of candump, the JSON of `drivebench trace`.
+
+use super::{Capture, CaptureError};
+use crate::buses::sender_of;
+use crate::report::pcapng_frames::{DRIVE, ERROR, EXTENDED, HEADER, LOST, MASTER, REMOTE};
+use harness_proto::can::{BitRate, BusError, Frame, Id};
+use harness_proto::line::Rate;
+use harness_proto::time::{Instant, Span};
+use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
+use serde::Deserialize;
+use std::collections::BTreeSet;
+
+/// The longest time, in nanoseconds, that is one since the start, and not one since 1970: a day.
+const DAY: u64 = 86_400_000_000_000;
+
+/// Who sent a frame, as far as the file says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sender {
+    /// The bench, or a drive.
+    Known(Option<u8>),
+    /// What the bus knows by the identifier.
+    ByIdentifier,
+}
+
+impl Sender {
+    /// By the name of an interface.
+    pub(super) fn named(name: &str) -> Self {
+        let drive = name.strip_prefix(DRIVE).and_then(|own| own.parse().ok());
+        match (name, drive) {
+            (MASTER, _) => Self::Known(None),
+            (_, Some(drive)) => Self::Known(Some(drive)),
+            _ => Self::ByIdentifier,
+        }
+    }
+}
+
+/// A frame as a file has it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FrameRead {
+    /// When it had ended.
+    pub(super) nanos: u64,
+    pub(super) sender: Sender,
+    pub(super) frame: Frame,
+    pub(super) ended: FrameEnd,
+}
+
+/// The capture of these frames.
+pub(super) fn assemble(mut frames: Vec<FrameRead>, rate: Option<BitRate>) -> Capture {
+    let rate = rate.unwrap_or(BitRate::K500);
+    let length = |frame: &Frame| rate.time_of(frame.wire_bits());
+    // Frames of one time are in order already; other tools may write packets late.
+    frames.sort_by_key(|own| own.nanos);
+    let base = frames.first().filter(|first| first.nanos > DAY);
+    let base = base.map_or(0, |first| first.nanos - length(&first.frame).as_nanos());
+    let line = frames.iter().map(|own| {
+        let at = Instant::START + Span::from_nanos(own.nanos - base);
+        LineFrame {
+            from: match own.sender {
+                Sender::Known(from) => from,
+                Sender::ByIdentifier => sender_of(&own.frame),
+            },
+            start: at - length(&own.frame),
+            at,
+            frame: own.frame,
+            ended: own.ended,
+        }
+    });
+    let line: Vec<_> = line.collect();
+    let drives: BTreeSet<u8> = line.iter().filter_map(|own| own.from).collect();
+    Capture {
+        rate: Rate::default(),
+        traces: vec![Trace {
+            channels: vec![Channel::of_frames(line)],
+            ..Trace::empty(u8::try_from(drives.len()).unwrap_or(u8::MAX))
+        }],
+    }
+}
+
+/// Reads a packet of link type 227: header and data, and its comment.
+///
+/// # Errors
+/// What is wrong with it, in a sentence. `None` for an error frame that does not say which frame it ended.
+pub(super) fn packet(
+    data: &[u8],
+    comment: Option<&str>,
+) -> Result<Option<(Frame, FrameEnd)>, String> {
+    let (header, data) = data.split_at_checked(HEADER).ok_or_else(|| {
+        format!(
+            "a packet of {} bytes: at least the {HEADER} of its header are expected",
+            data.len()
+        )
+    })?;
+    let id = u32::from_be_bytes([header[0], header[1], header[2], header[3]]);
+    let len = usize::from(header[4]);
+    if id & ERROR != 0 {
+        let ended = comment.and_then(|text| {
+            let (error, frame) = text.split_once(' ')?;
+            let error = BusError::from_name(error)?;
+            Some((frame.parse().ok()?, FrameEnd::Error(error)))
+        });
+        return Ok(ended);
+    }
+    let number = id & Id::MAX_EXTENDED;
+    let known = match id & EXTENDED != 0 {
+        true => Id::extended(number),
+        false => u16::try_from(number).ok().and_then(Id::base),
+    };
+    let id = known.ok_or_else(|| format!("identifier {number:X} does not fit into 11 bits"))?;
+    let frame = match id_is_remote(header) {
+        true => Frame::remote(id, len),
+        false => {
+            let data = data.get(..len).ok_or_else(|| {
+                format!("{len} data bytes are stated, and {} are there", data.len())
+            })?;
+            Frame::new(id, data)
+        }
+    };
+    let frame = frame.map_err(|bad| bad.to_string())?;
+    let ended = match comment {
+        Some(LOST) => FrameEnd::Lost,
+        _ => FrameEnd::Good,
+    };
+    Ok(Some((frame, ended)))
+}
+
+fn id_is_remote(header: &[u8]) -> bool {
+    u32::from_be_bytes([header[0], header[1], header[2], header[3]]) & REMOTE != 0
+}
+
+/// Reads the log that candump writes with `-l` or `-L`: `(1436509052.249713) can0 201#3D4000`, and the direction behind it in newer
+/// versions. Lines of error frames are passed over.
+///
+/// # Errors
+/// A line that is none of such a log.
+pub(super) fn candump(bytes: &[u8]) -> Result<Capture, CaptureError> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut frames = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let read = logged(line).map_err(|what| CaptureError::Link {
+            place: format!("line {}", number + 1),
+            what,
+        })?;
+        frames.extend(read);
+    }
+    Ok(assemble(frames, None))
+}
+
+/// A line of the log; `None` for an error frame.
+fn logged(line: &str) -> Result<Option<FrameRead>, String> {
+    const FORM: &str = "(1436509052.249713) can0 201#3D4000 is expected, as candump -L writes it";
+    let shown: String = line.chars().take(60).collect();
+    let wrong = |what: &str| format!("{shown:?}: {what}");
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let (time, frame) = match words.as_slice() {
+        [time, _, frame] | [time, _, frame, "R" | "T"] => (time, frame),
+        _ => return Err(wrong(FORM)),
+    };
+    let time = time.strip_prefix('(').and_then(|own| own.strip_suffix(')'));
+    let nanos = time.and_then(nanoseconds).ok_or_else(|| wrong(FORM))?;
+    if frame.contains("##") {
+        return Err(wrong("a frame of CAN FD, and classic frames are expected"));
+    }
+    let (id, _) = frame.split_once('#').ok_or_else(|| wrong(FORM))?;
+    if id.len() == 8 && u32::from_str_radix(id, 16).is_ok_and(|id| id & ERROR != 0) {
+        return Ok(None);
+    }
+    // Behind `_` stands the raw length code of a frame with 8 bytes.
+    let frame = frame.split('_').next().unwrap_or(frame);
+    let frame: Frame = frame.parse().map_err(|bad| wrong(&format!("{bad}")))?;
+    Ok(Some(FrameRead {
+        nanos,
+        sender: Sender::ByIdentifier,
+        frame,
+        ended: FrameEnd::Good,
+    }))
+}
+
+/// Seconds with up to nine places, in nanoseconds.
+fn nanoseconds(text: &str) -> Option<u64> {
+    let (seconds, places) = text.split_once('.')?;
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|own| own.is_ascii_digit());
+    if !digits(seconds) || !digits(places) || places.len() > 9 {
+        return None;
+    }
+    let nanos: u64 = format!("{places:0<9}").parse().ok()?;
+    let seconds: u64 = seconds.parse().ok()?;
+    // More than any clock shows.
+    let most = u64::MAX / 8;
+    seconds
+        .checked_mul(1_000_000_000)?
+        .checked_add(nanos)
+        .filter(|own| *own < most)
+}
+
+#[derive(Deserialize)]
+struct Object {
+    frames: Vec<FrameObject>,
+}
+
+#[derive(Deserialize)]
+struct FrameObject {
+    t_ns: u64,
+    id: u32,
+    #[serde(default)]
+    extended: bool,
+    remote: Option<usize>,
+    data: Vec<u8>,
+    from: serde_json::Value,
+    fault: Option<String>,
+}
+
+/// Whether a JSON text is a trace of frames.
+pub(super) fn is_json(bytes: &[u8]) -> bool {
+    let start = bytes.get(..200).unwrap_or(bytes);
+    let start: String = String::from_utf8_lossy(start).split_whitespace().collect();
+    start.contains("\"schema\":2") && start.contains("\"frames\"")
+}
+
+/// Reads the JSON of a trace of frames, schema 2.
+///
+/// # Errors
+/// What is wrong, and at which frame.
+pub(super) fn json(bytes: &[u8]) -> Result<Capture, CaptureError> {
+    let object: Object = serde_json::from_slice(bytes).map_err(|error| CaptureError::Link {
+        place: format!("line {}, column {}", error.line(), error.column()),
+        what: format!("{error}"),
+    })?;
+    let frames = object.frames.iter().enumerate().map(|(number, own)| {
+        own.read().map_err(|what| CaptureError::Link {
+            place: format!("frame {}", number + 1),
+            what,
+        })
+    });
+    Ok(assemble(frames.collect::<Result<_, _>>()?, None))
+}
+
+impl FrameObject {
+    fn read(&self) -> Result<FrameRead, String> {
+        let id = match self.extended {
+            true => Id::extended(self.id),
+            false => u16::try_from(self.id).ok().and_then(Id::base),
+        };
+        let id = id.ok_or_else(|| format!("identifier {:X} is too large", self.id))?;
+        let frame = match self.remote {
+            Some(len) => Frame::remote(id, len),
+            None => Frame::new(id, &self.data),
+        };
+        let from = match &self.from {
+            serde_json::Value::String(name) if name == MASTER => Some(None),
+            own => own
+                .as_u64()
+                .and_then(|own| u8::try_from(own).ok())
+                .map(Some),
+        };
+        let ended = match self.fault.as_deref() {
+            None => Some(FrameEnd::Good),
+            Some(LOST) => Some(FrameEnd::Lost),
+            Some(name) => BusError::from_name(name).map(FrameEnd::Error),
+        };
+        Ok(FrameRead {
+            nanos: self.t_ns,
+            sender: Sender::Known(from.ok_or("`from` is \"master\" or a drive's number")?),
+            frame: frame.map_err(|bad| bad.to_string())?,
+            ended: ended.ok_or("`fault` is null, \"lost\", or the name of an error")?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::pcapng_frames;
+
+    fn frames(capture: &Capture) -> &[LineFrame] {
+        capture.traces[0].channels[0].frames()
+    }
+
+    /// Lines of candump, with the direction that newer versions write, and one of an error frame.
+    #[test]
+    fn a_log_of_candump_is_read() {
+        let log = "(1436509052.249713) can0 201#3D4000\n(1436509052.249999) vcan0 181#40810100 R\n\n\
+                   (1436509052.250100) can0 20000088#0000000000000000\n(1436509052.250200) can0 00000201#R3\n";
+        let capture = super::super::read(log.as_bytes(), None).expect("a capture");
+        let read: Vec<_> = frames(&capture)
+            .iter()
+            .map(|own| (own.from, own.frame.to_string()))
+            .collect();
+        let own = |from, text: &str| (from, text.to_owned());
+        assert_eq!(
+            read,
+            [
+                own(None, "201#3D4000"),
+                own(Some(1), "181#40810100"),
+                own(None, "00000201#R3")
+            ]
+        );
+        let first = &frames(&capture)[0];
+        assert_eq!(first.start, Instant::START);
+        let apart = frames(&capture)[1].at.since(first.at);
+        assert_eq!(apart, Span::from_micros(286));
+    }
+
+    #[test]
+    fn what_is_no_log_names_its_line() {
+        for (line, words) in [
+            ("(1.0) can0", "as candump -L writes it"),
+            ("(1,0) can0 201#", "as candump -L writes it"),
+            (
+                "(99999999999999999999.0) can0 201#",
+                "as candump -L writes it",
+            ),
+            ("(1.0) can0 201#3D4", "pairs of hexadecimal digits"),
+            ("(1.0) can0 201##0AA", "CAN FD"),
+            ("(1.0) can0 FFF#00", "too large"),
+            ("hello", "as candump -L writes it"),
+        ] {
+            let log = format!("(0.5) can0 201#\n{line}\n");
+            let error = super::super::read(log.as_bytes(), None)
+                .expect_err(line)
+                .to_string();
+            assert!(
+                error.starts_with("line 2: ") && error.contains(words),
+                "{error}"
+            );
+        }
+    }
+
+    /// Every kind of frame and of end, at times in nanoseconds, written and read again.
+    fn every_kind() -> Capture {
+        let frame = |text: &str| text.parse::<Frame>().expect("a frame");
+        let kinds = [
+            (None, "201#3D4000", FrameEnd::Good),
+            (Some(1), "181#40810100", FrameEnd::Good),
+            (Some(2), "182#", FrameEnd::Lost),
+            (None, "1FFFFFFF#R8", FrameEnd::Good),
+            (None, "201#R", FrameEnd::Good),
+            (
+                None,
+                "201#0011223344556677",
+                FrameEnd::Error(BusError::ErrorFrame),
+            ),
+            (
+                Some(1),
+                "00000181#AA",
+                FrameEnd::Error(BusError::NoAcknowledge),
+            ),
+        ];
+        let read = kinds
+            .iter()
+            .zip(1..)
+            .map(|((from, text, ended), number)| FrameRead {
+                nanos: number * 1_000_001,
+                sender: Sender::Known(*from),
+                frame: frame(text),
+                ended: *ended,
+            });
+        assemble(read.collect(), None)
+    }
+
+    #[test]
+    fn pcapng_survives() {
+        let capture = every_kind();
+        let mut bytes = Vec::new();
+        pcapng_frames::write(&capture.traces, &mut bytes).expect("a Vec");
+        assert_eq!(super::super::read(&bytes, None), Ok(capture));
+        // Every cut and every flipped bit gives a capture or an error that names the place.
+        for length in 0..bytes.len() {
+            let _any = super::super::read(&bytes[..length], None);
+        }
+        for place in 0..bytes.len() * 8 {
+            let mut other = bytes.clone();
+            other[place / 8] ^= 1 << (place % 8);
+            let _any = super::super::read(&other, None);
+        }
+    }
+
+    #[test]
+    fn json_survives() {
+        let capture = every_kind();
+        let mut bytes = Vec::new();
+        let form = crate::buses::FrameForm::Json;
+        crate::buses::write_frames(&capture.traces, form, &mut bytes).expect("a Vec");
+        assert_eq!(super::super::read(&bytes, None), Ok(capture));
+        let wrong =
+            br#"{"schema":2,"frames":[{"t_ns":1,"id":4096,"data":[],"from":1,"fault":null}]}"#;
+        let error = super::super::read(wrong, None)
+            .expect_err("too large")
+            .to_string();
+        assert_eq!(error, "frame 1: identifier 1000 is too large");
+    }
+
+    #[test]
+    fn a_candump_log_survives_but_for_what_it_cannot_hold() {
+        let capture = every_kind();
+        let mut bytes = Vec::new();
+        let form = crate::buses::FrameForm::Candump;
+        crate::buses::write_frames(&capture.traces, form, &mut bytes).expect("a Vec");
+        let again = super::super::read(&bytes, None).expect("a capture");
+        let good = frames(&capture)
+            .iter()
+            .filter(|own| own.ended == FrameEnd::Good);
+        let good: Vec<_> = good.map(|own| own.frame).collect();
+        let read: Vec<_> = frames(&again).iter().map(|own| own.frame).collect();
+        assert_eq!(read, good);
+    }
+}
