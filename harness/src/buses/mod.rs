@@ -25,6 +25,8 @@ pub(crate) use novobus::language::parse::header;
 /// The bus of a scenario without a `bus` line.
 pub use novobus::language::Novobus as DefaultBus;
 
+pub(crate) use unitek::dbc::dbc;
+
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
 
 use crate::cli::args::CellsArguments;

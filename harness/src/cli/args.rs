@@ -80,6 +80,15 @@ pub enum Command {
         #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
         bus: Bus,
     },
+    /// Print a DBC file of UNITEK drives on CAN, for tools that decode frames by one.
+    ///
+    /// Byte 0 of a frame, REGID, selects the signals behind it. Frames may be shorter than a message says: a register of 16 bits has 3 bytes from
+    /// the master and 4 bytes from the drive. Let the tool accept that (cantools: `allow_truncated`).
+    Dbc {
+        /// How many drives: drive n has the identifiers 200 + n and 180 + n.
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=127))]
+        drives: u16,
+    },
     /// List the manual's tables with the scenarios that test them, and the errata.
     Manual(ManualArguments),
     /// List the drive's memory cells: address, access, unit, meaning, section.

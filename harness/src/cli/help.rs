@@ -37,7 +37,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("Find", &["fuzz", "shrink", "promote", "campaign"]),
     (
         "Exchange",
-        &["import", "diff", "report", "dissector", "schema"],
+        &["import", "diff", "report", "dissector", "dbc", "schema"],
     ),
     ("More", &["completions", "man", "help"]),
 ];

@@ -73,6 +73,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Import(arguments) => import::import(&arguments, output),
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector { bus } => import::dissector(bus, output),
+        Command::Dbc { drives } => import::dbc(drives, output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => crate::buses::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),

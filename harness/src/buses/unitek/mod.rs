@@ -1,6 +1,7 @@
 //! UNITEK DS/BAMOCAR on CAN: what the bench knows of this bus alone.
 
 pub(crate) mod cli;
+pub mod dbc;
 pub mod dissector;
 pub mod driver;
 pub mod gate;
