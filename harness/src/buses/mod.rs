@@ -38,7 +38,6 @@ use crate::cli::rig_failure::find_any_rig;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
-use crate::rig::find::{find, folder};
 use crate::rig::port_file::Node;
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
@@ -185,14 +184,13 @@ pub(crate) fn write_frames(
 
 /// Runs a command on drives, in the words of the bus of its bench.
 pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Result<Exit> {
-    let named = match command.rig().and_then(|arguments| arguments.rig.as_ref()) {
-        Some(RigName::Named(name)) => find(name, &folder()).ok(),
-        _ => None,
+    let Some(RigName::Named(name)) = command.rig().and_then(|own| own.rig.as_ref()) else {
+        return novobus::cli::drive(command, output);
     };
-    let Some((rig, bus)) =
-        named.and_then(|rig| rig.port().map(|port| port.bus).map(|bus| (rig, bus)))
-    else {
-        // Where there is no such bench, this reports it.
+    let Some(rig) = find_any_rig(name, output) else {
+        return Ok(Exit::Usage);
+    };
+    let Some(bus) = rig.port().map(|port| port.bus) else {
         return novobus::cli::drive(command, output);
     };
     let end = match bus {

@@ -159,7 +159,7 @@ impl Check<'_> {
             (_, _, None) => {}
         }
         if let Some(place) = &port.slcan
-            && !place.starts_with('/')
+            && !place.contains('/')
             && !is_address(place)
         {
             let message = format!("`{place}` is neither a device nor an address");

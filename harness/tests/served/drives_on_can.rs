@@ -224,3 +224,56 @@ fn another_master_is_left_alone() {
     drop(end);
     talking.join().expect("the other master");
 }
+
+/// The watchdog locks the drives when the program hangs (its output is not read, as when a terminal is held).
+#[test]
+fn a_program_that_hangs_is_watched() {
+    let desk = Desk::new("slcan", MOTION);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig") + "[safe_state]\nwatchdog = \"2s\"\n";
+    std::fs::write(&path, text).expect("room");
+    desk.shows("write 1 SPEED_CMD=10% --move --hold", "0CCD");
+    let line = "watch all all --every 1ms --for 500s --rig desk.toml";
+    let mut child = desk.command(line).spawn().expect("the program");
+    // Nobody reads its output, so that the pipe is full soon.
+    let pipe = child.stdout.as_ref().expect("its output");
+    rustix::pipe::fcntl_setpipe_size(pipe, 4_096).expect("a small pipe");
+    let mut said = String::new();
+    let mut err = child.stderr.take().expect("a pipe");
+    std::io::Read::read_to_string(&mut err, &mut said).expect("text");
+    assert_eq!(child.wait().expect("its end").code(), Some(7), "{said}");
+    assert!(said.contains("no sign of life"), "{said}");
+    desk.shows("read 1 MODE SPEED_CMD", "0004");
+    let commands = desk.run("read 1 SPEED_CMD");
+    ended(&commands, 0, "31   SPEED_CMD  0000");
+}
+
+/// A signal while drives are asked for the first time ends the program, and nothing was changed.
+#[test]
+fn a_signal_while_the_bench_is_opened() {
+    let desk = Desk::new("slcan", MOTION);
+    let path = desk.path("desk.toml");
+    let text = std::fs::read_to_string(&path).expect("a rig");
+    let text = text
+        .replace("{ node = 2 }", "{ node = 9 }")
+        .replace("2s", "100s");
+    std::fs::write(&path, text).expect("room");
+    let mut other = connect(&desk.slcan);
+    other.write_all(b"S6\rO\r").expect("sent");
+    let mut heard = BufReader::new(other.try_clone().expect("a socket"));
+    let child = desk
+        .command("read 1 MODE --rig desk.toml")
+        .spawn()
+        .expect("the program");
+    // The request to the drive that is not there.
+    let mut frame = Vec::new();
+    while !String::from_utf8_lossy(&frame).contains("t2093") {
+        frame.clear();
+        heard.read_until(b'\r', &mut frame).expect("a frame");
+    }
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &id]).status();
+    assert!(sent.expect("kill").success());
+    let output = child.wait_with_output().expect("its end");
+    ended(&output, 130, "interrupted");
+}
