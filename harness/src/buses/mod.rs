@@ -152,6 +152,16 @@ pub(crate) fn dissector(bus: Bus) -> Option<String> {
     }
 }
 
+/// The last frames of a trace, a row a frame: playing stops at the first line that is not met. `None` for a bus of octets.
+pub(crate) fn last_rows(trace: &Trace, most: usize) -> Option<String> {
+    let all = rows(trace, None, None)?;
+    let lines: Vec<_> = all.lines().collect();
+    let (head, rest) = lines.split_first()?;
+    let rest = &rest[rest.len().saturating_sub(most)..];
+    let shown: Vec<_> = std::iter::once(*head).chain(rest.iter().copied()).collect();
+    Some(shown.join("\n") + "\n")
+}
+
 /// A form in which frames are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameForm {

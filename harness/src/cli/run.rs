@@ -8,17 +8,14 @@ use super::page::Page;
 use super::rig_failure::find_rig;
 use super::run_rig::{PlayOrder, reports, work};
 use super::tally::Tally;
-use crate::buses::SimulatedLink;
 use crate::evidence::{About, EvidenceError, Folder, too_large};
 use crate::library::{Entry, LibraryError, sources};
-use crate::link::{Link, Recording};
+use crate::link::Recording;
 use crate::report::finding::explain;
 use crate::report::html::Head;
 use crate::report::plot::plot;
 use crate::rig::{Attempt, Keeper, Rig};
-use crate::scenario::plan::Plan;
-use crate::scenario::run::{AtMismatch, Outcome, Skip, play};
-use crate::scenario::simulate::simulated;
+use crate::scenario::run::{AtMismatch, Outcome, Skip};
 use harness_sim::record::Trace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Write as _;
@@ -177,17 +174,17 @@ fn keep(
         });
     };
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
-    let played = match (too_large, &entry.plan) {
+    let played = match (too_large, entry.settled()) {
         (Some(why), _) => not_played(why),
         (None, None) => play_entry(entry, AtMismatch::Stop),
         (None, Some(plan)) => {
             kept.begins(1);
-            let mut link = simulated(plan);
+            let mut link = plan.simulate();
             let played = {
-                let mut recording = Recording::whole(&mut link, &mut kept);
-                play(plan, &mut recording, AtMismatch::Stop)
+                let mut recording = Recording::whole(&mut *link, &mut kept);
+                plan.play(&mut recording, AtMismatch::Stop)
             };
-            let traces = traces(plan, &link);
+            let traces = (0..plan.ports()).map(|port| link.trace(port)).collect();
             let attempt = Attempt::on_own_rings(played, traces);
             kept.ends(1, &attempt);
             PlayedOnce {
@@ -204,12 +201,6 @@ fn keep(
         &played.outcome,
     );
     Ok(played)
-}
-
-/// What the links of every ring carried.
-fn traces(plan: &Plan, link: &SimulatedLink) -> Vec<Trace> {
-    let rings = 0..plan.rings.len();
-    rings.map(|ring| link.trace(ring)).collect()
 }
 
 /// A scenario that was played, with what it left.

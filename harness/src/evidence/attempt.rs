@@ -7,16 +7,14 @@ use crate::buses::twin::{Conversation, Twin};
 use crate::file::values::Wire;
 use crate::library::Entry;
 use crate::link::{
-    Line as _, Link as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble,
-    link_name,
+    Line as _, LinkEvent, LinkFault, Moment, PlacedFault, Recording, Replay, Trouble, link_name,
 };
 use crate::rig::judge::known;
 use crate::rig::judge::{Heard, judge};
 use crate::rig::run::{Way, opening, twin};
 use crate::rig::{Attempt, Driven, Rig, SessionError, play_one};
-use crate::scenario::plan::Plan;
-use crate::scenario::run::{AtMismatch, Outcome, play};
-use crate::scenario::simulate::simulated;
+use crate::scenario::run::{AtMismatch, Outcome};
+use crate::scenario::settled::Settled;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
@@ -89,6 +87,13 @@ pub(super) fn again(
     };
     let size = header.rings.first().map(|ring| ring.drives());
     let entry = Entry::fitting(source, size).map_err(|problems| problems.to_string());
+    if header.own_rings
+        && let Ok(Entry {
+            other: Some(plan), ..
+        }) = &entry
+    {
+        return simulated_again(recorded, &**plan);
+    }
     let plan = entry.and_then(|entry| entry.plan.ok_or("no scenario of this bus".to_owned()));
     let mut plan = match plan {
         Ok(plan) if plan.rings == header.rings => plan,
@@ -177,11 +182,11 @@ pub(super) fn again(
 }
 
 /// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.
-fn simulated_again(recorded: &Recorded, plan: &Plan) -> Again {
-    let mut link = simulated(plan);
+fn simulated_again(recorded: &Recorded, plan: &dyn Settled) -> Again {
+    let mut link = plan.simulate();
     let mut events: Vec<LinkEvent> = Vec::new();
-    let mut recording = Recording::whole(&mut link, &mut events);
-    let outcome = play(plan, &mut recording, AtMismatch::Stop);
+    let mut recording = Recording::whole(&mut *link, &mut events);
+    let outcome = plan.play(&mut recording, AtMismatch::Stop);
     let written = |events: &[LinkEvent]| -> Vec<RecordLine> {
         events.iter().filter_map(RecordLine::of).collect()
     };
@@ -191,7 +196,7 @@ fn simulated_again(recorded: &Recorded, plan: &Plan) -> Again {
         Some(Ok(text)) => text,
         _ => "nothing more".to_owned(),
     };
-    let traces: Vec<_> = (0..plan.rings.len()).map(|ring| link.trace(ring)).collect();
+    let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
     Again {
         capture: Some(capture(&traces, &outcome)),
         exact: true,

@@ -225,6 +225,7 @@ impl Opened {
     fn skipped(&self, entry: &Entry, remarks: &[String]) -> Option<Outcome> {
         let header = &self.header;
         let why = match (&entry.plan, header.own_rings) {
+            (None, true) if entry.settled().is_some() => return None,
             (None, true) => Skip::no_bus(entry.scenario.bus),
             (None, false) => Skip::not_on_rig(entry.scenario.bus),
             (Some(_), true) => too_large(entry, &self.rig)?,

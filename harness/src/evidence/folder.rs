@@ -8,6 +8,7 @@ use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
 use crate::buses::SimulatedLink;
 use crate::buses::twin::Exactness;
+use crate::buses::{FrameForm, carry_frames, write_frames};
 use crate::link::{Capability, LinkEvent, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
@@ -328,7 +329,10 @@ impl Keeper for KeptAttempts<'_> {
 pub(super) fn capture(traces: &[Trace], outcome: &Outcome) -> String {
     let mut capture = Vec::new();
     // Writing to a Vec cannot fail.
-    let _infallible = json::write(traces, &outcome.records, &mut capture);
+    let _infallible = match carry_frames(traces) {
+        true => write_frames(traces, FrameForm::Json, &mut capture),
+        false => json::write(traces, &outcome.records, &mut capture),
+    };
     String::from_utf8_lossy(&capture).into_owned()
 }
 

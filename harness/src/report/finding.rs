@@ -1,11 +1,15 @@
 //! A finding as a text for people: its line in the scenario, what was expected, what was received, and the table around it.
 
 use super::mismatch::mismatch;
+use crate::buses::last_rows;
 use crate::library::Entry;
 use crate::scenario::run::Mismatch;
 use crate::scenario::source::line_number;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
+
+/// Frames shown in front of the one that differs, at most.
+const ROWS: usize = 12;
 
 /// The line that a finding is about, with its place, and the bytes that differ.
 #[must_use]
@@ -28,6 +32,10 @@ pub fn explain(entry: &Entry, finding: &Mismatch, traces: &[Trace]) -> String {
     }
     let bytes = mismatch(finding, traces, &sources);
     if bytes.is_empty() {
+        for rows in traces.iter().filter_map(|trace| last_rows(trace, ROWS)) {
+            // Writing to a String cannot fail.
+            let _infallible = write!(text, "\n{rows}");
+        }
         if !sources.is_empty() {
             let _infallible = writeln!(text, "see {}", sources.join(", "));
         }
@@ -59,7 +67,11 @@ pub fn class(entry: &Entry) -> String {
     match (words.next(), words.next()) {
         (Some(manual), Some(section)) => {
             let chapter = section.split('.').next().unwrap_or(section);
-            format!("{manual}.chapter-{chapter}")
+            match chapter.starts_with(|c: char| c.is_ascii_digit()) {
+                true => format!("{manual}.chapter-{chapter}"),
+                // An example or an item of an appendix.
+                false => format!("{manual}.{chapter}"),
+            }
         }
         _ => "scenarios".to_owned(),
     }

@@ -17,3 +17,4 @@ mod reports;
 mod rig;
 mod tidy;
 mod top;
+mod unitek;
