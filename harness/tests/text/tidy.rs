@@ -204,6 +204,54 @@ fn files_outside_the_buses_name_no_bus() {
     );
 }
 
+/// Names that stand for more than one public type: twice among the rooms or in one bus, or in a room and in a bus. Two buses may use one name.
+/// The number may only fall.
+const NAMES_TWICE: usize = 60;
+
+#[test]
+fn a_name_is_one_type() {
+    let mut declared: BTreeMap<String, BTreeMap<&str, BTreeSet<PathBuf>>> = BTreeMap::new();
+    let tests = ["tests.rs", "_test.rs", "reference.rs"];
+    let folders = ["harness/src", "harness/proto/src", "harness/sim/src"];
+    for path in folders.map(|folder| files(folder, "rs")).concat() {
+        let place = path.display().to_string();
+        if tests.iter().any(|ending| place.ends_with(ending)) {
+            continue;
+        }
+        let buses = [
+            ("/unitek/", "unitek"),
+            ("/novobus/", "novobus"),
+            ("/nd21/", "novobus"),
+        ];
+        let bus = buses.iter().find(|(folder, _)| place.contains(folder));
+        let bus = bus.map_or("rooms", |(_, bus)| *bus);
+        for line in read(&path).lines() {
+            let words = line
+                .strip_prefix("pub ")
+                .or_else(|| line.strip_prefix("pub(crate) "));
+            let Some((kind, rest)) = words.and_then(|words| words.split_once(' ')) else {
+                continue;
+            };
+            if ["struct", "enum", "trait"].contains(&kind) {
+                let end = rest
+                    .find(|c: char| !c.is_alphanumeric())
+                    .unwrap_or(rest.len());
+                let own = declared.entry(rest[..end].to_owned()).or_default();
+                own.entry(bus).or_default().insert(path.clone());
+            }
+        }
+    }
+    declared.retain(|_, places| {
+        let twice = places.values().any(|files| files.len() > 1);
+        twice || places.len() > 1 && places.contains_key("rooms")
+    });
+    assert!(
+        declared.len() <= NAMES_TWICE,
+        "{} names are those of several types, the limit is {NAMES_TWICE}: {declared:#?}",
+        declared.len()
+    );
+}
+
 #[test]
 fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
     let name = |path: &Path, base: &str| {
@@ -226,6 +274,27 @@ fn every_scenario_has_a_snapshot_and_no_snapshot_is_an_orphan() {
     {
         let campaign = root().join("corpora").join(format!("{output}.toml"));
         assert!(campaign.exists(), "{output}");
+    }
+    // The names of all others stand in the tests that compare them.
+    let tests: String = files("harness", "rs")
+        .iter()
+        .map(|path| read(path))
+        .collect();
+    for path in ["snap", "txt", "json", "svg"]
+        .map(|ending| files("snapshots", ending))
+        .concat()
+    {
+        let own = name(&path, "snapshots");
+        let named = ["scenarios/", "campaigns/"];
+        let file = path
+            .file_name()
+            .and_then(|file| file.to_str())
+            .expect("a name");
+        let literal =
+            ["\"", "/"].map(|before| format!("{before}{}\"", file.trim_end_matches(".snap")));
+        let compared = named.iter().any(|folder| own.starts_with(folder))
+            || literal.iter().any(|literal| tests.contains(literal));
+        assert!(compared, "no test compares snapshots/{file}");
     }
     assert_eq!(
         files("snapshots", "new"),
