@@ -215,6 +215,7 @@ fn settle(
         difference: small.difference,
         setup: small.subject.setup,
         case: small.subject.case,
+        attempts: Vec::new(),
         ..finding.clone()
     };
     let stem = path

@@ -1,26 +1,23 @@
 //! A run tries case after case, keeps those that show something new, and confirms and records every difference from the model.
 
+use super::Case;
 use super::Difference;
 use super::Finding;
 use super::Pool;
+use super::confirm::Confirmation;
 use super::dice::Dice;
-use super::drive_name;
 use super::error::ExploreError;
 use super::mutate;
 use super::record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress};
 use super::swarm::Swarm;
 use super::target::{Rehearsal, Target};
 use super::tour;
-use super::{Act, ActKind, Case, Talk, To};
 use super::{CaseScope, Generator};
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 
 /// After how many flaky sightings a difference is no longer looked at.
 const SETTLED: u8 = 3;
-
-/// How many times in a row a byte must be late before the drive is blamed. A busy computer sometimes delays the same byte twice.
-const TIMES_LATE: u8 = 4;
 
 /// The bounds of a run.
 #[derive(Clone, Copy, Debug)]
@@ -71,8 +68,6 @@ pub struct FuzzRun {
     known: BTreeMap<String, u8>,
     /// On a rig with ports, what every ring is asked before anything is left to chance.
     tour: Vec<Case>,
-    /// Whether the last finding was at another byte when it was seen again.
-    moves: bool,
     /// How many findings count.
     confirmed: usize,
     flaky: usize,
@@ -92,7 +87,6 @@ impl FuzzRun {
             pool: Pool::default(),
             progress: Progress::default(),
             known: BTreeMap::new(),
-            moves: false,
             confirmed: 0,
             flaky: 0,
         }
@@ -127,13 +121,10 @@ impl FuzzRun {
     }
 
     fn note(&mut self, signature: &str, confirmed: bool) {
-        let times = self.known.entry(signature.to_owned()).or_default();
-        if confirmed {
-            *times = SETTLED;
-            self.confirmed += 1;
-        } else {
-            *times += 1;
-            self.flaky += 1;
+        count_finding(&mut self.known, signature, confirmed);
+        match confirmed {
+            true => self.confirmed += 1,
+            false => self.flaky += 1,
         }
     }
 
@@ -326,8 +317,15 @@ impl FuzzRun {
                     difference,
                     setup: self.about.setup.clone(),
                     case: case.clone(),
+                    attempts: Vec::new(),
                 };
-                self.confirm(&mut finding, rehearsal, tried.before.as_deref(), target)?;
+                finding.attempts.extend(target.recorded());
+                let (confirm, of) = (self.about.confirm, self.about.of);
+                let mut confirmation = Confirmation::new(confirm, of, &self.known);
+                let before = tried.before.as_deref();
+                confirmation.confirm(&mut finding, rehearsal, before, target)?;
+                let took = confirmation.took;
+                self.use_line(took);
                 let signature = finding.difference.key();
                 self.note(&signature, finding.confirmed);
                 let file = format!("finding-{number:06}");
@@ -345,134 +343,15 @@ impl FuzzRun {
         }
         Ok(())
     }
+}
 
-    /// Tries a case again with drives made ready for it, then with more and more of what was sent before it. A difference that several
-    /// cases have shown counts as confirmed too: a disturbed line or a busy computer does not repeat itself in different cases.
-    fn confirm(
-        &mut self,
-        finding: &mut Finding,
-        rehearsal: &Rehearsal,
-        before: Option<&[Act]>,
-        target: &mut dyn Target,
-    ) -> Result<(), ExploreError> {
-        let alone = finding.case.clone();
-        for most in PREFIXES {
-            let acts = last_acts(before.unwrap_or_default(), alone.drives, most);
-            finding.case.acts = [acts, &alone.acts[..]].concat();
-            self.again(finding, rehearsal, target)?;
-            let longer = before.is_some_and(|before| before.len() > acts.len());
-            if finding.confirmed || !longer || target.over().is_some() {
-                break;
-            }
-        }
-        if finding.confirmed {
-            return self.blame(finding, target);
-        }
-        finding.case = alone;
-        let times = self
-            .known
-            .get(&finding.difference.key())
-            .copied()
-            .unwrap_or(0);
-        if times >= self.about.confirm && !finding.difference.time {
-            (finding.seen_again, finding.of) = (times, times);
-            finding.confirmed = true;
-        }
-        Ok(())
-    }
-
-    /// Repeats a case until it has shown the same kind of difference often enough, or no longer can.
-    fn again(
-        &mut self,
-        finding: &mut Finding,
-        rehearsal: &Rehearsal,
-        target: &mut dyn Target,
-    ) -> Result<(), ExploreError> {
-        (finding.seen_again, finding.of) = (0, 0);
-        self.moves = false;
-        let (confirm, of) = match finding.difference.time {
-            true => (TIMES_LATE, TIMES_LATE),
-            false => (self.about.confirm, self.about.of),
-        };
-        let own = finding.difference.clone();
-        while finding.of < of && target.over().is_none() {
-            target.begin();
-            let tried = target.attempt(&finding.case, rehearsal)?;
-            self.use_line(tried.took);
-            finding.of += 1;
-            let Some(other) = tried.difference.filter(|other| other.is_like(&own)) else {
-                if confirm > finding.seen_again + (of - finding.of) {
-                    return Ok(());
-                }
-                continue;
-            };
-            // A late computer delays another byte the next time; a drive that counts is wrong at another byte too.
-            let moved = other.byte != finding.difference.byte;
-            self.moves |= finding.of > 1 && moved;
-            let late = finding.difference.time && moved;
-            finding.seen_again += u8::from(!late);
-            finding.difference = if late {
-                finding.difference.clone()
-            } else {
-                other
-            };
-            if finding.seen_again >= confirm {
-                finding.confirmed = true;
-                return Ok(());
-            }
-        }
-        Ok(())
-    }
-
-    /// Checks whether the drive that the telegram addresses is to blame. If another drive on the byte's way is to blame, the same
-    /// conversation with the drives' roles exchanged differs at that byte too.
-    fn blame(
-        &mut self,
-        finding: &mut Finding,
-        target: &mut dyn Target,
-    ) -> Result<(), ExploreError> {
-        let drives = finding.case.drives;
-        let always = !self.moves && finding.seen_again == finding.of;
-        let Some(meant) = finding
-            .difference
-            .meant
-            .filter(|_| always && finding.difference.drive.is_none())
-        else {
-            return Ok(());
-        };
-        for step in 1..drives.min(MOST_EXCHANGED) {
-            let case = exchanged(&finding.case, step);
-            let rehearsal = target.rehearse(&case)?;
-            if rehearsal.denied.is_some() || target.over().is_some() {
-                return Ok(());
-            }
-            target.begin();
-            let tried = target.attempt(&case, &rehearsal)?;
-            self.use_line(tried.took);
-            if tried.not_played.is_some()
-                || tried
-                    .difference
-                    .is_some_and(|own| own.byte <= finding.difference.byte)
-            {
-                return Ok(());
-            }
-        }
-        // A drive that is wrong only sometimes may have been right by chance.
-        let rehearsal = target.rehearse(&finding.case)?;
-        target.begin();
-        let tried = target.attempt(&finding.case, &rehearsal)?;
-        self.use_line(tried.took);
-        let again = tried
-            .difference
-            .is_some_and(|own| own.byte == finding.difference.byte);
-        if !again {
-            return Ok(());
-        }
-        finding.difference.drive = Some(meant);
-        let name = drive_name(finding.difference.ring, meant);
-        finding.difference.about = format!("drive {name}, {}", finding.difference.about);
-        Ok(())
-    }
+/// Counts a finding by the key of its difference: how often it was flaky, or `SETTLED` for a confirmed one.
+pub(crate) fn count_finding(known: &mut BTreeMap<String, u8>, key: &str, confirmed: bool) {
+    let times = known.entry(key.to_owned()).or_default();
+    *times = match confirmed {
+        true => SETTLED,
+        false => times.saturating_add(1),
+    };
 }
 
 /// Interleaves the cases of several tours.
@@ -484,42 +363,6 @@ fn in_turns(tours: Vec<Vec<Case>>) -> Vec<Case> {
             .filter_map(move |tour| tour.get(index).cloned())
     };
     (0..longest).flat_map(at).collect()
-}
-
-/// How many earlier bytes are sent again before a case that shows nothing by itself.
-const PREFIXES: [usize; 3] = [0, 2_000, 8_000];
-
-/// The maximum number of drives to exchange roles with.
-const MOST_EXCHANGED: u8 = 8;
-
-/// The last acts that fit into `most` bytes.
-fn last_acts(acts: &[Act], drives: u8, most: usize) -> &[Act] {
-    let mut left = most;
-    let mut from = acts.len();
-    while let Some(act) = from.checked_sub(1).map(|before| &acts[before]) {
-        match left.checked_sub(act.length(drives)) {
-            Some(rest) if most > 0 => left = rest,
-            _ => break,
-        }
-        from -= 1;
-    }
-    &acts[from..]
-}
-
-/// The same conversation with each telegram addressed to the drive `step` addresses further on.
-fn exchanged(case: &Case, step: u8) -> Case {
-    let mut new = case.clone();
-    for act in &mut new.acts {
-        if let ActKind::Talk(Talk {
-            to: To::Drive(drive),
-            ..
-        }) = &mut act.what
-        {
-            let other = (u16::from(*drive) + u16::from(step)) % u16::from(case.drives);
-            *drive = u8::try_from(other).unwrap_or(*drive);
-        }
-    }
-    new
 }
 
 fn write(

@@ -7,6 +7,7 @@
 //! findings and [`promote`](mod@promote) makes them regression tests.
 
 mod campaign;
+mod confirm;
 mod dice;
 mod error;
 pub(crate) mod files;
@@ -14,7 +15,9 @@ mod record;
 mod swarm;
 mod target;
 
+pub(crate) use campaign::count_finding;
 pub use campaign::{Bounds, FuzzRun, RunEnd, Watcher};
+pub use confirm::judged_again;
 pub use dice::Dice;
 pub use error::ExploreError;
 pub use record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read};
@@ -23,9 +26,10 @@ pub use target::{Rehearsal, Target, Tried};
 
 /// What the one bus that is explored today gives: its cases and targets.
 pub use crate::buses::novobus::explore::{
-    Act, ActKind, Case, CaseScope, Command, CommandSent, Damage, Difference, Finding, Generator,
-    Harm, MOST_ACTS, MOST_BYTES, MOST_KEPT, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted,
-    Pool, RingScope, RingSetup, Spoil, Talk, To, against_model, against_reference,
-    against_witnesses, beside, by_novelty, features, mutate, page, play, promote, shrink, text,
+    Act, ActKind, AttemptRecord, Case, CaseScope, Command, CommandSent, Damage, Difference,
+    Finding, Generator, Harm, MOST_ACTS, MOST_BYTES, MOST_KEPT, MOST_NET, MasterView, OnRig, OnSim,
+    OtherRing, Planted, Pool, RingScope, RingSetup, Spoil, Talk, To, against_model,
+    against_reference, against_witnesses, beside, by_novelty, features, mutate, page, play,
+    promote, shrink, text,
 };
-pub(crate) use crate::buses::novobus::explore::{drive_name, tour};
+pub(crate) use crate::buses::novobus::explore::{OnRecord, drive_name, tour};

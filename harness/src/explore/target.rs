@@ -3,7 +3,7 @@
 use super::Difference;
 use super::MasterView;
 use super::error::ExploreError;
-use super::{Act, Case};
+use super::{Act, AttemptRecord, Case};
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
 
@@ -48,6 +48,11 @@ pub trait Target {
     /// # Errors
     /// The rig cannot go on.
     fn attempt(&mut self, case: &Case, rehearsal: &Rehearsal) -> Result<Tried, ExploreError>;
+
+    /// The last attempt, with all that its difference rests on; `None` where playing it again shows the same.
+    fn recorded(&self) -> Option<AttemptRecord> {
+        None
+    }
 
     /// Has the drives made ready before the next attempt.
     fn begin(&mut self) {}

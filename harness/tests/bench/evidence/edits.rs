@@ -165,6 +165,63 @@ fn signatures() {
     ended(&signed("bench@lab"), 1, "SHA256SUMS.sig: it is missing");
 }
 
+/// A finding of a ring with ports is judged again from the attempts in its file, and an edited one is refused.
+#[test]
+fn a_fuzz_run_on_a_ring_with_ports_is_verified() {
+    let wrong = OWN.replace("\"]", "\", \"drive 1 deviates writes-ignored\"]");
+    let desk = Desk::new(&wrong);
+    let fixed = ["fuzz", "run", "--rig", "desk.toml", "--allow-motion"];
+    let more = ["--behind-port", "--findings", "1", "--out", "kept"];
+    ended(&desk.run(&[&fixed[..], &more].concat()), 1, "1 found");
+    let verify = || desk.run(&["verify", "kept"]);
+    ended(&verify(), 5, "1 finding judged again, 0 things wrong");
+    let file = crate::program::findings(&desk.path("kept")).remove(0);
+    let text = fs::read_to_string(&file).expect("a finding");
+    let finding: Value = serde_json::from_str(&text).expect("JSON");
+    let refused = |file: &Path, edited: &str| {
+        let before = fs::read_to_string(file).expect("a file");
+        assert_ne!(before, edited);
+        fs::write(file, edited).expect("room");
+        ended(&verify(), 1, "differs      case ");
+        fs::write(file, before).expect("room");
+    };
+    let change = |path: &str, value: Value| {
+        let mut changed = finding.clone();
+        *changed.pointer_mut(path).expect("a field") = value;
+        refused(&file, &changed.to_string());
+    };
+    change("/difference/drive", 0.into());
+    change("/difference/byte", 3.into());
+    change("/difference/about", "another sentence".into());
+    change("/seen_again", 1.into());
+    change("/confirmed", false.into());
+    change("/number", 1_000_000.into());
+    change("/case/acts", Value::Array(Vec::new()));
+    let attempts = finding["attempts"].as_array().expect("attempts").len();
+    assert!(attempts >= 3, "{attempts}");
+    for attempt in 0..attempts {
+        let path = format!("/attempts/{attempt}/last/received");
+        let received = finding.pointer(&path).expect("bytes").as_str();
+        let byte = &received.expect("a text")[..2];
+        let other = received.expect("a text").replacen(byte, "5B", 1);
+        change(&path, other.into());
+        let mut fewer = finding.clone();
+        fewer["attempts"]
+            .as_array_mut()
+            .expect("attempts")
+            .remove(attempt);
+        refused(&file, &fewer.to_string());
+    }
+    let scenario = file.with_extension("scn");
+    let own = fs::read_to_string(&scenario).expect("a scenario");
+    refused(&scenario, &(own + "> 80\n"));
+    // Without its attempts it is as one of an earlier version: not confirmed.
+    let mut bare = finding.clone();
+    bare.as_object_mut().expect("an object").remove("attempts");
+    fs::write(&file, bare.to_string()).expect("room");
+    ended(&verify(), 5, "unconfirmed  case ");
+}
+
 /// The folder of a fuzz run is signed; its findings are played again, and a changed one is refused.
 #[test]
 fn a_fuzz_run_is_verified() {
@@ -197,7 +254,7 @@ fn a_fuzz_run_is_verified() {
     let by = ["--allowed-signers", "signers", "--identity", "bench@lab"];
     let signed = || desk.run(&[&["verify", "kept"], &by[..]].concat());
     ended(&signed(), 0, "signed by    bench@lab");
-    ended(&signed(), 0, "1 finding played again, 0 things wrong");
+    ended(&signed(), 0, "1 finding judged again, 0 things wrong");
     let files = fs::read_dir(desk.path("kept")).expect("a folder");
     let mut files = files.map(|file| file.expect("a file").path());
     let finding = files

@@ -3,6 +3,7 @@
 use crate::buses::novobus::explore::judge::Judge;
 use crate::buses::novobus::explore::text::{ExpectedBytes, Surroundings, text};
 use crate::buses::novobus::language::syntax::Header;
+use crate::explore::AttemptRecord;
 use crate::explore::Case;
 use crate::explore::Difference;
 use crate::explore::ExploreError;
@@ -16,6 +17,9 @@ use std::path::{Path, PathBuf};
 
 /// The version of the format.
 const SCHEMA: u32 = 1;
+
+/// Maximum number of attempts of a finding.
+const MOST_ATTEMPTS: usize = 1_000;
 
 /// A finding.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,6 +50,9 @@ pub struct Finding {
     pub setup: RingSetup,
     /// The conversation.
     pub case: Case,
+    /// The attempts that the finding rests on, the first one first; none where drives are simulated, which do the same again.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub attempts: Vec<AttemptRecord>,
 }
 
 impl Finding {
@@ -71,7 +78,11 @@ impl Finding {
         let finding: Self = serde_json::from_str(&json).map_err(|error| {
             ExploreError::Usage(format!("{} is not a finding: {error}", file.display()))
         })?;
-        let sound = finding.schema == SCHEMA && finding.case.is_kept();
+        let attempts = finding.attempts.iter();
+        let sound = finding.schema == SCHEMA
+            && finding.case.is_kept()
+            && attempts.clone().count() <= MOST_ATTEMPTS
+            && attempts.into_iter().all(AttemptRecord::is_sound);
         if !sound {
             return Err(ExploreError::Usage(format!(
                 "{} is not a finding of schema {SCHEMA} within the bounds of a case",
@@ -88,14 +99,37 @@ impl Finding {
     pub fn write(&self, folder: &Path, name: &str) -> Result<[PathBuf; 2], ExploreError> {
         let json = folder.join(format!("{name}.json"));
         let scenario = folder.join(format!("{name}.scn"));
-        let title = format!("Found by fuzzing: {}", self.difference.kind());
-        let text = self.scenario(&title, &self.sources())?;
-        let mut form = serde_json::to_string_pretty(self)
+        let text = self.text()?;
+        let form = self
+            .form()
             .map_err(|error| ExploreError::file("write", &json, &error))?;
-        form.push('\n');
         write_whole(&scenario, &text)?;
         write_whole(&json, &form)?;
         Ok([json, scenario])
+    }
+
+    /// Its JSON, with a line for each attempt: they are long, and seldom read.
+    fn form(&self) -> serde_json::Result<String> {
+        let mut short = self.clone();
+        let attempts = std::mem::take(&mut short.attempts);
+        let mut form = serde_json::to_string_pretty(&short)?;
+        if !attempts.is_empty() {
+            let lines = attempts.iter().map(serde_json::to_string);
+            let lines = lines.collect::<Result<Vec<_>, _>>()?.join(",\n    ");
+            form.truncate(form.len() - "\n}".len());
+            form.push_str(&format!(",\n  \"attempts\": [\n    {lines}\n  ]\n}}"));
+        }
+        form.push('\n');
+        Ok(form)
+    }
+
+    /// The text of the scenario that stands beside it.
+    ///
+    /// # Errors
+    /// The model cannot be made.
+    pub fn text(&self) -> Result<String, ExploreError> {
+        let title = format!("Found by fuzzing: {}", self.difference.kind());
+        self.scenario(&title, &self.sources())
     }
 
     /// The scenario, which passes if every byte is as the model predicts, and fails if one is not.

@@ -98,6 +98,26 @@ impl Judge {
         self.model = RingModel::new(self.size, properties);
     }
 
+    /// Whether the link shows line errors at their bytes.
+    pub(crate) const fn line_errors(&self) -> bool {
+        self.line_errors
+    }
+
+    /// What of the open properties the ring can still have, as places among all that it could have.
+    pub(crate) fn possible(&self) -> Vec<u8> {
+        let all = (0..).zip(all_properties());
+        let own = all.filter(|(_, own)| self.possible.contains(own));
+        own.map(|(place, _)| place).collect()
+    }
+
+    /// Limits them to these places.
+    pub(crate) fn set_possible(&mut self, places: &[u8]) {
+        let all = (0..).zip(all_properties());
+        let own = all.filter(|(place, _)| places.contains(place));
+        self.possible = own.map(|(_, own)| own).collect();
+        self.begin();
+    }
+
     /// Mismatch of a ring with every drive that the manual permits. Call [`Self::begin`] after it.
     pub(crate) fn see(&mut self, exchange: BytesExchanged) -> Option<Difference> {
         let before = self.possible.clone();

@@ -1,15 +1,14 @@
 //! Runs cases on a rig with ports, one after another. Bytes that the guard would deny are not sent, and a [`Judge`] sees every byte. The
 //! drives are made ready again when their state is unknown.
 
-use super::case::{Act, ActKind, Case, Harm, OtherRing};
+use super::case::{ActKind, Case, Harm, OtherRing};
 use super::judge::{BytesExchanged, Judge, prologue};
-use super::oracle::{Difference, sent};
+use super::on_record::{AnsweredCase, AttemptRecord, ByteTimes, acts, untimely};
 use super::order::{Command, CommandSent};
 use super::play::MasterView;
 use crate::buses::SimulatedLink;
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::link::BesideTheBus;
-use crate::buses::novobus::twin;
 use crate::explore::ExploreError;
 use crate::explore::features;
 use crate::explore::{Rehearsal, Target, Tried};
@@ -23,15 +22,13 @@ use harness_proto::nd21::bits::flags2;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::Limits;
-use harness_proto::novobus::role::{Role, roles};
-use harness_proto::novobus::sync::PAUSE;
 use harness_proto::time::{Instant, Span};
 
 /// How long the drives of the model have been switched on: their self-tests are over (ND21 11.8).
 const WARM: Span = Span::from_millis(200);
 
 /// Maximum number of bytes sent before the drives are made ready again. The bytes sent since then are kept, so they can be replayed.
-const LONGEST_HISTORY: usize = 40_000;
+pub(super) const LONGEST_HISTORY: usize = 40_000;
 
 /// How long a byte may be missing before it counts as lost, in addition to the tolerance of the rig.
 const PATIENCE: Span = Span::from_millis(60);
@@ -44,8 +41,12 @@ pub struct OnRig<'r, 's> {
     limits: Limits,
     /// What each ring has done since its drives were made ready.
     judges: Vec<Judge>,
-    /// The acts of these cases, ring by ring.
-    history: Vec<Vec<Act>>,
+    /// What each has taken for possible before that.
+    possible: Vec<Vec<u8>>,
+    /// The conversations since then, ring by ring; the first one makes the addresses known.
+    history: Vec<Vec<AnsweredCase>>,
+    /// The last attempt, and how many conversations of its ring came before it.
+    last: Option<(AttemptRecord, usize)>,
     /// Whether the state of the drives is unknown.
     stale: bool,
 }
@@ -74,7 +75,9 @@ impl<'r, 's> OnRig<'r, 's> {
             run,
             model,
             limits,
+            possible: vec![Vec::new(); judges.len()],
             history: vec![Vec::new(); judges.len()],
+            last: None,
             judges,
             stale: true,
         })
@@ -92,61 +95,53 @@ impl<'r, 's> OnRig<'r, 's> {
         }
         let took = self.run.session().link().now().since_start();
         self.run.session().health()?;
+        self.history.iter_mut().for_each(Vec::clear);
         for (ring, judge) in self.judges.iter_mut().enumerate() {
             judge.begin();
+            self.possible[ring] = judge.possible();
             let case = prologue(rings[ring].drives(), beside_of(&rings, ring));
             let link = self.run.session().link();
             let (received, ..) = converse(link, &case, case.bytes().len());
-            let received = received.into_iter().map(|(_, byte)| byte).collect();
+            let received: Vec<_> = received.into_iter().map(|(_, byte)| byte).collect();
             // A difference here shows again in the first case.
             let _again = judge
-                .see(BytesExchanged::of(&case, received))
+                .see(BytesExchanged::of(&case, received.clone()))
                 .map(|_| judge.begin());
+            self.history[ring].push(AnsweredCase { case, received });
         }
-        self.history.iter_mut().for_each(Vec::clear);
         self.stale = false;
         Ok(took)
     }
+}
 
-    /// The first byte of a complete conversation that came at a wrong time (ND21 8.2): every drive takes a byte time.
-    fn untimely(
-        &mut self,
-        case: &Case,
-        received: &[(Instant, Received)],
-        due: &[Instant],
-    ) -> Option<Difference> {
-        let size = RingSize::new(u64::from(case.drives)).ok()?;
-        let all = sent(case);
-        let roles = roles(size, &all);
-        let answered = roles.iter().zip(&all).zip(due);
-        let answered =
-            answered.filter(|((role, (byte, _)), _)| (**role, *byte) != (Role::Idle, PAUSE));
-        let answered: Vec<_> = answered.map(|((role, _), due)| (*role, *due)).collect();
-        if answered.len() != received.len() || !case.faults().is_empty() {
-            return None;
+impl OnRig<'_, '_> {
+    /// An attempt of which nothing was played yet.
+    fn record(&self, case: &Case) -> AttemptRecord {
+        let ring = case.ring();
+        AttemptRecord {
+            possible: self.possible[ring].clone(),
+            line_errors: self.judges[ring].line_errors(),
+            before: Vec::new(),
+            last: AnsweredCase {
+                case: case.clone(),
+                received: Vec::new(),
+            },
+            played: false,
+            known: false,
+            times: ByteTimes::default(),
         }
+    }
+
+    /// When bytes went and came.
+    fn times(&mut self, received: &[(Instant, Received)], sent: &[Instant]) -> ByteTimes {
         let link = self.run.session().link();
-        let (round, tolerance) = (
-            link.byte_time() * u64::from(case.drives),
-            link.time_tolerance(),
-        );
-        let index = answered
-            .iter()
-            .zip(received)
-            .position(|((_, due), (at, _))| {
-                at.since(*due + round).max((*due + round).since(*at)) > tolerance
-            })?;
-        let (role, due) = answered[index];
-        Some(Difference::from(&twin::Divergence {
-            ring: case.ring(),
-            byte: index + 1,
-            what: twin::Symptom::Time,
-            expected: Some((due + round, received[index].1)),
-            received: Some(received[index]),
-            role,
-            step: None,
-            drive: None,
-        }))
+        let units = |at: &Instant| at.since_start().units();
+        ByteTimes {
+            byte: link.byte_time().units(),
+            tolerance: link.time_tolerance().units(),
+            sent: sent.iter().map(units).collect(),
+            came: received.iter().map(|(at, _)| units(at)).collect(),
+        }
     }
 }
 
@@ -182,12 +177,8 @@ impl Target for OnRig<'_, '_> {
     fn attempt(&mut self, case: &Case, _: &Rehearsal) -> Result<Tried, ExploreError> {
         let began = std::time::Instant::now();
         let mut made_ready = Span::ZERO;
-        let used: usize = self
-            .history
-            .iter()
-            .flatten()
-            .map(|act| act.length(case.drives))
-            .sum();
+        let sent = self.history.iter().flatten();
+        let used: usize = sent.map(|own| own.case.bytes().len()).sum();
         if self.stale || used > LONGEST_HISTORY {
             made_ready = self.begin_anew()?;
         }
@@ -196,7 +187,9 @@ impl Target for OnRig<'_, '_> {
             session.health()?;
             session.look_at_interlocks();
         }
-        let foreseen = self.judges[case.ring()].foresee(case);
+        let ring = case.ring();
+        self.last = Some((self.record(case), self.history[ring].len()));
+        let foreseen = self.judges[ring].foresee(case);
         if foreseen.is_harmful {
             let why = "the result is the drive's choice: it writes cells that the drive's program uses, or a fault hits the drive's own data";
             return Ok(Tried {
@@ -217,12 +210,12 @@ impl Target for OnRig<'_, '_> {
                 }
             }
         } else {
-            let ring = case.ring();
-            let bytes = received.iter().map(|(_, byte)| *byte).collect();
-            let before = std::mem::take(&mut self.history[ring]);
-            tried.difference = self.judges[ring].see(BytesExchanged::of(case, bytes));
+            let times = self.times(&received, &due);
+            let received: Vec<_> = received.iter().map(|(_, byte)| *byte).collect();
+            let before = acts(&self.history[ring]);
+            tried.difference = self.judges[ring].see(BytesExchanged::of(case, received.clone()));
             if tried.difference.is_none() {
-                tried.difference = self.untimely(case, &received, &due);
+                tried.difference = untimely(case, &received, &times);
             }
             // A known deviation of the rig's file explains it.
             let deviations = &self.run.session().rig().file.deviation;
@@ -230,10 +223,16 @@ impl Target for OnRig<'_, '_> {
                 let rule = format!("nd21 {}", found.section);
                 deviations.iter().any(|entry| entry.rule == rule)
             });
-            let mut acts = before.clone();
-            acts.extend(case.acts.iter().cloned());
             tried.before = (tried.difference.is_some() && !before.is_empty()).then_some(before);
-            self.history[ring] = acts;
+            let answered = AnsweredCase {
+                case: case.clone(),
+                received,
+            };
+            self.history[ring].push(answered.clone());
+            if let Some((record, _)) = &mut self.last {
+                (record.last, record.times) = (answered, times);
+                (record.played, record.known) = (true, known.is_some());
+            }
             // For how long a drive tests itself is its choice (ND21 11.8).
             self.stale = known.is_some() || tried.difference.is_some() || case.orders().any(resets);
         }
@@ -244,6 +243,15 @@ impl Target for OnRig<'_, '_> {
             }
         };
         Ok(tried)
+    }
+
+    fn recorded(&self) -> Option<AttemptRecord> {
+        let (record, before) = self.last.as_ref()?;
+        let history = &self.history[record.last.case.ring()];
+        Some(AttemptRecord {
+            before: history[..*before].to_vec(),
+            ..record.clone()
+        })
     }
 
     fn begin(&mut self) {
