@@ -27,6 +27,12 @@ pub struct Unsaid {
 }
 
 impl LastWords {
+    /// Bytes as they are, for a descriptor that is no wire.
+    #[cfg(feature = "socketcan")]
+    pub(crate) const fn raw(fd: OwnedFd, name: String, bytes: Vec<u8>) -> Self {
+        Self { fd, name, bytes }
+    }
+
     /// Sends them, behind whatever the operating system has taken before; at most for two seconds.
     ///
     /// # Errors

@@ -3,6 +3,8 @@
 #[path = "../common/debian.rs"]
 mod debian;
 mod guide;
+#[path = "../common/python.rs"]
+mod python;
 mod scenarios;
 
 datatest_stable::harness! {

@@ -11,7 +11,6 @@ use harness_proto::can::{Frame, Heard, Id};
 use harness_proto::time::{Instant, Span};
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
@@ -35,7 +34,7 @@ fn until(stream: &mut impl Read, end: &str) -> String {
 /// Python-can, as a vehicle's controller would use it, over every way in.
 #[test]
 fn python_can_talks_to_a_drive() {
-    let Some(python) = crate::debian::python_can("SLCAN and socketcand as it speaks them") else {
+    let Some(python) = crate::python::python_can("SLCAN and socketcand as it speaks them") else {
         return;
     };
     let terminal = path("slcan-python");

@@ -15,6 +15,8 @@ mod inner;
 mod junit_rules;
 #[path = "../common/program.rs"]
 mod program;
+#[path = "../common/python.rs"]
+mod python;
 #[path = "../common/record.rs"]
 mod record;
 mod reports;

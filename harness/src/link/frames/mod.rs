@@ -1,4 +1,5 @@
-//! Frames over a CAN adapter in real time: SLCAN behind a serial port, a pseudo terminal or a socket, and socketcand.
+//! Frames over a CAN adapter in real time: SLCAN behind a serial port, a pseudo terminal or a socket, socketcand, and, with the feature
+//! `socketcan`, an interface of Linux.
 //!
 //! Time is the computer's monotonic clock. A frame is stamped by the adapter where it has stamps, and with the time of reading where it
 //! has none. When a frame of the bench itself was on the bus is not reported by either language: it counts as sent as soon as the bus can
@@ -8,15 +9,18 @@
 
 mod adapter;
 mod clock;
+#[cfg(feature = "socketcan")]
+mod kernel;
 mod open;
+mod transport;
 
 pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD};
 
 use super::port_end::MOST_RECORDED;
 use super::{Capability, InnerLink, Line, Link, Moment, PlacedFault, PortLink, Trouble};
 use crate::medium::{Heard, Medium, Out, Pieces};
-use crate::port::{LastWords, Outgoing, Wire, wake_on_time};
-use adapter::{Adapter, Event};
+use crate::port::{LastWords, wake_on_time};
+use adapter::Event;
 use harness_proto::can::{self, BitRate, BusError, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, FrameEnd, LineFrame, Trace};
@@ -28,6 +32,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time;
+use transport::Transport;
 
 /// How far ahead of the bus frames are handed to the adapter.
 const AHEAD: Span = Span::from_millis(2);
@@ -41,8 +46,7 @@ const NAP: Span = Span::from_millis(50);
 /// A link over a CAN adapter, with one port.
 #[derive(Debug)]
 pub struct FrameLink {
-    wire: Wire,
-    adapter: Adapter,
+    transport: Box<dyn Transport>,
     rate: BitRate,
     listen_only: bool,
     /// The identifier with which each drive sends.
@@ -82,11 +86,10 @@ impl FrameLink {
         interrupt: Arc<AtomicBool>,
     ) -> Result<Self, AdapterError> {
         wake_on_time();
-        let opened = open::open(settings, &interrupt)?;
+        let transport = open::open(settings, &interrupt)?;
         let now = time::Instant::now();
-        let mut link = Self {
-            wire: opened.wire,
-            adapter: opened.adapter,
+        Ok(Self {
+            transport,
             rate: settings.rate,
             listen_only: settings.listen_only,
             senders,
@@ -105,9 +108,7 @@ impl FrameLink {
             interrupt,
             beats: Arc::default(),
             trouble: None,
-        };
-        link.understand(opened.come);
-        Ok(link)
+        })
     }
 
     /// Sets how exact its times are; 30 ms at first.
@@ -118,7 +119,7 @@ impl FrameLink {
     /// The descriptor of its stream, for locks.
     #[must_use]
     pub fn fd(&self) -> BorrowedFd<'_> {
-        self.wire.fd()
+        self.transport.fd()
     }
 
     /// A time of the computer's clock, in the conversation.
@@ -166,49 +167,38 @@ impl FrameLink {
         if !self.is_sound() {
             return Ok(());
         }
-        let now = self.clock_now();
-        let mut bytes = Vec::new();
+        let (now, begun) = (self.clock_now(), self.begun());
         while let Some(&frame) = self.queue.front()
             && self.free <= now + AHEAD
-            && self.adapter.is_ready()
+            && self.transport.is_ready()
         {
             self.queue.pop_front();
-            self.adapter.send(now + self.begun(), &frame, &mut bytes);
+            self.transport.send(now + begun, &frame)?;
             let start = self.free.max(now);
             self.free = start + self.rate.time_of(frame.wire_bits());
             self.keep(None, start, self.free, frame);
         }
-        self.adapter.attend(now + self.begun(), &mut bytes);
-        for byte in bytes {
-            self.wire.send(Outgoing::Byte(byte))?;
-        }
-        self.wire.flush()
+        self.transport.attend(now + begun)
     }
 
     fn take(&mut self) -> Result<(), Trouble> {
         if self.trouble.as_ref().is_some_and(Trouble::stops_the_line) {
             return Ok(());
         }
-        let mut read = Vec::new();
-        let result = self.wire.receive(&mut read);
-        self.understand(read.iter().map(|own| own.byte));
-        result
-    }
-
-    fn understand(&mut self, bytes: impl IntoIterator<Item = u8>) {
+        let mut events = Vec::new();
         let (now, begun) = (self.adapter_now(), self.begun());
-        for byte in bytes {
-            for event in self.adapter.push(byte, now) {
-                match event {
-                    Event::Heard(at, heard) => self.hear(at - begun, heard),
-                    Event::Overrun => self.unplaced += 1,
-                    Event::Ended(why) => {
-                        let why = format!("{}: {why}", self.wire.name());
-                        self.end(Trouble::Lost(why));
-                    }
+        let result = self.transport.receive(now, &mut events);
+        for event in events {
+            match event {
+                Event::Heard(at, heard) => self.hear(at - begun, heard),
+                Event::Overrun => self.unplaced += 1,
+                Event::Ended(why) => {
+                    let why = format!("{}: {why}", self.transport.name());
+                    self.end(Trouble::Lost(why));
                 }
             }
         }
+        result
     }
 
     fn hear(&mut self, at: Instant, heard: can::Heard) {
@@ -228,7 +218,7 @@ impl FrameLink {
             can::Heard::Error(BusError::BusOff) => {
                 let why = format!(
                     "{}: the adapter is bus-off: check rate, cable and termination, and start it again",
-                    self.wire.name()
+                    self.transport.name()
                 );
                 self.end(Trouble::Lost(why));
             }
@@ -252,7 +242,7 @@ impl FrameLink {
     /// Waits for the stream.
     fn listen(&mut self, until: Instant) {
         let due = match self.queue.is_empty() {
-            true => self.adapter.due().map(|due| due - self.begun()),
+            true => self.transport.due().map(|due| due - self.begun()),
             false => Some(self.free - AHEAD),
         };
         let now = self.clock_now();
@@ -262,27 +252,12 @@ impl FrameLink {
             tv_nsec: i64::try_from(until.since(now).as_nanos()).unwrap_or(0),
         };
         // An error shows when the stream is read.
-        let _ready = poll(&mut [self.wire.poll_fd()], Some(&timeout));
+        let _ready = poll(&mut [self.transport.poll_fd()], Some(&timeout));
     }
 }
 
 fn span(duration: time::Duration) -> Span {
     Span::from_nanos(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX))
-}
-
-impl Drop for FrameLink {
-    /// Closes the channel.
-    fn drop(&mut self) {
-        if matches!(self.adapter, Adapter::Slcan(_)) {
-            // A port that is gone has no channel any more.
-            let close = b"C\r"
-                .iter()
-                .map(|own| self.wire.send(Outgoing::Byte(*own)));
-            let _gone = close
-                .collect::<Result<(), _>>()
-                .and_then(|()| self.wire.flush());
-        }
-    }
 }
 
 impl Line for FrameLink {
@@ -312,7 +287,7 @@ impl Line for FrameLink {
     /// Nothing while the bench only listens, and only what the adapter's language carries.
     fn permits(&self, port: usize, what: Out<'_>) -> bool {
         let carried =
-            what.octets().is_empty() && what.frames().iter().all(|own| self.adapter.carries(own));
+            what.octets().is_empty() && what.frames().iter().all(|own| self.transport.carries(own));
         let speaks = !self.listen_only || what.is_empty();
         carried && speaks && port == 0 && self.is_sound()
     }
@@ -362,7 +337,7 @@ impl Link for FrameLink {
 
     fn busy(&self) -> bool {
         let answers = self.free + SLACK.max(self.tolerance);
-        let waits = !self.queue.is_empty() || self.wire.waiting() > 0;
+        let waits = !self.queue.is_empty() || self.transport.waits();
         let sent = self.log.iter().any(|own| own.from.is_none());
         self.is_sound() && (waits || (sent && self.clock_now() < answers))
     }
@@ -403,11 +378,7 @@ impl PortLink for FrameLink {
     }
 
     fn last_words(&self, words: &dyn Fn(usize) -> Pieces) -> io::Result<Vec<LastWords>> {
-        let mut bytes = Vec::new();
-        let words = words(0);
-        let frames = words.as_out().frames().iter();
-        frames.for_each(|frame| self.adapter.encode(frame, &mut bytes));
-        Ok(vec![self.wire.last_words(&bytes)?])
+        self.transport.last_words(words(0).as_out().frames())
     }
 
     fn resume(&mut self) {

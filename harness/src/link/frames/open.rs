@@ -1,6 +1,7 @@
 //! Opening a CAN adapter: the handshake of its language.
 
 use super::adapter::{Adapter, Slcan, Socketcand};
+use super::transport::{Stream, Transport};
 use crate::frames::slcan::{self, BitTiming, Command, Report, rate_of};
 use crate::frames::socketcand::{Answer, Messages, Request};
 use crate::port::{Endpoint, OpenError, Outgoing, Wire, open_adapter};
@@ -40,6 +41,12 @@ pub enum AdapterPlace {
         /// The bus, such as `can0`.
         channel: String,
     },
+    /// An interface of Linux's SocketCAN. Never tried on a kernel with CAN.
+    #[cfg(feature = "socketcan")]
+    Kernel {
+        /// Its name, such as `can0`.
+        interface: String,
+    },
 }
 
 impl AdapterPlace {
@@ -62,7 +69,7 @@ impl AdapterPlace {
 pub struct AdapterSettings {
     /// The adapter.
     pub place: AdapterPlace,
-    /// The rate of the bus. A server of socketcand has a rate of its own, which is not changed.
+    /// The rate of the bus. A server of socketcand and an interface of the kernel have a rate of their own, which is not changed.
     pub rate: BitRate,
     /// Whether the adapter sends nothing: with SLCAN not even acknowledges.
     pub listen_only: bool,
@@ -123,19 +130,11 @@ pub enum AdapterError {
 const SLCAN: &str = "SLCAN adapter";
 const SOCKETCAND: &str = "server of socketcand";
 
-/// An adapter whose channel is open.
-pub(super) struct Opened {
-    pub(super) wire: Wire,
-    pub(super) adapter: Adapter,
-    /// What has come behind the last answer.
-    pub(super) come: VecDeque<u8>,
-}
-
 /// Opens an adapter: its stream, and the language on it.
 pub(super) fn open(
     settings: &AdapterSettings,
     interrupt: &AtomicBool,
-) -> Result<Opened, AdapterError> {
+) -> Result<Box<dyn Transport>, AdapterError> {
     match &settings.place {
         AdapterPlace::Slcan { at, baud } => {
             let commands = rate_commands(settings.rate)?;
@@ -154,6 +153,8 @@ pub(super) fn open(
             talk.open_socketcand(channel)?;
             Ok(talk.opened(Adapter::Socketcand(Socketcand::new())))
         }
+        #[cfg(feature = "socketcan")]
+        AdapterPlace::Kernel { interface } => Ok(Box::new(super::kernel::Kernel::open(interface)?)),
     }
 }
 
@@ -186,12 +187,12 @@ impl<'a> Talk<'a> {
         }
     }
 
-    fn opened(self, adapter: Adapter) -> Opened {
-        Opened {
+    fn opened(self, adapter: Adapter) -> Box<dyn Transport> {
+        Box::new(Stream {
             wire: self.wire,
             adapter,
             come: self.come,
-        }
+        })
     }
 
     fn open_slcan(
