@@ -20,6 +20,16 @@ use std::fmt::Write as _;
 /// The longest message, both brackets included.
 pub const MAX_MESSAGE: usize = 256;
 
+/// Flags beside an identifier, as Linux has them (`linux/can.h`).
+pub mod flag {
+    /// It has 29 bits.
+    pub const EXTENDED: u32 = 0x8000_0000;
+    /// A remote frame.
+    pub const REMOTE: u32 = 0x4000_0000;
+    /// An error frame: the identifier is its class.
+    pub const ERROR: u32 = 0x2000_0000;
+}
+
 /// The bits of an error frame's class, as Linux numbers them (`linux/can/error.h`).
 pub mod class {
     /// The interface is bus-off.

@@ -14,6 +14,8 @@
 use super::pcapng::{
     Block, COMMENT, END, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, NANOSECONDS, PACKET,
 };
+use crate::frames::socketcand::class;
+pub(crate) use crate::frames::socketcand::flag::{ERROR, EXTENDED, REMOTE};
 use harness_proto::can::{BitRate, BusError, MAX_DATA};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::BTreeSet;
@@ -23,22 +25,18 @@ use std::io::Write;
 pub(crate) const LINK_TYPE: u16 = 227;
 /// The length of the header in front of the data.
 pub(crate) const HEADER: usize = 8;
-/// Flags of an identifier.
-pub(crate) const EXTENDED: u32 = 0x8000_0000;
-pub(crate) const REMOTE: u32 = 0x4000_0000;
-pub(crate) const ERROR: u32 = 0x2000_0000;
 /// The comment of a frame that no station has got.
 pub(crate) const LOST: &str = "lost";
 /// The name of the interface of the bench's own frames, and what stands in front of a drive's number.
 pub(crate) const MASTER: &str = "master";
 pub(crate) const DRIVE: &str = "drive ";
 
-/// The class of an error frame, as Linux numbers them.
-const fn class(error: BusError) -> u32 {
+/// The class of an error frame.
+const fn class_of(error: BusError) -> u32 {
     match error {
-        BusError::ErrorFrame => 0x88,
-        BusError::NoAcknowledge => 0x20,
-        BusError::BusOff => 0x40,
+        BusError::ErrorFrame => class::PROTOCOL | class::BUS_ERROR,
+        BusError::NoAcknowledge => class::NO_ACKNOWLEDGE,
+        BusError::BusOff => class::BUS_OFF,
     }
 }
 
@@ -113,7 +111,7 @@ fn packet(block: &mut Block, interface: usize, own: &LineFrame) {
         FrameEnd::Good => {}
         FrameEnd::Lost => comment = Some(LOST.to_owned()),
         FrameEnd::Error(error) => {
-            id = ERROR | class(error);
+            id = ERROR | class_of(error);
             len = MAX_DATA;
             data = [0; HEADER + MAX_DATA];
             comment = Some(format!("{error} {frame}"));

@@ -130,16 +130,17 @@ impl Check<'_> {
     fn adapter(&mut self, port: &Port) {
         let at = |key| [PORT[0], PORT[1], Step::Key(key)];
         let sim = self.file.sim.as_ref();
-        match (&port.slcan, &port.socketcand, sim) {
-            (Some(_), Some(_), _) => self.wrong(
-                &at("socketcand"),
+        let adapters = port.adapters();
+        match (adapters.first(), adapters.get(1), sim) {
+            (Some(_), Some(second), _) => self.wrong(
+                &at(second),
                 "two adapters are given",
-                "one of `slcan` and `socketcand` expected",
+                "one of `slcan`, `socketcand` and `socketcan` expected",
             ),
             (None, None, None) => self.wrong(
                 &PORT,
                 "the port has no adapter",
-                "`slcan`, `socketcand`, or a table [sim] with `bus` for simulated drives, expected",
+                "`slcan`, `socketcand`, `socketcan`, or a table [sim] with `bus` for simulated drives, expected",
             ),
             (None, None, Some(sim)) if sim.bus != Some(port.bus) => {
                 let expected = format!("`bus = \"{}\"` expected in [sim]", port.bus.name());
@@ -175,12 +176,16 @@ impl Check<'_> {
             let fits = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
             name.is_empty() || name.len() > 15 || !name.chars().all(fits)
         };
-        if let Some(channel) = port.channel.as_ref().filter(name) {
-            let message = format!("`{channel}` is not the name of a bus");
-            let expected =
-                "1 to 15 letters, digits, `.`, `_` or `-` expected here, such as \"can0\"";
-            self.wrong(&at("channel"), message, expected);
-        } else if port.channel.is_some() && port.socketcand.is_none() {
+        for (key, given) in [("channel", &port.channel), ("socketcan", &port.socketcan)] {
+            if let Some(given) = given.as_ref().filter(name) {
+                let message = format!("`{given}` is not the name of a bus");
+                let expected =
+                    "1 to 15 letters, digits, `.`, `_` or `-` expected here, such as \"can0\"";
+                self.wrong(&at(key), message, expected);
+            }
+        }
+        let named = port.channel.as_ref().is_some_and(|own| !name(&own));
+        if named && port.socketcand.is_none() {
             let expected = "`channel` only beside `socketcand` expected";
             self.wrong(&at("channel"), "this adapter has one bus", expected);
         }

@@ -30,6 +30,10 @@ pub struct Port {
     /// The bus of the socketcand server; default `can0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
+    /// A CAN interface of the Linux kernel, such as `can0`, in builds with the feature `socketcan`. Its rate and listen-only are set by
+    /// `ip link`. Never tried on a kernel with CAN.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub socketcan: Option<String>,
     /// The bit rate in kbit/s; default 500.
     #[serde(default = "half_a_megabit")]
     #[schemars(range(min = 10, max = 1000))]
@@ -43,6 +47,20 @@ pub struct Port {
     /// How long a reply may take; default 20ms.
     #[serde(default = "twenty_milliseconds")]
     pub patience: Time,
+}
+
+impl Port {
+    /// The keys of the adapters that are given: one, or none where the drives are simulated.
+    #[must_use]
+    pub fn adapters(&self) -> Vec<&'static str> {
+        let all = [
+            ("slcan", &self.slcan),
+            ("socketcand", &self.socketcand),
+            ("socketcan", &self.socketcan),
+        ];
+        let given = all.into_iter().filter(|(_, place)| place.is_some());
+        given.map(|(key, _)| key).collect()
+    }
 }
 
 /// A drive on a bus, by its number or by its identifiers.

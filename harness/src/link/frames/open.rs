@@ -41,8 +41,7 @@ pub enum AdapterPlace {
         /// The bus, such as `can0`.
         channel: String,
     },
-    /// An interface of Linux's SocketCAN. Never tried on a kernel with CAN.
-    #[cfg(feature = "socketcan")]
+    /// An interface of Linux's SocketCAN, in builds with the feature `socketcan`. Never tried on a kernel with CAN.
     Kernel {
         /// Its name, such as `can0`.
         interface: String,
@@ -122,6 +121,13 @@ pub enum AdapterError {
          kbit/s"
     )]
     Rate(BitRate),
+    /// The program has no interfaces of the kernel.
+    #[cfg(not(feature = "socketcan"))]
+    #[error(
+        "{0}: this program is built without CAN interfaces of the kernel; build it with `cargo build --release --features socketcan`, or \
+         serve the interface with socketcand"
+    )]
+    NotBuilt(String),
     /// The program was interrupted.
     #[error("interrupted")]
     Interrupted,
@@ -153,9 +159,18 @@ pub(super) fn open(
             talk.open_socketcand(channel)?;
             Ok(talk.opened(Adapter::Socketcand(Socketcand::new())))
         }
-        #[cfg(feature = "socketcan")]
-        AdapterPlace::Kernel { interface } => Ok(Box::new(super::kernel::Kernel::open(interface)?)),
+        AdapterPlace::Kernel { interface } => kernel(interface),
     }
+}
+
+#[cfg(feature = "socketcan")]
+fn kernel(interface: &str) -> Result<Box<dyn Transport>, AdapterError> {
+    Ok(Box::new(super::kernel::Kernel::open(interface)?))
+}
+
+#[cfg(not(feature = "socketcan"))]
+fn kernel(interface: &str) -> Result<Box<dyn Transport>, AdapterError> {
+    Err(AdapterError::NotBuilt(interface.to_owned()))
 }
 
 /// The command that chooses a rate: a code, or bit timing registers.

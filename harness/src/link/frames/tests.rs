@@ -355,3 +355,21 @@ fn an_interruption_ends_sending_and_can_be_taken_back() {
     let stopped = FrameLink::open(&settings(&address, false), Vec::new(), interrupt);
     assert!(matches!(stopped, Err(AdapterError::Interrupted)));
 }
+
+/// The default build has no interfaces of the kernel, and says how to get them.
+#[cfg(not(feature = "socketcan"))]
+#[test]
+fn an_interface_of_the_kernel_needs_its_feature() {
+    let settings = AdapterSettings {
+        place: AdapterPlace::Kernel {
+            interface: "can0".to_owned(),
+        },
+        rate: BitRate::K500,
+        listen_only: true,
+    };
+    let why = refused(&settings);
+    assert!(
+        why.contains("can0") && why.contains("--features socketcan"),
+        "{why}"
+    );
+}

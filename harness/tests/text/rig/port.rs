@@ -63,6 +63,11 @@ fn mistakes_of_ports_are_shown_with_line_and_column() {
             port("slcan = \"/dev/ttyACM0\"\nsocketcand = \"lab:29536\""),
         ),
         ("an adapter nowhere", port("slcan = \"ttyACM0\"")),
+        ("an interface without a name", port("socketcan = \"\"")),
+        (
+            "an interface beside an adapter",
+            port("slcan = \"/dev/ttyACM0\"\nsocketcan = \"can0\""),
+        ),
         ("a server without a port", port("socketcand = \"lab\"")),
         (
             "a channel of an adapter with one",

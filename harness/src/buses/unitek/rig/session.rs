@@ -275,7 +275,12 @@ fn open(
             address: address.clone(),
             channel: port.channel.clone().unwrap_or_else(|| "can0".to_owned()),
         },
-        (None, None) => return Err(failed(rig, "its port has no adapter")),
+        (None, None) => AdapterPlace::Kernel {
+            interface: port
+                .socketcan
+                .clone()
+                .ok_or_else(|| failed(rig, "its port has no adapter"))?,
+        },
     };
     let settings = AdapterSettings {
         place,
