@@ -346,7 +346,7 @@ fn worst(finished: &PlayedCampaign) -> Option<Html> {
             &[],
             "The gravest cases, each with what plays it again",
         );
-        html.heads(&["Class", "Case", "What happened", "Again"]);
+        html.heads(&["Class", "Case", "What happened", "Reproduce with"]);
         for outcome in worst.into_iter().take(WORST) {
             let case = outcome.case.name(finished.drives);
             html.element("tr", &[], |html| {

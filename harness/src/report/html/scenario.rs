@@ -86,7 +86,7 @@ fn facts(html: &mut Html, played: &ScenarioView<'_>) {
             html.line("dd", &[], value);
         };
         if !played.sources.is_empty() {
-            fact("Pins", &played.sources.join(", "));
+            fact("Covers", &played.sources.join(", "));
         }
         fact("Drives", &played.drives);
         fact("On the line", &outcome.took);
@@ -96,7 +96,7 @@ fn facts(html: &mut Html, played: &ScenarioView<'_>) {
         if outcome.remarks.len() > REMARKS {
             fact("Note", &format!("{} more", outcome.remarks.len() - REMARKS));
         }
-        fact("Again", &played.again);
+        fact("Reproduce with", &played.again);
     });
 }
 

@@ -118,7 +118,7 @@ fn table(html: &mut Html, shown: &[ShownScenario]) {
                 "Drives",
                 "On the line",
                 "Shows",
-                "Pins",
+                "Covers",
             ]);
         });
         html.element("tbody", &[], |html| {

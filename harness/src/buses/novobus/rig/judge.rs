@@ -195,7 +195,7 @@ fn failed_alike(outcome: &mut Outcome, untimely: Option<&Divergence>, heard: &He
     } else if passes_with_defaults(heard) {
         outcome.verdict = Verdict::Inconclusive;
         outcome.remarks.push(
-            "it passes on drives with the model's defaults: the rig's drives do otherwise where the manual leaves it open"
+            "it passes on drives with the model's defaults: the rig's drives differ where the manual leaves the choice open"
                 .to_owned(),
         );
     } else if heard.exactness.knows_cells && passes(heard.rig, heard) {
