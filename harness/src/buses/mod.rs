@@ -38,11 +38,11 @@ use crate::cli::rig_failure::find_any_rig;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
-use crate::rig::port_file::Node;
+use crate::rig::port_file::{Node, Port};
 use crate::scenario::plan::Plan;
-use crate::scenario::problem::Problems;
+use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::settled::{self, Settled};
-use crate::scenario::source::Source;
+use crate::scenario::source::{Source, line_number};
 use crate::scenario::syntax::Scenario;
 use crate::serve::frames::FrameJob;
 use crate::serve::{End, Host, ServeError};
@@ -108,6 +108,21 @@ impl PortBus {
         match self {
             Self::Unitek => unitek::rig::drive(index, node),
         }
+    }
+
+    /// The mistakes of `setup` lines of a simulated port, each with the number of its line, counted from 0.
+    pub(crate) fn setup_mistakes(self, port: &Port, lines: &[String]) -> Vec<(usize, Problem)> {
+        let source = Source {
+            name: "setup".to_owned(),
+            text: lines.join("\n").into(),
+        };
+        let read = match self {
+            Self::Unitek => unitek::rig::setup(port, &source).err(),
+        };
+        let line = |own: &Problem| line_number(&source.text, own.span.start) - 1;
+        let problems = read.iter().flat_map(Problems::all);
+        let placed = problems.map(|own| (line(own), own.clone()));
+        placed.collect()
     }
 
     /// The register of `allow_registers`.

@@ -146,12 +146,7 @@ impl Check<'_> {
                 let expected = format!("`bus = \"{}\"` expected in [sim]", port.bus.name());
                 self.wrong(&["sim".into()], "the simulated bus is missing", expected);
             }
-            (None, None, Some(sim)) if !sim.setup.is_empty() => {
-                let path = ["sim".into(), "setup".into()];
-                let message = "the lines of `setup` are for benches with rings";
-                self.wrong(&path, message, "no `setup` expected here");
-            }
-            (None, None, Some(_)) => {}
+            (None, None, Some(sim)) => self.lines(port, &sim.setup),
             (_, _, Some(_)) => self.wrong(
                 &["sim".into()],
                 "[sim] is only for simulated drives; this port has an adapter",
@@ -192,6 +187,20 @@ impl Check<'_> {
         if BitRate::from_bits_per_second(port.rate.saturating_mul(1000)).is_none() {
             let message = format!("no bus runs at {} kbit/s", port.rate);
             self.wrong(&at("rate"), message, "such as 500 expected here");
+        }
+    }
+
+    /// The lines of `setup` are about drives of the port.
+    fn lines(&mut self, port: &Port, lines: &[String]) {
+        let at = |index: usize| [Step::Key("sim"), Step::Key("setup"), Step::Index(index)];
+        let long = |line: &String| line.contains(['\n', '\r']);
+        if let Some(index) = lines.iter().position(long) {
+            let expected = "one line expected here";
+            self.wrong(&at(index), "this is more than one line", expected);
+            return;
+        }
+        for (index, problem) in port.bus.setup_mistakes(port, lines) {
+            self.add(&at(index), &problem);
         }
     }
 

@@ -75,7 +75,7 @@ impl Check<'_> {
     }
 
     /// Adds a mistake at a value of the rig's file.
-    fn add(&mut self, path: &[Step<'_>], problem: &Problem) {
+    pub(crate) fn add(&mut self, path: &[Step<'_>], problem: &Problem) {
         let span = self.place(path);
         self.problems.push(Problem {
             span,

@@ -45,6 +45,48 @@ fn registers_are_read_by_every_name() {
     );
 }
 
+/// Header lines of a scenario set simulated drives up.
+#[test]
+fn simulated_drives_are_set_up() {
+    let folder = folder("unitek-setup");
+    let put = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("room");
+    let run = |line: &str| {
+        let arguments: Vec<_> = line.split_whitespace().collect();
+        drivebench_in(&folder, &arguments)
+    };
+    put(
+        "wide.setup",
+        "bus unitek\ndrive 1 property map-reply native\ndrive 1 register 31 = 10%\n",
+    );
+    let (code, stdout, stderr) = run("read 1 STATUS SPEED_CMD --rig sim:unitek --setup wide.setup");
+    assert_eq!(code, 0, "{stderr}");
+    assert!(
+        stdout.contains("STATUS     00000101") && stdout.contains("0CCD"),
+        "{stdout}"
+    );
+    put(
+        "wrong.setup",
+        "bus unitek\ndrive 1 property map-reply nativ\n",
+    );
+    let (code, _, stderr) = run("read 1 STATUS --rig sim:unitek --setup wrong.setup");
+    assert_eq!(code, 2);
+    assert!(
+        stderr.contains("wrong.setup:2") && stderr.contains("did you mean `native`?"),
+        "{stderr}"
+    );
+    put(
+        "bench.toml",
+        "schema = 2\n[rig]\nid = \"bench\"\n[port.1]\nbus = \"unitek\"\ndrives = [{ rx = 0x210, tx = 0x190 }]\n[sim]\nbus = \"unitek\"\nsetup = [\"drive 1 register 31 = 10%\"]\n",
+    );
+    let (code, stdout, stderr) = run("read 1 SPEED_CMD --rig bench.toml");
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("0CCD"), "{stdout}");
+    assert_eq!(
+        run("read 1 STATUS --rig bench.toml --setup wide.setup").0,
+        2
+    );
+}
+
 /// Every write has a unit, is read back, and is judged before the first one leaves.
 #[test]
 fn registers_are_written_with_units() {

@@ -59,6 +59,16 @@ fn mistakes_of_ports_are_shown_with_line_and_column() {
             port("[sim]\nsetup = []"),
         ),
         (
+            "setup lines of a simulated port",
+            port(
+                "[sim]\nbus = \"unitek\"\nsetup = [\"drive 1 property map-reply nativ\", \"drve 1\"]",
+            ),
+        ),
+        (
+            "a setup line of another drive",
+            port("[sim]\nbus = \"unitek\"\nsetup = [\"drive 2\"]"),
+        ),
+        (
             "two adapters",
             port("slcan = \"/dev/ttyACM0\"\nsocketcand = \"lab:29536\""),
         ),

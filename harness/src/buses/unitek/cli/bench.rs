@@ -2,13 +2,14 @@
 
 use crate::buses::commands::{RigArguments, Use};
 use crate::buses::unitek::driver::{Driver, Error};
-use crate::buses::unitek::rig::{Axis, Session};
+use crate::buses::unitek::rig::{Axis, Session, setup};
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, tell_end};
 use crate::link::{Line, Trouble};
 use crate::rig::{Options, Rig};
+use crate::scenario::source::Source;
 use crate::signals::interrupt_flag;
 use harness_proto::unitek::units::Scaling;
 use std::time::Duration;
@@ -22,8 +23,20 @@ pub(super) fn on(
     output: &mut Output,
     act: impl FnOnce(&mut Session, &mut Output) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
-    if arguments.setup.is_some() {
-        return Err(Failure::refused("--setup is for rings: sim:N"));
+    let mut rig = rig.clone();
+    if let Some(path) = &arguments.setup {
+        if !rig.origin.starts_with("sim:") {
+            return Err(Failure::refused(
+                "--setup is for sim:unitek:N; what stands in a rig's file is set up by its [sim] setup",
+            ));
+        }
+        let source = Source::read(path).map_err(|error| Failure::File(error.into()))?;
+        if let Some(port) = rig.port() {
+            setup(port, &source)?;
+        }
+        if let Some(sim) = &mut rig.file.sim {
+            sim.setup = vec![source.text.to_string()];
+        }
     }
     let options = Options {
         purpose: as_what.purpose.to_owned(),
@@ -33,7 +46,7 @@ pub(super) fn on(
         alarm: alarm(),
         ..Options::default()
     };
-    let session = Session::open(rig, &options);
+    let session = Session::open(&rig, &options);
     let mut session = session.map_err(|error| Failure::Said(exit_of(&error), error.to_string()))?;
     let result = act(&mut session, output);
     Ok(give_back(session, as_what, result, output))

@@ -7,9 +7,11 @@ pub use permitted::limits;
 pub(crate) use permitted::special_register;
 pub use session::Session;
 
+use super::serve;
 use super::simulate::{DriveSetup, Setup};
-use crate::rig::Rig;
 use crate::rig::port_file::{Node, Port};
+use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::source::Source;
 use harness_proto::can::BitRate;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 
@@ -55,18 +57,33 @@ pub fn rate(port: &Port) -> BitRate {
     BitRate::from_bits_per_second(bits).unwrap_or(BitRate::K500)
 }
 
-/// The drives of a simulated rig, as they are switched on: their hardware enable and power are on. `None` of a rig without `[port.1]`.
-#[must_use]
-pub fn setup(rig: &Rig) -> Option<Setup> {
-    let port = rig.port()?;
-    let drives = axes(port).into_iter().map(|axis| {
-        let mut drive = DriveSetup::new(axis.node);
-        drive.identifiers = (axis.rx, axis.tx);
-        (drive.inputs.run, drive.inputs.rfe) = (true, true);
-        drive
-    });
-    Some(Setup {
+/// The drives of a simulated port, as they are switched on. `source` has header lines of a scenario about them; a drive that they do not
+/// name is as delivered. The identifiers are those of the port.
+///
+/// # Errors
+/// The lines have mistakes.
+pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
+    let named = serve::bench(Some(0), Some(source))?.setup.setup.drives;
+    let axes = axes(port);
+    let missing = |drive: &&DriveSetup| axes.iter().all(|axis| axis.node != drive.node);
+    if let Some(drive) = named.iter().find(missing) {
+        let message = format!("the port has no drive {}", drive.node);
+        let problem = Problem::new(Span::default(), message, "a drive of `drives` expected");
+        return Err(Problems::new(
+            &source.name,
+            source.text.clone(),
+            vec![problem],
+        ));
+    }
+    let drive = |axis: Axis| {
+        let named = named.iter().find(|drive| drive.node == axis.node);
+        DriveSetup {
+            identifiers: (axis.rx, axis.tx),
+            ..named.cloned().unwrap_or_else(|| DriveSetup::new(axis.node))
+        }
+    };
+    Ok(Setup {
         rate: rate(port),
-        drives: drives.collect(),
+        drives: axes.iter().copied().map(drive).collect(),
     })
 }

@@ -14,6 +14,7 @@ use crate::rig::lock::PortLock;
 use crate::rig::taken::{Taken, take};
 use crate::rig::watchdog::{Watchdog, watch_over};
 use crate::rig::{Alarm, End, Ends, Options, Rig, SessionError, standing};
+use crate::scenario::source::Source;
 use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
 
@@ -48,12 +49,19 @@ impl Session {
     /// # Errors
     /// [`SessionError`]; nothing is left locked or open.
     pub fn open(rig: &Rig, options: &Options) -> Result<Self, SessionError> {
-        let (Some(port), Some(setup)) = (rig.port(), setup(rig)) else {
-            return Err(failed(rig, "it has no [port.1]"));
-        };
+        let port = rig
+            .port()
+            .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
         let taken = take(rig, options)?;
         let axes = axes(port);
         let (ends, locks) = if rig.is_simulated() {
+            let lines = rig.file.sim.iter().flat_map(|sim| sim.setup.clone());
+            let source = Source {
+                name: rig.origin.clone(),
+                text: lines.collect::<Vec<_>>().join("\n").into(),
+            };
+            let setup = setup(port, &source);
+            let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;
             (Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new())
         } else {
             open(rig, &axes, options)?
