@@ -1,4 +1,4 @@
-//! What the targets share: libFuzzer's extra counters, fed with the protocol transitions of a case, and the mutator that
+//! What the targets share: libFuzzer's extra counters, fed with the protocol transitions or the cells of a case, and the mutator that
 //! repairs commands.
 
 use harness_sim::novobus::fuzz::repair;
@@ -38,7 +38,10 @@ macro_rules! counters {
         impl harness_sim::novobus::transitions::Notes for Counters {
             #[inline]
             fn note(&mut self, cell: harness_sim::novobus::transitions::Transition) {
-                $crate::tell(&TRANSITIONS, &LEFT, cell);
+                let told = cell.number().is_some_and(|number| $crate::tell(&TRANSITIONS, &LEFT, number));
+                if !told {
+                    $crate::not_counted(cell);
+                }
             }
 
             fn join(&mut self, _other: &Self) {}
@@ -48,26 +51,43 @@ macro_rules! counters {
     };
 }
 
-/// Raises the counter of a transition, once a case, while `left` reports remain for it.
-///
-/// # Panics
-/// There is no counter for it.
+/// Raises the counter with this number, once a case, while `left` reports remain for it; `false` if there is no such counter.
 #[inline]
-pub fn tell<const N: usize>(counters: &[AtomicU8; N], left: &[AtomicU16; N], cell: Transition) {
-    let of = |number| Some((counters.get(number)?, left.get(number)?));
-    let Some((counter, left)) = cell.number().and_then(of) else {
-        return not_counted(cell);
+pub fn tell<const N: usize>(counters: &[AtomicU8; N], left: &[AtomicU16; N], number: usize) -> bool {
+    let (Some(counter), Some(left)) = (counters.get(number), left.get(number)) else {
+        return false;
     };
     let cases = left.load(Relaxed);
     if cases > 0 && counter.load(Relaxed) == 0 {
         counter.store(1, Relaxed);
         left.store(cases - 1, Relaxed);
     }
+    true
+}
+
+/// A target that gives the number of each cell that a case reaches to a function: `$cells` counters for libFuzzer.
+#[macro_export]
+macro_rules! cell_counters {
+    ($cells:expr, $body:expr) => {
+        // As in `counters`.
+        #[used]
+        #[unsafe(link_section = "__libfuzzer_extra_counters")]
+        static CELLS: [std::sync::atomic::AtomicU8; $crate::counters($cells)] =
+            [const { std::sync::atomic::AtomicU8::new(0) }; $crate::counters($cells)];
+        static LEFT: [std::sync::atomic::AtomicU16; $crate::counters($cells)] =
+            [const { std::sync::atomic::AtomicU16::new($crate::NEWS) }; $crate::counters($cells)];
+        libfuzzer_sys::fuzz_target!(|data: &[u8]| $body(data, &mut |cell: usize| {
+            assert!($crate::tell(&CELLS, &LEFT, cell), "cell {cell}: this target has no counter for it");
+        }));
+    };
 }
 
 /// Ends the case of a target that reaches a cell that it cannot reach.
+///
+/// # Panics
+/// Always.
 #[cold]
-fn not_counted(cell: Transition) {
+pub fn not_counted(cell: Transition) {
     cell.assert_possible();
     panic!("{cell}: this target has no counter for it");
 }

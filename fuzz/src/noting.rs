@@ -1,6 +1,7 @@
-//! Targets that tell libFuzzer what their cases reach, by the names of `harness_sim::novobus::fuzz::features`.
+//! Targets that tell libFuzzer what their cases reach, by the names of `harness_sim::fuzz::Feature`.
 
-use harness_sim::novobus::fuzz::{Feature, NOTING, Notebook};
+use harness_sim::fuzz::{Feature, Notebook};
+use harness_sim::{novobus, unitek};
 use std::sync::atomic::{AtomicU8, Ordering};
 
 /// How many counters there are for features; two features with one counter are no harm.
@@ -24,7 +25,8 @@ macro_rules! noting {
 /// # Panics
 /// The input breaks a rule, or there is no such target.
 pub fn note(name: &str, data: &[u8], counters: &[AtomicU8; FEATURES]) {
-    let Some(target) = NOTING.iter().find(|target| target.name == name) else {
+    let mut all = novobus::fuzz::NOTING.into_iter().chain(unitek::fuzz::NOTING);
+    let Some(target) = all.find(|target| target.name == name) else {
         panic!("no target {name}");
     };
     let mut count = |feature: Feature| {

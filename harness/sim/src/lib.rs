@@ -4,10 +4,12 @@
 //! the same bytes at the same times. No code sleeps or polls: a run jumps from event to event.
 //!
 //! [`novobus`] is the ring with its drives, [`nd21`] the whole drive on it, [`fault`] the faults of a line, and [`record`]
-//! the records of a run. [`segment`] is a CAN bus, and [`unitek`] the UNITEK drive on it.
+//! the records of a run. [`segment`] is a CAN bus, and [`unitek`] the UNITEK drive on it. [`fuzz`] is what
+//! the fuzz targets of all buses share.
 #![forbid(unsafe_code)]
 
 pub mod fault;
+pub mod fuzz;
 pub mod nd21;
 pub mod novobus;
 pub mod record;

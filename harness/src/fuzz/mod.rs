@@ -1,19 +1,21 @@
 //! Fuzz targets whose bodies need the whole bench, the kept inputs of all of them, and what those reach.
 //!
-//! The bodies for bytes of the bus are in `harness_sim::novobus::fuzz`; here are those for texts ([`scenario`], [`rig`]);
+//! The bodies for bytes and frames of a bus are in `harness_sim`, in the folder of the bus. Here are those for texts ([`scenario`], [`rig`]);
 //! those for captures and records stand beside what reads them.
-//! [`coverage`] holds the kept inputs against the matrix of protocol transitions and sums up what they reach, [`distil`](mod@distil) chooses
-//! what is worth keeping.
+//! [`coverage`] compares the kept inputs with the matrix of protocol transitions and sums up what they reach. [`distil`](mod@distil) chooses
+//! the inputs to keep.
 
+pub mod distil;
 pub mod input;
 mod text;
 
 pub use text::{rig, scenario, written};
 
+/// The matrix of protocol transitions is that of the ring.
+pub use crate::buses::novobus::fuzz::coverage;
 use crate::buses::novobus::fuzz::noted;
-/// The targets that reach transitions of the one bus that is fuzzed today.
-pub use crate::buses::novobus::fuzz::{coverage, distil};
-use harness_sim::novobus::fuzz::{FuzzTarget, NOTING, Noting, TARGETS};
+use harness_sim::fuzz::{Body, FuzzTarget, InputPieces, Noting};
+use harness_sim::{novobus, unitek};
 
 /// The targets whose bodies need the whole bench.
 pub const BENCH_TARGETS: [FuzzTarget; 4] = [
@@ -25,34 +27,34 @@ pub const BENCH_TARGETS: [FuzzTarget; 4] = [
 
 /// Every target.
 pub fn targets() -> impl Iterator<Item = FuzzTarget> {
-    TARGETS.into_iter().chain(BENCH_TARGETS)
+    let of_buses = novobus::fuzz::TARGETS
+        .into_iter()
+        .chain(unitek::fuzz::TARGETS);
+    of_buses.chain(BENCH_TARGETS)
 }
 
 /// What the inputs of those reach.
 pub const BENCH_NOTING: [Noting; 4] = [
-    Noting {
-        name: "scenario",
-        body: noted::scenario,
-        of: None,
-    },
-    Noting {
-        name: "rig",
-        body: noted::rig,
-        of: None,
-    },
-    Noting {
-        name: "capture",
-        body: noted::capture,
-        of: None,
-    },
-    Noting {
-        name: "record",
-        body: noted::record,
-        of: None,
-    },
+    text("scenario", noted::scenario, "scn"),
+    text("rig", noted::rig, "toml"),
+    text("capture", noted::capture, "json"),
+    text("record", noted::record, "jsonl"),
 ];
+
+/// A target whose inputs are texts, in files with this ending.
+const fn text(name: &'static str, body: Body, ending: &'static str) -> Noting {
+    Noting {
+        name,
+        body,
+        pieces: InputPieces::Text(ending),
+        of: None,
+    }
+}
 
 /// Every target with what its inputs reach.
 pub fn noting() -> impl Iterator<Item = Noting> {
-    NOTING.into_iter().chain(BENCH_NOTING)
+    let of_buses = novobus::fuzz::NOTING
+        .into_iter()
+        .chain(unitek::fuzz::NOTING);
+    of_buses.chain(BENCH_NOTING)
 }

@@ -152,6 +152,16 @@ fn the_corpus_reaches_every_reachable_transition() {
     kept(&snapshot, &coverage.page());
 }
 
+/// Every state of a UNITEK drive, and everything that can happen in it, is in the kept inputs.
+#[test]
+fn the_corpus_reaches_every_cell_of_a_unitek_drive() {
+    let coverage = Coverage::of_folder(&folder()).expect("a corpus");
+    let mut sums = coverage.targets.iter();
+    let sum = sums.find(|sum| sum.target == "unitek-drive");
+    let sum = sum.expect("the target has inputs");
+    assert_eq!(Some(sum.reached), sum.of, "{sum:?}");
+}
+
 /// The inputs of a target with the names of their files.
 fn inputs(target: &str) -> Vec<(String, Vec<u8>)> {
     let files = std::fs::read_dir(folder().join(target)).expect("a folder");

@@ -20,6 +20,7 @@ use harness_proto::unitek::properties::{
 };
 use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
 use harness_proto::unitek::{Ignored, REGISTERS, Register, Request};
+use std::sync::Arc;
 
 /// One scan of the drive.
 const SCAN: Span = Span::from_millis(1);
@@ -37,7 +38,7 @@ pub struct Drive {
     inputs: Inputs,
     cells: Cells,
     /// Levels 0 and 1; level 1 is empty at first.
-    eeprom: [Option<Box<Cells>>; 2],
+    eeprom: [Option<Arc<Cells>>; 2],
     /// On which it receives and sends now.
     identifiers: (u16, u16),
     control: Control,
@@ -71,7 +72,7 @@ impl Drive {
             properties,
             inputs,
             cells: dump,
-            eeprom: [Some(Box::new(dump)), None],
+            eeprom: [Some(Arc::new(dump)), None],
             identifiers: (0, 0),
             control: Control::Speed,
             plant: Plant::new(POWER_UP_POSITION),
@@ -99,7 +100,7 @@ impl Drive {
         for &(number, raw) in setup {
             let raw = raw & Register::of(number).mask();
             if let Some(level) = &mut self.eeprom[0] {
-                level[usize::from(number)] = raw;
+                Arc::make_mut(level)[usize::from(number)] = raw;
             }
             self.cells[usize::from(number)] = raw;
         }
@@ -207,6 +208,12 @@ impl Drive {
     #[must_use]
     pub const fn control(&self) -> Control {
         self.control
+    }
+
+    /// What all registers hold; what a read gives can differ.
+    #[must_use]
+    pub const fn held(&self) -> &[u32; 256] {
+        &self.cells
     }
 
     /// Overwrites the contents of a register from outside the bus, as a test or a deviation does.

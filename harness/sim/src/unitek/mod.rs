@@ -5,6 +5,7 @@
 pub mod cycles;
 pub mod deviation;
 pub mod drive;
+pub mod fuzz;
 pub mod inputs;
 pub mod outbox;
 pub mod plant;

@@ -7,10 +7,13 @@ use super::inputs::Inputs;
 use harness_proto::can::Frame;
 use harness_proto::unitek::REGISTERS;
 use harness_proto::unitek::properties::Properties;
-use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A cyclic entry: register, interval, millisecond of the request, number of the request.
 type Entry = (u8, u64, u64, u64);
+
+/// The contents of all registers, by number.
+type Cells = [u32; 256];
 
 /// The model.
 #[derive(Clone, Debug)]
@@ -18,16 +21,16 @@ pub struct Reference {
     p: Properties,
     /// What is connected.
     pub inputs: Inputs,
-    held: BTreeMap<u8, u32>,
-    store: BTreeMap<u32, BTreeMap<u8, u32>>,
+    held: Cells,
+    store: [Option<Arc<Cells>>; 2],
     rx: u32,
     tx: u32,
     mode: char,
-    speed: i128,
-    position: i128,
-    ramp: i128,
-    torque: i128,
-    turn: i128,
+    speed: i64,
+    position: i64,
+    ramp: i64,
+    torque: i64,
+    turn: i64,
     homing: i64,
     cal: bool,
     timeout: bool,
@@ -47,21 +50,21 @@ fn wide(number: u8) -> bool {
     REGISTERS[number as usize].width.bits() == 32
 }
 
-fn access(number: u8) -> String {
-    REGISTERS[number as usize].access.name().into()
+fn access(number: u8) -> &'static str {
+    REGISTERS[number as usize].access.name()
 }
 
-fn i16_of(raw: u32) -> i128 {
-    let low = i128::from(raw % 65_536);
+fn i16_of(raw: u32) -> i64 {
+    let low = i64::from(raw % 65_536);
     if low >= 32_768 { low - 65_536 } else { low }
 }
 
-fn i32_of(raw: u32) -> i128 {
-    let all = i128::from(raw);
+fn i32_of(raw: u32) -> i64 {
+    let all = i64::from(raw);
     if all >= 1 << 31 { all - (1 << 32) } else { all }
 }
 
-fn raw_of(number: i128) -> u32 {
+fn raw_of(number: i64) -> u32 {
     (number.rem_euclid(1 << 32)) as u32
 }
 
@@ -69,9 +72,9 @@ impl Reference {
     /// The model after power-up.
     #[must_use]
     pub fn new(p: Properties, inputs: Inputs) -> Self {
-        let held: BTreeMap<u8, u32> = (0..=255).map(|n| (n, REGISTERS[n as usize].dump)).collect();
+        let held = REGISTERS.map(|register| register.dump);
         let mut new = Self {
-            store: BTreeMap::from([(0, held.clone())]),
+            store: [Some(Arc::new(held)), None],
             held,
             inputs,
             rx: 0x201,
@@ -103,18 +106,30 @@ impl Reference {
             0
         };
         for (number, value) in [(0x31, 0), (0x6E, 0), (0x90, 0), (0x51, lock), (0x52, mask)] {
-            new.held.insert(number, value);
+            new.held[number] = value;
         }
         new.before = new.read(0x40);
         new
     }
 
+    /// What all registers hold; what a read gives can differ.
+    #[must_use]
+    pub const fn held(&self) -> &[u32; 256] {
+        &self.held
+    }
+
     fn at(&self, number: u8) -> u32 {
-        self.held[&number]
+        self.held[number as usize]
     }
 
     fn ready(&self) -> bool {
-        self.read(0x8F) & 0xFFFF == 0
+        self.errors().is_multiple_of(65_536)
+    }
+
+    fn errors(&self) -> u32 {
+        let time_out = if self.timeout { 8 } else { 0 };
+        let no_power = if self.inputs.dc_bus { 0 } else { 32 };
+        self.inputs.faults | time_out | no_power
     }
 
     fn enabled(&self) -> bool {
@@ -123,12 +138,12 @@ impl Reference {
 
     fn tolerance(&self) -> bool {
         let away = (i32_of(self.at(0x6E)) - self.position).abs();
-        let found = self.mode == 'p' && self.homing == 0 && away <= i128::from(self.at(0x79));
+        let found = self.mode == 'p' && self.homing == 0 && away <= i64::from(self.at(0x79));
         self.inputs.tolerance.unwrap_or(found)
     }
 
-    fn measured(&self) -> i128 {
-        self.inputs.speed.map_or(self.speed, i128::from)
+    fn measured(&self) -> i64 {
+        self.inputs.speed.map_or(self.speed, i64::from)
     }
 
     /// What a read gives.
@@ -136,12 +151,12 @@ impl Reference {
     pub fn read(&self, number: u8) -> u32 {
         let i = &self.inputs;
         let bit = |place: u32, on: bool| if on { 1 << place } else { 0 };
-        let follows = self.mode == 'p' && number != 0x8F && self.enabled();
-        let slow = self.measured().abs() < 328;
+        let follows = || self.mode == 'p' && self.enabled();
+        let slow = || self.measured().abs() < 328;
         let raw = match number {
             0x20 | 0x27 | 0x5F if self.mode == 't' && self.enabled() => {
                 let torque = i16_of(self.at(0x90));
-                let size = torque.abs() * i128::from(self.at(0xD9)) / 43_690;
+                let size = torque.abs() * i64::from(self.at(0xD9)) / 43_690;
                 raw_of(if torque < 0 { -size } else { size })
             }
             0x20 | 0x27 | 0x5F => 0,
@@ -156,7 +171,7 @@ impl Reference {
                     + bit(6, f && self.mode == 't')
                     + bit(7, self.mode == 'p')
                     + bit(8, self.mode != 't')
-                    + bit(9, f && slow)
+                    + bit(9, f && slow())
                     + bit(11, f && self.homing > 0)
                     + bit(12, self.inputs.calibrated.unwrap_or(self.cal))
                     + bit(13, self.tolerance())
@@ -166,11 +181,11 @@ impl Reference {
             0x4A => i.igbt_temperature.into(),
             0x4B => i.air_temperature.into(),
             0x6D => raw_of(self.position),
-            0x91 if follows => self.at(0x6E),
+            0x91 if follows() => self.at(0x6E),
             0x91 => raw_of(self.position),
-            0x70 if follows => raw_of(i32_of(self.at(0x6E)) - self.position),
+            0x70 if follows() => raw_of(i32_of(self.at(0x6E)) - self.position),
             0x70 => 0,
-            0x8F => i.faults | bit(3, self.timeout) | bit(5, !i.dc_bus),
+            0x8F => self.errors(),
             0xCE => self.at(0xC8),
             0xD8 => {
                 bit(0, i.limit1)
@@ -196,11 +211,11 @@ impl Reference {
                     1
                 }
             }
-            0xEF => bit(0, self.read(0x8F) & 0xFFDF == 0),
+            0xEF => bit(0, self.errors() & 0xFFDF == 0),
             0xF2 => bit(0, !self.enabled()),
             0xF3 => bit(0, i.icns),
             0xF4 => bit(0, self.tolerance()),
-            0xF5 => bit(0, slow),
+            0xF5 => bit(0, slow()),
             _ => self.at(number),
         };
         if wide(number) { raw } else { raw % 65_536 }
@@ -223,23 +238,26 @@ impl Reference {
         } else {
             raw
         };
-        let mut bytes = vec![number];
         let long = six || (wide(number) && !cut);
-        bytes.extend(&value.to_le_bytes()[..if long { 4 } else { 2 }]);
-        bytes.push(p.stuff);
-        Frame::base(self.tx as u16, &bytes).ok()
+        let [a, b, c, d] = value.to_le_bytes();
+        let bytes = if long {
+            &[number, a, b, c, d, p.stuff][..]
+        } else {
+            &[number, a, b, p.stuff]
+        };
+        Frame::base(self.tx as u16, bytes).ok()
     }
 
-    /// A frame arrives; the frames that answer it.
-    pub fn frame(&mut self, frame: &Frame) -> Vec<Frame> {
-        let d = frame.data().to_vec();
+    /// A frame arrives; the frame that answers it.
+    pub fn frame(&mut self, frame: &Frame) -> Option<Frame> {
+        let d = frame.data();
         let deaf = frame.id().is_extended() || frame.id().number() != self.rx || frame.is_remote();
         if deaf || d.len() < 3 || (d.len() == 4 && self.p.dlc4.word() == "ignore") {
-            return Vec::new();
+            return None;
         }
         self.last = self.now;
         if d[0] == 0x3D {
-            return self.request(d[1], d[2]).into_iter().collect();
+            return self.request(d[1], d[2]);
         }
         let low = u32::from(d[1]) + 256 * u32::from(d[2]);
         let value = if d.len() < 5 {
@@ -258,7 +276,7 @@ impl Reference {
             low
         };
         self.write(d[0], value);
-        Vec::new()
+        None
     }
 
     fn request(&mut self, number: u8, t: u8) -> Option<Frame> {
@@ -290,7 +308,7 @@ impl Reference {
     }
 
     fn write(&mut self, number: u8, value: u32) {
-        match access(number).as_str() {
+        match access(number) {
             "FN" => self.function(number, value),
             "RW" | "SP" => {
                 if number == 0x68 || number == 0x69 {
@@ -304,7 +322,7 @@ impl Reference {
                         return;
                     }
                 }
-                self.held.insert(number, value);
+                self.held[number as usize] = value;
                 match number {
                     0x31 => self.mode = 's',
                     0x90 => self.mode = 't',
@@ -312,8 +330,8 @@ impl Reference {
                     0x7A => self.position = i32_of(value),
                     0x35 | 0xED | 0xC7 => self.ramp = 0,
                     0x51 if value / 4 % 2 == 1 && self.p.lock_clears_command.word() == "yes" => {
-                        self.held.insert(0x31, 0);
-                        self.held.insert(0x90, 0);
+                        self.held[0x31] = 0;
+                        self.held[0x90] = 0;
                     }
                     _ => {}
                 }
@@ -335,13 +353,13 @@ impl Reference {
             self.timeout = false;
         }
         if number == 0x84 && value < 2 {
-            self.store.insert(value, self.held.clone());
+            self.store[value as usize] = Some(Arc::new(self.held));
         }
         if number == 0x83 {
-            if let Some(stored) = self.store.get(&value) {
-                for (n, v) in stored {
-                    if access(*n) == "RW" {
-                        self.held.insert(*n, *v);
+            if let Some(Some(stored)) = self.store.get(value as usize) {
+                for n in 0..=255 {
+                    if access(n) == "RW" {
+                        self.held[n as usize] = stored[n as usize];
                     }
                 }
             }
@@ -349,7 +367,7 @@ impl Reference {
         }
         if number == 0x78 && value == 1 && self.enabled() {
             self.mode = 'p';
-            self.held.insert(0x6E, raw_of(self.position));
+            self.held[0x6E] = raw_of(self.position);
             self.homing = (self.p.homing_time.as_nanos() / 1_000_000).max(1) as i64;
         }
     }
@@ -368,7 +386,10 @@ impl Reference {
             out.extend(self.answer(0x40, true));
         }
         self.before = status;
-        for (number, t, since, _) in self.table.into_iter().flatten() {
+        for place in 0..8 {
+            let Some((number, t, since, _)) = self.table[place] else {
+                continue;
+            };
             if (self.now - since).is_multiple_of(t) {
                 out.extend(self.answer(number, false));
             }
@@ -382,9 +403,8 @@ impl Reference {
             self.homing = 0;
         }
         let limit = i16_of(self.at(0x34)).abs();
-        let nmax = i128::from(self.at(0xC8));
-        let blocked =
-            |way: i128| (way > 0 && self.inputs.limit1) || (way < 0 && self.inputs.limit2);
+        let nmax = i64::from(self.at(0xC8));
+        let blocked = |way: i64| (way > 0 && self.inputs.limit1) || (way < 0 && self.inputs.limit2);
         if enabled && self.mode == 'p' {
             let away = i32_of(self.at(0x6E)) - self.position;
             let most = nmax * 65_536 * limit / (32_767 * 60_000);
@@ -411,7 +431,7 @@ impl Reference {
                 if blocked(target) {
                     target = 0;
                 }
-                let times = |n: u8| i128::from(self.at(n) % 65_536);
+                let times = |n: u8| i64::from(self.at(n) % 65_536);
                 let (v, up, down, stop) = (self.speed, times(0x35), times(0xED), times(0xC7));
                 if blocked(v) {
                     self.ramped(0, target, stop);
@@ -434,13 +454,13 @@ impl Reference {
                 self.position = i32_of(self.at(0x72));
                 self.turn = 0;
                 let home = self.at(0x72);
-                self.held.insert(0x6E, home);
+                self.held[0x6E] = home;
                 self.cal = true;
             }
         }
     }
 
-    fn ramped(&mut self, goal: i128, target: i128, ramp: i128) {
+    fn ramped(&mut self, goal: i64, target: i64, ramp: i64) {
         if ramp == 0 {
             self.speed = goal;
         } else if self.speed != goal {

@@ -1,6 +1,6 @@
 //! One drive's end of the bus with everything that a line can do to it: bytes, line errors, silence.
 
-use super::LONGEST;
+use crate::fuzz::LONGEST;
 use crate::novobus::device::Device as _;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::reference;

@@ -1,8 +1,8 @@
 //! What an input of the target `codec` reaches: every command of ND21 10 and every telegram of 9.2, whole, cut and wrong.
 
-use super::LONGEST;
-use super::features::{Feature, Notebook};
 use super::words;
+use crate::fuzz::LONGEST;
+use crate::fuzz::{Feature, Notebook};
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::command::{Command, CommandError, Field, LAYOUTS, Layout, layout};
 use harness_proto::novobus::decode::Decoded;

@@ -1,6 +1,7 @@
 //! One drive's end of the bus against the reference model.
 
-use super::{LONGEST, same_memory};
+use super::same_memory;
+use crate::fuzz::LONGEST;
 use crate::novobus::device::Device as _;
 use crate::novobus::reference;
 use crate::novobus::transitions::{Notes, Reached, Watched};

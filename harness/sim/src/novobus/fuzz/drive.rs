@@ -1,8 +1,8 @@
 //! Operation lists on the whole ND21: its invariants are debug assertions, so builds for fuzzing have them on.
 
-use super::LONGEST;
 use super::drive_words::Watch;
-use super::features::Notebook;
+use crate::fuzz::LONGEST;
+use crate::fuzz::Notebook;
 use crate::nd21::{Nd21Drive, Nd21Properties, Stimulus, factory};
 use crate::novobus::device::Device;
 use arbitrary::{Arbitrary, Unstructured};

@@ -1,6 +1,6 @@
 //! What the target `drive` reaches: what an ND21 does by itself, seen from its cells, its inputs and its outputs.
 
-use super::features::{Feature, Notebook};
+use crate::fuzz::{Feature, Notebook};
 use crate::nd21::{Mode, Nd21Drive};
 use harness_proto::nd21::bits::{flags, flags2, ps_status, set_in};
 use harness_proto::nd21::errors::ErrorCode;

@@ -1,9 +1,9 @@
 //! An attack on the guard: no input makes it let a command pass that the limits deny, as judged by drives of the reference
 //! model, which shares no code with it.
 
-use super::LONGEST;
-use super::features::Notebook;
 use super::guard_words::{self as words, Heard};
+use crate::fuzz::LONGEST;
+use crate::fuzz::Notebook;
 use crate::novobus::reference::{Cell, Drive};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::guard::{Guard, Limits};

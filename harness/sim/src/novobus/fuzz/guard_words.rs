@@ -1,7 +1,7 @@
 //! What the target `guard` reaches: where the drives stood, what came, and what the guard made of it.
 
-use super::features::{Feature, Notebook};
 use super::words;
+use crate::fuzz::{Feature, Notebook};
 use harness_proto::novobus::command::layout;
 use harness_proto::novobus::guard::{Cause, Denial, DriveAct, Guard, Need, Stage};
 use harness_proto::novobus::properties::ReadLongAnswer;

@@ -1,8 +1,8 @@
 //! The master on a ring that sends arbitrary answers.
 
-use super::LONGEST;
-use super::features::Notebook;
 use super::words;
+use crate::fuzz::LONGEST;
+use crate::fuzz::Notebook;
 use crate::novobus::reference;
 use harness_proto::line::{LineError, Rate, Received};
 use harness_proto::novobus::address::RingSize;
@@ -213,8 +213,8 @@ impl Sound {
 
 #[cfg(test)]
 mod tests {
-    use super::super::features::features;
     use super::*;
+    use crate::fuzz::features;
 
     /// ND21 10: every command ends well on a ring that answers as sound drives do, so FA is what they answer.
     #[test]

@@ -1,7 +1,7 @@
 //! In-band marks: the meaning of a stream with marks does not depend on where it is split.
 
-use super::LONGEST;
-use super::features::{Feature, Notebook};
+use crate::fuzz::LONGEST;
+use crate::fuzz::{Feature, Notebook};
 use arbitrary::{Arbitrary, Unstructured};
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};

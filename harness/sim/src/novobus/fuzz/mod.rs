@@ -23,7 +23,7 @@ pub use bus_end::{bus_end, bus_end_watched};
 pub use codec::codec_stream;
 pub use detector::{Detector, detector, detector_watched};
 pub use drive::drive;
-pub use features::{Body, Feature, NOTING, Notebook, Noting, features, of_cell};
+pub use features::{NOTING, of_cell};
 pub use guard::guard;
 pub use hostile::master;
 pub use jobs::jobs;
@@ -31,15 +31,13 @@ pub use links::links;
 pub use repair::repair;
 pub use ring::{ThreeDrives, ring, ring_watched};
 
+use crate::fuzz::FuzzTarget;
 use crate::novobus::plain::PlainDrive;
 use crate::novobus::reference;
 use crate::novobus::transitions::Reached;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::decode::Decoded;
 use harness_proto::novobus::telegram::Telegram;
-
-/// A target: its name, which is that of its folder in `corpora/fuzz`, and its body.
-pub type FuzzTarget = (&'static str, fn(&[u8]));
 
 /// A target that feeds drives raw bytes, and tells which transitions they went through.
 pub type Watching = (&'static str, fn(&[u8]) -> Reached);
@@ -63,9 +61,6 @@ pub const TARGETS: [FuzzTarget; 9] = [
     ("jobs", jobs),
     ("guard", guard),
 ];
-
-/// Maximum length of an input; further bytes are ignored.
-const LONGEST: usize = 4_096;
 
 /// The codec: every byte string is a value, a beginning or a mistake, and a value is made of the bytes that it
 /// took.

@@ -1,6 +1,6 @@
 //! Names of features for the acts and events of a master and for the bytes of a line.
 
-use super::features::{Feature, Notebook};
+use crate::fuzz::{Feature, Notebook};
 use harness_proto::line::Received;
 use harness_proto::novobus::command::{Kind, LAYOUTS};
 use harness_proto::novobus::master::{Event, Fault, Outcome, Phase, Refused};

@@ -90,18 +90,6 @@ impl Transition {
     }
 }
 
-/// The name of a state or an event as part of a file's name.
-#[must_use]
-pub fn slug(name: &str) -> String {
-    let name = name.replace('*', "upstream").replace("+ 1", "plus 1");
-    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
-    let words: Vec<_> = words
-        .filter(|word| !word.is_empty())
-        .map(str::to_ascii_lowercase)
-        .collect();
-    words.join("-")
-}
-
 impl std::fmt::Display for Transition {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}", self.state.name(), self.event.name())

@@ -1,7 +1,8 @@
 //! A tour through every reachable cell: for each state the shortest known way to it, and for each event the stimulus that
 //! causes it there. The inputs of the target `bus_end` in `corpora/fuzz` are this tour, one file for each state.
 
-use super::{Event, State, Transition, slug};
+use super::{Event, State, Transition};
+use crate::fuzz::slug;
 use harness_proto::line::{LineError, Received};
 use harness_proto::novobus::check_sequence::{CHECK_SEQUENCE, SEQUENCE};
 

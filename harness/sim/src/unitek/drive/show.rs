@@ -75,6 +75,12 @@ impl Drive {
         self.inputs.run && self.inputs.rfe && self.is_ready() && !locked
     }
 
+    /// Whether homing runs (ex 12).
+    #[must_use]
+    pub const fn is_homing(&self) -> bool {
+        self.homing.is_some()
+    }
+
     /// The speed that it measures.
     fn speed(&self) -> i64 {
         self.inputs

@@ -8,6 +8,7 @@ use harness_proto::unitek::frame::{Occasion, reply_data};
 use harness_proto::unitek::properties::{IdChange, IdRange, LockClearsCommand, UnknownRegister};
 use harness_proto::unitek::words::MODE_LOCK;
 use harness_proto::unitek::{Access, Data, REGISTERS, Register, Reply};
+use std::sync::Arc;
 
 /// What a cell without a meaning reads (dump).
 const UNASSIGNED: u32 = 0xFACE;
@@ -79,7 +80,7 @@ impl Drive {
                 self.use_identifiers();
             }
             (0x84, 0 | 1) => {
-                self.eeprom[usize::from(value == 1)] = Some(Box::new(self.cells));
+                self.eeprom[usize::from(value == 1)] = Some(Arc::new(self.cells));
             }
             (0x8E, _) => self.timed_out = false,
             _ => {}

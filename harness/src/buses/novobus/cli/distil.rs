@@ -4,12 +4,12 @@ use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::counted::counted;
 use crate::fuzz::coverage::{CoverageError, read_folder};
-use crate::fuzz::distil::{InputPieces, distil as distilled};
+use crate::fuzz::distil::distil as distilled;
 use crate::fuzz::input::input;
 use crate::fuzz::noting;
 use crate::regular;
 use clap::Args;
-use harness_sim::novobus::fuzz::{Feature, features};
+use harness_sim::fuzz::{Feature, features};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,7 @@ fn chosen(arguments: &DistilArguments) -> Result<String, CoverageError> {
     let Some(target) = noting().find(|target| target.name == arguments.target) else {
         return Err(CoverageError::Empty);
     };
-    let (body, pieces) = (target.body, InputPieces::of(target.name));
+    let (body, pieces) = (target.body, target.pieces);
     let grown = inputs(&arguments.from)?;
     if grown.is_empty() {
         return Err(CoverageError::Empty);

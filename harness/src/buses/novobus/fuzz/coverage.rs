@@ -3,7 +3,8 @@
 
 use crate::fuzz::input::{InputError, input};
 use crate::fuzz::noting;
-use harness_sim::novobus::fuzz::{Feature, Noting, WATCHING, features, of_cell};
+use harness_sim::fuzz::{Feature, Noting, features};
+use harness_sim::novobus::fuzz::{WATCHING, of_cell};
 use harness_sim::novobus::transitions::{
     CELLS, Event, RULES, Reached, State, Transition, why_unreachable,
 };
@@ -30,7 +31,7 @@ const MAX_FILES: usize = 100_000;
 pub enum CoverageError {
     /// A folder or file cannot be read.
     #[error(
-        "failed to read {name}: {error}; a corpus is a folder with a folder for each of bus_end, detector and ring, and inputs in these"
+        "failed to read {name}: {error}; a corpus is a folder with a folder for each target, and inputs in these"
     )]
     Unreadable {
         /// Which.
@@ -67,7 +68,7 @@ pub enum CoverageError {
         name: String,
     },
     /// There is no input.
-    #[error("the corpus is empty: no input for bus_end, detector or ring")]
+    #[error("the corpus is empty: no folder of a target holds an input")]
     Empty,
     /// The list of what was reached on hardware is damaged.
     #[error("corpora/fuzz/hardware.toml: {0}")]
@@ -185,7 +186,7 @@ impl Coverage {
                 files.push(InputReach { name, reached });
             }
         }
-        if files.is_empty() {
+        if tallies.iter().all(|tally| tally.inputs == 0) {
             return Err(CoverageError::Empty);
         }
         Ok(Self {
@@ -242,7 +243,7 @@ impl Coverage {
     /// A row a target: its inputs, their bytes, and what they reach.
     #[must_use]
     pub fn targets(&self) -> String {
-        let mut text = String::from("target      inputs    bytes  reached\n");
+        let mut text = String::from("target            inputs    bytes  reached\n");
         for sum in &self.targets {
             let of = sum.of.map(|of| format!(" of {of}")).unwrap_or_default();
             let Sum {
@@ -252,7 +253,7 @@ impl Coverage {
                 reached,
                 ..
             } = sum;
-            let _infallible = writeln!(text, "{target:10}{inputs:8}{bytes:9}  {reached}{of}");
+            let _infallible = writeln!(text, "{target:16}{inputs:8}{bytes:9}  {reached}{of}");
         }
         text
     }

@@ -1,5 +1,4 @@
 //! What the kept inputs reach of the bus's transitions.
 
 pub mod coverage;
-pub mod distil;
 pub(crate) mod noted;

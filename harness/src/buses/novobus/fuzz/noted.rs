@@ -11,7 +11,7 @@ use crate::scenario::source::Source;
 use crate::scenario::syntax::{Bus, Scenario};
 use harness_proto::line::LineError;
 use harness_proto::nd21::cells::cell;
-use harness_sim::novobus::fuzz::{Feature, Notebook};
+use harness_sim::fuzz::{Feature, Notebook};
 use harness_sim::record::{Channel, LineByte};
 
 /// The sizes of ring for which a scenario is settled: its own, the smallest and the largest (ND21 8.4).

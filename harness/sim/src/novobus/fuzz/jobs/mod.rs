@@ -12,7 +12,7 @@ mod work;
 pub use judge::Lie;
 pub use work::{JobFault, JobOrder, Work};
 
-use super::features::Notebook;
+use crate::fuzz::Notebook;
 use crate::novobus::deviation::MasterDeviation;
 use harness_proto::novobus::command::Command;
 

@@ -1,9 +1,9 @@
 //! The features of the target `jobs`: events at a master, its reactions, and the states of its drives.
 
-use super::super::features::{Feature, Notebook};
 use super::super::words;
 use super::work::{JobOrder, Work};
 use crate::fault::LinkFault;
+use crate::fuzz::{Feature, Notebook};
 use crate::novobus::counted::Counted;
 use crate::novobus::ring::Ring;
 use crate::novobus::transitions::Transition;

@@ -1,10 +1,10 @@
 //! Runs a master in virtual time.
 
-use super::super::features::Notebook;
 use super::judge::{DATA_IN, DATA_OUT, Judge, Lie};
 use super::noted::Watch;
 use super::wire;
 use super::work::{BITS, CONSTANT_CELLS, CONSTANTS, Work, constant, nominal};
+use crate::fuzz::Notebook;
 use crate::novobus::counted::Counted;
 use crate::novobus::deviation::MasterDeviation;
 use crate::novobus::master::AnyMaster;
