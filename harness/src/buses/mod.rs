@@ -30,6 +30,7 @@ pub(crate) use unitek::dbc::dbc;
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
 
 use crate::cli::args::CellsArguments;
+use crate::cli::deviations::DeviationRow;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::output::Output;
@@ -258,6 +259,15 @@ pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io:
             output.complain("the bus nordac is not built yet");
             Ok(Exit::Usage)
         }
+    }
+}
+
+/// The deviations of the drives of a bus, and those of its master; none for a bus that is not built.
+pub(crate) fn deviations(bus: Bus) -> [Vec<DeviationRow>; 2] {
+    match bus {
+        Bus::Novobus => novobus::cli::deviations::rows(),
+        Bus::Unitek => unitek::cli::deviations::rows(),
+        Bus::Nordac => Default::default(),
     }
 }
 

@@ -397,6 +397,9 @@ pub struct CampaignArguments {
 pub struct DeviationsArguments {
     /// Only deviations with this text in their name, section or description.
     pub filter: Option<String>,
+    /// The bus: novobus for ND21 drives, unitek for UNITEK drives.
+    #[arg(long, value_enum, default_value_t = crate::buses::Bus::Novobus)]
+    pub bus: crate::buses::Bus,
     /// Output format.
     #[arg(long, value_enum, default_value_t = TableFormat::Table)]
     pub format: TableFormat,

@@ -4,6 +4,7 @@ pub(crate) mod args;
 mod campaign;
 mod check;
 mod complete;
+pub(crate) mod deviations;
 pub(crate) mod exit;
 pub(crate) mod failure;
 pub(crate) mod file;
@@ -85,9 +86,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Promote(arguments) => promote::promote(&arguments, output),
         Command::Rig { command } => rig::rig(&command, output),
         Command::Campaign(arguments) => campaign::campaign(&arguments, output),
-        Command::Deviations(arguments) => {
-            crate::buses::commands::deviations::deviations(&arguments, output)
-        }
+        Command::Deviations(arguments) => deviations::deviations(&arguments, output),
         Command::Drive(command) => crate::buses::drive(&command, output),
         Command::Completions { shell } => complete::completions(shell, output),
         Command::Complete { words } => complete::complete(&words, output),

@@ -9,7 +9,7 @@ use super::plan::{Plan, PlannedStep, Unroll};
 use super::problem::{Problem, Span, Spanned};
 use super::run::CellRecord;
 use super::run::outcome::{ByteDifference, Mismatch, Stop};
-use super::run::player::Runner;
+use super::run::player::{MAX_ROUND, Runner};
 use super::scanner::Scanner;
 use super::syntax::Scenario;
 use crate::buses::Bus;
@@ -34,6 +34,8 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     const BUS: Bus;
     /// Whether a message that no line asks for is a failure also without a `strict` line.
     const STRICT: bool;
+    /// The longest time for which what was sent may be under way. On a bus that other stations fill it may never leave.
+    const ROUND: time::Span = MAX_ROUND;
     /// A document and a section as a `source` line has them, for messages.
     const SOURCE: &'static str;
     /// A step and what it does, for messages.

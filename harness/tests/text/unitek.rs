@@ -144,3 +144,23 @@ fn the_catalogue() {
         "{complaint}"
     );
 }
+
+/// The wrong drives and drivers that a scenario can ask for.
+#[test]
+fn deviations() {
+    let (code, all, _) = run(&["deviations", "--bus", "unitek"]);
+    assert_eq!((code, all.lines().count()), (0, 67 + 1 + 20), "{all}");
+    let (_, some, _) = run(&["deviations", "--bus", "unitek", "no-lock"]);
+    assert!(
+        some.starts_with("no-lock ") && some.lines().count() == 1,
+        "{some}"
+    );
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("unitek-no-lock.scn");
+    let text = "title a\nbus unitek\ndrive 1 deviates no-lock\nlock 1\n? drive 1 register E3 = 0\n";
+    std::fs::write(&path, text).expect("a file");
+    let (code, _, shown) = run(&["run", "unitek-no-lock.scn"]);
+    assert!(
+        code == 1 && shown.contains("register E3 (O_GO) reads 0001"),
+        "{shown}"
+    );
+}

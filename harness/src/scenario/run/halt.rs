@@ -1,7 +1,7 @@
 //! How a conversation ends: at its last step, at a finding, or where it cannot go on.
 
 use super::outcome::Stop;
-use super::player::{MAX_ROUND, Runner};
+use super::player::Runner;
 use crate::link::Trouble;
 use crate::scenario::language::Language;
 use crate::scenario::plan::MAX_CARRIED;
@@ -72,7 +72,7 @@ impl<L: Language> Runner<'_, L> {
 
     /// Waits for what was sent before the trouble: a denial or an interlock stops only what is sent behind it.
     fn come_home(&mut self) {
-        let end = self.link.now() + MAX_ROUND;
+        let end = self.link.now() + L::ROUND;
         while self.link.busy() && self.link.now() < end && self.link.wait(end) {}
         self.fetch();
     }

@@ -228,7 +228,7 @@ impl<L: Language> Runner<'_, L> {
 
     /// Lets time pass until everything that was sent has come round (or has been lost).
     pub(crate) fn settle(&mut self) {
-        let end = self.link.now() + MAX_ROUND;
+        let end = self.link.now() + L::ROUND;
         while self.link.busy() && self.link.now() < end && self.wait(end) {}
         self.fetch();
     }

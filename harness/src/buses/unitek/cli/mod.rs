@@ -4,6 +4,7 @@ mod bench;
 pub(crate) mod cells;
 mod check;
 mod control;
+pub(crate) mod deviations;
 mod info;
 mod params;
 mod position;

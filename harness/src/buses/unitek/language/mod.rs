@@ -25,7 +25,7 @@ use crate::scenario::run::player::Runner;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
 use harness_proto::can::Frame;
-use harness_proto::time::Instant;
+use harness_proto::time::{self, Instant};
 
 /// The language of scenarios with the words of this bus.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +34,8 @@ pub struct Unitek;
 impl Language for Unitek {
     const BUS: Bus = Bus::Unitek;
     const STRICT: bool = true;
+    /// Replies may be 10 s late (`reply-delay`).
+    const ROUND: time::Span = time::Span::from_millis(11_000);
     const SOURCE: &'static str = "unitek 5.4 ex 8";
     const EXAMPLE: &'static str = "`> 201 3D 40 00`: the master asks drive 1 for STATUS";
 

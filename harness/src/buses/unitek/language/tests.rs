@@ -294,3 +294,16 @@ fn several_drives() {
     );
     passes("drive 1\ndrive 2\ndrive 3\nfor k in 1..N\nread (k) 1B = 01D8\nend\n");
 }
+
+/// Cycles that fill the bus hold the bench's own frame back for ever: the scenario ends all the same.
+#[test]
+fn a_full_bus_ends() {
+    let lines = "rate 100\ndrive 1\nfor k in 1..8\n> 201 3D (k) 01\nend\n> 201 3D 01 FF\n? quiet\n";
+    let entry = Entry::new(source(&format!("{HEADER}{lines}")), None).expect("a scenario");
+    let plan = entry.other.expect("a plan of this bus");
+    let mut link = plan.simulate();
+    let outcome = plan.play(&mut *link, crate::scenario::run::AtMismatch::Stop);
+    assert_eq!(outcome.verdict, Verdict::Failed);
+    let seconds = outcome.took.as_nanos() / 1_000_000_000;
+    assert!(seconds < 60, "{seconds} s");
+}

@@ -178,7 +178,16 @@ fn property(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
 
 /// `tol = 1`, `tol off`
 fn force(scanner: &mut Scanner<'_>) -> Result<Outside, Problem> {
-    let names = Inputs::FORCED.map(|name| (name, name));
+    let own = Inputs::FORCED.map(|name| (name, name));
+    // As the registers that show them are called.
+    let others = [
+        ("T_MOTOR", "motor-temperature"),
+        ("T_IGBT", "igbt-temperature"),
+        ("T_AIR", "air-temperature"),
+        ("DC_BUS", "bus-voltage"),
+        ("voltage", "bus-voltage"),
+    ];
+    let names = [&own[..], &others].concat();
     let name = named(scanner, &names, "what is overruled")?;
     let equal = scanner.eat("=");
     if scanner.eat_word("off") {

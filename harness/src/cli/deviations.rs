@@ -1,0 +1,81 @@
+//! `drivebench deviations`: the wrong drives and the wrong masters that a scenario can ask for.
+
+use super::args::{DeviationsArguments, TableFormat};
+use super::exit::Exit;
+use super::output::Output;
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// A deviation of a drive or of the bench's own master.
+#[derive(Serialize)]
+pub(crate) struct DeviationRow {
+    pub(crate) name: &'static str,
+    pub(crate) section: &'static str,
+    pub(crate) about: &'static str,
+    /// Which models can deviate in this way, where a drive has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) models: Option<&'static [&'static str]>,
+}
+
+/// All of them, for tools.
+#[derive(Serialize)]
+struct Table {
+    schema: u8,
+    deviations: Vec<DeviationRow>,
+    masters: Vec<DeviationRow>,
+}
+
+/// Shows the deviations.
+pub(crate) fn deviations(
+    arguments: &DeviationsArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let filter = arguments.filter.as_deref().unwrap_or_default();
+    let filter = filter.to_lowercase();
+    let holds = |row: &DeviationRow| {
+        let texts = [row.name, row.section, row.about];
+        let mut texts = texts.iter();
+        texts.any(|text| text.to_lowercase().contains(&filter))
+    };
+    let mut rows = crate::buses::deviations(arguments.bus);
+    rows.iter_mut().for_each(|rows| rows.retain(holds));
+    let [rows, masters] = rows;
+    if rows.is_empty() && masters.is_empty() {
+        output.complain(
+            "no deviation has this text in it; `drivebench deviations` shows all of them",
+        );
+        return Ok(Exit::NothingSelected);
+    }
+    let mut text = String::new();
+    match arguments.format {
+        TableFormat::Table => {
+            let mut line = |name, section, about| {
+                // Writing to a String cannot fail.
+                let _infallible = writeln!(text, "{name:32} {section:9} {about}");
+            };
+            for row in rows {
+                line(row.name, row.section, row.about);
+            }
+            if !masters.is_empty() {
+                line(
+                    "wrong masters",
+                    "section",
+                    "`master deviates NAME` in a scenario",
+                );
+            }
+            for row in masters {
+                line(row.name, row.section, row.about);
+            }
+        }
+        TableFormat::Json => {
+            text = serde_json::to_string(&Table {
+                schema: 1,
+                deviations: rows,
+                masters,
+            })?;
+            text.push('\n');
+        }
+    }
+    output.result(&text)?;
+    Ok(Exit::Passed)
+}
