@@ -432,6 +432,28 @@ fn a_ring_that_is_asked_shows_what_is_wrong() {
     }
 }
 
+/// ND21 9.6, 9.7: the section is that of the rule that is broken. A drive that finds a wrong checking byte and begins its zeros one byte late
+/// breaks the rules of the error mode, and one that finds nothing those of the checking byte.
+#[test]
+fn the_section_is_that_of_the_broken_rule() {
+    for (deviation, name, section) in [
+        (
+            "wrong-checksum-passed-on",
+            "qualify-checksum-drive-1",
+            "9.7",
+        ),
+        ("checksum-not-checked", "qualify-checksum-drive-1", "9.6"),
+    ] {
+        let lines = [STANDS.to_owned(), format!("drive 1 deviates {deviation}")];
+        let link = twin(&lines).expect("a ring").into_link();
+        let right = twin(&lines[..1]).expect("a ring");
+        let all = played_in_time(&named_plan(name), &link);
+        let (_, sighting) = Play::default().judge(all, link.byte_time(), right);
+        let found = sighting.map(|own| (own.meant, own.section));
+        assert_eq!(found, Some((Meant::Own(1), section)), "{deviation}");
+    }
+}
+
 #[test]
 fn right_drives_have_no_names() {
     let right = verdict(&[]);

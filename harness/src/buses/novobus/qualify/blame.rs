@@ -10,6 +10,7 @@ use super::pinned::Pinned;
 use crate::buses::novobus::twin::{Conversation, Divergence};
 use crate::library::Entry;
 use crate::scenario::source::Source;
+use harness_proto::nd21::io::OUTPUTS;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::checksum::Checksum;
 use harness_proto::novobus::role::Role;
@@ -21,6 +22,9 @@ use std::fmt;
 /// The command bytes that read several cells (10.1).
 const READ_WORD: u8 = 0xC1;
 const READ_LONG: u8 = 0xC7;
+
+/// The section of WriteIO.
+const WRITE_IO: &str = "10.4";
 
 /// How the byte at which an attempt differed belongs to a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -340,8 +344,18 @@ impl Sent {
             meant => meant,
         };
         let before = index.checked_sub(1).and_then(came);
-        let section = self
-            .comes_back(index, came)
+        // The drive has found the error, and its zeros begin one byte late.
+        let of_own = matches!(
+            self.roles[index],
+            Role::Command { .. } | Role::Data { .. } | Role::Check { .. }
+        );
+        // A 00 of the master's is an error by itself, and is answered so by a drive that has found none before.
+        let next = self.bytes.get(index + 1).map_or(0, |own| own.0);
+        let tells = next != 0 || came(index) == Some(self.bytes[index].0);
+        let late = expected == Some(0) && !refused && came(index + 1) == Some(0) && tells;
+        let section = (of_own && late)
+            .then_some("9.7")
+            .or_else(|| self.comes_back(index, came))
             .unwrap_or_else(|| self.section(index, refused && before == Some(0)));
         (meant, section, end)
     }
@@ -498,13 +512,15 @@ impl Sent {
                     writes,
                     length,
                 } if own == drive => {
-                    let writes = writes.is_some_and(|(first, width)| {
-                        (first..first.saturating_add(u16::from(width))).contains(&address)
-                    });
                     let section = match at.checked_sub(1).map(|before| self.roles[before]) {
                         Some(Role::Command { section, .. }) => section,
                         _ => "10.1",
                     };
+                    let writes = writes.is_some_and(|(first, width)| {
+                        (first..first.saturating_add(u16::from(width))).contains(&address)
+                    });
+                    // WriteIO names no cell.
+                    let writes = writes || section == WRITE_IO && address == OUTPUTS;
                     let right = self.is_right(at, drive, length);
                     match (section, right) {
                         ("10.5", true) => return "10.5",
@@ -556,6 +572,45 @@ impl Sent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::novobus::language::plan::Exchange;
+    use harness_proto::novobus::address::RingSize;
+    use harness_proto::novobus::command::Command;
+    use harness_proto::novobus::output::{Output, OutputChange};
+    use harness_proto::novobus::role::roles;
+
+    /// ND21 9.6, 10.4: what an output shows belongs to WriteIO, or to the checking byte that should have kept it from acting.
+    #[test]
+    fn an_output_belongs_to_write_io() {
+        let output = Command::WriteIo(OutputChange {
+            output: Output::Gpo2,
+            set: true,
+        });
+        let read = Command::ReadByte { address: OUTPUTS };
+        for (spoilt, section) in [(0, "10.4"), (1, "9.6")] {
+            let bytes = [output, read].into_iter().flat_map(|command| {
+                let exchange = Exchange::new(3, 1, command);
+                exchange.expect("a drive").bytes
+            });
+            let mut sent = Sent::default();
+            sent.bytes = bytes.map(|byte| (byte, true)).collect();
+            // The checking byte of WriteIO stands behind a sync byte, an address byte, the command and its code.
+            sent.bytes[4].0 += spoilt;
+            sent.roles = roles(RingSize::new(3).expect("a ring"), &sent.bytes);
+            let index = sent.bytes.len() - 2;
+            let role = sent.roles[index];
+            assert!(
+                matches!(
+                    role,
+                    Role::Data {
+                        address: OUTPUTS,
+                        ..
+                    }
+                ),
+                "{role:?}"
+            );
+            assert_eq!(sent.of_cell(index, 1, OUTPUTS), section);
+        }
+    }
 
     fn trial(meant: Meant, steps: &[(u8, Option<Meant>)]) -> Trial {
         Trial {
