@@ -159,6 +159,18 @@ pub(crate) fn sender_of(frame: &Frame) -> Option<u8> {
     unitek::report::sender_of(frame)
 }
 
+/// A scenario that replays a capture of frames; `setup` describes the drives.
+///
+/// # Errors
+/// It does not say enough of the drives, in a sentence.
+pub(crate) fn frame_scenario(
+    traces: &[Trace],
+    title: &str,
+    setup: Option<&Source>,
+) -> Result<String, String> {
+    unitek::capture::scenario(traces, title, setup)
+}
+
 /// The dissector of a bus for Wireshark; `None` if it is not built.
 pub(crate) fn dissector(bus: Bus) -> Option<String> {
     match bus {

@@ -69,14 +69,6 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
             Exit::RigError
         });
     }
-    if carry_frames(&capture.traces) {
-        output.complain(&format!(
-            "{}: frames of CAN are not compared with a model; `--format table` shows them, and `drivebench diff` compares them with another \
-             capture or with a scenario",
-            path.display()
-        ));
-        return Ok(Exit::Usage);
-    }
     let setup = match arguments.setup.as_deref().map(Source::read).transpose() {
         Ok(setup) => setup,
         Err(error) => {
@@ -84,6 +76,9 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
             return Ok(Exit::Usage);
         }
     };
+    if carry_frames(&capture.traces) {
+        return frames(&capture, &title, setup.as_ref(), arguments, output);
+    }
     let options = Options {
         title: &title,
         setup: setup.as_ref(),
@@ -118,6 +113,31 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     Ok(Exit::of(&[judged.verdict], false))
 }
 
+/// Makes a scenario of frames.
+fn frames(
+    capture: &Capture,
+    title: &str,
+    setup: Option<&Source>,
+    arguments: &ImportArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let path = arguments.file.display();
+    if !arguments.scenario {
+        output.complain(&format!(
+            "{path}: frames of CAN are not compared with a model; `--format table` shows them, `--scenario` makes a scenario of them that \
+             `drivebench run` plays, and `drivebench diff` compares them with another capture"
+        ));
+        return Ok(Exit::Usage);
+    }
+    match buses::frame_scenario(&capture.traces, title, setup) {
+        Ok(text) => write_scenario(&text, arguments, output),
+        Err(error) => {
+            output.complain(&format!("{path}: {error}"));
+            Ok(Exit::Usage)
+        }
+    }
+}
+
 fn read(path: &Path, rate: Option<Rate>, output: &mut Output) -> Option<Capture> {
     match read_file(path, rate) {
         Ok(capture) => Some(capture),
@@ -141,8 +161,16 @@ fn as_scenario(
             return Ok(Exit::Usage);
         }
     };
+    write_scenario(&text, arguments, output)
+}
+
+fn write_scenario(
+    text: &str,
+    arguments: &ImportArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let Some(path) = &arguments.showing.output else {
-        output.result(&text)?;
+        output.result(text)?;
         return Ok(Exit::Passed);
     };
     match regular::write(path, |mut out| {

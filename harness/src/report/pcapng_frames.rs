@@ -78,7 +78,7 @@ pub fn write(traces: &[Trace], mut out: impl Write) -> std::io::Result<()> {
 }
 
 /// The rate at which a frame lasts as long as this one.
-fn rate_of(own: &LineFrame) -> Option<BitRate> {
+pub(crate) fn rate_of(own: &LineFrame) -> Option<BitRate> {
     let lasted = own.at.since(own.start).units();
     let bits = own.frame.wire_bits();
     let fits = |rate: &BitRate| {

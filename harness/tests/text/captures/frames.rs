@@ -229,3 +229,50 @@ fn tshark_reads_frames_of_drives() {
     }
     assert_eq!(rows.len(), expected.len());
 }
+
+/// A scenario made of a capture plays as the run that was captured; one of identifiers that are not those of 3.1 needs a header.
+#[test]
+fn a_scenario_is_made_of_a_capture() {
+    let scenario = scenario("replayed.scn");
+    let faults = std::fs::read_to_string(&scenario).expect("a scenario") + "! frame 5: corrupt\n";
+    std::fs::write(&scenario, faults).expect("room");
+    let [capture, again] = ["replayed.pcapng", "again.scn"].map(file);
+    let written = drivebench(&[
+        "trace",
+        plain(&scenario),
+        "--format",
+        "pcapng",
+        "-o",
+        plain(&capture),
+    ]);
+    ended(&written, 0);
+    let said = ended(&drivebench(&["import", "--scenario", plain(&capture)]), 2);
+    assert!(
+        said.contains("drive 2 sends on 190") && said.contains("--setup"),
+        "{said}"
+    );
+    let made = drivebench(&[
+        "import",
+        "--scenario",
+        plain(&capture),
+        "--setup",
+        plain(&scenario),
+        "-o",
+        plain(&again),
+    ]);
+    ended(&made, 0);
+    ended(&drivebench(&["run", plain(&again)]), 0);
+    let same = drivebench(&["diff", plain(&capture), plain(&again), "--tolerance", "1ms"]);
+    assert!(ended(&same, 0).starts_with("same: "));
+    let log = file("replayed.log");
+    std::fs::write(
+        &log,
+        "(1436509052.000148) can0 203#3D1B00\n(1436509052.000316) can0 183#1BD80100\n",
+    )
+    .expect("room");
+    let text = ended(&drivebench(&["import", "--scenario", plain(&log)]), 0);
+    assert!(
+        text.contains("drive 3\n\n@0.000000ms > 203 3D 1B 00\n< 183 1B D8 01 xx\n"),
+        "{text}"
+    );
+}

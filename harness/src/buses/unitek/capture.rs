@@ -1,0 +1,132 @@
+//! A scenario made of a capture: what hosts have sent is sent again at its time, and what drives have sent is expected.
+
+use super::language::{identifier, written};
+use crate::report::pcapng_frames::rate_of;
+use crate::scenario::source::Source;
+use harness_proto::can::{BitRate, BusError, Frame};
+use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
+use harness_sim::record::{FrameEnd, LineFrame, Trace};
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+/// The highest number of a drive.
+const MOST_NODES: u16 = 127;
+
+/// A scenario that replays a capture. `setup` describes the drives: its lines `drive` and `rate` become the header; without it, drives
+/// are those of which identifiers are those of UNITEK 3.1.
+///
+/// # Errors
+/// A drive has other identifiers, in a sentence with the remedy.
+pub(crate) fn scenario(
+    traces: &[Trace],
+    title: &str,
+    setup: Option<&Source>,
+) -> Result<String, String> {
+    let channels = traces.iter().flat_map(|trace| &trace.channels);
+    let frames: Vec<&LineFrame> = channels.flat_map(|channel| channel.frames()).collect();
+    let title: String = title.chars().filter(|c| !c.is_control()).collect();
+    let mut text = format!("title   {title}\nsource  unitek 4.1\nbus     unitek\n");
+    match setup {
+        Some(setup) => {
+            let header = |line: &&str| line.starts_with("drive ") || line.starts_with("rate ");
+            for line in setup.text.lines().filter(header) {
+                // Writing to a String cannot fail.
+                let _infallible = writeln!(text, "{line}");
+            }
+        }
+        None => {
+            let rate = frames.iter().find_map(|own| rate_of(own));
+            if let Some(rate) = rate.filter(|rate| *rate != BitRate::K500) {
+                let _infallible = writeln!(text, "rate {}", rate.bits_per_second() / 1000);
+            }
+            for node in nodes(&frames)? {
+                let _infallible = writeln!(text, "drive {node}");
+            }
+        }
+    }
+    text.push('\n');
+    let (mut number, mut steps) = (0_u64, String::new());
+    for own in frames {
+        // A frame that an error ended is repeated, which is no frame of its own.
+        let fault = match own.ended {
+            FrameEnd::Good => None,
+            FrameEnd::Lost => Some("lost"),
+            FrameEnd::Error(BusError::ErrorFrame) => Some("corrupt"),
+            FrameEnd::Error(BusError::NoAcknowledge) => Some("no-acknowledge"),
+            FrameEnd::Error(BusError::BusOff) => continue,
+        };
+        if let Some(fault) = fault {
+            let line = format!("! frame {}: {fault}\n", number + 1);
+            if !text.ends_with(&line) {
+                text.push_str(&line);
+            }
+        }
+        if matches!(own.ended, FrameEnd::Error(_)) {
+            continue;
+        }
+        number += 1;
+        step(own, &mut steps);
+    }
+    Ok(text + &steps)
+}
+
+fn step(own: &LineFrame, steps: &mut String) {
+    let frame = &own.frame;
+    let nanos = own.start.since_start().as_nanos();
+    let _infallible = match own.from {
+        None => writeln!(
+            steps,
+            "@{}.{:06}ms > {}",
+            nanos / 1_000_000,
+            nanos % 1_000_000,
+            written(frame)
+        ),
+        Some(_) if own.ended == FrameEnd::Lost => Ok(()),
+        Some(_) => writeln!(steps, "< {}", expected(frame)),
+    };
+}
+
+/// A drive's frame, its stuff byte left open (UNITEK 4.1).
+fn expected(frame: &Frame) -> String {
+    let mut text = written(frame);
+    if !frame.is_remote() && matches!(frame.dlc(), 4 | 6) {
+        text.truncate(text.len() - 2);
+        text.push_str("xx");
+    }
+    text
+}
+
+/// The numbers of the drives, by the identifiers on which they send and receive.
+fn nodes(frames: &[&LineFrame]) -> Result<BTreeSet<u16>, String> {
+    let mut nodes = BTreeSet::new();
+    for own in frames {
+        let id = own.frame.id();
+        let first = own.from.map_or(DEFAULT_RX, |_| DEFAULT_TX);
+        let base = u16::try_from(id.number())
+            .ok()
+            .filter(|_| !id.is_extended());
+        let node = base.and_then(|own| own.checked_sub(first - 1));
+        // Where the capture numbers its drives, the number must be that of the identifier.
+        let fits = |node: &u16| own.from.is_none_or(|drive| u16::from(drive) == *node);
+        let node = node.filter(|node| (1..=MOST_NODES).contains(node) && fits(node));
+        match (node, own.from) {
+            (Some(node), _) => drop(nodes.insert(node)),
+            // A host may speak to others.
+            (None, None) => {}
+            (None, Some(drive)) => {
+                return Err(format!(
+                    "drive {drive} sends on {}, from which it does not follow on what it receives; --setup with a line such as `drive \
+                     {drive} rx 210 tx {}` expected",
+                    identifier(id),
+                    identifier(id)
+                ));
+            }
+        }
+    }
+    match nodes.is_empty() {
+        true => Err(
+            "no frame of it is to or from a drive; --setup with `drive` lines expected".to_owned(),
+        ),
+        false => Ok(nodes),
+    }
+}
