@@ -86,7 +86,7 @@ pub enum Command {
     /// the master and 4 bytes from the drive. Let the tool accept that (cantools: `allow_truncated`).
     Dbc {
         /// How many drives: drive n has the identifiers 200 + n and 180 + n.
-        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=127))]
+        #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=127))]
         drives: u16,
     },
     /// List the manual's tables with the scenarios that test them, and the errata.

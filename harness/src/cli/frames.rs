@@ -13,7 +13,7 @@ pub struct FrameArguments {
     #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
     pub bus: Bus,
     /// How many drives are on the CAN bus: nodes 1 to N, beside those of --setup. By default node 1, if --setup has none.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=127))]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(1..=127))]
     pub drives: Option<u8>,
     /// Serve a CAN bus as a serial CAN adapter (SLCAN) behind a socket: HOST:PORT, port 0 for a free one. Several clients share the bus.
     #[arg(long, value_name = "ADDRESS", group = "place")]

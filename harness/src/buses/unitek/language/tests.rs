@@ -307,3 +307,93 @@ fn a_full_bus_ends() {
     let seconds = outcome.took.as_nanos() / 1_000_000_000;
     assert!(seconds < 60, "{seconds} s");
 }
+
+/// Damaged scenarios are read, settled and played, or refused with a place inside the text; what is read comes back from the writer.
+#[test]
+fn damaged_scenarios() {
+    let sources = crate::library::sources(&[]).expect("built-in scenarios");
+    let own = sources
+        .into_iter()
+        .filter(|own| own.name.starts_with("unitek/"));
+    let texts: Vec<_> = own
+        .map(|own| own.text.to_string())
+        .filter(|text| text.len() < 700)
+        .collect();
+    let words = [
+        " ",
+        "#",
+        "x",
+        "xx",
+        "(k)",
+        "N",
+        "0",
+        "FFFFFFFF",
+        "181",
+        "-",
+        "%",
+        "5A",
+        "ms",
+        "drive 128 ",
+        "rx 7FF ",
+        "! frame 1: delay 1s\n",
+        "for k in 0..3\n",
+        "end\n",
+        "@1ms ",
+        "+1ms..2ms ",
+        "master ",
+        "= ",
+        "rtr 9",
+        "restart\n",
+        "\n",
+        "force ",
+        "é",
+    ];
+    let mut state = 0x2545_F491_4F6C_DD17_u64;
+    let mut random = |below: usize| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        usize::try_from(state % below as u64).unwrap_or(0)
+    };
+    let (mut played, mut refused) = (0, 0);
+    for _ in 0..3_000 {
+        let mut text = texts[random(texts.len())].clone();
+        for _ in 0..=random(3) {
+            let places: Vec<_> = text.char_indices().map(|(at, _)| at).collect();
+            if places.is_empty() {
+                break;
+            }
+            let at = places[random(places.len())];
+            match random(3) {
+                0 => text.insert_str(at, words[random(words.len())]),
+                1 => {
+                    let end = places.iter().find(|own| **own > at + random(6));
+                    text.replace_range(at..end.copied().unwrap_or(text.len()), "");
+                }
+                _ => text.truncate(at.max(1)),
+            }
+        }
+        let source = source(&text);
+        if crate::scenario::parse::bus(&source) != crate::buses::Bus::Unitek {
+            continue;
+        }
+        if let Ok(scenario) = parse::<Unitek>(&source) {
+            crate::fuzz::written(&scenario);
+        }
+        match Entry::new(source, None) {
+            Ok(entry) => {
+                let plan = entry.settled().expect("a plan of this bus");
+                let mut link = plan.simulate();
+                plan.play(&mut *link, crate::scenario::run::AtMismatch::GoOn);
+                played += 1;
+            }
+            Err(problems) => {
+                let inside =
+                    |span: crate::scenario::problem::Span| text.get(span.start..span.end).is_some();
+                assert!(problems.all().iter().all(|own| inside(own.span)), "{text}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(played > 300 && refused > 300, "{played} {refused}");
+}
