@@ -39,6 +39,7 @@ use crate::cli::rig_failure::find_any_rig;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
+use crate::report::html::Html;
 use crate::rig::port_file::{Node, Port};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::{Problem, Problems};
@@ -141,6 +142,19 @@ impl PortBus {
 pub(crate) fn carry_frames(traces: &[Trace]) -> bool {
     let mut channels = traces.iter().flat_map(|trace| &trace.channels);
     channels.any(|channel| matches!(channel.carried, Carried::Frames(_)))
+}
+
+/// Pictures of a trace of frames, each with its heading: what was said, and values against time. `id` names their parts.
+pub(crate) fn frame_pictures(trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
+    let (mut said, mut values) = (Html::new(), Html::new());
+    let mut pictures = Vec::new();
+    if unitek::report::sequence::sequence(&mut said, id, title, trace) {
+        pictures.push(("What was said", said));
+    }
+    if unitek::report::curves::curves(&mut values, id, trace) {
+        pictures.push(("Registers against time", values));
+    }
+    pictures
 }
 
 /// The frames of a trace, a row a frame: the rows that are wanted, counted from 0, and of them `at_most`. `None` for a bus of

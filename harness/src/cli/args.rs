@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// A test bench and fuzzer for serial servo drives: plays conversations and compares every byte with the manual.
 ///
-/// Without a command it plays all built-in scenarios on simulated rings.
+/// Without a command it plays all built-in scenarios on simulated drives.
 #[derive(Debug, Parser)]
 #[command(name = "drivebench", version, after_help = EXAMPLES, after_long_help = after_long_help())]
 pub struct Arguments {

@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
     on_simulated(arguments, &entries, rig.as_ref(), page, output)
 }
 
-/// Plays scenarios on simulated rings, each of its own, and keeps evidence where it is asked for.
+/// Plays scenarios on simulated drives, each of its own, and keeps evidence where it is asked for.
 fn on_simulated(
     arguments: &RunArguments,
     entries: &[Entry],
@@ -143,7 +143,7 @@ fn on_simulated(
     bar.finish_and_clear();
     output.result(&tally.summary())?;
     let head = Head {
-        title: "drivebench: scenarios on simulated rings",
+        title: "drivebench: scenarios on simulated drives",
         facts: Vec::new(),
     };
     let written = match (rig, folder) {

@@ -1,4 +1,4 @@
-//! What another program uses: scenarios on simulated rings, drives, and rings served to a controller. Everything here is re-exported by
+//! What another program uses: scenarios on simulated drives, drives, and rings served to a controller. Everything here is re-exported by
 //! the crate itself.
 
 mod error;

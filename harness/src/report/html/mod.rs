@@ -12,15 +12,17 @@
 //! | `scenario.rs` | the section of a scenario: verdict, section of the manual, expected beside received |
 //! | `diagram.rs` | the space-time diagram of a ring, and the data that the script shows of it |
 //! | `sequence.rs` | what the master and the drives said, one after another |
+//! | `curve.rs` | values against time |
 //! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it shows when the pointer is on a byte |
 
+mod curve;
 mod page;
 mod scenario;
 mod summary;
 mod write;
 
-pub(crate) use crate::report::lines::Curve;
+pub(crate) use curve::Curve;
 pub use page::{FoldedPart, MAX_PAGE, Section, page};
 pub use scenario::{ScenarioView, section};
 pub(crate) use summary::colour;

@@ -1,7 +1,9 @@
 //! How frames of UNITEK drives read: a row a frame, JSON, the log of candump.
 
 pub mod csv;
+pub(crate) mod curves;
 pub mod json;
+pub(crate) mod sequence;
 pub mod table;
 
 use harness_proto::can::Frame;
