@@ -9,6 +9,7 @@ mod hypothesis;
 mod pinned;
 mod probes;
 mod qualification;
+mod section;
 mod settle;
 
 pub use blame::{Culprit, Meant, Sighting, Trial, agreed, culprit, exchange};
