@@ -15,7 +15,7 @@ use harness_proto::unitek::words::{ERROR_TIME_OUT, MODE_EVENT, MODE_LOCK, status
 use harness_proto::unitek::{Access, Data, Ignored, Register, Request, Width};
 use std::sync::LazyLock;
 
-/// Behind so many milliseconds a case ends, so that none takes long.
+/// Milliseconds after which a case ends, so that none takes long.
 const MOST_TIME: u64 = 600;
 
 /// Homing ends soon in all variants but that of `homing-time`.
@@ -42,7 +42,7 @@ enum What {
     Switch(usize, bool),
     /// The value with this number is overruled, or no longer.
     Force(usize, Option<u32>),
-    /// So many milliseconds pass.
+    /// This number of milliseconds passes.
     Time(u64),
 }
 

@@ -31,7 +31,7 @@ struct Operation {
 enum What {
     /// A job is given to the master.
     Give(Job),
-    /// The next frame of a drive that hears the master arrives so many times.
+    /// The next frame of a drive that hears the master arrives this number of times.
     Answer(usize),
     /// A frame arrives.
     Frame(Id, [u8; 8], usize),
