@@ -212,7 +212,8 @@ fn zsh_and_fish_complete_names() {
         let script = format!("{script}\ncomplete -C '{line}'\n");
         vec!["--no-config".to_owned(), "-c".to_owned(), script]
     };
-    let shells: [(&str, &dyn Fn(&str, &str) -> Vec<String>); 2] = [("zsh", &zsh), ("fish", &fish)];
+    type Arguments<'a> = &'a dyn Fn(&str, &str) -> Vec<String>;
+    let shells: [(&str, Arguments<'_>); 2] = [("zsh", &zsh), ("fish", &fish)];
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("9.7-own.scn"), "").expect("room");
     let program = Path::new(env!("CARGO_BIN_EXE_drivebench"));
