@@ -22,3 +22,5 @@ pub use run::{Campaign, CaseOutcome, Contradiction, PlayedCampaign};
 pub use crate::buses::novobus::campaign::{
     by_driver, by_manual, class, conversation, report, sound,
 };
+/// Campaigns of the bus whose conversations are frames.
+pub use crate::buses::unitek::campaign as frames;

@@ -6,6 +6,7 @@ use super::output::Output;
 use super::page::{writable, write};
 use super::run::progress_bar;
 use crate::campaign::find::{FindCampaignError, find, names};
+use crate::campaign::frames::{self, FrameCampaign};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line, table};
 use crate::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign};
@@ -18,12 +19,29 @@ pub(crate) fn campaign(
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let wanted = if arguments.campaigns.is_empty() {
-        names().into_iter().map(PathBuf::from).collect()
+        let of_frames = frames::names().into_iter().map(PathBuf::from);
+        names()
+            .into_iter()
+            .map(PathBuf::from)
+            .chain(of_frames)
+            .collect()
     } else {
         arguments.campaigns.clone()
     };
     let mut campaigns = Vec::new();
+    let mut of_frames = Vec::new();
     for name in &wanted {
+        match frames::find(name) {
+            Some(Ok(campaign)) => {
+                of_frames.push(campaign);
+                continue;
+            }
+            Some(Err(error)) => {
+                output.complain(&error);
+                return Ok(Exit::Usage);
+            }
+            None => {}
+        }
         match find(name) {
             Ok(campaign) => campaigns.push(campaign),
             Err(error) => {
@@ -31,6 +49,12 @@ pub(crate) fn campaign(
                 return Ok(Exit::Usage);
             }
         }
+    }
+    let rings_only =
+        arguments.only.is_some() || arguments.html.is_some() || arguments.case.is_some();
+    if rings_only && campaigns.is_empty() && !of_frames.is_empty() {
+        output.complain("--only, --case and --html show campaigns of rings; for one of frames use --format json, which lists every case");
+        return Ok(Exit::Usage);
     }
     if let Some(name) = &arguments.case {
         return replay(name, &campaigns, output);
@@ -60,19 +84,43 @@ pub(crate) fn campaign(
             }
         }
     }
+    let mut listed = json(&all, arguments.only.map(CaseClass::from));
+    let mut differs = all.iter().any(|finished| !finished.differs().is_empty());
+    if !rings_only {
+        differs |= play_frames(&of_frames, arguments.format, &mut listed, output)?;
+    }
     if arguments.format == TableFormat::Json {
-        output.result(&format!(
-            "{}\n",
-            json(&all, arguments.only.map(CaseClass::from))
-        ))?;
+        output.result(&format!("{listed}\n"))?;
     }
     if let Some(path) = &arguments.html
         && !write(path, &crate::campaign::campaigns(&all), output)
     {
         return Ok(Exit::RigError);
     }
-    let differs = all.iter().any(|finished| !finished.differs().is_empty());
     Ok(if differs { Exit::Failed } else { Exit::Passed })
+}
+
+/// Plays campaigns of frames; gives whether a pinned figure is not met.
+fn play_frames(
+    campaigns: &[FrameCampaign],
+    format: TableFormat,
+    listed: &mut serde_json::Value,
+    output: &mut Output,
+) -> std::io::Result<bool> {
+    let mut differs = false;
+    for campaign in campaigns {
+        let bar = progress_bar(campaign.cases.len(), output.progress);
+        bar.set_message(campaign.name.clone());
+        let played = campaign.run(&|done| bar.inc(done));
+        bar.finish_and_clear();
+        differs |= !played.differs().is_empty();
+        if format == TableFormat::Table {
+            output.result(&(frames::table(&played) + "\n"))?;
+        } else if let Some(all) = listed["campaigns"].as_array_mut() {
+            all.push(frames::json(&played));
+        }
+    }
+    Ok(differs)
 }
 
 /// How many threads there is room for.

@@ -443,10 +443,13 @@ impl Reference {
                     self.ramped(target, target, up);
                 }
             }
-            self.turn += self.speed * nmax * 65_536;
-            let counts = self.turn.div_euclid(1_966_020_000);
-            self.turn -= counts * 1_966_020_000;
-            self.position = i32_of(raw_of(self.position + counts));
+            // A motor that stands keeps its position, and the rest of a count.
+            if self.speed != 0 {
+                self.turn += self.speed * nmax * 65_536;
+                let counts = self.turn.div_euclid(1_966_020_000);
+                self.turn -= counts * 1_966_020_000;
+                self.position = i32_of(raw_of(self.position + counts));
+            }
         }
         if self.homing > 0 {
             self.homing -= 1;

@@ -1,5 +1,6 @@
 //! UNITEK DS/BAMOCAR on CAN: what the bench knows of this bus alone.
 
+pub mod campaign;
 pub(crate) mod capture;
 pub(crate) mod cli;
 pub mod dbc;

@@ -16,7 +16,7 @@ use harness_proto::unitek::{Access, Data, Ignored, Register, Request, Width};
 use std::sync::LazyLock;
 
 /// Milliseconds after which a case ends, so that none takes long.
-const MOST_TIME: u64 = 600;
+const MOST_TIME: u64 = 250;
 
 /// Homing ends soon in all variants but that of `homing-time`.
 const HOMING: Span = Span::from_millis(5);
@@ -49,8 +49,8 @@ enum What {
 impl<'a> Arbitrary<'a> for Operation {
     /// Seven bytes: what, register, four bytes of a value, time. Of the first byte, bits 3 to 0 give the number of data bytes (9 to 11 mean 3,
     /// 12 to 15 mean 5), or which input or value. 00: a frame to the drive; 80: to 201; B0: to the identifier in the value, bit 31 for 29 bits;
-    /// C0: a remote frame; D0: an input; E0: a value that is overruled; F0: it is so no longer; FF: as many
-    /// milliseconds as the first byte of the value.
+    /// C0: a remote frame; D0: an input; E0: a value that is overruled; F0: it is so no longer; FF: a quarter of the first byte
+    /// of the value in milliseconds.
     fn arbitrary(input: &mut Unstructured<'a>) -> arbitrary::Result<Self> {
         let mut bytes = [0; 7];
         input.fill_buffer(&mut bytes)?;
@@ -70,7 +70,7 @@ impl<'a> Arbitrary<'a> for Operation {
             0xC => What::Remote(len),
             0xD => What::Switch(low % Inputs::SWITCHES.len(), register & 1 != 0),
             0xE => What::Force(low % Inputs::FORCED.len(), Some(value)),
-            0xF if low == 0xF => What::Time(u64::from(a)),
+            0xF if low == 0xF => What::Time(u64::from(a >> 2)),
             _ => What::Force(low % Inputs::FORCED.len(), None),
         };
         Ok(Self {
@@ -494,7 +494,7 @@ mod tests {
         let input = operation([0xD3, 1, 0, 0, 0, 0, 0xFF]);
         assert_eq!((input.what, input.wait), (What::Switch(3, true), 15));
         let time = operation([0xFF, 0, 200, 0, 0, 0, 0]);
-        assert_eq!((time.what, time.wait), (What::Time(200), 0));
+        assert_eq!((time.what, time.wait), (What::Time(50), 0));
         let foreign = operation([0xB5, 0, 1, 2, 0, 0x80, 0]);
         assert!(matches!(foreign.what, What::Elsewhere(id, _, 5) if id.is_extended()));
     }

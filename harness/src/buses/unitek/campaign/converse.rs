@@ -1,0 +1,257 @@
+//! A conversation of the master with a drive on a segment.
+
+use super::file::{FrameCampaignFile, Step};
+use harness_proto::can::{BitRate, Frame, Heard};
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::master::{Event, Job, Master, Outcome, Trouble};
+use harness_proto::unitek::properties::Properties;
+use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
+use harness_sim::segment::{Host, Placed, Segment};
+use harness_sim::unitek::{Control, Drive, Inputs, Member};
+
+/// The stations.
+const MASTER: usize = 0;
+const DRIVE: usize = 1;
+
+/// How long a job may take; every job of the master ends in a shorter time.
+const PATIENCE: Span = Span::from_millis(5_000);
+
+/// Behind the last step: what is late arrives, and what was not stopped shows.
+const REST: Span = Span::from_millis(300);
+
+/// How a step ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JobEnd {
+    /// A job, by its outcome; the stuff byte of a reply is left out.
+    Job(Outcome),
+    /// A wait has passed.
+    Waited,
+    /// The job has not ended.
+    Open,
+}
+
+impl JobEnd {
+    /// Whether the master reports it as done.
+    #[must_use]
+    pub const fn is_well(&self) -> bool {
+        match self {
+            Self::Waited => true,
+            Self::Open => false,
+            Self::Job(outcome) => !matches!(
+                outcome,
+                Outcome::NoReply { .. } | Outcome::NotReady(_) | Outcome::Differs { .. }
+            ),
+        }
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match self {
+            Self::Waited => "waited".to_owned(),
+            Self::Open => "not ended".to_owned(),
+            Self::Job(outcome) => match outcome {
+                Outcome::Read(reply) => format!("read {:X}", reply.data.bits()),
+                Outcome::Written(reply) => format!("written {:X}", reply.data.bits()),
+                Outcome::Differs { wrote, reads } => {
+                    format!("wrote {:X}, reads {:X}", wrote.bits(), reads.data.bits())
+                }
+                Outcome::Sent => "sent".to_owned(),
+                Outcome::Started(_) => "started".to_owned(),
+                Outcome::Released => "released".to_owned(),
+                Outcome::NotReady(_) => "not ready".to_owned(),
+                Outcome::NoReply { tries } => format!("no reply to {tries} requests"),
+            },
+        }
+    }
+}
+
+/// What the drive holds at the end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DriveState {
+    cells: [u32; 256],
+    control: Control,
+    enabled: bool,
+    cycles: Vec<(u8, u8)>,
+}
+
+/// What a conversation gave.
+#[derive(Clone, Debug)]
+pub struct Conversation {
+    /// How each step ended.
+    pub ends: Vec<JobEnd>,
+    /// What the master reported besides, in its words.
+    pub troubles: Vec<String>,
+    /// Frames that the master sent.
+    pub sent: u64,
+    /// The frames on the bus, in order; a repetition by a controller is left out.
+    pub frames: Vec<Frame>,
+    /// What the drive holds at the end.
+    pub state: Option<DriveState>,
+}
+
+/// Plays the steps, with a fault or without.
+pub(super) fn converse(
+    file: &FrameCampaignFile,
+    steps: &[Step],
+    fault: Option<Placed>,
+) -> Conversation {
+    let mut desk = Desk::new(file);
+    if let Some(fault) = fault {
+        desk.segment.inject(fault);
+    }
+    let ends: Vec<_> = steps.iter().map(|step| desk.step(*step)).collect();
+    desk.run(desk.now + REST);
+    let frames = desk.segment.record().iter().map(|line| line.frame);
+    let frames = frames.collect();
+    let drive = desk.segment.station(DRIVE).drive();
+    let state = drive.map(|drive| DriveState {
+        cells: *drive.held(),
+        control: drive.control(),
+        enabled: drive.is_enabled(),
+        cycles: drive.running_cycles().collect(),
+    });
+    Conversation {
+        ends,
+        troubles: desk.troubles,
+        sent: desk.sent,
+        frames,
+        state,
+    }
+}
+
+struct Desk {
+    segment: Segment<Member<Box<Drive>>>,
+    master: Master,
+    now: Instant,
+    sent: u64,
+    troubles: Vec<String>,
+    ended: Option<Outcome>,
+}
+
+impl Desk {
+    fn new(file: &FrameCampaignFile) -> Self {
+        let drive = Drive::new(Properties::default(), Inputs::default(), Instant::START);
+        let stations = vec![
+            Member::Host(Host::default()),
+            Member::Drive(Box::new(drive)),
+        ];
+        Self {
+            segment: Segment::new(BitRate::K500, stations),
+            master: Master::new(DEFAULT_RX, DEFAULT_TX, file.options()),
+            now: Instant::START,
+            sent: 0,
+            troubles: Vec::new(),
+            ended: None,
+        }
+    }
+
+    fn step(&mut self, step: Step) -> JobEnd {
+        match step {
+            Step::Wait(time) => {
+                self.run(self.now + time);
+                JobEnd::Waited
+            }
+            Step::Job(job) => self.job(job),
+        }
+    }
+
+    fn job(&mut self, job: Job) -> JobEnd {
+        self.ended = None;
+        if self.master.submit(job).is_err() {
+            return JobEnd::Open;
+        }
+        let end = self.now + PATIENCE;
+        while self.ended.is_none() && self.now < end {
+            self.advance(end);
+        }
+        match self.ended.take() {
+            Some(outcome) => JobEnd::Job(plain(outcome)),
+            None => JobEnd::Open,
+        }
+    }
+
+    fn run(&mut self, end: Instant) {
+        while self.now < end {
+            self.advance(end);
+        }
+    }
+
+    /// To the next thing that happens, and at most to `end`.
+    fn advance(&mut self, end: Instant) {
+        self.transmit();
+        let due = [
+            self.segment.next_event(),
+            self.master.poll_timeout(),
+            self.host().and_then(|host| host.heard_at()),
+        ];
+        let next = due.into_iter().flatten().min().unwrap_or(end);
+        self.now = self.now.max(next.min(end));
+        self.segment.run_until(self.now);
+        while let Some(at) = self.host().and_then(|host| host.heard_at()) {
+            if at > self.now {
+                break;
+            }
+            let heard = self.host().and_then(Host::receive);
+            if let Some((at, Heard::Frame(frame))) = heard {
+                self.master.handle_frame(at, &frame);
+            }
+        }
+        if self
+            .master
+            .poll_timeout()
+            .is_some_and(|due| due <= self.now)
+        {
+            self.master.handle_timeout(self.now);
+        }
+        self.transmit();
+        while let Some(event) = self.master.poll_event() {
+            match event {
+                Event::Ended { outcome, .. } => self.ended = Some(outcome),
+                Event::Trouble(trouble) => self.troubles.push(words(trouble)),
+                Event::Cyclic { .. } | Event::Status { .. } => {}
+            }
+        }
+    }
+
+    fn transmit(&mut self) {
+        while let Some(frame) = self.master.poll_transmit(self.now) {
+            let now = self.now;
+            if let Some(host) = self.host() {
+                host.send(now, frame);
+            }
+            self.sent += 1;
+        }
+    }
+
+    fn host(&mut self) -> Option<&mut Host> {
+        self.segment.station_mut(MASTER).host_mut()
+    }
+}
+
+/// An outcome without the byte that means nothing.
+fn plain(outcome: Outcome) -> Outcome {
+    match outcome {
+        Outcome::Read(mut reply) => {
+            reply.stuff = 0;
+            Outcome::Read(reply)
+        }
+        Outcome::Written(mut reply) => {
+            reply.stuff = 0;
+            Outcome::Written(reply)
+        }
+        other => other,
+    }
+}
+
+/// What the master reports, in words.
+fn words(trouble: Trouble) -> String {
+    match trouble {
+        Trouble::Odd(why) => format!("a frame that is no reply: {why}"),
+        Trouble::Unasked { reply } => format!("{:02X} comes unasked", reply.register),
+        Trouble::Missing { register } => format!("a cyclic frame of {register:02X} is missing"),
+        Trouble::Early { register, after } => {
+            format!("{register:02X} comes {after} behind the last one")
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! Campaigns on a CAN segment: one conversation of the master with a drive, disturbed at every frame, and what came of it.
+//!
+//! [`file`](mod@file) says what stands in a campaign file, [`converse`] plays the conversation with one fault or none, and this module
+//! classifies the outcomes and counts them.
+
+mod converse;
+pub mod file;
+mod report;
+
+pub use converse::{Conversation, JobEnd};
+pub use file::{FrameCampaignFile, Step};
+pub use report::{json, table};
+
+use harness_sim::segment::{FrameFault, Placed};
+use include_dir::{Dir, include_dir};
+use std::fmt;
+use std::path::Path;
+
+/// The campaigns that the binary carries.
+static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/campaigns/unitek");
+
+/// In front of the names of the built-in ones.
+const FOLDER: &str = "unitek/";
+
+/// What came of a fault; the least serious class comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FrameClass {
+    /// Nothing is different, and the master sent nothing again.
+    Answered,
+    /// The master sent a request again, and nothing else is different.
+    Retried,
+    /// The master reported it: a job without a right end, or a disturbance.
+    Noticed,
+    /// The master reported nothing, and a result or what the drive holds is wrong.
+    Unnoticed,
+}
+
+impl FrameClass {
+    /// All of them, in order.
+    pub const ALL: [Self; 4] = [
+        Self::Answered,
+        Self::Retried,
+        Self::Noticed,
+        Self::Unnoticed,
+    ];
+
+    /// Its name in files and tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Answered => "answered",
+            Self::Retried => "retried",
+            Self::Noticed => "noticed",
+            Self::Unnoticed => "unnoticed",
+        }
+    }
+
+    /// What it means.
+    #[must_use]
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Answered => "every job ended as without the fault",
+            Self::Retried => "every job ended as without the fault, after a repeated request",
+            Self::Noticed => "the master reported the fault",
+            Self::Unnoticed => {
+                "the master reported nothing, and a result or what the drive holds is wrong"
+            }
+        }
+    }
+}
+
+/// A fault at a frame of the conversation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameCase {
+    /// The frame, counted from 1 over both stations.
+    pub frame: u64,
+    /// The fault.
+    pub fault: FrameFault,
+}
+
+impl fmt::Display for FrameCase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.frame, self.fault)
+    }
+}
+
+/// A case that was played.
+#[derive(Clone, Debug)]
+pub struct FrameOutcome {
+    /// The case.
+    pub case: FrameCase,
+    /// The disturbed frame, as candump writes it.
+    pub disturbed: String,
+    /// The class of the outcome.
+    pub class: FrameClass,
+    /// What the conversation gave.
+    pub conversation: Conversation,
+}
+
+/// A campaign.
+#[derive(Clone, Debug)]
+pub struct FrameCampaign {
+    /// Its name, for messages: a path, or the name of a built-in one.
+    pub name: String,
+    /// What its file says.
+    pub file: FrameCampaignFile,
+    steps: Vec<Step>,
+    /// The conversation without a fault.
+    sound: Conversation,
+    /// The cases, in order of frames.
+    pub cases: Vec<FrameCase>,
+}
+
+/// The names of the built-in campaigns, in order.
+#[must_use]
+pub fn names() -> Vec<String> {
+    let files = BUILT_IN.files();
+    let mut names: Vec<_> = files
+        .filter_map(|file| file.path().to_str()?.strip_suffix(".toml"))
+        .map(|name| format!("{FOLDER}{name}"))
+        .collect();
+    names.sort_unstable();
+    names
+}
+
+/// Finds and reads a campaign of frames: a file that names this bus, or a built-in one by its name. `None` where it is neither.
+///
+/// # Errors
+/// What is wrong with it, with file, place and remedy.
+#[must_use]
+pub fn find(name: &Path) -> Option<Result<FrameCampaign, String>> {
+    let shown = name.display().to_string();
+    if name.is_file() {
+        let text = std::fs::read_to_string(name).ok()?;
+        return file::is_of_this_bus(&text).then(|| FrameCampaign::new(&shown, &text));
+    }
+    let bare = shown.strip_suffix(".toml").unwrap_or(&shown);
+    let found = BUILT_IN.get_file(format!("{}.toml", bare.strip_prefix(FOLDER)?))?;
+    Some(FrameCampaign::new(bare, found.contents_utf8()?))
+}
+
+impl FrameCampaign {
+    /// Reads a campaign, and plays its conversation without a fault.
+    ///
+    /// # Errors
+    /// A mistake in the text, or a conversation that does not end well without a fault.
+    pub fn new(name: &str, text: &str) -> Result<Self, String> {
+        let wrong = |message: String| format!("{name}: {message}");
+        let (file, steps) = file::read(text).map_err(wrong)?;
+        let sound = converse::converse(&file, &steps, None);
+        if let Some((step, end)) = sound
+            .ends
+            .iter()
+            .enumerate()
+            .find(|(_, end)| !end.is_well())
+        {
+            return Err(wrong(format!(
+                "step {} ({}) ends without any fault as {}; a conversation is expected that the drive answers",
+                step + 1,
+                file.steps[step],
+                end.words()
+            )));
+        }
+        if let Some(trouble) = sound.troubles.first() {
+            return Err(wrong(format!(
+                "the master reports {trouble} without any fault; give the steps more time"
+            )));
+        }
+        let faults = file.faults();
+        let frames = 1..=sound.frames.len() as u64;
+        let cases =
+            frames.flat_map(|frame| faults.iter().map(move |&fault| FrameCase { frame, fault }));
+        Ok(Self {
+            name: name.to_owned(),
+            cases: cases.collect(),
+            file,
+            steps,
+            sound,
+        })
+    }
+
+    /// How many frames the conversation has without a fault.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.sound.frames.len()
+    }
+
+    /// Plays one case.
+    #[must_use]
+    pub fn play(&self, case: FrameCase) -> FrameOutcome {
+        let placed = Placed {
+            station: None,
+            frame: case.frame,
+            fault: case.fault,
+        };
+        let conversation = converse::converse(&self.file, &self.steps, Some(placed));
+        let place = usize::try_from(case.frame).unwrap_or(usize::MAX);
+        let disturbed = self.sound.frames.get(place.wrapping_sub(1));
+        FrameOutcome {
+            case,
+            disturbed: disturbed.map(ToString::to_string).unwrap_or_default(),
+            class: self.class(&conversation),
+            conversation,
+        }
+    }
+
+    fn class(&self, played: &Conversation) -> FrameClass {
+        let reported = !played.troubles.is_empty() || !played.ends.iter().all(JobEnd::is_well);
+        if reported {
+            FrameClass::Noticed
+        } else if played.ends != self.sound.ends || played.state != self.sound.state {
+            FrameClass::Unnoticed
+        } else if played.sent > self.sound.sent {
+            FrameClass::Retried
+        } else {
+            FrameClass::Answered
+        }
+    }
+
+    /// Plays every case, in order; `progress` is called behind each.
+    #[must_use]
+    pub fn run(&self, progress: &dyn Fn(u64)) -> PlayedFrames<'_> {
+        let play = |case: &FrameCase| {
+            let outcome = self.play(*case);
+            progress(1);
+            outcome
+        };
+        PlayedFrames {
+            campaign: self,
+            outcomes: self.cases.iter().map(play).collect(),
+        }
+    }
+}
+
+/// A campaign that was played.
+#[derive(Clone, Debug)]
+pub struct PlayedFrames<'c> {
+    /// The campaign.
+    pub campaign: &'c FrameCampaign,
+    /// Every case, in order.
+    pub outcomes: Vec<FrameOutcome>,
+}
+
+impl PlayedFrames<'_> {
+    /// How many cases there are of a class.
+    #[must_use]
+    pub fn count(&self, class: FrameClass) -> u64 {
+        let of_class = |outcome: &&FrameOutcome| outcome.class == class;
+        self.outcomes.iter().filter(of_class).count() as u64
+    }
+
+    /// The pinned figures that were not met: what is counted, expected, found.
+    #[must_use]
+    pub fn differs(&self) -> Vec<(&'static str, u64, u64)> {
+        let expect = &self.campaign.file.expect;
+        let cases = ("cases", expect.cases, self.outcomes.len() as u64);
+        let classes =
+            FrameClass::ALL.map(|class| (class.name(), expect.of(class), self.count(class)));
+        let pinned = std::iter::once(cases).chain(classes);
+        let differing = pinned.filter_map(|(name, expected, found)| {
+            let expected = expected.filter(|expected| *expected != found)?;
+            Some((name, expected, found))
+        });
+        differing.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;
