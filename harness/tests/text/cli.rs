@@ -473,7 +473,7 @@ fn fuzz_coverage() {
     let output = drivebench(&["fuzz", "coverage"]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     assert!(stdout(&output).contains("(100.0 %)"));
-    assert!(stdout(&output).contains("bus_end         49    15045  435 of 435\n"));
+    assert!(stdout(&output).contains("bus_end               49    15045  435 of 435\n"));
     let path = file("fuzz_coverage", "empty", "");
     let folder = path.parent().expect("a folder");
     let _none_before = std::fs::remove_dir_all(folder.join("detector"));
