@@ -173,6 +173,18 @@ fn parameters_are_saved_compared_and_loaded() {
     assert!(stderr.contains("is no parameter (RO)"), "{stderr}");
 }
 
+/// All drives on one page, without a terminal.
+#[test]
+fn drives_are_shown_in_rows() {
+    assert_eq!(
+        shown("top --once --rig sim:unitek:2"),
+        "drive  ready  enable  mode      speed           position     status   errors\n\
+         1      yes    yes     released  0.0% (0.0 rpm)  0.526 turns  Ena N-I  none\n\
+         2      yes    yes     released  0.0% (0.0 rpm)  0.526 turns  Ena N-I  none\n"
+    );
+    refused("top --rig sim:unitek", 2, &["--once prints one page"]);
+}
+
 #[test]
 fn registers_are_listed() {
     let one = shown("cells --bus unitek 31");

@@ -26,7 +26,7 @@ mod write;
 pub(crate) use args::{
     DeleteErrorArguments, DriveCommand, InfoArguments, LoadArguments, MoveArguments, OutputForm,
     ParamsArguments, ParamsCommand, PositionArguments, ReadArguments, RigArguments,
-    SelectArguments, WatchArguments, WatchForm, WriteArguments,
+    SelectArguments, TopArguments, WatchArguments, WatchForm, WriteArguments,
 };
 pub(crate) use axes::Axes;
 pub(crate) use read::columns;

@@ -2,7 +2,7 @@
 
 use super::bench::{on, select};
 use super::read::{Found, find};
-use crate::buses::commands::{InfoArguments, OutputForm, Use, columns};
+use crate::buses::commands::{InfoArguments, OutputForm, TopArguments, Use, columns};
 use crate::buses::unitek::value::hex;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
@@ -53,6 +53,61 @@ pub(super) fn info(
             Ok(Exit::Passed)
         },
     )
+}
+
+/// Shows all drives, a row each; with `--once` one page, and without it again and again until the program is interrupted.
+pub(super) fn top(
+    rig: &Rig,
+    arguments: &TopArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    if !arguments.once && !output.full_screen {
+        return Err(Failure::refused(
+            "top needs a terminal; --once prints one page without one",
+        ));
+    }
+    let look = Use::look("top");
+    on(rig, &arguments.rig, look, output, |session, output| {
+        let registers = SHOWN.map(|(_, register)| Register::of(register));
+        loop {
+            let drives = session.axes().to_vec();
+            let found = find(session, &drives, &registers)?;
+            let page = output.fitted(&rows(&found));
+            if arguments.once {
+                output.result(&page)?;
+                return Ok(Exit::Passed);
+            }
+            // Clears the screen, and begins in its upper left corner.
+            output.result(&format!("\x1b[2J\x1b[H{page}"))?;
+            session.driver().run(arguments.every)?;
+        }
+    })
+}
+
+/// A row a drive.
+fn rows(found: &[Found]) -> String {
+    let row = |drive: &[Found]| {
+        let of = |register: u8| {
+            let found = drive.iter().find(|found| found.reply.register == register);
+            found.map_or_else(String::new, words)
+        };
+        let node = drive.first().map_or(0, |found| found.axis.node);
+        [
+            node.to_string(),
+            of(0xE2),
+            of(0xE8),
+            of(0x51),
+            of(0x30),
+            of(0x6D),
+            of(0x40),
+            of(0x8F),
+        ]
+    };
+    let heading = [
+        "drive", "ready", "enable", "mode", "speed", "position", "status", "errors",
+    ];
+    let all: Vec<_> = found.chunks_exact(SHOWN.len()).map(row).collect();
+    columns(&heading, &all)
 }
 
 /// A value in words: of a flag `yes` or `no`, of a word the names of its bits, of a number with its unit.

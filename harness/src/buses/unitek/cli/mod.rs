@@ -49,12 +49,12 @@ pub(crate) fn drive(
         DriveCommand::Stop(arguments) => control::stop(rig, arguments, output),
         DriveCommand::Block(arguments) => control::block(rig, arguments, output),
         DriveCommand::DeleteError(arguments) => control::delete_error(rig, arguments, output),
-        DriveCommand::Top(_)
-        | DriveCommand::Scope(_)
+        DriveCommand::Top(arguments) => info::top(rig, arguments, output),
+        DriveCommand::Scope(_)
         | DriveCommand::Reset(_)
         | DriveCommand::Recover(_)
         | DriveCommand::Sim(_) => Err(Failure::refused(
-            "this command is for rings of ND21; on UNITEK drives there are read, write, watch, info, params, position, go, stop, block and delete-error",
+            "this command is for rings of ND21; on UNITEK drives there are read, write, watch, info, top, params, position, go, stop, block and delete-error",
         )),
     }
 }

@@ -19,7 +19,7 @@ use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
 
 /// How long a bus is listened to before anything is sent.
-const LISTEN: Span = Span::from_millis(50);
+const LISTEN: Span = Span::from_millis(150);
 
 /// Which firmware a drive has: the register that every drive is asked for at first.
 const FIRMWARE: u8 = 0x1B;
