@@ -280,13 +280,13 @@ impl Check<'_> {
             if order[..index].contains(step) {
                 self.wrong(
                     &path,
-                    "this step stands there twice",
+                    "this step is listed twice",
                     "each step once expected",
                 );
             } else if *step == SafeStep::PowerOff && index + 1 < order.len() {
                 let expected =
-                    "`power-off` as the last step expected: drives without power hear nothing";
-                self.wrong(&path, "something stands behind power-off", expected);
+                    "`power-off` as the last step expected: drives without power receive nothing";
+                self.wrong(&path, "a step follows `power-off`", expected);
             } else if *step == SafeStep::PowerOff && self.file.power.is_empty() {
                 let expected = "a table [power.NAME] expected beside it";
                 self.wrong(&path, "there is no power to switch off", expected);
@@ -351,8 +351,8 @@ impl Check<'_> {
         if endpoint.marks == Marks::InBand && !carries {
             let why = match endpoint.transport {
                 Transport::Rfc2217 => "RFC 2217 cannot carry the value of a bad byte",
-                Transport::Serial => "a serial port tells of line errors by itself",
-                _ => "a simulated ring tells of line errors by itself",
+                Transport::Serial => "a serial port reports line errors itself",
+                _ => "a simulated ring reports line errors itself",
             };
             self.wrong(
                 &at("marks"),
@@ -555,7 +555,7 @@ impl Check<'_> {
                 if interlock.level.is_none() {
                     self.wrong(
                         &at("input"),
-                        "at which level it must stay is missing",
+                        "the level that the input must hold is missing",
                         "`level` expected beside it",
                     );
                 }

@@ -126,7 +126,7 @@ impl Located {
         if let Some(counter) = self.expression.outside(scope) {
             return Err(Problem::new(
                 self.span,
-                format!("`{counter}` stands outside a loop that counts with it"),
+                format!("`{counter}` is used outside a loop that counts with it"),
                 "a number, `N`, `last` or the counter of a loop expected here",
             )
             .help(format!("`for {counter} in 0..last` begins such a loop")));

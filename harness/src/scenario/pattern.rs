@@ -147,7 +147,7 @@ impl Pattern {
                 Expected::Byte(byte) => Ok(byte),
                 Expected::Any | Expected::MinusChecksum(_) => Err(Problem::new(
                     self.span,
-                    "`xx` (any byte) stands where every byte must be known",
+                    "`xx` (any byte) is not allowed where every byte must be known",
                     "`xx` can only be received",
                 )),
             })
@@ -169,7 +169,7 @@ fn expand(
                 usize::try_from(value).map_err(|_| {
                     Problem::new(
                         item.span,
-                        format!("{value} times is not possible"),
+                        format!("a repeat count of {value} is not possible"),
                         "0 or more expected here",
                     )
                 })?
@@ -293,9 +293,9 @@ fn count(scanner: &mut Scanner<'_>) -> Result<Located, Problem> {
         Some("last") => Expression::Last,
         Some(digits) => match digits.parse() {
             Ok(number) => Expression::Number(number),
-            Err(_) => return Err(scanner.unexpected("how many times, such as 17")),
+            Err(_) => return Err(scanner.unexpected("a repeat count such as 17")),
         },
-        None => return Err(scanner.unexpected("how many times, such as 17")),
+        None => return Err(scanner.unexpected("a repeat count such as 17")),
     };
     *scanner = ahead;
     Ok(Located {

@@ -145,14 +145,14 @@ impl<'a> Scanner<'a> {
         })
     }
 
-    /// A mistake right here: something else stands where `expected` should.
+    /// A mistake right here: something else is there in place of `expected`.
     pub(crate) fn unexpected(&mut self, expected: &str) -> Problem {
         let mut ahead = self.clone();
         let found = ahead.chunk();
         let message = if found.value.is_empty() {
-            format!("the line ends where {expected} is expected")
+            format!("{expected} is missing at the end of the line")
         } else {
-            format!("`{}` stands where {expected} is expected", found.value)
+            format!("`{}` is not valid here", found.value)
         };
         Problem::new(found.span, message, format!("{expected} expected here"))
     }

@@ -283,7 +283,7 @@ fn lines_of_control() {
         ("? drive 2 mode go", Some("ok")),
         (
             "? drive 0 memory FF08 = 1234",
-            Some("no: cell FF08 of drive 0 holds 00, expected is 12"),
+            Some("no: cell FF08 of drive 0 holds 00, expected 12"),
         ),
         (
             "state 2",
@@ -308,7 +308,7 @@ fn lines_of_control() {
         ("wait 5ms", "can be done at once"),
         ("+5ms ! drive 1: off", "no time may stand in front"),
         ("? received 3 bytes", "counts the bytes"),
-        ("drive 0 model plain", "behind the first step"),
+        ("drive 0 model plain", "after the first step"),
         ("ring 3", "error: column 1"),
         ("\u{1}", "is not a text"),
         ("state", "`state` and a drive of the bench expected"),

@@ -417,7 +417,7 @@ fn a_failed_scenario_leaves_deviations_unsettled() {
         1,
         "wrong: it failed, although every byte is as the model says",
     );
-    ended(&output, 1, "scenarios played are equal to their end");
+    ended(&output, 1, "scenarios played match the model to their end");
     let text = std::fs::read_to_string(folder.path().join("kept/deviations.txt"));
     let text = text.expect("a file");
     assert!(!text.contains("none"), "{text}");

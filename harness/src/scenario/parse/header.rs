@@ -210,7 +210,11 @@ fn broken_loop<L: Language>(steps: &[Step<L>]) -> Option<Problem> {
         match step.action {
             Action::For(..) => open.push(step.span),
             Action::End if open.pop().is_none() => {
-                let problem = Problem::new(step.span, "no loop ends here", "a step expected here");
+                let problem = Problem::new(
+                    step.span,
+                    "no loop begins above this `end`",
+                    "a step expected here",
+                );
                 return Some(problem.help("`for k in 0..last` begins a loop"));
             }
             _ => {}
@@ -219,7 +223,7 @@ fn broken_loop<L: Language>(steps: &[Step<L>]) -> Option<Problem> {
     let begin = open.pop()?;
     let problem = Problem::new(
         begin,
-        "the loop has no end",
+        "the loop has no `end` line",
         "an `end` line expected behind it",
     );
     Some(problem.help("the lines up to `end` are played for each number"))
@@ -244,7 +248,7 @@ pub(crate) fn once<T>(
 /// A line that may stand once and stands twice.
 pub(crate) fn stands_twice(word: &Spanned<&str>) -> Problem {
     let what = format!("`{}` stands twice", word.value);
-    Problem::new(word.span, what, "this line may stand once")
+    Problem::new(word.span, what, "this line may appear only once")
 }
 
 fn citation(scanner: &mut Scanner<'_>, example: &str) -> Result<Citation, Problem> {
@@ -257,7 +261,7 @@ fn citation(scanner: &mut Scanner<'_>, example: &str) -> Result<Citation, Proble
     if text.len() < 2 {
         return Err(Problem::new(
             span,
-            "a source is a document and a section",
+            "a source needs a document and a section",
             format!("a document and a section expected here, such as `{example}`"),
         ));
     }

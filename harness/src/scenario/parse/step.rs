@@ -32,8 +32,8 @@ pub(crate) fn step<L: Language>(scanner: &mut Scanner<'_>) -> Result<Step<L>, Pr
     {
         return Err(Problem::new(
             window.from.span().to(window.to.span()),
-            "a window of time stands before a line that does not wait for a byte",
-            "one time expected here; a window can stand before `<`",
+            "a time window is only allowed before a line that waits for a byte",
+            "one time expected here; a window is allowed before `<`",
         ));
     }
     Ok(Step {
@@ -140,7 +140,7 @@ fn begin_loop<L: Language>(scanner: &mut Scanner<'_>) -> Result<Action<L>, Probl
 pub(crate) fn behind_the_first(span: Span, word: &str) -> Problem {
     Problem::new(
         span,
-        format!("`{word}` stands behind the first step"),
+        format!("`{word}` comes after the first step"),
         "header lines come before all steps",
     )
 }

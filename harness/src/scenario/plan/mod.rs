@@ -234,7 +234,7 @@ fn action<L: Language>(
         Action::Wait(time) => PlannedAction::Wait(time.on(planner.byte_time())),
         Action::Own(own) => PlannedAction::Own(planner.act(own, step.span, needs)?),
         Action::For(..) | Action::End => {
-            let what = "a loop stands where one step is expected";
+            let what = "a loop is not one step";
             return Err(Problem::new(step.span, what, "a step expected here"));
         }
     })

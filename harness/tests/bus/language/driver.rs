@@ -35,11 +35,11 @@ fn faults_on_the_way_are_repaired() {
 fn what_cannot_be_done_fails_with_words() {
     fails(
         &steps("master read-byte 1 FE13 = 42"),
-        "drive 1 holds 00, expected is 42",
+        "drive 1 holds 00, expected 42",
     );
     fails(
         &steps("master count = 4"),
-        "the ring has 3 drives, expected are 4",
+        "the ring has 3 drives, expected 4",
     );
     fails(
         &steps("! 2->1: cut\nmaster read-byte 1 FE13"),
@@ -64,7 +64,7 @@ fn mistakes_are_found_before_anything_is_sent() {
     refused(
         &steps("master raed-byte 1 FE13"),
         "raed-byte",
-        "stands where what the driver is to do",
+        "a job of the driver expected",
         Some("`read-byte`"),
     );
     refused(&steps("master read-byte 3 FE13"), "3", "drive 3", None);

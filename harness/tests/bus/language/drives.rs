@@ -74,7 +74,7 @@ fn stimuli_that_cannot_be_are_refused() {
     refused(
         &lines("drive 0 inptu GPIN3 high"),
         "inptu",
-        "what to set",
+        "a setting or a condition",
         Some("`input`"),
     );
     refused(
@@ -144,13 +144,13 @@ fn stimuli_that_cannot_be_are_refused() {
     refused(
         &nd21("> 80\ndrive 0 memory FE13 = 88"),
         "drive",
-        "behind the first step",
+        "after the first step",
         Some("`? drive"),
     );
     refused(
         &nd21("> 80\n+5ms drive 0 model nd21"),
         "drive 0 model nd21",
-        "behind the first",
+        "after the first",
         None,
     );
 }
@@ -190,7 +190,7 @@ fn a_drives_monitoring_reports_errors() {
     refused(
         &nd21("! drive 0 byte 3: error 0151"),
         "3",
-        "knows no bytes",
+        "not timed in bytes",
         None,
     );
     refused(
@@ -288,7 +288,7 @@ fn cells_are_checked_by_their_names() {
         ("nRampe- = off", "nRampe- is 0000, expected 7FFF"),
         (
             "memory FF43 = 01",
-            "cell FF43 of drive 0 holds 21, expected is 01",
+            "cell FF43 of drive 0 holds 21, expected 01",
         ),
     ] {
         fails(&cells(&format!("? drive 0..last {check}")), message);
@@ -303,12 +303,7 @@ fn cells_are_checked_by_their_names() {
 #[test]
 fn cells_that_cannot_be_are_refused() {
     let check = |check: &str| plain(&format!("? drive 0 {check}"));
-    refused(
-        &check("nits = 00"),
-        "nits",
-        "what must hold",
-        Some("`nist`"),
-    );
+    refused(&check("nits = 00"), "nits", "a condition", Some("`nist`"));
     refused(&check("nist 1500rpm"), "1500rpm", "`=`, `<`", None);
     refused(
         &check("nist = 1500rpn"),
@@ -341,7 +336,7 @@ fn cells_that_cannot_be_are_refused() {
         "a number with a unit",
         None,
     );
-    refused(&check("nist = 161E +-1%"), "+", "behind bytes", None);
+    refused(&check("nist = 161E +-1%"), "+", "follows bytes", None);
     refused(
         &check("nist & FF = 0000"),
         "FF",
@@ -351,7 +346,7 @@ fn cells_that_cannot_be_are_refused() {
     refused(
         &check("Flags2 & E0 = 04"),
         "04",
-        "does not let through",
+        "that the mask excludes",
         None,
     );
     refused(&check("Flags2 & E0 > 00"), ">", "bits are compared", None);
@@ -469,7 +464,7 @@ fn values_are_written_in_units() {
         "nsoll",
         "has 2 bytes, the job has 1 byte",
     );
-    refused_line("or 0 imax = 10 A", "10 A", "bits are no number");
+    refused_line("or 0 imax = 10 A", "10 A", "bits are not a number");
     refused_line("write-word 0 nsoll = 1500rpm +-1%", "+-1%", "complete");
 }
 

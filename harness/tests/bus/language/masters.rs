@@ -50,7 +50,7 @@ fn masters_deviate() {
     let twice = "master deviates names-drive-0\nmaster deviates names-drive-0";
     refused(&text(twice, read), "master", "stands twice", None);
     let late = format!("{read}\nmaster deviates names-drive-0");
-    refused(&text("", &late), "master", "behind the first step", None);
+    refused(&text("", &late), "master", "after the first step", None);
     refused(
         &text("", "master once reference 1"),
         "reference 1",

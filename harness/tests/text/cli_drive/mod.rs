@@ -120,7 +120,11 @@ fn all_mistakes_in_cells_are_shown_at_once() {
             "at most 8000 expected (ND21 14.5.3.2)",
         ],
     );
-    refused("write 0 nMax", 2, &["the line ends where `=` is expected"]);
+    refused(
+        "write 0 nMax",
+        2,
+        &["`=` is missing at the end of the line"],
+    );
 }
 
 #[test]

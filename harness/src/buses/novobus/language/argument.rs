@@ -303,10 +303,7 @@ fn location(scanner: &mut Scanner<'_>) -> Result<MemoryRange, Problem> {
 fn one<T>(text: &str, read: impl Fn(&mut Scanner<'_>) -> Result<T, Problem>) -> Result<T, String> {
     let mut scanner = Scanner::new(text, 0);
     let found = read(&mut scanner).and_then(|found| scanner.expect_end().map(|()| found));
-    found.map_err(|problem| match problem.help {
-        Some(help) => format!("{}; {help}", problem.message),
-        None => format!("{}; {}", problem.message, problem.expected),
-    })
+    found.map_err(|problem| problem.sentence())
 }
 
 /// Reads each of several texts as a whole.

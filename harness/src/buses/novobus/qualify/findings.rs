@@ -99,7 +99,7 @@ impl Findings {
             Verdict::Aborted => "it was aborted",
             Verdict::RigError => "the rig failed",
             Verdict::Marginal if played.late_each_time(self.tolerance).is_some() => {
-                "a byte was as late each time: the computer or a drive"
+                "a byte was late by the same time at each attempt: the computer or a drive is slow"
             }
             Verdict::Passed | Verdict::Marginal if !whole => {
                 "drives sent bytes by themselves, so the order of the bytes behind them is open (ND21 9.9)"
@@ -274,13 +274,13 @@ impl Findings {
                 0 => text.push_str(&self.unnamed(culprit)),
                 1 => {}
                 2..=MOST_TOLD => text.push_str(
-                    "each of these explains every byte: the bytes do not say which it is\n",
+                    "each of these explains every byte: the bytes do not tell which one it is\n",
                 ),
                 more => {
                     let more = more - MOST_TOLD;
                     let _infallible = writeln!(
                         text,
-                        "each of these, and {more} more, explains every byte: the bytes do not say which it is"
+                        "each of these, and {more} more, explains every byte: the bytes do not tell which one it is"
                     );
                 }
             }
@@ -288,7 +288,7 @@ impl Findings {
         } else if self.is_open() || self.equal == 0 {
             let _infallible = writeln!(
                 text,
-                "deviations: not settled; no byte is known to differ, but not everything was compared: {count}"
+                "deviations: not known; no byte is known to differ, but not everything was compared: {count}"
             );
         } else if known.is_empty() {
             let _infallible = writeln!(
@@ -347,7 +347,7 @@ impl Findings {
     /// How much was compared.
     fn counts(&self) -> String {
         format!(
-            "{} of {} scenarios played are equal to their end, {} were skipped; {} compared, {} more have values that only the drives know; {} asked",
+            "{} of {} scenarios played match the model to their end, {} were skipped; {} compared, {} more have values that only the drives know; {} asked",
             self.equal,
             self.played,
             self.skipped,

@@ -139,7 +139,7 @@ impl Qualification {
             return Ok(self.qualified(None, self.findings.text(None, &[])));
         }
         if self.ill {
-            let why = "the ring is ill: nothing more was played";
+            let why = "the ring is not healthy: nothing more was played";
             self.findings.note_open(why.to_owned());
             let deviations = self.deviations(bench, Some(&Header::default()));
             return Ok(self.qualified(None, deviations));
@@ -290,7 +290,7 @@ impl Qualification {
             text.push_str("the bench's master differs from the master of the manual, and no single known deviation explains it\n");
         }
         text.push_str(
-            "the bench is wrong, not a drive: its own master deviates, so nothing follows for the drives\n",
+            "the bench is wrong, not a drive: its own master deviates, so this run says nothing about the drives\n",
         );
         text
     }
@@ -353,13 +353,13 @@ impl Qualification {
         Ok(Asking::Open(match answer {
             Answer::Settled { value, header } => return Ok(Asking::Settled { value, header }),
             Answer::NoDifference => {
-                "every value of it gives the bytes that came: the drive was not in a state that shows it".to_owned()
+                "every value explains the bytes received: the drive was not in a state that shows the property".to_owned()
             }
             Answer::NotDone(time) => {
                 format!("longer than {time}: not finished when asked for the last time")
             }
             Answer::Unexplained => {
-                let why = "no value of it gives the bytes that came";
+                let why = "no value explains the bytes received";
                 let of = match probe.asked {
                     Asked::Drive(drive, _) => format!(" of drive {drive}"),
                     Asked::Ring => String::new(),

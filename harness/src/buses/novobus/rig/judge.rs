@@ -76,7 +76,7 @@ pub(crate) fn judge(outcome: &mut Outcome, heard: &Heard<'_>) -> Option<Explanat
     {
         outcome.verdict = Verdict::Inconclusive;
         outcome.remarks.push(format!(
-            "{} line errors were told of without their bytes: the transport could not have shown them",
+            "{} line errors were reported without their bytes: the transport cannot show which bytes they damaged",
             heard.unplaced
         ));
     }

@@ -44,7 +44,8 @@ fn mistake(lines: &str) -> (String, String, String) {
     let found = Entry::new(source.clone(), None).expect_err(lines);
     let first = found.all()[0].clone();
     let place = source.text[first.span.start..first.span.end].to_owned();
-    (place, first.message, first.help.unwrap_or_default())
+    let said = format!("{}; {}", first.message, first.expected);
+    (place, said, first.help.unwrap_or_default())
 }
 
 /// Every line of the language is written as it was read.

@@ -62,7 +62,7 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
         Word::Corrected => Ok(Check::Corrected(expression::sum(scanner)?)),
         Word::Named => {
             let kinds = [("damaged", false), ("broken", true)];
-            let broken = named(scanner, &kinds, "what is wrong with a link")?;
+            let broken = named(scanner, &kinds, "a fault of a link")?;
             let (ring, link, ends) = step::link(scanner)?;
             Ok(Check::Named {
                 ring,
@@ -72,7 +72,7 @@ pub(crate) fn check(scanner: &mut Scanner<'_>) -> Result<Check, Problem> {
             })
         }
         Word::Ended => {
-            let ending = named(scanner, &Ending::NAMES, "how a job has ended")?;
+            let ending = named(scanner, &Ending::NAMES, "a result of a job")?;
             Ok(Check::Ended(ending))
         }
         Word::Rules => {
@@ -109,7 +109,7 @@ fn one_drive(scanner: &mut Scanner<'_>) -> Result<DriveRange, Problem> {
         None => Ok(drives),
         Some(to) => Err(Problem::new(
             to.span,
-            "several drives stand where one is expected",
+            "several drives are given where one is expected",
             "one drive expected here",
         )),
     }

@@ -320,9 +320,9 @@ fn condition(scanner: &mut Scanner<'_>, others: &[&'static str]) -> Result<Condi
     let own = CONDITIONS.iter().map(|(name, _)| *name);
     let known: Vec<_> = others.iter().copied().chain(own).collect();
     let expected = if others.is_empty() {
-        format!("what must hold ({}, or a cell's name)", known.join(", "))
+        format!("a condition ({}, or a cell's name)", known.join(", "))
     } else {
-        "what to set or what must hold".to_owned()
+        "a setting or a condition".to_owned()
     };
     let names: Vec<_> = known.iter().copied().chain(cell_names()).collect();
     let chunk = scanner.clone().chunk().value;

@@ -130,7 +130,7 @@ pub(crate) fn parse_lines(source: &Source) -> Result<Header, Problems> {
 }
 
 fn no_header_line(step: &Step) -> Problem {
-    let what = "this is a step, and nothing is played here";
+    let what = "this is a step, and only header lines are allowed here";
     let expected = "a line of a header expected here, such as `drive 1 input GPIN3 high`";
     Problem::new(step.span, what, expected)
 }

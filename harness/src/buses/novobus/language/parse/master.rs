@@ -80,7 +80,7 @@ fn one_call(scanner: &mut Scanner<'_>) -> Result<(DriveRange, MasterCall), Probl
         known.extend(CALLS);
         known.retain(|name| !["master", "recover"].contains(name));
         known.extend([super::header::DEVIATES, "once"]);
-        let problem = scanner.unexpected("what the driver is to do");
+        let problem = scanner.unexpected("a job of the driver");
         return Err(problem.did_you_mean(name, &known));
     }
     let drives = drives(scanner)?;

@@ -240,7 +240,7 @@ fn flips(scanner: &mut Scanner<'_>) -> Result<Flips, Problem> {
             let here = scanner.here();
             return Err(Problem::new(
                 here,
-                "a bit that is flipped twice is not flipped",
+                "the same bit is flipped twice",
                 "each bit once",
             ));
         }

@@ -219,8 +219,8 @@ pub(crate) fn tolerance(
     if quantity::plus_minus(&mut ahead) {
         return Err(Problem::new(
             scanner.here(),
-            "a tolerance stands behind bytes",
-            "a tolerance can stand behind a number with a unit",
+            "a tolerance follows bytes",
+            "a tolerance is allowed after a number with a unit",
         ));
     }
     Ok(None)

@@ -128,7 +128,7 @@ impl Planner {
         {
             return Err(Problem::new(
                 value.span,
-                "a bit is expected that the mask does not let through",
+                "the expected value has a bit that the mask excludes",
                 "bits of the mask expected here",
             ));
         }

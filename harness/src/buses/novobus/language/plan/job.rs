@@ -117,7 +117,7 @@ impl Planner {
         let mask = || match data {
             Some(Written::Number(number)) => Err(Problem::new(
                 number.span,
-                "bits are no number",
+                "bits are not a number",
                 "a byte expected here",
             )),
             _ => byte(),

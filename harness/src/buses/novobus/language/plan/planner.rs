@@ -203,7 +203,7 @@ impl Planner {
                 "the scenario has one ring",
                 "a drive or link of ring 1 expected here",
             )
-            .help("a second ring stands behind a comma in the header: `ring 4, 3`")
+            .help("a second ring follows a comma in the header: `ring 4, 3`")
         })
     }
 
@@ -295,7 +295,7 @@ impl Planner {
                 if let Some(byte) = &fault.byte {
                     return Err(Problem::new(
                         byte.span,
-                        "the drive's monitoring knows no bytes of the bus",
+                        "the drive's monitoring is not timed in bytes of the bus",
                         "a time expected here, as in `@20ms`",
                     ));
                 }
@@ -390,7 +390,7 @@ impl Planner {
             u64::try_from(value).map_err(|_| {
                 Problem::new(
                     number.span,
-                    format!("{value} is less than nothing"),
+                    format!("{value} is negative"),
                     "0 or more expected here",
                 )
             })

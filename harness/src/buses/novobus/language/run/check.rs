@@ -26,11 +26,11 @@ impl Runner<'_> {
             PlannedCheck::Located(ring, drive, within) => match self.locate(*ring) {
                 Some(location) if location.drive == *drive => enough(location, *within, span),
                 Some(location) => failed(format!(
-                    "the ring spells out drive {}, expected is drive {drive}",
+                    "the ring spells out drive {}, expected drive {drive}",
                     location.drive
                 )),
                 None => failed(format!(
-                    "the ring spells out no address, expected is drive {drive}"
+                    "the ring spells out no address, expected drive {drive}"
                 )),
             },
             PlannedCheck::Within(zeros) => match self.locate(0) {
@@ -56,10 +56,10 @@ impl Runner<'_> {
                 let seen = match self.shown_error(*ring, *drive) {
                     Some(Some(found)) if found == *error => Ok(()),
                     Some(Some(found)) => Err(Miss::Otherwise(format!(
-                        "drive {drive} has error {found}, expected is {error}"
+                        "drive {drive} has error {found}, expected {error}"
                     ))),
                     Some(None) => Err(Miss::Otherwise(format!(
-                        "drive {drive} is not in the error mode, expected is error {error}"
+                        "drive {drive} is not in the error mode, expected error {error}"
                     ))),
                     None => Err(Miss::Unseen(format!(
                         "this link does not show whether drive {drive} is in the error mode"
@@ -69,7 +69,7 @@ impl Runner<'_> {
             }
             PlannedCheck::Corrected(times) if *times == self.own.corrected => Ok(()),
             PlannedCheck::Corrected(times) => failed(format!(
-                "{} check sequences came back, expected are {times}",
+                "{} check sequences came back, expected {times}",
                 self.own.corrected
             )),
             PlannedCheck::Named(ring, link, broken) => self.named((*ring, *link), *broken, span),
@@ -78,7 +78,7 @@ impl Runner<'_> {
             PlannedCheck::Sent(bytes, time) => {
                 if *bytes != self.own.sent {
                     return failed(format!(
-                        "{} bytes were sent since the last check, expected are {bytes}",
+                        "{} bytes were sent since the last check, expected {bytes}",
                         self.own.sent
                     ));
                 }
@@ -88,7 +88,7 @@ impl Runner<'_> {
                     Some((time, tolerance))
                         if took + *tolerance + own < *time || *time + *tolerance + own < took =>
                     {
-                        failed(format!("the {bytes} bytes took {took}, expected is {time}"))
+                        failed(format!("the {bytes} bytes took {took}, expected {time}"))
                     }
                     _ => Ok(()),
                 }
@@ -98,9 +98,7 @@ impl Runner<'_> {
                 if received == *bytes {
                     return Ok(());
                 }
-                failed(format!(
-                    "{received} bytes were received, expected are {bytes}"
-                ))
+                failed(format!("{received} bytes were received, expected {bytes}"))
             }
         }
     }
@@ -112,7 +110,7 @@ impl Runner<'_> {
             (false, None) => return Ok(()),
             (true, _) => "the driver has had no command before".to_owned(),
             (_, Some(other)) => format!(
-                "the driver's command ended as \"{}\", expected is \"{}\"",
+                "the driver's command ended as \"{}\", expected \"{}\"",
                 other.name(),
                 ending.name()
             ),
@@ -125,8 +123,7 @@ impl Runner<'_> {
         let what = if broken { "broken" } else { "damaged" };
         let expected = format!("{what} {}", self.plan.link_name(ring, link));
         let Some(fault) = self.own.disturbed.first() else {
-            let message =
-                format!("the driver says of nothing that it is wrong, expected is {expected}");
+            let message = format!("the driver reports no fault, expected {expected}");
             return Err(Stop::failed(span, message));
         };
         let drives = usize::from(self.link.drives(ring));
@@ -143,7 +140,7 @@ impl Runner<'_> {
             true => Ok(()),
             false => Err(Stop::failed(
                 span,
-                format!("the driver says: {fault}; expected is {expected}"),
+                format!("the driver reports: {fault}; expected {expected}"),
             )),
         }
     }
@@ -168,7 +165,7 @@ fn enough(location: Location, most: Option<u64>, span: Span) -> Result<(), Stop>
     match (location.zeros, most) {
         (Some(zeros), Some(most)) if zeros > most => Err(Stop::failed(
             span,
-            format!("the address came after {zeros} zeros, expected are at most {most}"),
+            format!("the address came after {zeros} zeros, expected at most {most}"),
         )),
         _ => Ok(()),
     }

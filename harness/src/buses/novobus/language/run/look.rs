@@ -112,7 +112,7 @@ impl Runner<'_> {
                     let found = found.ok_or_else(|| unseen(&format!("cell {cell:04X}")))?;
                     if !matches(*expected, Received::good(found)) {
                         return Err(Miss::Otherwise(format!(
-                            "cell {cell:04X} of {} holds {found:02X}, expected is {}",
+                            "cell {cell:04X} of {} holds {found:02X}, expected {}",
                             label(),
                             expected
                         )));

@@ -192,10 +192,7 @@ impl Runner<'_> {
             Ok(size) if size.drives() == expected => Ok(()),
             Ok(size) => Err(Stop::failed(
                 span,
-                format!(
-                    "the ring has {} drives, expected are {expected}",
-                    size.drives()
-                ),
+                format!("the ring has {} drives, expected {expected}", size.drives()),
             )),
             Err(error) => Err(Stop::failed(span, error.to_string())),
         }
@@ -317,7 +314,7 @@ fn compare(axis: Axis, value: Option<u32>, expected: &[Expected]) -> Result<(), 
         })
         .collect();
     Err(format!(
-        "drive {axis} holds {}, expected is {wanted}",
+        "drive {axis} holds {}, expected {wanted}",
         hex(bytes)
     ))
 }

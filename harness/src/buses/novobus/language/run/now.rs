@@ -21,7 +21,7 @@ pub enum Now {
 pub fn now(plan: &Plan, link: &mut dyn Link, step: &PlannedStep) -> Now {
     if step.when != PlannedWhen::Now {
         return Now::Refused(
-            "a line is done at once: no time may stand in front of it (a fault may have one behind its place)",
+            "a line is carried out at once: no time is allowed in front of it (a fault may have one after its place)",
         );
     }
     match &step.action {
@@ -46,7 +46,7 @@ fn look(plan: &Plan, link: &mut dyn Link, check: &PlannedCheck, step: &PlannedSt
         PlannedCheck::Drive(_) | PlannedCheck::Error(..) | PlannedCheck::Located(_, _, None) => {}
         _ => {
             return Now::Refused(
-                "this check counts the bytes of a scenario's own master, and here the master is another's",
+                "this check counts bytes of the scenario's own master; here another master sends",
             );
         }
     }

@@ -319,7 +319,7 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
         match waiting.first() {
             None => return Ok(()),
             Some(cell) if link.now() >= end || link.trouble().is_some() => {
-                let why = "it does not come back from its reset";
+                let why = "it does not answer after its reset";
                 return Err(NotReady::new(*cell, Unready::NoAnswer, why));
             }
             Some(_) if silent => {
@@ -410,7 +410,7 @@ fn reset_ring(link: &mut dyn Link, cells: &[Before]) -> Result<(), NotReady> {
 
 /// Waits until a ring passes bytes again in which this drive was the last one to be reset.
 fn close(link: &mut dyn Link, cell: Before) -> Result<(), NotReady> {
-    let why = "it does not come back from its reset";
+    let why = "it does not answer after its reset";
     match closes_again(link, cell.ring) {
         true => Ok(()),
         false => Err(NotReady::new(cell, Unready::NoAnswer, why)),
