@@ -56,6 +56,11 @@ pub(crate) fn campaign(
         output.complain("--only, --case and --html show campaigns of rings; for one of frames use --format json, which lists every case");
         return Ok(Exit::Usage);
     }
+    if rings_only && !of_frames.is_empty() {
+        output.say(
+            "campaigns of frames are left out: --only, --case and --html show those of rings\n",
+        );
+    }
     if let Some(name) = &arguments.case {
         return replay(name, &campaigns, output);
     }

@@ -119,3 +119,26 @@ fn wrong_usage_says_what_to_do() {
         );
     }
 }
+
+/// Campaigns over frames stand beside those of rings; what shows rings only says so.
+#[test]
+fn campaigns_over_frames() {
+    let frames = "unitek/5.3-no-read-back";
+    let table = drivebench(&["campaign", frames]);
+    assert_eq!(table.status.code(), Some(0), "{}", stderr(&table));
+    assert!(stdout(&table).contains("  unnoticed                 5"));
+    let listed = drivebench(&["campaign", frames, "--format", "json"]);
+    let listed: Value = serde_json::from_str(&stdout(&listed)).expect("JSON");
+    let cases = listed["campaigns"][0]["cases"].as_array();
+    assert_eq!(cases.map(Vec::len), Some(248));
+    let alone = drivebench(&["campaign", frames, "--only", "located"]);
+    assert_eq!(alone.status.code(), Some(2));
+    assert!(
+        stderr(&alone).contains("--format json"),
+        "{}",
+        stderr(&alone)
+    );
+    let both = drivebench(&["campaign", "9.6-single-bits", frames, "--only", "recovered"]);
+    assert_eq!(both.status.code(), Some(0), "{}", stderr(&both));
+    assert!(stderr(&both).contains("are left out"), "{}", stderr(&both));
+}
