@@ -26,7 +26,7 @@ pub(crate) enum NotNow {
 pub(crate) fn now(bench: &mut Bench, step: &PlannedStep<Unitek>) -> Result<(), NotNow> {
     if step.when != PlannedWhen::Now {
         return Err(NotNow::Refused(
-            "a line is done at once: no time may stand in front of it",
+            "a line is carried out at once: no time is allowed in front of it",
         ));
     }
     let PlannedAction::Own(act) = &step.action else {
