@@ -1,6 +1,6 @@
 //! Campaigns on a CAN segment: one conversation of the master with a drive, disturbed at every frame, and what came of it.
 //!
-//! [`file`](mod@file) says what stands in a campaign file, [`converse`] plays the conversation with one fault or none, and this module
+//! [`file`](mod@file) says what stands in a campaign file, `converse` plays the conversation with one fault or none, and this module
 //! classifies the outcomes and counts them.
 
 mod converse;
