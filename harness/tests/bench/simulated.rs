@@ -47,7 +47,7 @@ fn have_none(sizes: &[u8], resets: &[bool]) {
             assert!(!failed, "{name}: {}", said(&output));
             let words = match code {
                 Some(0) => "deviations: none; every byte is as the model of the manual says",
-                _ => "deviations: not settled; no byte is known to differ",
+                _ => "deviations: not known; no byte is known to differ",
             };
             assert!(said(&output).contains(words), "{name}: {}", said(&output));
             assert!(!said(&output).contains(": a byte differed"), "{name}");
@@ -411,7 +411,7 @@ fn a_failed_scenario_leaves_deviations_unsettled() {
         .current_dir(folder.path())
         .args(["--evidence", "kept"]);
     let output = output.output().expect("the program");
-    ended(&output, 1, "deviations: not settled");
+    ended(&output, 1, "deviations: not known");
     ended(
         &output,
         1,
