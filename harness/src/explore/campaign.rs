@@ -1,18 +1,13 @@
 //! A run tries case after case, keeps those that show something new, and confirms and records every difference from the model.
 
 use super::Case;
-use super::Difference;
-use super::Finding;
-use super::Pool;
 use super::confirm::Confirmation;
 use super::dice::Dice;
 use super::error::ExploreError;
-use super::mutate;
 use super::record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress};
-use super::swarm::Swarm;
+use super::swarm::{ROUND, Swarm};
 use super::target::{Rehearsal, Target};
-use super::tour;
-use super::{CaseScope, Generator};
+use super::{Differing, Finding, FuzzCase, Pool};
 use harness_proto::time::Span;
 use std::collections::BTreeMap;
 
@@ -46,42 +41,39 @@ pub enum RunEnd {
 }
 
 /// What a run tells of while it goes on.
-pub trait Watcher {
+pub trait Watcher<C: FuzzCase = Case> {
     /// A round begins, with what its cases may have.
-    fn round(&mut self, round: u64, swarm: &Swarm);
+    fn round(&mut self, round: u64, swarm: &Swarm<C::Spice>);
 
     /// Something was found; `file` is the name of its files.
-    fn found(&mut self, finding: &Finding, file: &str);
+    fn found(&mut self, finding: &Finding<C>, file: &str);
 
     /// The state so far.
-    fn progress(&mut self, progress: &Progress, pool: &Pool);
+    fn progress(&mut self, progress: &Progress, pool: &Pool<C>);
 }
 
 /// A run.
 #[derive(Debug)]
-pub struct FuzzRun {
-    about: FuzzSettings,
-    scope: CaseScope,
-    pool: Pool,
+pub struct FuzzRun<C: FuzzCase = Case> {
+    about: FuzzSettings<C>,
+    scope: C::Scope,
+    pool: Pool<C>,
     progress: Progress,
     /// How often each difference was flaky, by its key; `SETTLED` for a confirmed one.
     known: BTreeMap<String, u8>,
-    /// On a rig with ports, what every ring is asked before anything is left to chance.
-    tour: Vec<Case>,
+    /// What the drives are asked before anything is left to chance.
+    tour: Vec<C>,
     /// How many findings count.
     confirmed: usize,
     flaky: usize,
 }
 
-impl FuzzRun {
+impl<C: FuzzCase> FuzzRun<C> {
     /// A run that begins.
     #[must_use]
-    pub fn new(about: FuzzSettings, scope: CaseScope) -> Self {
-        let rings = std::iter::once(&scope.first).chain(&scope.second);
-        let rings = rings.filter(|_| about.ports);
-        let tours = rings.map(|ring| tour(&scope, ring, about.seed));
+    pub fn new(about: FuzzSettings<C>, scope: C::Scope) -> Self {
         Self {
-            tour: in_turns(tours.collect()),
+            tour: C::tour(&scope, &about),
             about,
             scope,
             pool: Pool::default(),
@@ -97,9 +89,9 @@ impl FuzzRun {
     /// # Errors
     /// The model cannot be made.
     pub fn resumed(
-        kept: &KeptRun,
-        scope: CaseScope,
-        target: &mut dyn Target,
+        kept: &KeptRun<C>,
+        scope: C::Scope,
+        target: &mut dyn Target<C>,
     ) -> Result<Self, ExploreError> {
         let mut campaign = Self::new(kept.about.clone(), scope);
         for line in &kept.lines {
@@ -129,7 +121,7 @@ impl FuzzRun {
     }
 
     /// Whether this difference was found already, or was flaky often enough.
-    fn is_settled(&self, difference: &Difference) -> bool {
+    fn is_settled(&self, difference: &C::Difference) -> bool {
         let times = self.known.get(&difference.key());
         times.is_some_and(|times| *times >= SETTLED)
     }
@@ -148,33 +140,20 @@ impl FuzzRun {
 
     /// What was kept.
     #[must_use]
-    pub const fn pool(&self) -> &Pool {
+    pub const fn pool(&self) -> &Pool<C> {
         &self.pool
     }
 
     /// The case of a number: it depends on the seed, the number and what was kept before.
-    fn case(&self, number: u64, swarm: &Swarm) -> Case {
+    fn case(&self, number: u64, swarm: &Swarm<C::Spice>) -> C {
         let mut dice = Dice::of_part(self.about.seed, number);
-        let ring = usize::from(self.scope.second.is_some() && dice.percent(50));
-        let own = self.scope.ring(ring);
-        let maker = Generator::new(&self.scope, own, swarm, &mut dice);
-        // Every third case is left to chance.
-        let of_tour = (number % 3 < 2).then_some(number / 3 * 2 + number % 3);
-        let of_tour = of_tour.and_then(|number| self.tour.get(usize::try_from(number).ok()?));
-        if let Some(case) = of_tour {
-            let mut case = case.clone();
-            maker.keep_in_step(&mut case);
-            return case;
-        }
-        let old = dice
-            .percent(60)
-            .then(|| self.pool.pick(ring, &mut dice))
-            .flatten();
-        let other = self.pool.pick(ring, &mut dice);
-        match old {
-            Some(old) => mutate(old, other, &maker, &mut dice),
-            None => maker.case(&mut dice),
-        }
+        C::made(
+            &self.scope,
+            swarm,
+            (&self.tour, number),
+            &self.pool,
+            &mut dice,
+        )
     }
 
     /// Goes on up to the bounds. The record, where there is one, holds everything when it ends, and when it fails on the way.
@@ -183,10 +162,10 @@ impl FuzzRun {
     /// The rig or the record fails.
     pub fn run(
         &mut self,
-        target: &mut dyn Target,
+        target: &mut dyn Target<C>,
         mut record: Option<&mut FuzzRecord>,
         bounds: &Bounds,
-        watcher: &mut dyn Watcher,
+        watcher: &mut dyn Watcher<C>,
     ) -> Result<RunEnd, ExploreError> {
         let mut swarm = None;
         let end = loop {
@@ -194,15 +173,15 @@ impl FuzzRun {
                 break end;
             }
             let number = self.progress.cases;
-            let round = number / Swarm::ROUND;
+            let round = number / ROUND;
             let own = match swarm.take() {
                 Some((known, own)) if known == round => own,
                 _ => {
-                    let own = Swarm::of_round(self.about.seed, round, &self.scope);
+                    let own = C::swarm(self.about.seed, round, &self.scope);
                     watcher.round(round, &own);
-                    if number.is_multiple_of(Swarm::ROUND) {
+                    if number.is_multiple_of(ROUND) {
                         let spices = own.names().into_iter().map(str::to_owned).collect();
-                        write(&mut record, || LogLine::Swarm { round, spices })?;
+                        write::<C>(&mut record, || LogLine::Swarm { round, spices })?;
                     }
                     own
                 }
@@ -216,11 +195,11 @@ impl FuzzRun {
             self.one(&case, &rehearsal, target, &mut record, watcher)?;
             self.progress.cases += 1;
             if self.progress.cases.is_multiple_of(bounds.every) {
-                write(&mut record, || LogLine::Progress(self.progress))?;
+                write(&mut record, || LogLine::<C>::Progress(self.progress))?;
                 watcher.progress(&self.progress, &self.pool);
             }
         };
-        write(&mut record, || LogLine::Progress(self.progress))?;
+        write(&mut record, || LogLine::<C>::Progress(self.progress))?;
         watcher.progress(&self.progress, &self.pool);
         Ok(end)
     }
@@ -231,11 +210,11 @@ impl FuzzRun {
     /// The rig or the record fails.
     pub fn replay(
         &mut self,
-        cases: &[Case],
-        target: &mut dyn Target,
+        cases: &[C],
+        target: &mut dyn Target<C>,
         mut record: Option<&mut FuzzRecord>,
         bounds: &Bounds,
-        watcher: &mut dyn Watcher,
+        watcher: &mut dyn Watcher<C>,
     ) -> Result<RunEnd, ExploreError> {
         let mut end = RunEnd::Cases;
         for case in cases {
@@ -250,13 +229,13 @@ impl FuzzRun {
             }
             self.one(case, &rehearsal, target, &mut record, watcher)?;
             self.progress.cases += 1;
-            write(&mut record, || LogLine::Progress(self.progress))?;
+            write(&mut record, || LogLine::<C>::Progress(self.progress))?;
         }
         watcher.progress(&self.progress, &self.pool);
         Ok(end)
     }
 
-    fn end(&self, bounds: &Bounds, target: &mut dyn Target) -> Option<RunEnd> {
+    fn end(&self, bounds: &Bounds, target: &mut dyn Target<C>) -> Option<RunEnd> {
         if let Some(why) = target.over() {
             return Some(RunEnd::Over(why));
         }
@@ -278,11 +257,11 @@ impl FuzzRun {
 
     fn one(
         &mut self,
-        case: &Case,
-        rehearsal: &Rehearsal,
-        target: &mut dyn Target,
+        case: &C,
+        rehearsal: &Rehearsal<C>,
+        target: &mut dyn Target<C>,
         record: &mut Option<&mut FuzzRecord>,
-        watcher: &mut dyn Watcher,
+        watcher: &mut dyn Watcher<C>,
     ) -> Result<(), ExploreError> {
         if rehearsal.denied.is_some() {
             self.progress.not_sent += 1;
@@ -305,7 +284,7 @@ impl FuzzRun {
             }
             Some(difference) => {
                 let mut finding = Finding {
-                    schema: Finding::SCHEMA,
+                    schema: Finding::<C>::SCHEMA,
                     rig: self.about.rig.clone(),
                     ports: self.about.ports,
                     seed: self.about.seed,
@@ -323,7 +302,7 @@ impl FuzzRun {
                 let (confirm, of) = (self.about.confirm, self.about.of);
                 let mut confirmation = Confirmation::new(confirm, of, &self.known);
                 let before = tried.before.as_deref();
-                confirmation.confirm(&mut finding, rehearsal, before, target)?;
+                C::confirm(&mut confirmation, &mut finding, rehearsal, before, target)?;
                 let took = confirmation.took;
                 self.use_line(took);
                 let signature = finding.difference.key();
@@ -331,7 +310,7 @@ impl FuzzRun {
                 let file = format!("finding-{number:06}");
                 if let Some(record) = record {
                     finding.write(record.folder(), &file)?;
-                    record.line(&LogLine::Finding {
+                    record.line(&LogLine::<C>::Finding {
                         number,
                         signature,
                         confirmed: finding.confirmed,
@@ -354,20 +333,9 @@ pub(crate) fn count_finding(known: &mut BTreeMap<String, u8>, key: &str, confirm
     };
 }
 
-/// Interleaves the cases of several tours.
-fn in_turns(tours: Vec<Vec<Case>>) -> Vec<Case> {
-    let longest = tours.iter().map(Vec::len).max().unwrap_or(0);
-    let at = |index: usize| {
-        tours
-            .iter()
-            .filter_map(move |tour| tour.get(index).cloned())
-    };
-    (0..longest).flat_map(at).collect()
-}
-
-fn write(
+fn write<C: FuzzCase>(
     record: &mut Option<&mut FuzzRecord>,
-    line: impl FnOnce() -> LogLine,
+    line: impl FnOnce() -> LogLine<C>,
 ) -> Result<(), ExploreError> {
     match record {
         Some(record) => record.line(&line()),

@@ -1,35 +1,39 @@
-//! Exploring: generated conversations, tried on a ring beside its model.
+//! Exploring: generated conversations, tried on drives beside their model.
 //!
-//! A [`Case`] is a conversation as a value. [`Generator`] and [`mutate`] make them from a seed, within a [`Swarm`]'s subset of what a
-//! conversation can have; a [`Target`] tries them: [`OnSim`] on simulated rings, [`OnRig`] on a rig with ports behind its guard. A [`Pool`]
-//! keeps the cases that show something new, a difference from the model is a [`Finding`], and every finding is a scenario
-//! ([`text`](mod@text)). A [`FuzzRun`] does all of it and a [`FuzzRecord`] writes it down as it happens. [`shrink`](mod@shrink) reduces
-//! findings and [`promote`](mod@promote) makes them regression tests.
+//! A conversation is a value that implements [`FuzzCase`]; each bus has its own. It is made from a seed, within a [`Swarm`]'s subset of
+//! what a conversation can have; a [`Target`] tries it: on simulated drives, or on a rig with ports behind its guard. A [`Pool`] keeps the
+//! cases that show something new, a difference from the model is a [`Finding`], and every finding is a scenario. A [`FuzzRun`] does all of
+//! it and a [`FuzzRecord`] writes it down as it happens. The ring's cases, and what shrinks and promotes them, are the default.
 
 mod campaign;
 mod confirm;
 mod dice;
 mod error;
 pub(crate) mod files;
+mod finding;
+mod fuzz_case;
+mod pool;
 mod record;
 mod swarm;
 mod target;
 
 pub(crate) use campaign::count_finding;
 pub use campaign::{Bounds, FuzzRun, RunEnd, Watcher};
-pub use confirm::judged_again;
+pub use confirm::Confirmation;
 pub use dice::Dice;
 pub use error::ExploreError;
-pub use record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read};
-pub use swarm::{Spice, Swarm};
+pub use finding::Finding;
+pub use fuzz_case::{Differing, FuzzCase, Spiced};
+pub use pool::{MOST_KEPT, Pool};
+pub use record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read, read_as};
+pub use swarm::Swarm;
 pub use target::{Rehearsal, Target, Tried};
 
-/// What the one bus that is explored today gives: its cases and targets.
+/// The ring's cases and targets, the default of every parameter of this module.
 pub use crate::buses::novobus::explore::{
     Act, ActKind, AttemptRecord, Case, CaseScope, Command, CommandSent, Damage, Difference,
-    Finding, Generator, Harm, MOST_ACTS, MOST_BYTES, MOST_KEPT, MOST_NET, MasterView, OnRig, OnSim,
-    OtherRing, Planted, Pool, RingScope, RingSetup, Spoil, Talk, To, against_model,
-    against_reference, against_witnesses, beside, by_novelty, features, mutate, page, play,
-    promote, shrink, text,
+    Generator, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted,
+    RingScope, RingSetup, Spice, Spoil, Talk, To, against_model, against_reference,
+    against_witnesses, beside, by_novelty, features, judged_again, mutate, page, play, promote,
+    shrink, text,
 };
-pub(crate) use crate::buses::novobus::explore::{OnRecord, drive_name, tour};

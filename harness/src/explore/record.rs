@@ -4,7 +4,7 @@
 //! done again when a run is resumed.
 
 use super::Case;
-use super::RingSetup;
+use super::FuzzCase;
 use super::error::ExploreError;
 use super::files::read_text;
 use rustix::fs::FlockOperation;
@@ -18,8 +18,8 @@ pub const RECORD: &str = "run.jsonl";
 
 /// What a run is: all that decides which cases are tried, and how they are judged.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FuzzSettings {
+#[serde(deny_unknown_fields, bound = "")]
+pub struct FuzzSettings<C: FuzzCase = Case> {
     /// The version of the form: 1.
     pub schema: u32,
     /// The rig as it was named.
@@ -37,23 +37,23 @@ pub struct FuzzSettings {
     pub confirm: u8,
     /// ... in this many attempts.
     pub of: u8,
-    /// What the rings are made of.
-    pub setup: RingSetup,
+    /// What the drives are made of.
+    pub setup: C::Setup,
     /// What cases may have, by name.
     pub spices: Vec<String>,
 }
 
-impl FuzzSettings {
+impl<C: FuzzCase> FuzzSettings<C> {
     /// The version of the form.
     pub const SCHEMA: u32 = 1;
 }
 
 /// A line of the record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum LogLine {
+#[serde(tag = "kind", rename_all = "kebab-case", bound = "")]
+pub enum LogLine<C: FuzzCase = Case> {
     /// The first line.
-    Run(FuzzSettings),
+    Run(FuzzSettings<C>),
     /// A round begins.
     Swarm {
         /// Which, counted from 0.
@@ -68,7 +68,7 @@ pub enum LogLine {
         /// How many features are new.
         new: usize,
         /// The case.
-        case: Case,
+        case: C,
     },
     /// Something was found; its files are in the folder.
     Finding {
@@ -101,11 +101,11 @@ pub struct Progress {
 
 /// What a record holds.
 #[derive(Clone, Debug)]
-pub struct KeptRun {
+pub struct KeptRun<C: FuzzCase = Case> {
     /// The first line.
-    pub about: FuzzSettings,
+    pub about: FuzzSettings<C>,
     /// The lines behind it, up to the last one of progress.
-    pub lines: Vec<LogLine>,
+    pub lines: Vec<LogLine<C>>,
     /// The last line of progress.
     pub progress: Progress,
     /// All lines of progress, in order.
@@ -124,7 +124,10 @@ impl FuzzRecord {
     ///
     /// # Errors
     /// It is there with something in it, or cannot be written.
-    pub fn create(folder: &Path, about: &FuzzSettings) -> Result<Self, ExploreError> {
+    pub fn create<C: FuzzCase>(
+        folder: &Path,
+        about: &FuzzSettings<C>,
+    ) -> Result<Self, ExploreError> {
         let unusable =
             |error: std::io::Error| ExploreError::unwritten("make the folder", folder, &error);
         std::fs::create_dir_all(folder).map_err(unusable)?;
@@ -148,7 +151,7 @@ impl FuzzRecord {
             file,
         };
         record.line(&LogLine::Run(about.clone()))?;
-        record.line(&LogLine::Progress(Progress::default()))?;
+        record.line(&LogLine::<C>::Progress(Progress::default()))?;
         Ok(record)
     }
 
@@ -156,9 +159,9 @@ impl FuzzRecord {
     ///
     /// # Errors
     /// There is none, or a line of it is damaged; half a line at its end is not.
-    pub fn resume(folder: &Path) -> Result<(Self, KeptRun), ExploreError> {
+    pub fn resume<C: FuzzCase>(folder: &Path) -> Result<(Self, KeptRun<C>), ExploreError> {
         let path = folder.join(RECORD);
-        let (kept, length) = read(folder)?;
+        let (kept, length) = read_as(folder)?;
         let file = File::options()
             .append(true)
             .open(&path)
@@ -184,7 +187,7 @@ impl FuzzRecord {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn line(&mut self, line: &LogLine) -> Result<(), ExploreError> {
+    pub fn line<C: FuzzCase>(&mut self, line: &LogLine<C>) -> Result<(), ExploreError> {
         let path = self.folder.join(RECORD);
         let failed = |error: std::io::Error| ExploreError::unwritten("write", &path, &error);
         let mut text = serde_json::to_string(line).map_err(|error| failed(error.into()))?;
@@ -207,11 +210,19 @@ fn hold(file: &File, folder: &Path) -> Result<(), ExploreError> {
     })
 }
 
-/// What a folder holds, and how long its record is up to the last line of progress.
+/// What the folder of a run on a ring holds, and how long its record is up to the last line of progress.
 ///
 /// # Errors
 /// There is no record, or it is damaged.
 pub fn read(folder: &Path) -> Result<(KeptRun, usize), ExploreError> {
+    read_as(folder)
+}
+
+/// The same for any bus.
+///
+/// # Errors
+/// There is no record, or it is damaged.
+pub fn read_as<C: FuzzCase>(folder: &Path) -> Result<(KeptRun<C>, usize), ExploreError> {
     let path = folder.join(RECORD);
     if !path.exists() {
         return Err(ExploreError::Usage(format!(
@@ -238,10 +249,10 @@ pub fn read(folder: &Path) -> Result<(KeptRun, usize), ExploreError> {
             // Its writer was killed.
             break;
         }
-        let line: LogLine =
+        let line: LogLine<C> =
             serde_json::from_str(line).map_err(|error| damaged(number, &error.to_string()))?;
         match line {
-            LogLine::Run(own) if number == 0 && own.schema == FuzzSettings::SCHEMA => {
+            LogLine::Run(own) if number == 0 && own.schema == FuzzSettings::<C>::SCHEMA => {
                 about = Some(own)
             }
             LogLine::Run(_) => return Err(damaged(number, "another kind of record")),

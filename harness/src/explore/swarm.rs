@@ -1,159 +1,46 @@
 //! Swarm options: each round of a run uses a random subset of what a conversation can have. What is never there lets the rest
 //! stand out: a drive that forgets something after ten reads is not found where every third byte is damaged.
 
-use super::CaseScope;
+use super::Spice;
+use super::Spiced;
 use super::dice::Dice;
 use std::collections::BTreeSet;
 
-/// Something that a conversation can have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Spice {
-    /// `ReadByte` (ND21 10.1).
-    ReadByte,
-    /// `ReadWord` (10.1).
-    ReadWord,
-    /// `ReadLong` (10.1).
-    ReadLong,
-    /// `WriteByte` (10.2).
-    WriteByte,
-    /// `WriteWord` (10.2).
-    WriteWord,
-    /// `And` (10.3).
-    And,
-    /// `Or` (10.3).
-    Or,
-    /// `WriteIO` (10.4).
-    WriteIo,
-    /// `ResetH8` (10.5).
-    Reset,
-    /// Process data (9.4).
-    ProcessData,
-    /// The drive of the telegram before (9.2).
-    Same,
-    /// The next drive (9.2).
-    Next,
-    /// Addresses of no drive (9.3).
-    Nobody,
-    /// SYNCO and PAUSE between telegrams (9.2).
-    Idle,
-    /// Commands cut over several telegrams (9.5).
-    Cut,
-    /// Wrong bytes in commands: code, fixed byte, checking byte (9.6, 9.7).
-    Spoil,
-    /// Addresses that no command may touch (10.1, 10.2).
-    Forbidden,
-    /// Any bytes where a sync byte is due (9.2, 9.7).
-    Noise,
-    /// Zeros and check sequences in parts (9.7, 9.8).
-    Zeros,
-    /// Silence (9.9).
-    Silence,
-    /// Inverted bits (9.7).
-    Flip,
-    /// Stop bits of 0 and receivers that are too slow (9.7).
-    Framing,
-    /// Bytes that are lost, doubled, put in or exchanged.
-    Slip,
-    /// Bytes that come late, and breaks.
-    Late,
-    /// Drives without power.
-    Power,
-    /// Motors that turn (14.10, 14.5.3.1, 13.2).
-    Motion,
-    /// The EEPROM controller (14.10.5).
-    Eeprom,
-}
+/// A subset of what a conversation can have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Swarm<S = Spice>(BTreeSet<S>);
 
-impl Spice {
-    /// All with their names.
-    pub const NAMES: [(&'static str, Self); 27] = [
-        ("read-byte", Self::ReadByte),
-        ("read-word", Self::ReadWord),
-        ("read-long", Self::ReadLong),
-        ("write-byte", Self::WriteByte),
-        ("write-word", Self::WriteWord),
-        ("and", Self::And),
-        ("or", Self::Or),
-        ("write-io", Self::WriteIo),
-        ("reset", Self::Reset),
-        ("process-data", Self::ProcessData),
-        ("same-drive", Self::Same),
-        ("next-drive", Self::Next),
-        ("nobody", Self::Nobody),
-        ("idle", Self::Idle),
-        ("cut", Self::Cut),
-        ("spoil", Self::Spoil),
-        ("forbidden", Self::Forbidden),
-        ("noise", Self::Noise),
-        ("zeros", Self::Zeros),
-        ("silence", Self::Silence),
-        ("flip", Self::Flip),
-        ("framing", Self::Framing),
-        ("slip", Self::Slip),
-        ("late", Self::Late),
-        ("power", Self::Power),
-        ("motion", Self::Motion),
-        ("eeprom", Self::Eeprom),
-    ];
-
-    /// The commands; a conversation has at least one of them.
-    pub const COMMANDS: [Self; 9] = [
-        Self::ReadByte,
-        Self::ReadWord,
-        Self::ReadLong,
-        Self::WriteByte,
-        Self::WriteWord,
-        Self::And,
-        Self::Or,
-        Self::WriteIo,
-        Self::Reset,
-    ];
-
-    /// The faults on links.
-    pub const FAULTS: [Self; 4] = [Self::Flip, Self::Framing, Self::Slip, Self::Late];
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        let named = Self::NAMES.iter().find(|(_, own)| *own == self);
-        named.map_or("", |(name, _)| name)
+impl<S> Default for Swarm<S> {
+    fn default() -> Self {
+        Self(BTreeSet::new())
     }
 }
 
-/// A subset of what a conversation can have.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Swarm(BTreeSet<Spice>);
+/// How many cases a round has, all with the same subset.
+pub(crate) const ROUND: u64 = 100;
 
-impl Swarm {
-    /// How many cases a round has, all with the same subset.
-    pub const ROUND: u64 = 100;
-
-    /// The subset of a round of a run, of what the scope allows.
+impl<S: Spiced> Swarm<S> {
+    /// The subset of a round of a run, of what there is. `least` is had where none of `needed` is.
     #[must_use]
-    pub fn of_round(seed: u64, round: u64, scope: &CaseScope) -> Self {
+    pub fn drawn(seed: u64, round: u64, all: &[S], (needed, least): (&[S], S)) -> Self {
         // Other numbers than those of the cases.
         let mut dice = Dice::of_part(!seed, round);
-        let mut own: BTreeSet<_> = scope
-            .spices
-            .iter()
-            .copied()
-            .filter(|_| dice.percent(50))
-            .collect();
-        if !own.iter().any(|spice| Spice::COMMANDS.contains(spice)) {
-            own.insert(Spice::ReadByte);
+        let mut own: BTreeSet<_> = all.iter().copied().filter(|_| dice.percent(50)).collect();
+        if !own.iter().any(|spice| needed.contains(spice)) {
+            own.insert(least);
         }
         Self(own)
     }
 
     /// Whether it has this.
     #[must_use]
-    pub fn has(&self, spice: Spice) -> bool {
+    pub fn has(&self, spice: S) -> bool {
         self.0.contains(&spice)
     }
 
     /// What of these it has.
     #[must_use]
-    pub fn of(&self, spices: &[Spice]) -> Vec<Spice> {
+    pub fn of(&self, spices: &[S]) -> Vec<S> {
         let own = spices.iter().copied();
         own.filter(|spice| self.has(*spice)).collect()
     }

@@ -1,17 +1,16 @@
 //! What cases are tried on.
 
-use super::Difference;
-use super::MasterView;
+use super::Case;
+use super::FuzzCase;
 use super::error::ExploreError;
-use super::{Act, AttemptRecord, Case};
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
 
 /// What the model makes of a case before it is tried.
-#[derive(Clone, Debug, Default)]
-pub struct Rehearsal {
+#[derive(Clone, Debug)]
+pub struct Rehearsal<C: FuzzCase = Case> {
     /// What the master sees of it.
-    pub seen: MasterView,
+    pub seen: C::Seen,
     /// How long the line is used for it, with all that comes before it on a rig.
     pub took: Span,
     /// What it shows.
@@ -19,38 +18,61 @@ pub struct Rehearsal {
     /// Why it is not tried: the rig does not allow it, or cannot do it.
     pub denied: Option<String>,
     /// How the model differs from the reference model.
-    pub of_model: Option<Difference>,
+    pub of_model: Option<C::Difference>,
+}
+
+impl<C: FuzzCase> Default for Rehearsal<C> {
+    fn default() -> Self {
+        Self {
+            seen: C::Seen::default(),
+            took: Span::ZERO,
+            features: BTreeSet::new(),
+            denied: None,
+            of_model: None,
+        }
+    }
 }
 
 /// The outcome of a case.
-#[derive(Clone, Debug, Default)]
-pub struct Tried {
+#[derive(Clone, Debug)]
+pub struct Tried<C: FuzzCase = Case> {
     /// How long the line was used for it.
     pub took: Span,
     /// Mismatch with the expected behaviour.
-    pub difference: Option<Difference>,
+    pub difference: Option<C::Difference>,
     /// What was sent to the ring between making its drives ready and the case, if the difference may come from that.
-    pub before: Option<Vec<Act>>,
+    pub before: Option<Vec<C::Act>>,
     /// Why it was not played after all.
     pub not_played: Option<String>,
 }
 
-/// A ring that cases are tried on, beside its model.
-pub trait Target {
+impl<C: FuzzCase> Default for Tried<C> {
+    fn default() -> Self {
+        Self {
+            took: Span::ZERO,
+            difference: None,
+            before: None,
+            not_played: None,
+        }
+    }
+}
+
+/// What cases are tried on, beside its model.
+pub trait Target<C: FuzzCase = Case> {
     /// Plays a case on the model.
     ///
     /// # Errors
     /// The model cannot be made.
-    fn rehearse(&mut self, case: &Case) -> Result<Rehearsal, ExploreError>;
+    fn rehearse(&mut self, case: &C) -> Result<Rehearsal<C>, ExploreError>;
 
     /// Tries a case that the model has been through.
     ///
     /// # Errors
     /// The rig cannot go on.
-    fn attempt(&mut self, case: &Case, rehearsal: &Rehearsal) -> Result<Tried, ExploreError>;
+    fn attempt(&mut self, case: &C, rehearsal: &Rehearsal<C>) -> Result<Tried<C>, ExploreError>;
 
     /// The last attempt, with all that its difference rests on; `None` where playing it again shows the same.
-    fn recorded(&self) -> Option<AttemptRecord> {
+    fn recorded(&self) -> Option<C::Attempt> {
         None
     }
 

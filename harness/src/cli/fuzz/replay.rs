@@ -99,7 +99,7 @@ fn campaign(
     scope: crate::explore::CaseScope,
 ) -> FuzzRun {
     let about = FuzzSettings {
-        schema: FuzzSettings::SCHEMA,
+        schema: <FuzzSettings>::SCHEMA,
         rig: arguments.rig.clone(),
         drives: scope.first.drives,
         second: scope.second.as_ref().map(|ring| ring.drives),

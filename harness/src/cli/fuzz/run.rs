@@ -241,7 +241,7 @@ fn about(
 ) -> FuzzSettings {
     let names = scope.spices.iter().map(|spice| spice.name().to_owned());
     FuzzSettings {
-        schema: FuzzSettings::SCHEMA,
+        schema: <FuzzSettings>::SCHEMA,
         rig: arguments.rig.clone(),
         drives: scope.first.drives,
         second: scope.second.as_ref().map(|ring| ring.drives),

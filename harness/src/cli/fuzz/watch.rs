@@ -2,7 +2,9 @@
 
 use crate::cli::output::Output;
 use crate::counted::counted;
-use crate::explore::{Finding, FuzzRun, Pool, Progress, RunEnd, Swarm, Watcher};
+use crate::explore::{
+    Differing, Finding, FuzzCase, FuzzRun, Pool, Progress, RunEnd, Swarm, Watcher,
+};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -22,19 +24,19 @@ pub(crate) struct Telling<'o> {
     pub(crate) failed: Option<std::io::Error>,
 }
 
-impl Watcher for Telling<'_> {
-    fn round(&mut self, round: u64, swarm: &Swarm) {
+impl<C: FuzzCase> Watcher<C> for Telling<'_> {
+    fn round(&mut self, round: u64, swarm: &Swarm<C::Spice>) {
         if self.rounds && self.output.progress {
             let names = swarm.names().join(" ");
             self.output.say(&format!("round {round}: {names}\n"));
         }
     }
 
-    fn found(&mut self, finding: &Finding, file: &str) {
+    fn found(&mut self, finding: &Finding<C>, file: &str) {
         if finding.seen_again == 0 {
             self.output.say(&format!(
                 "case {} differed once and not again in {} tries; the computer or the line may have been disturbed, so this is not a finding: {}\n",
-                finding.number, finding.of, finding.difference.about
+                finding.number, finding.of, finding.difference.about()
             ));
             return;
         }
@@ -46,7 +48,7 @@ impl Watcher for Telling<'_> {
             counted(finding.of, "time"),
             finding.difference.signature()
         );
-        text.push_str(&format!("  {}\n", finding.difference.about));
+        text.push_str(&format!("  {}\n", finding.difference.about()));
         if let Some(folder) = &self.folder {
             let path = folder.join(file).with_extension("json");
             text.push_str(&format!("  drivebench shrink {}\n", path.display()));
@@ -56,7 +58,7 @@ impl Watcher for Telling<'_> {
         }
     }
 
-    fn progress(&mut self, progress: &Progress, pool: &Pool) {
+    fn progress(&mut self, progress: &Progress, pool: &Pool<C>) {
         if self.output.progress && self.told.is_none_or(|told| told.elapsed() >= PAUSE) {
             self.told = Some(Instant::now());
             self.output.say(&format!(
@@ -70,7 +72,7 @@ impl Watcher for Telling<'_> {
 }
 
 /// The last line of a run.
-pub(crate) fn summary(campaign: &FuzzRun, end: &RunEnd) -> String {
+pub(crate) fn summary<C: FuzzCase>(campaign: &FuzzRun<C>, end: &RunEnd) -> String {
     let progress = campaign.progress();
     let (confirmed, flaky) = campaign.findings();
     let why = match end {

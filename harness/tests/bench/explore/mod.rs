@@ -60,7 +60,7 @@ fn planted(drive: u8, name: &str) -> RingSetup {
 
 fn about(setup: &RingSetup, seed: u64) -> FuzzSettings {
     FuzzSettings {
-        schema: FuzzSettings::SCHEMA,
+        schema: <FuzzSettings>::SCHEMA,
         rig: "sim:3".to_owned(),
         drives: 3,
         second: None,

@@ -205,7 +205,7 @@ fn counts(
         let mut target = OnSim::new(setup.clone());
         let scope = simulated(&rig, Limits::unlimited(), &setup);
         let about = FuzzSettings {
-            schema: FuzzSettings::SCHEMA,
+            schema: <FuzzSettings>::SCHEMA,
             rig: format!("sim:{DRIVES}"),
             drives: DRIVES,
             second: None,

@@ -1,8 +1,10 @@
 //! Exploring the ring: cases as values, and what generates, plays, judges and shrinks them.
 
 mod case;
+mod confirm;
 mod expect;
 mod finding;
+mod fuzz_case;
 mod generate;
 mod html;
 mod idiom;
@@ -20,24 +22,23 @@ mod play;
 pub mod promote;
 mod setup;
 pub mod shrink;
+mod spice;
 pub mod text;
 mod tour;
 
 pub use case::{
     Act, ActKind, Case, Damage, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, OtherRing, Talk, To,
 };
-pub use finding::Finding;
+pub use confirm::judged_again;
 pub use generate::{CaseScope, Generator, RingScope};
 pub use mutate::mutate;
-pub use novelty::{MOST_KEPT, Pool, by_novelty, features};
+pub use novelty::{by_novelty, features};
 pub use on_record::AttemptRecord;
-pub(crate) use on_record::OnRecord;
 pub use on_rig::OnRig;
 pub use on_sim::OnSim;
 pub use oracle::{Difference, against_model, against_reference, against_witnesses, beside};
 pub use order::{Command, CommandSent, Spoil};
 pub use page::page;
 pub use play::{MasterView, play};
-pub(crate) use setup::drive_name;
 pub use setup::{Planted, RingSetup};
-pub(crate) use tour::tour;
+pub use spice::Spice;

@@ -1,19 +1,15 @@
-//! Keeps cases that show new features, so that other cases can be made from them.
+//! What a case shows: its features.
 //!
 //! A feature is an action of a drive's bus end and the state of the line at that time: which byte of which kind of telegram followed which
 //! other byte, how the ring answered it, what the drives marked there (ND21 9.7) and for what reason.
 
 use crate::explore::Case;
-use crate::explore::Dice;
 use crate::explore::MasterView;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::{Role, roles};
 use harness_sim::novobus::mark::Mark as _;
 use harness_sim::record::Trace;
 use std::collections::BTreeSet;
-
-/// Maximum number of cases kept.
-pub const MOST_KEPT: usize = 2_000;
 
 /// The features of a run of the model.
 #[must_use]
@@ -104,53 +100,6 @@ fn hash(words: &[u32]) -> u32 {
     bytes.fold(0x811C_9DC5, |hash: u32, byte| {
         (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
     })
-}
-
-/// The cases that are kept, and what all of them have shown.
-#[derive(Clone, Debug, Default)]
-pub struct Pool {
-    cases: Vec<Case>,
-    /// Which of them are with ring 1, and which with ring 2.
-    of_ring: [Vec<usize>; 2],
-    shown: BTreeSet<u32>,
-}
-
-impl Pool {
-    /// Keeps a case that shows new features. Returns the number of new features, 0 if the case is not kept.
-    pub fn offer(&mut self, case: &Case, features: &BTreeSet<u32>) -> usize {
-        let new = features.difference(&self.shown).count();
-        if new == 0 || self.cases.len() >= MOST_KEPT {
-            return 0;
-        }
-        self.shown.extend(features);
-        self.of_ring[case.ring()].push(self.cases.len());
-        self.cases.push(case.clone());
-        new
-    }
-
-    /// Those that are kept, the oldest first.
-    #[must_use]
-    pub fn cases(&self) -> &[Case] {
-        &self.cases
-    }
-
-    /// How many features there are.
-    #[must_use]
-    pub fn shown(&self) -> usize {
-        self.shown.len()
-    }
-
-    /// One of them with this ring, counted from 0; the younger ones more often.
-    pub fn pick(&self, ring: usize, dice: &mut Dice) -> Option<&Case> {
-        let own = self.of_ring.get(ring)?;
-        let from = if dice.percent(50) {
-            own.len() * 3 / 4
-        } else {
-            0
-        };
-        let at = own.get(from + dice.below(own.len() - from))?;
-        self.cases.get(*at)
-    }
 }
 
 /// Cases in an order in which each shows as much new as any could, as long as one shows something.

@@ -198,7 +198,7 @@ impl Target for OnRig<'_, '_> {
             });
         }
         let (received, due, took) = converse(self.run.session().link(), case, foreseen.count);
-        let mut tried = Tried::default();
+        let mut tried: Tried = Tried::default();
         if let Some(trouble) = self.run.session().link().trouble() {
             self.stale = true;
             match trouble {

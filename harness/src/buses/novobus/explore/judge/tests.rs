@@ -232,7 +232,7 @@ fn run(mut ring: AnyRing, seed: u64, cases: u64, without: &[Spice]) -> (Vec<Find
         spare_eeprom: true,
     };
     let about = FuzzSettings {
-        schema: FuzzSettings::SCHEMA,
+        schema: <FuzzSettings>::SCHEMA,
         rig: "any".to_owned(),
         drives: 3,
         second: None,

@@ -1,0 +1,114 @@
+//! The ring's conversations as the engine explores them.
+
+use super::case::{Act, Case};
+use super::generate::{CaseScope, Generator};
+use super::mutate::mutate;
+use super::oracle::Difference;
+use super::play::MasterView;
+use super::setup::RingSetup;
+use super::tour::tour;
+use super::{AttemptRecord, Spice};
+use crate::explore::{
+    Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, Pool, Rehearsal,
+    Swarm, Target,
+};
+
+impl Differing for Difference {
+    fn is_like(&self, other: &Self) -> bool {
+        Difference::is_like(self, other)
+    }
+    fn key(&self) -> String {
+        Difference::key(self)
+    }
+    fn signature(&self) -> String {
+        Difference::signature(self)
+    }
+    fn about(&self) -> &str {
+        &self.about
+    }
+    fn place(&self) -> Option<usize> {
+        self.byte
+    }
+    fn is_time(&self) -> bool {
+        self.time
+    }
+}
+
+impl FuzzCase for Case {
+    type Scope = CaseScope;
+    type Setup = RingSetup;
+    type Spice = Spice;
+    type Seen = MasterView;
+    type Difference = Difference;
+    type Attempt = AttemptRecord;
+    type Act = Act;
+
+    fn swarm(seed: u64, round: u64, scope: &CaseScope) -> Swarm {
+        Swarm::of_round(seed, round, scope)
+    }
+
+    fn tour(scope: &CaseScope, about: &FuzzSettings) -> Vec<Self> {
+        let rings = std::iter::once(&scope.first).chain(&scope.second);
+        let rings = rings.filter(|_| about.ports);
+        in_turns(rings.map(|ring| tour(scope, ring, about.seed)).collect())
+    }
+
+    fn made(
+        scope: &CaseScope,
+        swarm: &Swarm,
+        (tour, number): (&[Self], u64),
+        pool: &Pool,
+        dice: &mut Dice,
+    ) -> Self {
+        let ring = usize::from(scope.second.is_some() && dice.percent(50));
+        let own = scope.ring(ring);
+        let maker = Generator::new(scope, own, swarm, dice);
+        // Every third case is left to chance.
+        let of_tour = (number % 3 < 2).then_some(number / 3 * 2 + number % 3);
+        let of_tour = of_tour.and_then(|number| tour.get(usize::try_from(number).ok()?));
+        if let Some(case) = of_tour {
+            let mut case = case.clone();
+            maker.keep_in_step(&mut case);
+            return case;
+        }
+        let old = dice.percent(60).then(|| pool.pick(ring, dice)).flatten();
+        let other = pool.pick(ring, dice);
+        match old {
+            Some(old) => mutate(old, other, &maker, dice),
+            None => maker.case(dice),
+        }
+    }
+
+    fn lane(&self) -> usize {
+        self.ring()
+    }
+
+    fn text(finding: &Finding) -> Result<String, ExploreError> {
+        finding.text()
+    }
+
+    fn is_sound(finding: &Finding) -> bool {
+        finding.is_bounded()
+    }
+
+    fn confirm(
+        confirmation: &mut Confirmation<'_>,
+        finding: &mut Finding,
+        rehearsal: &Rehearsal,
+        before: Option<&[Act]>,
+        target: &mut dyn Target,
+    ) -> Result<(), ExploreError> {
+        confirmation.on_ring(finding, rehearsal, before, target)
+    }
+}
+
+/// Interleaves the cases of several tours.
+fn in_turns(tours: Vec<Vec<Case>>) -> Vec<Case> {
+    let longest = tours.iter().map(Vec::len).max().unwrap_or(0);
+    let at = |index: usize| {
+        tours
+            .iter()
+            .filter_map(move |tour| tour.get(index).cloned())
+    };
+    (0..longest).flat_map(at).collect()
+}

@@ -1,0 +1,89 @@
+//! What a bus gives so that a run can explore it: the conversation as a value, and what makes, compares and tells of it.
+
+use super::confirm::Confirmation;
+use super::{ExploreError, Finding, FuzzSettings, Pool, Rehearsal, Swarm, Target};
+use crate::explore::Dice;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Debug;
+
+/// Something that a conversation can have.
+pub trait Spiced: Copy + Ord + Debug {
+    /// Its name.
+    fn name(self) -> &'static str;
+}
+
+/// A mismatch of a drive with the expected behaviour.
+pub trait Differing: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwned {
+    /// Whether another one is of the same kind: the same symptom, against the same rule of the same section.
+    fn is_like(&self, other: &Self) -> bool;
+    /// Identifies it within a run.
+    fn key(&self) -> String;
+    /// Its kind in words.
+    fn signature(&self) -> String;
+    /// The whole difference, as a sentence.
+    fn about(&self) -> &str;
+    /// The number of the received byte or frame, counted from 1; `None` if the difference is at none.
+    fn place(&self) -> Option<usize>;
+    /// Whether only the time of that byte or frame differs.
+    fn is_time(&self) -> bool;
+}
+
+/// A conversation with drives of one bus.
+pub trait FuzzCase:
+    Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwned + 'static
+{
+    /// What conversations of a run may have, and with what drives.
+    type Scope: Clone + Debug;
+    /// What the simulated drives are made of.
+    type Setup: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwned;
+    /// Something that a conversation can have.
+    type Spice: Spiced;
+    /// What the model answers.
+    type Seen: Clone + Debug + Default;
+    /// A mismatch with the expected behaviour.
+    type Difference: Differing;
+    /// An attempt with all that its difference rests on.
+    type Attempt: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwned;
+    /// A part of a conversation.
+    type Act: Clone + Debug;
+
+    /// The subset of a round of a run, of what the scope allows.
+    fn swarm(seed: u64, round: u64, scope: &Self::Scope) -> Swarm<Self::Spice>;
+
+    /// What the drives are asked before anything is left to chance.
+    fn tour(scope: &Self::Scope, about: &FuzzSettings<Self>) -> Vec<Self>;
+
+    /// The case of a number; `tour_and_number` has the tour too. It depends on the numbers of `dice`, and on what was kept before.
+    fn made(
+        scope: &Self::Scope,
+        swarm: &Swarm<Self::Spice>,
+        tour_and_number: (&[Self], u64),
+        pool: &Pool<Self>,
+        dice: &mut Dice,
+    ) -> Self;
+
+    /// Which drives it is with, 0 or 1; cases with different ones are not mixed.
+    fn lane(&self) -> usize;
+
+    /// The scenario of a finding.
+    ///
+    /// # Errors
+    /// The model cannot be made.
+    fn text(finding: &Finding<Self>) -> Result<String, ExploreError>;
+
+    /// Whether a finding that was read is within the bounds of what a run writes.
+    fn is_sound(finding: &Finding<Self>) -> bool;
+
+    /// Tries a finding again until it is confirmed, or is not. `before` is what was sent before its case.
+    ///
+    /// # Errors
+    /// The rig cannot go on.
+    fn confirm(
+        confirmation: &mut Confirmation<'_>,
+        finding: &mut Finding<Self>,
+        rehearsal: &Rehearsal<Self>,
+        before: Option<&[Self::Act]>,
+        target: &mut dyn Target<Self>,
+    ) -> Result<(), ExploreError>;
+}
