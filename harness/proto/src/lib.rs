@@ -5,13 +5,15 @@
 //! stands in one place with the section of the manual that it obeys ("ND21 9.6" is section 9.6 of the
 //! *ND21 User Manual 1/96*).
 //!
-//! * [`time`]: virtual time, exact for every rate of every line;
+//! * [`time`]: virtual time, exact for every rate of every line; [`decode`]: what a decoder answers;
 //! * [`can`]: frames of a CAN bus, their length on the wire, bit rates;
 //! * [`line`](mod@line): an asynchronous serial line: its rate, and what a receiver reads from it;
 //! * [`marks`]: how a stream of bytes carries line errors;
 //! * [`novobus`]: the ring of the Novotron ND21;
-//! * [`nd21`]: the cells of that drive that its bus end itself needs.
-//! * [`unitek`]: registers of UNITEK drives over CAN frames.
+//! * [`nd21`]: the cells of that drive that its bus end itself needs;
+//! * [`unitek`]: registers of UNITEK drives over CAN frames;
+//! * [`profibus`]: telegrams and services of PROFIBUS DP;
+//! * [`nordac`]: NORDAC *vector* inverters on PROFIBUS DP.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -20,10 +22,13 @@ extern crate alloc;
 extern crate std;
 
 pub mod can;
+pub mod decode;
 pub mod line;
 pub mod marks;
 pub mod nd21;
+pub mod nordac;
 pub mod novobus;
+pub mod profibus;
 pub mod ratio;
 pub mod time;
 pub mod unitek;

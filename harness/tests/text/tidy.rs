@@ -77,6 +77,11 @@ fn imports_go_one_way() {
         // A CAN bus knows no device, and the reference of a drive shares nothing with it but the table of registers.
         ("harness/proto/src/can.rs", &["unitek", "novobus"]),
         ("harness/sim/src/segment.rs", &["unitek", "novobus"]),
+        // The bus knows no device on it.
+        (
+            "harness/proto/src/profibus",
+            &["nordac", "unitek", "novobus"],
+        ),
         (
             "harness/sim/src/unitek/reference.rs",
             &["drive", "plant", "cycles", "outbox", "frame::", "crate::"],
@@ -222,6 +227,8 @@ fn a_name_is_one_type() {
             ("/unitek/", "unitek"),
             ("/novobus/", "novobus"),
             ("/nd21/", "novobus"),
+            ("/profibus/", "nordac"),
+            ("/nordac/", "nordac"),
         ];
         let bus = buses.iter().find(|(folder, _)| place.contains(folder));
         let bus = bus.map_or("rooms", |(_, bus)| *bus);

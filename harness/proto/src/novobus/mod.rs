@@ -27,7 +27,7 @@ pub mod bus_end;
 pub mod check_sequence;
 pub mod checksum;
 pub mod command;
-pub mod decode;
+pub use crate::decode;
 pub mod error;
 pub mod error_mode;
 pub mod guard;
