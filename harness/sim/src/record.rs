@@ -99,9 +99,10 @@ pub enum Carried {
 /// One channel's part of a trace: a link between two stations, or a segment that all stations share.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Channel {
-    /// The station that sends; `None` for the master, and on a shared segment, whose frames say who sent them.
+    /// The station that sends; `None` for the master, and on a segment of frames, which say who sent them. A segment of octets has one
+    /// channel for each station that sends.
     pub from: Option<u8>,
-    /// The station that receives; `None` for the master, and on a shared segment.
+    /// The station that receives; `None` for the master, and on a shared segment. Readers of a segment of octets merge its channels by time.
     pub to: Option<u8>,
     /// What it carried.
     pub carried: Carried,

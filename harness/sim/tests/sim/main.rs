@@ -3,5 +3,6 @@
 mod deviations;
 mod master;
 mod nd21;
+mod nordac;
 mod ring;
 mod unitek;

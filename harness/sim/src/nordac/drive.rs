@@ -1,0 +1,246 @@
+//! The drive as a station of a line, and what else is on it.
+
+use super::inverter::Inverter;
+use super::setup::Setup;
+use super::slave::{Receiver, Slave};
+use crate::octet_segment::{LineHost, LineStation, Octet, Wish};
+use harness_proto::line::Received;
+use harness_proto::nordac::Properties;
+use harness_proto::profibus::{Buffer, BusRate, Telegram};
+use harness_proto::time::Instant;
+
+/// A drive on a line.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    properties: Properties,
+    rate: BusRate,
+    receiver: Receiver,
+    slave: Slave,
+    inverter: Inverter,
+    /// The reply that waits, and when it begins.
+    reply: Option<(Instant, Buffer)>,
+    powered: bool,
+}
+
+impl Drive {
+    /// A drive that is switched on at `at`.
+    #[must_use]
+    pub fn new(setup: &Setup, rate: BusRate, at: Instant) -> Self {
+        let inverter = Inverter::new(setup, at);
+        Self {
+            slave: Slave::new(setup.properties, inverter.settings()),
+            receiver: Receiver::new(rate, at),
+            inverter,
+            properties: setup.properties,
+            rate,
+            reply: None,
+            powered: true,
+        }
+    }
+
+    /// The module.
+    #[must_use]
+    pub const fn slave(&self) -> &Slave {
+        &self.slave
+    }
+
+    /// The inverter.
+    #[must_use]
+    pub const fn inverter(&self) -> &Inverter {
+        &self.inverter
+    }
+
+    /// The inverter, to be changed by its inputs.
+    pub const fn inverter_mut(&mut self) -> &mut Inverter {
+        &mut self.inverter
+    }
+
+    /// Whether it has power.
+    #[must_use]
+    pub const fn is_powered(&self) -> bool {
+        self.powered
+    }
+
+    /// Switches the drive off or on. At power-up it has its settings, and everything else begins anew.
+    pub fn set_power(&mut self, at: Instant, on: bool) {
+        LineStation::advance(self, at);
+        if on == self.powered {
+            return;
+        }
+        self.powered = on;
+        self.reply = None;
+        if on {
+            self.inverter.power_up(at);
+            self.slave = Slave::new(self.properties, self.inverter.settings());
+        }
+    }
+
+    /// Module and inverter lose each other, or find each other again (NORDAC 2.6).
+    pub fn set_link(&mut self, at: Instant, lost: bool) {
+        LineStation::advance(self, at);
+        self.slave.link(at, lost, &mut self.inverter);
+    }
+}
+
+impl Drive {
+    /// Takes an octet; gives the telegram that it completes, to be answered by [`Drive::answer`]. A drive without power hears nothing.
+    pub fn receive(&mut self, at: Instant, octet: Received) -> Option<Telegram> {
+        if self.powered {
+            return self.receiver.hear(at, octet);
+        }
+        self.receiver.skip(at);
+        None
+    }
+
+    /// Takes a telegram that has ended at `at`. The reply, if there is one, waits from now on.
+    pub fn answer(&mut self, at: Instant, telegram: &Telegram) {
+        LineStation::advance(self, at);
+        // Set_Prm changes the delay of the replies behind its own.
+        let delay = self.rate.bit_time() * self.slave.reply_delay_bits();
+        if let Some(octets) = self.slave.hear(at, telegram, &mut self.inverter) {
+            self.reply = Some((at + delay, octets));
+        }
+    }
+
+    /// The reply that waits, and when it begins.
+    #[must_use]
+    pub const fn reply(&self) -> Option<&(Instant, Buffer)> {
+        self.reply.as_ref()
+    }
+
+    /// Takes the waiting reply out, so that it is not sent.
+    pub const fn take_reply(&mut self) -> Option<(Instant, Buffer)> {
+        self.reply.take()
+    }
+
+    /// The rate of the line.
+    #[must_use]
+    pub const fn rate(&self) -> BusRate {
+        self.rate
+    }
+}
+
+impl LineStation for Drive {
+    fn hear(&mut self, at: Instant, octet: Received) {
+        if let Some(telegram) = self.receive(at, octet) {
+            self.answer(at, &telegram);
+        }
+    }
+
+    fn wants(&self) -> Option<Wish> {
+        self.reply.as_ref().map(|(ready, _)| Wish {
+            ready: *ready,
+            idle_bits: 0,
+        })
+    }
+
+    fn begin(&mut self, _at: Instant, into: &mut Vec<Octet>) {
+        if let Some((_, octets)) = self.reply.take() {
+            into.extend(octets.iter().copied().map(Octet::from));
+        }
+    }
+
+    fn sent(&mut self, at: Instant) {
+        self.receiver.skip(at);
+    }
+
+    fn next_action(&self) -> Option<Instant> {
+        if !self.powered {
+            return None;
+        }
+        let own = self.slave.next_action();
+        own.into_iter().chain(self.inverter.next_action()).min()
+    }
+
+    fn advance(&mut self, to: Instant) {
+        while let Some(at) = self.next_action().filter(|at| *at <= to) {
+            self.inverter.advance(at);
+            self.slave.advance(at, &mut self.inverter);
+        }
+        if self.powered {
+            self.inverter.advance(to);
+        }
+    }
+}
+
+/// A host or a drive.
+#[derive(Clone, Debug)]
+pub enum Member<D> {
+    /// A host: a master, a client, a tap.
+    Host(LineHost),
+    /// A drive.
+    Drive(D),
+}
+
+impl<D> Member<D> {
+    /// The host, if it is one.
+    pub const fn host_mut(&mut self) -> Option<&mut LineHost> {
+        match self {
+            Self::Host(host) => Some(host),
+            Self::Drive(_) => None,
+        }
+    }
+
+    /// The host, if it is one.
+    #[must_use]
+    pub const fn host(&self) -> Option<&LineHost> {
+        match self {
+            Self::Host(host) => Some(host),
+            Self::Drive(_) => None,
+        }
+    }
+
+    /// The drive, if it is one.
+    pub const fn drive_mut(&mut self) -> Option<&mut D> {
+        match self {
+            Self::Host(_) => None,
+            Self::Drive(drive) => Some(drive),
+        }
+    }
+
+    /// The drive, if it is one.
+    #[must_use]
+    pub const fn drive(&self) -> Option<&D> {
+        match self {
+            Self::Host(_) => None,
+            Self::Drive(drive) => Some(drive),
+        }
+    }
+}
+
+impl<D: LineStation> Member<D> {
+    fn station(&self) -> &dyn LineStation {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => drive,
+        }
+    }
+
+    fn station_mut(&mut self) -> &mut dyn LineStation {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => drive,
+        }
+    }
+}
+
+impl<D: LineStation> LineStation for Member<D> {
+    fn hear(&mut self, at: Instant, octet: Received) {
+        self.station_mut().hear(at, octet);
+    }
+    fn wants(&self) -> Option<Wish> {
+        self.station().wants()
+    }
+    fn begin(&mut self, at: Instant, into: &mut Vec<Octet>) {
+        self.station_mut().begin(at, into);
+    }
+    fn sent(&mut self, at: Instant) {
+        self.station_mut().sent(at);
+    }
+    fn next_action(&self) -> Option<Instant> {
+        self.station().next_action()
+    }
+    fn advance(&mut self, to: Instant) {
+        self.station_mut().advance(to);
+    }
+}

@@ -1,0 +1,13 @@
+//! The simulated NORDAC *vector*: the inverter and its PROFIBUS module.
+//!
+//! Sections are cited as in [`harness_proto::nordac`] and [`harness_proto::profibus`].
+
+mod drive;
+pub mod inverter;
+mod setup;
+pub mod slave;
+
+pub use drive::{Drive, Member};
+pub use inverter::Inverter;
+pub use setup::Setup;
+pub use slave::Slave;

@@ -1,0 +1,14 @@
+//! How a simulated drive is set up before power-up.
+
+use harness_proto::nordac::properties::Properties;
+
+/// How a simulated drive is set up before power-up.
+#[derive(Clone, Debug, Default)]
+pub struct Setup {
+    /// What the manual leaves open.
+    pub properties: Properties,
+    /// Whether the PosiCon option is fitted, and its parameters exist (5.6).
+    pub posicon: bool,
+    /// Parameters that are stored already: number, sub-index, raw value. The others have their factory settings.
+    pub parameters: Vec<(u16, u8, i32)>,
+}

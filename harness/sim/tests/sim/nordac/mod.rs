@@ -1,0 +1,5 @@
+//! The NORDAC inverter and its PROFIBUS module on a shared line: printed telegrams, tables, and properties.
+
+mod common;
+mod line;
+mod slave;
