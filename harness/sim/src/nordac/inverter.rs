@@ -1,135 +1,414 @@
-//! The inverter behind the module.
+//! The inverter behind the PROFIBUS module: process words, state machine, ramps, time-outs and faults (3.2, 3.3, 5, 2.6).
+//!
+//! The inverter has no cycle. Words arrive, the motor comes to rest, a time-out expires: each of these happens at an exact instant. In between the
+//! frequency is a formula, so that an idle inverter costs nothing.
 
-use super::setup::Setup;
-use harness_proto::nordac::pkw::{Answer, Pkw};
-use harness_proto::nordac::words::zsw;
-use harness_proto::nordac::{DEFAULT_ADDRESS, PpoType};
-use harness_proto::time::Instant;
+mod course;
+mod show;
+mod task;
 
-/// The words of an exchange that the inverter takes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+use super::Setup;
+use super::faults::{FaultMemory, Past, TIME_OUT};
+use super::frequency::Frequency;
+use super::machine;
+use super::parameters::Parameters;
+use super::ramp::Ramp;
+use harness_proto::nordac::pkw::Index;
+use harness_proto::nordac::properties::{
+    Off1BeatsDisable, Properties, PzdInvalid, Reinit, TimeoutCounts, TimeoutExactly,
+    TimeoutWith1614,
+};
+use harness_proto::nordac::words::{State, set_of, stw};
+use harness_proto::nordac::{Parameter, PpoType};
+use harness_proto::time::{Instant, Span};
+
+/// The control word before the first valid one: OFF1 alone (section 5 of the reading).
+const INITIAL: u16 = stw::NO_OFF2 | stw::NO_OFF3;
+/// How long module and inverter may have lost each other before fault 10 (2.6).
+const APART: Span = Span::from_millis(100);
+/// The unit of 1625.
+const TIMEOUT_UNIT: Span = Span::from_millis(100);
+/// The shortest time there is.
+const MOMENT: Span = Span::from_units(1);
+
+/// The process words of a Data_Exchange. What the PPO type does not carry is 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Outputs {
-    /// Control word.
+    /// The control word.
     pub stw: u16,
-    /// Main setpoint.
+    /// The main setpoint.
     pub hsw: u16,
-    /// PZD3; 0 where the PPO type has none.
+    /// The low word of a position.
     pub pzd3: u16,
-    /// PZD4; 0 where the PPO type has none.
+    /// The second setpoint.
     pub pzd4: u16,
 }
 
-/// The words of an exchange that the inverter gives.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The process words of a reply.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Inputs {
-    /// Status word.
+    /// The status word.
     pub zsw: u16,
-    /// Main actual value.
+    /// The main actual value.
     pub hiw: u16,
-    /// PZD3.
+    /// 0: the model does not position.
     pub pzd3: u16,
-    /// PZD4.
+    /// Actual value 2.
     pub pzd4: u16,
 }
 
-/// The parameters with which the module works: a change makes it begin anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What the module works with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Settings {
-    /// 1624: the address, 1 to 126.
+    /// 1624: 1 to 126.
     pub address: u8,
-    /// 1622: the PPO type.
+    /// 1622.
     pub ppo: PpoType,
-    /// 1619: the bus mode.
-    pub bus_mode: u8,
+    /// How often the module had to begin anew because 1619, 1622 or 1624 changed or the factory settings were loaded.
+    pub restarts: u32,
 }
 
-/// The inverter.
+/// What happens by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Event {
+    /// The motor has come to rest, and the state ends with it.
+    Standstill,
+    /// 1625 has expired.
+    BusTimeout,
+    /// Module and inverter have lost each other for too long.
+    Apart,
+}
+
+/// The simulated inverter.
 #[derive(Clone, Debug)]
 pub struct Inverter {
+    properties: Properties,
+    posicon: bool,
+    parameters: Parameters,
     settings: Settings,
+    faults: FaultMemory,
+    state: State,
+    /// The words in force: those of the last valid exchange that the interface lets through.
+    words: Outputs,
+    /// Whether a valid control word has come since power-up.
+    controlled: bool,
+    ramp: Ramp,
+    /// The last exchange that counts for 1625; `None` while it is not armed.
+    heard: Option<Instant>,
+    /// Since when module and inverter have lost each other.
+    lost: Option<Instant>,
+    /// When fault 10 comes for that.
+    apart: Option<Instant>,
+    /// The fault whose cause is there.
+    cause: Option<u8>,
+    now: Instant,
 }
 
 impl Inverter {
-    /// The inverter at its first power-up, at `at`.
+    /// An inverter that is switched on at `at`.
     #[must_use]
     pub fn new(setup: &Setup, at: Instant) -> Self {
-        let _ = at;
-        let stored = |number: u16, default: u8| {
-            let mut all = setup.parameters.iter();
-            let own = all.find(|(own, ..)| *own == number);
-            own.and_then(|(.., raw)| u8::try_from(*raw).ok())
-                .unwrap_or(default)
-        };
-        Self {
+        let mut parameters = Parameters::default();
+        for (number, index, value) in &setup.parameters {
+            if let Some(parameter) = Parameter::of(*number) {
+                parameters.store(parameter, *index, *value);
+            }
+        }
+        let mut inverter = Self {
+            properties: setup.properties,
+            posicon: setup.posicon,
+            parameters,
             settings: Settings {
-                address: stored(1624, DEFAULT_ADDRESS),
-                ppo: PpoType::from_raw(stored(1622, 0)).unwrap_or_default(),
-                bus_mode: stored(1619, 2),
+                address: 0,
+                ppo: PpoType::One,
+                restarts: 0,
             },
-        }
+            faults: FaultMemory::default(),
+            state: State::StartDisable,
+            words: Outputs::default(),
+            controlled: false,
+            ramp: Ramp::default(),
+            heard: None,
+            lost: None,
+            apart: None,
+            cause: None,
+            now: at,
+        };
+        inverter.power_up(at);
+        inverter
     }
 
-    /// The power is back at `at`: everything but the stored parameters begins anew.
+    /// The power is back at `at`, and nothing has happened since it went. Parameters and past faults stay; a cause of a fault and a lost
+    /// link stay too.
     pub fn power_up(&mut self, at: Instant) {
-        let _ = at;
-    }
-
-    /// When it does something by itself.
-    #[must_use]
-    pub const fn next_action(&self) -> Option<Instant> {
-        None
-    }
-
-    /// Does what is due up to and including `to`.
-    pub fn advance(&mut self, to: Instant) {
-        let _ = to;
-    }
-
-    /// Takes the words of an exchange.
-    pub fn take(&mut self, at: Instant, outputs: &Outputs) {
-        let _ = (at, outputs);
-    }
-
-    /// The words that it gives at `at`.
-    #[must_use]
-    pub fn inputs(&self, at: Instant) -> Inputs {
-        let _ = at;
-        Inputs {
-            zsw: zsw::START_DISABLE | zsw::NO_OFF2 | zsw::NO_OFF3,
-            ..Inputs::default()
+        self.now = self.now.max(at);
+        self.words = Outputs {
+            stw: INITIAL,
+            ..Outputs::default()
+        };
+        self.controlled = false;
+        self.heard = None;
+        self.lost = self.lost.map(|_| at);
+        self.apart = self.lost.map(|since| since + APART);
+        self.faults.acknowledge();
+        self.state = State::StartDisable;
+        self.settings = Settings {
+            restarts: self.settings.restarts + 1,
+            ..self.stored_settings()
+        };
+        self.steer();
+        if let Some(code) = self.cause {
+            self.fail(code);
         }
     }
 
-    /// Executes a task of the parameter channel once.
-    pub fn task(&mut self, at: Instant, task: Pkw, ppo: PpoType) -> Answer {
-        self.current(at, task, ppo)
+    /// Lets the time pass until `to`.
+    pub fn advance(&mut self, to: Instant) {
+        while let Some((at, event)) = self.next_event() {
+            if at > to {
+                break;
+            }
+            self.now = self.now.max(at);
+            self.happen(event);
+        }
+        self.now = self.now.max(to);
     }
 
-    /// The answer to a task that was executed, with the current value.
+    /// When something happens by itself: the state, the fault memory or the status word change then. Ramps are no events.
     #[must_use]
-    pub fn current(&self, at: Instant, task: Pkw, ppo: PpoType) -> Answer {
-        let _ = (at, task, ppo);
-        Answer::None
+    pub fn next_action(&self) -> Option<Instant> {
+        self.next_event().map(|(at, _)| at)
     }
 
-    /// The parameters with which the module works.
+    /// Takes over the process words of an exchange.
+    pub fn take(&mut self, at: Instant, outputs: &Outputs) {
+        self.advance(at);
+        let interface = self.value(1621);
+        if interface == 0 {
+            return;
+        }
+        let valid = outputs.stw & stw::VALID != 0;
+        if valid || self.properties.timeout_counts == TimeoutCounts::AnyDataExchange {
+            self.heard = Some(at);
+        }
+        let controls = !matches!(interface, 1 | 4);
+        if valid {
+            self.words.hsw = outputs.hsw;
+            self.words.pzd3 = outputs.pzd3;
+            if matches!(interface, 3 | 6) {
+                self.words.pzd4 = outputs.pzd4;
+            }
+        }
+        match self.properties.pzd_invalid {
+            _ if !controls => self.steer(),
+            _ if valid => self.obey(outputs.stw),
+            PzdInvalid::Hold => {}
+            PzdInvalid::SetpointOnly => self.obey(outputs.stw),
+            PzdInvalid::Stop => self.switch_off(),
+        }
+        self.advance(at);
+    }
+
+    /// The DP watchdog of the module has expired at `at`, and the drive stops for it (`watchdog-action`).
+    pub fn watchdog_expired(&mut self, at: Instant) {
+        self.advance(at);
+        self.switch_off();
+        self.advance(at);
+    }
+
+    /// Module and inverter lose each other at `at` (2.6).
+    pub fn link_lost(&mut self, at: Instant) {
+        self.advance(at);
+        if self.lost.is_none() {
+            self.lost = Some(at);
+            self.apart = Some(at + APART);
+        }
+    }
+
+    /// Module and inverter find each other again at `at`.
+    pub fn link_found(&mut self, at: Instant) {
+        self.advance(at);
+        self.lost = None;
+        self.apart = None;
+    }
+
+    /// A cause of a fault (1 to 25) comes at `at`, or goes.
+    pub fn set_cause(&mut self, at: Instant, code: Option<u8>) {
+        self.advance(at);
+        self.cause = code;
+        if let Some(code) = code {
+            self.fail(code);
+        }
+        self.advance(at);
+    }
+
+    /// What the module works with now.
     #[must_use]
     pub const fn settings(&self) -> Settings {
         self.settings
     }
 
-    /// The watchdog of the module has expired, and the drive is to stop for it.
-    pub fn watchdog_expired(&mut self, at: Instant) {
-        let _ = at;
+    /// The state; the time must have advanced to now.
+    #[must_use]
+    pub const fn state(&self) -> State {
+        self.state
     }
 
-    /// The module is lost.
-    pub fn link_lost(&mut self, at: Instant) {
-        let _ = at;
+    /// The process words in force.
+    #[must_use]
+    pub const fn words(&self) -> Outputs {
+        self.words
     }
 
-    /// The module is there again.
-    pub fn link_found(&mut self, at: Instant) {
-        let _ = at;
+    /// The exact frequency at `at`, which must not be before the last call.
+    #[must_use]
+    pub fn frequency(&self, at: Instant) -> Frequency {
+        self.ramp.at(at)
+    }
+
+    /// The active parameter set, 0 to 3.
+    #[must_use]
+    pub const fn set(&self) -> u8 {
+        set_of(self.words.stw)
+    }
+
+    /// The value of a parameter in the active set.
+    fn value(&self, number: u16) -> i32 {
+        self.parameters.value(number, self.set())
+    }
+
+    /// A value that is never negative: a time, a frequency, a size.
+    fn size(&self, number: u16) -> u16 {
+        u16::try_from(self.value(number)).unwrap_or(0)
+    }
+
+    /// Takes over a control word.
+    fn obey(&mut self, word: u16) {
+        let acknowledges = word & !self.words.stw & stw::ACKNOWLEDGE != 0;
+        self.words.stw = word;
+        self.controlled = true;
+        if self.state == State::Fault {
+            if acknowledges && self.cause.is_none() && self.lost.is_none() {
+                self.faults.acknowledge();
+                self.state = State::StartDisable;
+            }
+        } else {
+            let standing = self.ramp.at(self.now).is_zero();
+            let off1_first = self.properties.off1_beats_disable == Off1BeatsDisable::Yes;
+            while let Some((_, state)) = machine::next(self.state, word, standing, off1_first) {
+                self.state = state;
+            }
+        }
+        self.steer();
+    }
+
+    /// OFF1 for a motor that runs.
+    fn switch_off(&mut self) {
+        if self.state == State::OperationEnabled {
+            self.obey(self.words.stw & !stw::ON);
+        }
+    }
+
+    /// A fault occurs (rule 12). In the state "fault" a further one is not recorded.
+    fn fail(&mut self, code: u8) {
+        if self.state == State::Fault {
+            return;
+        }
+        self.faults.record(self.snapshot(code));
+        let at_once = code == TIME_OUT && self.properties.timeout_with_1614 == TimeoutWith1614::Off;
+        let stops = self.value(1614) == 1 && !self.ramp.at(self.now).is_zero() && !at_once;
+        self.state = if stops {
+            State::FaultReaction
+        } else {
+            State::Fault
+        };
+        self.steer();
+    }
+
+    fn next_event(&self) -> Option<(Instant, Event)> {
+        let standstill =
+            machine::at_standstill(self.state, self.words.stw).and_then(|_| self.ramp.zero_at());
+        let timeout = self.bus_timeout();
+        let events = [
+            standstill.map(|at| (at, Event::Standstill)),
+            timeout.map(|at| (at, Event::BusTimeout)),
+            self.apart.map(|at| (at, Event::Apart)),
+        ];
+        events.into_iter().flatten().min_by_key(|(at, _)| *at)
+    }
+
+    fn bus_timeout(&self) -> Option<Instant> {
+        let heard = self.heard?;
+        let time = TIMEOUT_UNIT * u64::from(self.size(1625));
+        let survives = self.properties.timeout_exactly == TimeoutExactly::Survives;
+        let more = if survives { MOMENT } else { Span::ZERO };
+        (time != Span::ZERO).then_some(heard + time + more)
+    }
+
+    fn happen(&mut self, event: Event) {
+        match event {
+            Event::Standstill => {
+                if let Some((_, state)) = machine::at_standstill(self.state, self.words.stw) {
+                    self.state = state;
+                }
+                self.steer();
+            }
+            Event::BusTimeout => {
+                self.heard = None;
+                self.fail(TIME_OUT);
+            }
+            Event::Apart => {
+                self.apart = None;
+                self.fail(TIME_OUT);
+            }
+        }
+    }
+
+    /// What the fault memory keeps of a fault that occurs now.
+    fn snapshot(&self, code: u8) -> Past {
+        let word = |number: i128| u16::try_from(number).unwrap_or(u16::MAX);
+        Past {
+            code,
+            hours: 0,
+            frequency: word(self.ramp.at(self.now).abs().cut(1, 1)),
+            voltage: word(self.output_voltage(self.now)),
+            current: self.output_current() / 10,
+            temperature: show::HEAT_SINK * 10,
+            set: self.set(),
+        }
+    }
+
+    /// The settings as they are stored.
+    fn stored_settings(&self) -> Settings {
+        let raw = u8::try_from(self.value(1622)).unwrap_or(0);
+        Settings {
+            address: u8::try_from(self.value(1624)).unwrap_or(0),
+            ppo: PpoType::from_raw(raw).unwrap_or_default(),
+            restarts: self.settings.restarts,
+        }
+    }
+
+    /// A parameter has changed at [`Inverter::now`]; `anew` says whether the module must begin anew.
+    fn changed(&mut self, anew: bool) {
+        if anew && self.properties.reinit == Reinit::AtOnce {
+            self.settings = Settings {
+                restarts: self.settings.restarts + 1,
+                ..self.stored_settings()
+            };
+        }
+        self.steer();
+        self.advance(self.now);
+    }
+
+    /// The value of a parameter as it reads now; `None` where there is no such parameter or index.
+    #[must_use]
+    pub fn parameter(&self, parameter: &'static Parameter, index: Index) -> Option<i64> {
+        let there = self.has(parameter)
+            && index.element < self.elements(parameter)
+            && index.set < parameter.sets();
+        there.then(|| self.shown(self.now, parameter, index))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,7 +3,14 @@
 //! Sections are cited as in [`harness_proto::nordac`] and [`harness_proto::profibus`].
 
 mod drive;
+pub mod faults;
+pub mod frequency;
 pub mod inverter;
+pub mod machine;
+pub mod parameters;
+#[cfg(test)]
+mod property;
+pub mod ramp;
 mod setup;
 pub mod slave;
 

@@ -1,5 +1,6 @@
 //! How a simulated drive is set up before power-up.
 
+use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::Properties;
 
 /// How a simulated drive is set up before power-up.
@@ -9,6 +10,6 @@ pub struct Setup {
     pub properties: Properties,
     /// Whether the PosiCon option is fitted, and its parameters exist (5.6).
     pub posicon: bool,
-    /// Parameters that are stored already: number, sub-index, raw value. The others have their factory settings.
-    pub parameters: Vec<(u16, u8, i32)>,
+    /// Parameters that are stored already: number, set and element, value. The others have their factory settings.
+    pub parameters: Vec<(u16, Index, i32)>,
 }

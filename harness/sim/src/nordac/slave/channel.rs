@@ -49,7 +49,7 @@ impl Channel {
         } else {
             inverter.current(at, task, ppo)
         };
-        now.to(task)
+        inverter.encode(now, task)
     }
 
     /// Takes what an exchange has brought, and executes the task if it is new.

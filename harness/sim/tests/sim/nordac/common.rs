@@ -1,6 +1,7 @@
 //! A desk: masters and drives on one line.
 
 use harness_proto::nordac::Properties;
+use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::Description;
 use harness_proto::profibus::fdl::{FrameControl, Function, Pdu, Sequence};
 use harness_proto::profibus::{BusRate, Telegram};
@@ -29,8 +30,12 @@ fn written(heard: impl Iterator<Item = harness_proto::line::Received>) -> String
 
 /// A setup with this address and these parameters.
 pub(super) fn setup(address: i32, parameters: &[(u16, i32)]) -> Setup {
-    let mut all = vec![(1624, 0, address)];
-    all.extend(parameters.iter().map(|&(number, raw)| (number, 0, raw)));
+    let mut all = vec![(1624, Index::default(), address)];
+    all.extend(
+        parameters
+            .iter()
+            .map(|&(number, raw)| (number, Index::default(), raw)),
+    );
     Setup {
         parameters: all,
         ..Setup::default()
