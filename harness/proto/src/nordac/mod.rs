@@ -5,8 +5,12 @@
 //!
 //! * [`ppo`]: the four layouts of the process data; [`words`]: control word, status word, states; [`pkw`]: the parameter channel;
 //! * [`parameter`] and [`PARAMETERS`]: the 172 parameters; [`units`]: seconds, hertz, ampere and raw numbers;
-//! * [`properties`]: what the manual leaves open.
+//! * [`properties`]: what the manual leaves open;
+//! * [`guard`]: what a telegram may do to a physical inverter;
+//! * [`master`]: one inverter as its master sees it.
 
+pub mod guard;
+pub mod master;
 pub mod parameter;
 pub mod pkw;
 pub mod ppo;

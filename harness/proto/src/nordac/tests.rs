@@ -456,6 +456,8 @@ fn properties_take_their_values() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     /// What is shown is read again.
     #[test]
     fn shown_values_are_read(place in 0..PARAMETERS.len(), raw in any::<u32>()) {

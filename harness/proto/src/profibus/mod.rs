@@ -5,12 +5,14 @@
 //!
 //! * [`rate`]: bit rates, and the times that are counted in bits;
 //! * [`fdl`]: telegrams SD1 to SD4 and SC, function codes, repetitions;
-//! * [`dp`]: the services, their data, the configuration bytes.
+//! * [`dp`]: the services, their data, the configuration bytes;
+//! * [`master`]: requests to a slave, and its replies.
 
 mod buffer;
 mod control;
 pub mod dp;
 pub mod fdl;
+pub mod master;
 pub mod rate;
 
 pub use fdl::{Buffer, Pdu, Telegram};

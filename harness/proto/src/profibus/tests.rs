@@ -257,6 +257,8 @@ fn any_telegram() -> impl Strategy<Value = Telegram> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     /// A telegram is what its octets say; every proper prefix is the beginning of one; octets behind it do not count.
     #[test]
     fn round_trip(telegram in any_telegram(), behind in prop::collection::vec(any::<u8>(), 0..4)) {
