@@ -10,7 +10,7 @@ use crate::program::{ended, said, verify};
 use crate::ring::Served;
 use harness::port::Endpoint;
 use std::io::{Read, Write};
-use std::net::TcpListener;
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -115,6 +115,64 @@ fn a_ring_is_qualified() {
         let served = Served::start("nd21", &[2], transport, true, &[]);
         is_qualified(&Desk::of(&served), &["--allow-motion"]);
     }
+}
+
+/// Passes bytes on between a client and a ring, and holds the end of an answer back for 150 ms, behind the end of its conversation.
+fn holding_back(to: &str) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let place = listener.local_addr().expect("an address").to_string();
+    let to = to.to_owned();
+    std::thread::spawn(move || {
+        while let Ok((client, _)) = listener.accept() {
+            let Ok(ring) = TcpStream::connect(&to) else {
+                return;
+            };
+            for stream in [&client, &ring] {
+                stream.set_nodelay(true).expect("a socket");
+            }
+            let copy = |stream: &TcpStream| stream.try_clone().expect("a socket");
+            let (sent, into) = (copy(&client), copy(&ring));
+            std::thread::spawn(move || pass(sent, into, &[]));
+            // ReadByte of FE17, as it comes back (ND21 10.1).
+            std::thread::spawn(move || pass(ring, client, &[0xC0, 0x17]));
+        }
+    });
+    place
+}
+
+/// Passes bytes on, and waits once, in front of the byte that follows these two.
+fn pass(mut from: TcpStream, mut to: TcpStream, mut hold: &[u8]) {
+    let mut byte = [0];
+    let mut before = Vec::new();
+    while let Ok(1) = from.read(&mut byte) {
+        if !hold.is_empty() && before.ends_with(hold) {
+            std::thread::sleep(Duration::from_millis(150));
+            hold = &[];
+        }
+        before.push(byte[0]);
+        if to.write_all(&byte).is_err() {
+            return;
+        }
+    }
+    let _gone = to.shutdown(Shutdown::Both);
+}
+
+/// Bytes that come behind the end of an attempt are no answers in the next one, which is right.
+#[test]
+fn late_bytes_are_not_taken_for_those_of_the_next_attempt() {
+    let served = Served::start("nd21", &[2], "tcp", true, &[]);
+    let Endpoint::Tcp(place) = &served.endpoints[0] else {
+        panic!("a socket");
+    };
+    let desk = Desk::new(2, "tcp", &holding_back(place));
+    let scenario = desk.path("late.scn");
+    let text = "title A cell that nothing else reads\nring 2\n> 80*3\n> 88 FE C0 17 FE D5 80*2\n";
+    std::fs::write(&scenario, text).expect("room");
+    let path = desk.path("desk.toml");
+    let rig = std::fs::read_to_string(&path).expect("a rig file");
+    std::fs::write(&path, rig + "[retry]\nattempts = 2\n").expect("room");
+    let output = desk.run(&["run", scenario.to_str().expect("a name")]);
+    ended(&output, 5, "2 attempts: failed, passed");
 }
 
 /// A right ring has no deviations, and its evidence is judged again.
