@@ -61,7 +61,7 @@ impl Drive {
         self.powered
     }
 
-    /// Switches the drive off or on. At power-up it has its settings, and everything else begins anew.
+    /// Switches the drive off or on. At power-up it has its settings, and everything else is as after power-up.
     pub fn set_power(&mut self, at: Instant, on: bool) {
         LineStation::advance(self, at);
         if on == self.powered {

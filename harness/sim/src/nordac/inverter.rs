@@ -64,7 +64,7 @@ pub struct Settings {
     pub address: u8,
     /// 1622.
     pub ppo: PpoType,
-    /// How often the module had to begin anew because 1619, 1622 or 1624 changed or the factory settings were loaded.
+    /// How often the module had to restart because 1619, 1622 or 1624 changed or the factory settings were loaded.
     pub restarts: u32,
 }
 
@@ -388,9 +388,9 @@ impl Inverter {
         }
     }
 
-    /// A parameter has changed at [`Inverter::now`]; `anew` says whether the module must begin anew.
-    fn changed(&mut self, anew: bool) {
-        if anew && self.properties.reinit == Reinit::AtOnce {
+    /// A parameter has changed at [`Inverter::now`]; `restart` says whether the module must restart.
+    fn changed(&mut self, restart: bool) {
+        if restart && self.properties.reinit == Reinit::AtOnce {
             self.settings = Settings {
                 restarts: self.settings.restarts + 1,
                 ..self.stored_settings()

@@ -2,6 +2,7 @@
 //!
 //! Sections are cited as in [`harness_proto::nordac`] and [`harness_proto::profibus`].
 
+pub mod deviation;
 mod drive;
 pub mod faults;
 pub mod frequency;

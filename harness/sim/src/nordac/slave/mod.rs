@@ -8,7 +8,7 @@ mod image;
 mod receiver;
 mod services;
 
-pub(in crate::nordac) use receiver::Receiver;
+pub(in crate::nordac) use receiver::{Receiver, expected};
 
 use super::inverter::{Inverter, Settings};
 use harness_proto::nordac::properties::{
@@ -304,7 +304,7 @@ impl Slave {
         self.data = ProcessData::default();
     }
 
-    /// Begins anew if the inverter has other settings of the bus than before.
+    /// Restarts if the inverter has other settings of the bus than before.
     fn follow(&mut self, inverter: &Inverter) {
         let settings = inverter.settings();
         if settings != self.settings && self.properties.reinit == Reinit::AtOnce {

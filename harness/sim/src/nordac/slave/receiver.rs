@@ -70,7 +70,7 @@ impl Receiver {
 }
 
 /// How many octets a telegram has that begins with these, or more than there are if that is not known yet; `None` if no telegram begins so.
-fn expected(octets: &[u8]) -> Option<usize> {
+pub(in crate::nordac) fn expected(octets: &[u8]) -> Option<usize> {
     match *octets {
         [SC, ..] => Some(1),
         [SD4, ..] => Some(3),

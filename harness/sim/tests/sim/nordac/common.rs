@@ -7,7 +7,7 @@ use harness_proto::profibus::fdl::{FrameControl, Function, Pdu, Sequence};
 use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::{Drive, Member, Setup};
-use harness_sim::octet_segment::{LineHost, Octet, OctetSegment, Wish};
+use harness_sim::octet_segment::{LineHost, LineStation, Octet, OctetSegment, Wish};
 
 /// Buffer written in hexadecimal digits.
 pub(super) fn octets(text: &str) -> Vec<u8> {
@@ -52,8 +52,8 @@ pub(super) fn with(mut setup: Setup, name: &str, word: &str) -> Setup {
 }
 
 /// LineStation 0 is the bench, the stations from 1 on are drives.
-pub(super) struct Desk {
-    pub(super) line: OctetSegment<Member<Box<Drive>>>,
+pub(super) struct Desk<D = Box<Drive>> {
+    pub(super) line: OctetSegment<Member<D>>,
     pub(super) rate: BusRate,
     now: Instant,
     /// The master as which the bench sends, and the slave to which.
@@ -68,11 +68,23 @@ impl Desk {
     }
 
     pub(super) fn at(rate: BusRate, setups: &[Setup]) -> Self {
-        let drives = setups.iter().map(|setup| {
-            let drive = Drive::new(setup, rate, Instant::START);
-            Member::Drive(Box::new(drive))
-        });
-        let stations = std::iter::once(Member::Host(LineHost::default())).chain(drives);
+        let drives = setups.iter();
+        Self::over(
+            rate,
+            drives.map(|setup| Box::new(Drive::new(setup, rate, Instant::START))),
+        )
+    }
+
+    /// The bench and the drive of the standard telegrams: master 2, slave 8.
+    pub(super) fn standard() -> Self {
+        Self::new(&setup(8, &[]))
+    }
+}
+
+impl<D: LineStation> Desk<D> {
+    pub(super) fn over(rate: BusRate, drives: impl Iterator<Item = D>) -> Self {
+        let stations =
+            std::iter::once(Member::Host(LineHost::default())).chain(drives.map(Member::Drive));
         Self {
             line: OctetSegment::new(rate.format(), stations.collect()),
             rate,
@@ -83,11 +95,6 @@ impl Desk {
         }
     }
 
-    /// The bench and the drive of the standard telegrams: master 2, slave 8.
-    pub(super) fn standard() -> Self {
-        Self::new(&setup(8, &[]))
-    }
-
     pub(super) fn host(&mut self) -> &mut LineHost {
         self.line
             .station_mut(0)
@@ -95,7 +102,7 @@ impl Desk {
             .expect("station 0 is the bench")
     }
 
-    pub(super) fn drive(&mut self) -> &mut Drive {
+    pub(super) fn drive(&mut self) -> &mut D {
         self.line
             .station_mut(1)
             .drive_mut()

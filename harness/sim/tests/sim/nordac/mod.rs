@@ -1,5 +1,7 @@
 //! The NORDAC inverter and its PROFIBUS module on a shared line: printed telegrams, tables, and properties.
 
 mod common;
+mod deviations;
+mod exchange;
 mod line;
 mod slave;

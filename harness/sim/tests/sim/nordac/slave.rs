@@ -485,7 +485,7 @@ fn autobaud() {
     assert_eq!(desk.ask(status), "10 02 08 00 0A 16");
 }
 
-/// A drive without power neither hears nor sends, and begins anew.
+/// A drive without power neither hears nor sends, and restarts.
 #[test]
 fn power() {
     let mut desk = Desk::standard();

@@ -255,7 +255,7 @@ fn repeated_answers_are_current() {
     );
 }
 
-/// 970 and 1602 load the factory settings, other values do nothing; the module begins anew (4.1.3).
+/// 970 and 1602 load the factory settings, other values do nothing; the module restarts (4.1.3).
 #[test]
 fn factory_settings() {
     for (task, loads) in [
