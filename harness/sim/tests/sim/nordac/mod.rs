@@ -4,4 +4,5 @@ mod common;
 mod deviations;
 mod exchange;
 mod line;
+mod profirust;
 mod slave;
