@@ -90,6 +90,11 @@ fn imports_go_one_way() {
             "harness/sim/src/unitek/reference.rs",
             &["drive", "plant", "cycles", "outbox", "frame::", "crate::"],
         ),
+        // The reference of an inverter shares nothing with it but the list of parameters.
+        (
+            "harness/sim/src/nordac/reference/inverter.rs",
+            &["crate::", "super::", "pkw", "words", "ratio", "properties"],
+        ),
         // The master and the drive share the codec and nothing else.
         (
             "harness/proto/src/novobus/master",

@@ -12,6 +12,7 @@ pub mod parameters;
 #[cfg(test)]
 mod property;
 pub mod ramp;
+pub mod reference;
 mod setup;
 pub mod slave;
 

@@ -8,6 +8,8 @@ use harness_proto::profibus::{BusRate, Telegram};
 use harness_proto::time::{Instant, Span};
 use harness_sim::nordac::{Drive, Member, Setup};
 use harness_sim::octet_segment::{LineHost, LineStation, Octet, OctetSegment, Wish};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngSeed, TestRunner};
 
 /// Buffer written in hexadecimal digits.
 pub(super) fn octets(text: &str) -> Vec<u8> {
@@ -204,5 +206,29 @@ fn data_of(reply: &str) -> String {
     match words.as_slice() {
         ["68", .., _, _] if words.len() > 8 => words[6..words.len() - 2].join(" "),
         _ => String::new(),
+    }
+}
+
+/// Runs a property; a failure prints the seed and the command that repeats it.
+pub(super) fn property<S: Strategy>(
+    name: &str,
+    cases: u32,
+    strategy: &S,
+    test: impl Fn(S::Value) -> Result<(), TestCaseError>,
+) {
+    let seed = std::env::var("DRIVEBENCH_SEED")
+        .ok()
+        .and_then(|s| s.parse().ok())
+        .unwrap_or(7_531);
+    let config = Config {
+        cases,
+        rng_seed: RngSeed::Fixed(seed),
+        failure_persistence: None,
+        ..Config::default()
+    };
+    if let Err(error) = TestRunner::new(config).run(strategy, test) {
+        panic!(
+            "{error}\nrepeat with: DRIVEBENCH_SEED={seed} cargo test -p harness-sim --test sim {name}"
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! The NORDAC inverter and its PROFIBUS module on a shared line: printed telegrams, tables, and properties.
 
+mod against_reference;
 mod common;
 mod deviations;
 mod exchange;
