@@ -80,17 +80,13 @@ impl Entry {
     pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
         let name = source.name.clone();
         let bus = parse::bus(&source);
-        let other = match bus {
-            Bus::DEFAULT => None,
-            other => settle(other, &source, size).transpose()?,
-        };
-        let (scenario, plan, other) = match other {
-            Some((scenario, other)) => (scenario, None, Some(other)),
-            None => {
-                let scenario = parse(&source)?;
-                let own = (bus == Bus::DEFAULT).then(|| plan(&scenario, &source, size));
-                (scenario, own.transpose()?, None)
-            }
+        let (scenario, plan, other) = if bus == Bus::DEFAULT {
+            let scenario = parse(&source)?;
+            let own = plan(&scenario, &source, size)?;
+            (scenario, Some(own), None)
+        } else {
+            let (scenario, other) = settle(bus, &source, size)?;
+            (scenario, None, Some(other))
         };
         Ok(Self {
             name,

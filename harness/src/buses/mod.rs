@@ -1,5 +1,6 @@
 //! The buses: one folder each. Only this file names them all.
 
+pub mod nordac;
 pub mod novobus;
 pub mod unitek;
 
@@ -144,28 +145,52 @@ pub(crate) fn carry_frames(traces: &[Trace]) -> bool {
     channels.any(|channel| matches!(channel.carried, Carried::Frames(_)))
 }
 
-/// Pictures of a trace of frames, each with its heading: what was said, and values against time. `id` names their parts.
-pub(crate) fn frame_pictures(trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
-    let (mut said, mut values) = (Html::new(), Html::new());
-    let mut pictures = Vec::new();
-    if unitek::report::sequence::sequence(&mut said, id, title, trace) {
-        pictures.push(("What was said", said));
+/// The bus whose stations share one line, by what the channels carried: frames, or octets for all stations. `None` for a ring.
+fn shared(traces: &[Trace]) -> Option<Bus> {
+    if carry_frames(traces) {
+        return Some(Bus::Unitek);
     }
-    if unitek::report::curves::curves(&mut values, id, trace) {
-        pictures.push(("Registers against time", values));
-    }
-    pictures
+    let mut channels = traces.iter().flat_map(|trace| &trace.channels);
+    let to_all = channels.any(|channel| channel.from.is_none() && channel.to.is_none());
+    to_all.then_some(Bus::Nordac)
 }
 
-/// The frames of a trace, a row a frame: the rows that are wanted, counted from 0, and of them `at_most`. `None` for a bus of
-/// octets, which has tables of its own.
+/// Whether these are traces of a bus whose stations share one line; those of a ring have tables and pictures of their own.
+pub(crate) fn share_a_line(traces: &[Trace]) -> bool {
+    shared(traces).is_some()
+}
+
+/// Pictures of a trace of a shared line, each with its heading: what was said, and values against time. `id` names their parts.
+pub(crate) fn pictures(trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
+    let (mut said, mut values) = (Html::new(), Html::new());
+    let drawn = match shared(std::slice::from_ref(trace)) {
+        Some(Bus::Unitek) => (
+            unitek::report::sequence::sequence(&mut said, id, title, trace),
+            unitek::report::curves::curves(&mut values, id, trace),
+        ),
+        Some(Bus::Nordac) => (
+            nordac::report::sequence::sequence(&mut said, id, title, trace),
+            false,
+        ),
+        Some(Bus::Novobus) | None => (false, false),
+    };
+    let said = drawn.0.then_some(("What was said", said));
+    let values = drawn.1.then_some(("Registers against time", values));
+    said.into_iter().chain(values).collect()
+}
+
+/// The frames or telegrams of a shared line, a row each: the rows that are wanted, counted from 0, and of them `at_most`. `None` for a
+/// ring, which has tables of its own.
 pub(crate) fn rows(
     trace: &Trace,
     wanted: Option<Range<usize>>,
     at_most: Option<usize>,
 ) -> Option<String> {
-    carry_frames(std::slice::from_ref(trace))
-        .then(|| unitek::report::table::table(trace, wanted, at_most))
+    match shared(std::slice::from_ref(trace))? {
+        Bus::Unitek => Some(unitek::report::table::table(trace, wanted, at_most)),
+        Bus::Nordac => Some(nordac::report::table::table(trace, wanted, at_most)),
+        Bus::Novobus => None,
+    }
 }
 
 /// The drive that sends a frame, by its identifier; `None` for a frame of a host.
@@ -194,7 +219,7 @@ pub(crate) fn dissector(bus: Bus) -> Option<String> {
     }
 }
 
-/// The last frames of a trace, a row a frame: playing stops at the first line that is not met. `None` for a bus of octets.
+/// The last rows of a trace of a shared line: playing stops at the first line that is not met. `None` for a ring.
 pub(crate) fn last_rows(trace: &Trace, most: usize) -> Option<String> {
     let all = rows(trace, None, None)?;
     let lines: Vec<_> = all.lines().collect();
@@ -204,33 +229,37 @@ pub(crate) fn last_rows(trace: &Trace, most: usize) -> Option<String> {
     Some(shown.join("\n") + "\n")
 }
 
-/// A form in which frames are written.
+/// A form in which the traffic of a shared line is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FrameForm {
+pub(crate) enum SharedForm {
     /// JSON for tools.
     Json,
     /// The log of candump.
     Candump,
-    /// A row a frame, for spreadsheets.
+    /// A row a frame or telegram, for spreadsheets.
     Csv,
     /// A capture for Wireshark.
     Pcapng,
 }
 
-/// Writes traces of a bus of frames.
+/// Writes traces of a shared line. Only frames have a log of candump and a capture for Wireshark.
 ///
 /// # Errors
 /// Those of `out`.
-pub(crate) fn write_frames(
+pub(crate) fn write_shared(
     traces: &[Trace],
-    form: FrameForm,
+    form: SharedForm,
     out: impl Write,
 ) -> std::io::Result<()> {
-    match form {
-        FrameForm::Json => unitek::report::json::write(Bus::Unitek, traces, out),
-        FrameForm::Candump => unitek::report::json::candump(traces, out),
-        FrameForm::Csv => unitek::report::csv::write(traces, out),
-        FrameForm::Pcapng => crate::report::pcapng_frames::write(traces, out),
+    match (form, shared(traces)) {
+        (SharedForm::Json, Some(Bus::Nordac)) => {
+            nordac::report::json::write(Bus::Nordac, traces, out)
+        }
+        (SharedForm::Csv, Some(Bus::Nordac)) => nordac::report::csv::write(traces, out),
+        (SharedForm::Json, _) => unitek::report::json::write(Bus::Unitek, traces, out),
+        (SharedForm::Candump, _) => unitek::report::json::candump(traces, out),
+        (SharedForm::Csv, _) => unitek::report::csv::write(traces, out),
+        (SharedForm::Pcapng, _) => crate::report::pcapng_frames::write(traces, out),
     }
 }
 
@@ -282,7 +311,7 @@ pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io:
             unitek::cli::cells::cells(filter.unwrap_or_default(), output)
         }
         Bus::Nordac => {
-            output.complain("the bus nordac is not built yet");
+            output.complain("drivebench does not list the parameters of the bus nordac yet");
             Ok(Exit::Usage)
         }
     }
@@ -313,6 +342,8 @@ pub enum Stimulus {
     Novobus(harness_sim::nd21::Stimulus),
     /// To a UNITEK drive.
     Unitek(harness_sim::unitek::Stimulus),
+    /// To a NORDAC inverter, or on its line.
+    Nordac(nordac::simulate::Happening),
 }
 
 /// The buses of the product.
@@ -322,7 +353,7 @@ pub enum Bus {
     Novobus,
     /// UNITEK DS/BAMOCAR on CAN.
     Unitek,
-    /// NORDAC vector on PROFIBUS DP; not built yet.
+    /// NORDAC vector on PROFIBUS DP.
     Nordac,
 }
 
@@ -371,19 +402,10 @@ pub(crate) fn serve_frames(
 /// Makes the languages of buses known: a line a bus.
 macro_rules! languages {
     ($($bus:ident => $language:ty),+ $(,)?) => {
-        impl Bus {
-            /// Whether its scenarios can be settled and played.
-            #[must_use]
-            pub const fn is_built(self) -> bool {
-                matches!(self, $(Self::$bus)|+)
-            }
-        }
-
-        /// Reads and settles a scenario in the words of its bus; `None` if that is not built.
-        pub(crate) fn settle(bus: Bus, source: &Source, size: Option<u8>) -> Option<Found> {
+        /// Reads and settles a scenario in the words of its bus.
+        pub(crate) fn settle(bus: Bus, source: &Source, size: Option<u8>) -> Found {
             match bus {
-                $(Bus::$bus => Some(settled::settle::<$language>(source, size)),)+
-                _ => None,
+                $(Bus::$bus => settled::settle::<$language>(source, size),)+
             }
         }
     };
@@ -392,4 +414,5 @@ macro_rules! languages {
 languages! {
     Novobus => novobus::language::Novobus,
     Unitek => unitek::language::Unitek,
+    Nordac => nordac::language::Nordac,
 }

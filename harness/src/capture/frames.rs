@@ -382,8 +382,8 @@ mod tests {
     fn json_survives() {
         let capture = every_kind();
         let mut bytes = Vec::new();
-        let form = crate::buses::FrameForm::Json;
-        crate::buses::write_frames(&capture.traces, form, &mut bytes).expect("a Vec");
+        let form = crate::buses::SharedForm::Json;
+        crate::buses::write_shared(&capture.traces, form, &mut bytes).expect("a Vec");
         assert_eq!(super::super::read(&bytes, None), Ok(capture));
         let wrong =
             br#"{"schema":2,"frames":[{"t_ns":1,"id":4096,"data":[],"from":1,"fault":null}]}"#;
@@ -397,8 +397,8 @@ mod tests {
     fn a_candump_log_survives_but_for_what_it_cannot_hold() {
         let capture = every_kind();
         let mut bytes = Vec::new();
-        let form = crate::buses::FrameForm::Candump;
-        crate::buses::write_frames(&capture.traces, form, &mut bytes).expect("a Vec");
+        let form = crate::buses::SharedForm::Candump;
+        crate::buses::write_shared(&capture.traces, form, &mut bytes).expect("a Vec");
         let again = super::super::read(&bytes, None).expect("a capture");
         let good = frames(&capture)
             .iter()

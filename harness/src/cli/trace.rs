@@ -4,7 +4,7 @@ use super::args::{Layout, TraceArguments, TraceFormat, TraceOutput};
 use super::exit::Exit;
 use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
-use crate::buses::{FrameForm, carry_frames, rows, write_frames};
+use crate::buses::{SharedForm, carry_frames, rows, share_a_line, write_shared};
 use crate::library::{Entry, sources};
 use crate::regular;
 use crate::report::plot::plots;
@@ -116,8 +116,8 @@ fn write(
     mut out: impl Write,
 ) -> std::io::Result<()> {
     let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
-    if carry_frames(shown.traces) {
-        return frames(shown.traces, format, rows, out);
+    if share_a_line(shown.traces) {
+        return of_shared_line(shown.traces, format, rows, out);
     }
     match format {
         TraceFormat::Json => json::write(shown.traces, shown.records, out),
@@ -162,18 +162,18 @@ fn write(
     }
 }
 
-/// Writes frames. Other forms have been refused by [`fits_bus`].
-fn frames(
+/// Writes what a shared line carried. Other forms have been refused by [`fits_bus`].
+fn of_shared_line(
     traces: &[Trace],
     format: TraceFormat,
     wanted: Option<Range<usize>>,
     mut out: impl Write,
 ) -> std::io::Result<()> {
     match format {
-        TraceFormat::Json => write_frames(traces, FrameForm::Json, out),
-        TraceFormat::Candump => write_frames(traces, FrameForm::Candump, out),
-        TraceFormat::Csv => write_frames(traces, FrameForm::Csv, out),
-        TraceFormat::Pcapng => write_frames(traces, FrameForm::Pcapng, out),
+        TraceFormat::Json => write_shared(traces, SharedForm::Json, out),
+        TraceFormat::Candump => write_shared(traces, SharedForm::Candump, out),
+        TraceFormat::Csv => write_shared(traces, SharedForm::Csv, out),
+        TraceFormat::Pcapng => write_shared(traces, SharedForm::Pcapng, out),
         _ => {
             for trace in traces {
                 let text = rows(trace, wanted.clone(), None).unwrap_or_default();
@@ -189,11 +189,14 @@ pub(crate) fn fits_bus(format: TraceFormat, traces: &[Trace], output: &mut Outpu
     const OF_RINGS: [TraceFormat; 2] = [TraceFormat::Svg, TraceFormat::Vcd];
     let name = format.to_possible_value();
     let name = name.as_ref().map_or("", |value| value.get_name());
-    let why = match (carry_frames(traces), format) {
-        (true, format) if OF_RINGS.contains(&format) => {
+    let why = match (carry_frames(traces), share_a_line(traces), format) {
+        (true, _, format) if OF_RINGS.contains(&format) => {
             format!("`--format {name}` shows bytes of a ring, and this bus carries frames; use table, json, csv, candump or pcapng")
         }
-        (false, TraceFormat::Candump) => {
+        (false, true, format) if OF_RINGS.contains(&format) || format == TraceFormat::Pcapng => {
+            format!("`--format {name}` shows bytes of a ring, and the stations of this bus share one line; use table, json or csv")
+        }
+        (false, _, TraceFormat::Candump) => {
             "`--format candump` shows frames of CAN, and this bus carries bytes; use table, json or csv".to_owned()
         }
         _ => return true,

@@ -8,7 +8,7 @@ use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
 use crate::buses::SimulatedLink;
 use crate::buses::twin::Exactness;
-use crate::buses::{FrameForm, carry_frames, write_frames};
+use crate::buses::{SharedForm, share_a_line, write_shared};
 use crate::link::{Capability, LinkEvent, Sink};
 use crate::report::json;
 use crate::rig::{Attempt, Keeper, Rig, state};
@@ -329,8 +329,8 @@ impl Keeper for KeptAttempts<'_> {
 pub(super) fn capture(traces: &[Trace], outcome: &Outcome) -> String {
     let mut capture = Vec::new();
     // Writing to a Vec cannot fail.
-    let _infallible = match carry_frames(traces) {
-        true => write_frames(traces, FrameForm::Json, &mut capture),
+    let _infallible = match share_a_line(traces) {
+        true => write_shared(traces, SharedForm::Json, &mut capture),
         false => json::write(traces, &outcome.records, &mut capture),
     };
     String::from_utf8_lossy(&capture).into_owned()

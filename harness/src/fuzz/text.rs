@@ -111,13 +111,11 @@ fn with_newline(text: &str) -> Option<Source> {
 /// What a scenario is for each size, in one text.
 fn settled(scenario: &Scenario, source: &Source) -> String {
     let mut shown = format!("{scenario:?}");
-    if scenario.bus.is_built() {
-        for size in SIZES {
-            shown += &match plan(scenario, source, size) {
-                Ok(plan) => format!("{plan:?}"),
-                Err(problems) => check(&problems, source),
-            };
-        }
+    for size in SIZES {
+        shown += &match plan(scenario, source, size) {
+            Ok(plan) => format!("{plan:?}"),
+            Err(problems) => check(&problems, source),
+        };
     }
     shown
 }

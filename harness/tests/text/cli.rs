@@ -230,20 +230,6 @@ fn a_ring_of_another_size_is_taken_where_the_scenario_allows_it() {
 }
 
 #[test]
-fn a_bus_that_is_not_built_is_skipped() {
-    let path = file("skipped", "a.scn", "title a\nbus nordac\n");
-    let output = drivebench(&["run", text(&path)]);
-    // Nothing was judged, so nothing passed.
-    assert_eq!(code(&output), 5);
-    assert!(
-        stdout(&output).starts_with("skipped "),
-        "{}",
-        stdout(&output)
-    );
-    assert_eq!(code(&drivebench(&["run", text(&path), "--require-all"])), 5);
-}
-
-#[test]
 fn the_trace_of_an_example_is_what_the_documentation_says() {
     let output = drivebench(&["trace", "9.7-parity-error", "--format", "json"]);
     assert_eq!(code(&output), 0);

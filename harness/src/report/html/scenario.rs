@@ -3,7 +3,7 @@
 use super::page::{FoldedPart, Section};
 use super::summary::{Row, ShownScenario, colour};
 use super::write::Html;
-use crate::buses::{frame_pictures, rows};
+use crate::buses::{pictures, rows};
 use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
@@ -247,7 +247,7 @@ fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
     let instead = format!("It is shown by: {}", played.again);
     for (ring, trace) in played.traces.iter().enumerate() {
         if let Some(rows) = rows(trace, None, Some(FRAMES)) {
-            let pictures = frame_pictures(trace, &format!("{id}-{ring}"), played.title);
+            let pictures = pictures(trace, &format!("{id}-{ring}"), played.title);
             parts.extend(pictures.into_iter().map(|(heading, html)| FoldedPart {
                 heading: heading.to_owned(),
                 html,

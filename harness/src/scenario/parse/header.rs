@@ -175,7 +175,7 @@ impl<L: Language> Reader<L> {
 
     fn finish(mut self, part: Part) -> Result<Scenario<L>, Vec<Problem>> {
         let bus = self.bus.unwrap_or(Bus::DEFAULT);
-        if part == Part::Whole && bus.is_built() && self.problems.is_empty() {
+        if part == Part::Whole && self.problems.is_empty() {
             let no_step = self.steps.is_empty().then(|| no_step(L::EXAMPLE));
             self.problems
                 .extend(L::incomplete(&self.header).or(no_step));

@@ -1,0 +1,5 @@
+//! NORDAC *vector* inverters on PROFIBUS DP: their words in a scenario, simulated slaves, tables and pictures.
+
+pub mod language;
+pub mod report;
+pub mod simulate;

@@ -1,0 +1,11 @@
+//! How telegrams of PROFIBUS read: a row a telegram, JSON, CSV, a picture.
+
+pub mod csv;
+pub mod json;
+pub(crate) mod sequence;
+pub mod table;
+mod telegrams;
+mod words;
+
+pub use telegrams::{Said, said};
+pub use words::Reader;
