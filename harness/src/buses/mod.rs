@@ -322,7 +322,7 @@ pub(crate) fn deviations(bus: Bus) -> [Vec<DeviationRow>; 2] {
     match bus {
         Bus::Novobus => novobus::cli::deviations::rows(),
         Bus::Unitek => unitek::cli::deviations::rows(),
-        Bus::Nordac => Default::default(),
+        Bus::Nordac => nordac::deviations::rows(),
     }
 }
 

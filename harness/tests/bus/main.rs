@@ -7,6 +7,7 @@ mod campaigns;
 mod corpora;
 mod deviations;
 mod driver;
+mod found;
 mod frames;
 mod guard;
 mod language;

@@ -6,10 +6,10 @@ use crate::medium::{Heard, Medium, Out};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{Parameter, PpoType, Properties};
 use harness_proto::profibus::BusRate;
-use harness_proto::profibus::rate::SYN_BITS;
 use harness_proto::time::Instant;
+use harness_sim::nordac::deviation::{Deviant, Deviation, MasterDeviation, MasterLine};
 use harness_sim::nordac::{self, Drive, Member};
-use harness_sim::octet_segment::{LineFaultAt, LineHost, LineStation, Octet, OctetSegment, Wish};
+use harness_sim::octet_segment::{LineFaultAt, LineHost, LineStation, OctetSegment, Wish};
 use harness_sim::record::{Channel, Trace};
 use std::any::Any;
 use std::collections::VecDeque;
@@ -55,6 +55,8 @@ pub struct SlaveSetup {
     pub properties: Properties,
     /// Parameters that differ from the factory settings, and their values.
     pub parameters: Vec<(&'static Parameter, Index, i64)>,
+    /// The way in which it breaks the bus standard or the manual, if it does.
+    pub deviation: Option<&'static Deviation>,
 }
 
 impl SlaveSetup {
@@ -67,12 +69,13 @@ impl SlaveSetup {
             posicon: false,
             properties: Properties::default(),
             parameters: Vec::new(),
+            deviation: None,
         }
     }
 
     /// The slave, switched on at `power_up`.
     #[must_use]
-    pub fn drive(&self, rate: BusRate, power_up: Instant) -> Drive {
+    pub fn drive(&self, rate: BusRate, power_up: Instant) -> Deviant {
         let none = Index::default();
         let own = [
             (ADDRESS, none, self.address.into()),
@@ -92,7 +95,7 @@ impl SlaveSetup {
             posicon: self.posicon,
             parameters: parameters.collect(),
         };
-        Drive::new(&setup, rate, power_up)
+        Deviant::new(Drive::new(&setup, rate, power_up), self.deviation)
     }
 }
 
@@ -103,10 +106,12 @@ pub struct Setup {
     pub rate: BusRate,
     /// The slaves.
     pub slaves: Vec<SlaveSetup>,
+    /// The way in which the bench's own master deviates, if it does.
+    pub master: Option<&'static MasterDeviation>,
 }
 
 /// A station of the segment: a host, or a slave.
-pub type SegmentStation = Member<Box<Drive>>;
+pub type SegmentStation = Member<Box<Deviant>>;
 
 /// A bench on a segment of simulated slaves. Its own host has one port.
 #[derive(Debug)]
@@ -121,6 +126,7 @@ pub struct Bench {
     /// When the last octet that the bench has sent will have left, as far as it knows.
     left: Instant,
     scheduled: VecDeque<(Instant, PlacedFault)>,
+    master: Option<&'static MasterDeviation>,
 }
 
 impl Bench {
@@ -153,6 +159,7 @@ impl Bench {
             origin: Instant::START,
             left: Instant::START,
             scheduled: VecDeque::new(),
+            master: setup.master,
         }
     }
 
@@ -171,13 +178,13 @@ impl Bench {
     #[must_use]
     pub fn drive(&self, slave: u8) -> Option<&Drive> {
         let station = self.line.station(self.place(slave)?);
-        station.drive().map(|own| &**own)
+        station.drive().map(|own| own.drive())
     }
 
     fn drive_mut(&mut self, slave: u8) -> Option<&mut Drive> {
         let place = self.place(slave)?;
         let station = self.line.station_mut(place);
-        station.drive_mut().map(|own| &mut **own)
+        station.drive_mut().map(|own| own.drive_mut())
     }
 
     fn place(&self, slave: u8) -> Option<usize> {
@@ -256,17 +263,20 @@ impl Line for Bench {
 
     /// Sends one telegram: idle time in front of it (T_SYN), and no gap in it.
     fn send(&mut self, _port: usize, what: Out<'_>) -> Instant {
-        let octets: Vec<Octet> = what.octets().iter().map(|own| (*own).into()).collect();
+        let MasterLine { idle_bits, octets } = match self.master {
+            Some(deviation) => deviation.sends(what.octets()),
+            None => MasterLine::of(what.octets()),
+        };
         if octets.is_empty() {
             return self.since_origin(self.left.max(self.now));
         }
-        let idle = self.rate.bit_time() * SYN_BITS;
+        let idle = self.rate.bit_time() * idle_bits;
         let free = self.left.max(self.line.busy_until()) + idle;
         let time = self.line.format().octet_time() * octets.len() as u64;
         self.left = free.max(self.now) + time;
         let wish = Wish {
             ready: self.now,
-            idle_bits: SYN_BITS,
+            idle_bits,
         };
         if let Some(host) = self.host() {
             host.send(wish, octets);

@@ -25,6 +25,24 @@ pub(crate) fn named<T: Copy>(
     }
 }
 
+/// The name of a deviation. There are too many to list them all in a message.
+pub(crate) fn deviation<T: Copy>(
+    scanner: &mut Scanner<'_>,
+    names: &[(&str, T)],
+    of: &str,
+    line: &str,
+) -> Result<T, Problem> {
+    let before = scanner.clone();
+    let word = scanner.word().map_or("", |word| word.value);
+    if let Some((_, found)) = names.iter().find(|(name, _)| *name == word) {
+        return Ok(*found);
+    }
+    *scanner = before;
+    let known: Vec<_> = names.iter().map(|(name, _)| *name).collect();
+    let expected = format!("the name of a deviation of {of}, as in {line}");
+    Err(scanner.unexpected(&expected).did_you_mean(word, &known))
+}
+
 /// `=` must come next.
 pub(crate) fn equals(scanner: &mut Scanner<'_>) -> Result<(), Problem> {
     if scanner.eat("=") {

@@ -13,16 +13,17 @@ use crate::scenario::expression;
 use crate::scenario::language::Opening;
 use crate::scenario::parse::header::once;
 use crate::scenario::parse::step::{behind_the_first, header_too_late};
-use crate::scenario::parse::words::{named, required};
+use crate::scenario::parse::words::{deviation, named, required};
 use crate::scenario::problem::{Problem, Span, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
 use harness_proto::profibus::BusRate;
 use harness_sim::fault::LinkFault;
+use harness_sim::nordac::deviation::{MASTER_DEVIATIONS, MasterDeviation};
 use harness_sim::octet_segment::TelegramFault;
 
 /// Words with which header lines of this bus begin.
-pub(super) const HEADER: [&str; 2] = ["rate", "slave"];
+pub(super) const HEADER: [&str; 3] = ["rate", "slave", "master"];
 
 /// Words with which steps begin that are no jobs.
 pub(super) const STEPS: [&str; 1] = ["slave"];
@@ -38,6 +39,7 @@ pub(super) fn header(
         "rate" if begun => Some(Err(header_too_late(word.span, word.value))),
         "rate" => Some(rate(scanner).and_then(|rate| once(&mut header.rate, rate, word))),
         "slave" => slave_line(word, scanner, header, begun),
+        "master" => Some(master(word, scanner, header, begun)),
         _ => None,
     }
 }
@@ -64,6 +66,33 @@ fn rate(scanner: &mut Scanner<'_>) -> Result<BusRate, Problem> {
     *scanner = ahead;
     scanner.expect_end()?;
     Ok(rate)
+}
+
+/// `master deviates NAME`
+fn master(
+    word: &Spanned<&str>,
+    scanner: &mut Scanner<'_>,
+    header: &mut Header,
+    begun: bool,
+) -> Result<(), Problem> {
+    if begun {
+        let problem = behind_the_first(word.span, "master deviates");
+        return Err(problem.help("move the line up, above the first step"));
+    }
+    required(scanner, &["deviates"])?;
+    let here = scanner.here();
+    let names: Vec<(&str, &'static MasterDeviation)> = MASTER_DEVIATIONS
+        .iter()
+        .map(|own| (own.name, own))
+        .collect();
+    let value = deviation(scanner, &names, "a master", "`master deviates NAME`")?;
+    let span = scanner.since(here);
+    scanner.expect_end()?;
+    let name = Spanned {
+        value: "master deviates",
+        span: word.span,
+    };
+    once(&mut header.master, Spanned { value, span }, &name)
 }
 
 /// A line that begins with `slave` is a header line where it can be one.

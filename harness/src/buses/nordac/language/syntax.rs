@@ -2,12 +2,13 @@
 
 use crate::scenario::expression::Located;
 use crate::scenario::pattern::Pattern;
-use crate::scenario::problem::Span;
+use crate::scenario::problem::{Span, Spanned};
 use crate::scenario::times::Duration;
 use harness_proto::nordac::properties::Description;
 use harness_proto::nordac::{Parameter, PpoType};
 use harness_proto::profibus::BusRate;
 use harness_sim::fault::{Flips, LinkFault};
+use harness_sim::nordac::deviation::{Deviation, MasterDeviation};
 use harness_sim::octet_segment::TelegramFault;
 
 /// The header lines of this bus.
@@ -15,6 +16,8 @@ use harness_sim::octet_segment::TelegramFault;
 pub struct Header {
     /// `rate 500`, in kbit/s.
     pub rate: Option<BusRate>,
+    /// `master deviates NAME`.
+    pub master: Option<Spanned<&'static MasterDeviation>>,
     /// Lines about slaves, in order.
     pub slaves: Vec<SlaveLine>,
 }
@@ -44,6 +47,8 @@ pub enum Setup {
     Property(&'static Description, String),
     /// `parameter 1205 = 70.0Hz`.
     Parameter(ParameterName, Value),
+    /// `deviates NAME`.
+    Deviates(&'static Deviation),
 }
 
 /// A parameter and its index.

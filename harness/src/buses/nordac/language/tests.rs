@@ -64,6 +64,8 @@ slave 8 parameter 1510 = 50.0%
 slave 8 property pzd-invalid = hold
 slave 8 property 967-write = taken
 slave 8 property position-count = 32
+slave 8 deviates no-off2
+master deviates master-gaps
 
 > 10 08 02 49 53 16
 > 68 07 07 68 88 82 7C 3E 3E F3 F1 E6 16 bad 3
@@ -285,4 +287,25 @@ fn mistakes() {
         assert!(said.contains(says), "{lines}{said}");
         assert!(helped.contains(help), "{lines}{helped}");
     }
+}
+
+/// A slave or a master that deviates fails where the right one passes.
+#[test]
+fn deviations() {
+    let status = "> 10 08 02 49 53 16\n< 10 02 08 00 0A 16\n";
+    passes(&format!("slave 8\n{status}"));
+    fails(
+        &format!("slave 8\nslave 8 deviates no-fdl-status\n{status}"),
+        "",
+    );
+    fails(
+        &format!("slave 8\nmaster deviates master-gaps\n{status}"),
+        "",
+    );
+    let (place, said, help) = mistake("slave 8\nslave 8 deviates no-of2\n");
+    assert_eq!(place, "no-of2");
+    assert!(said.contains("a deviation of a slave"), "{said}");
+    assert!(help.contains("no-off2"), "{help}");
+    let (place, ..) = mistake("slave 8\n> E5\nmaster deviates master-gaps\n");
+    assert_eq!(place, "master");
 }

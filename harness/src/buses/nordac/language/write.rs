@@ -16,7 +16,9 @@ pub(super) fn header(header: &Header) -> (Vec<(&'static str, String)>, Vec<Strin
         let blank = if what.is_empty() { "" } else { " " };
         format!("slave {}{blank}{what}", line.slave.expression)
     });
-    (rate.into_iter().collect(), slaves.collect())
+    let master = header.master.as_ref();
+    let master = master.map(|own| format!("master deviates {}", own.value.name));
+    (rate.into_iter().collect(), slaves.chain(master).collect())
 }
 
 fn setup(what: &Setup) -> String {
@@ -29,6 +31,7 @@ fn setup(what: &Setup) -> String {
         }
         Setup::Property(property, word) => format!("property {} = {word}", property.name),
         Setup::Parameter(name, own) => assigned(name, own),
+        Setup::Deviates(own) => format!("deviates {}", own.name),
     }
 }
 

@@ -15,7 +15,7 @@ use crate::scenario::expression;
 use crate::scenario::language::Opening;
 use crate::scenario::parse::header::once;
 use crate::scenario::parse::step::{behind_the_first, header_too_late};
-use crate::scenario::parse::words::{named, required};
+use crate::scenario::parse::words::{deviation, named, required};
 use crate::scenario::problem::{Problem, Span, Spanned};
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
@@ -87,7 +87,7 @@ fn master(
         .iter()
         .map(|own| (own.name, own))
         .collect();
-    let value = drive::deviation(scanner, &names, "a master", "`master deviates NAME`")?;
+    let value = deviation(scanner, &names, "a master", "`master deviates NAME`")?;
     let span = scanner.since(here);
     scanner.expect_end()?;
     let name = Spanned {

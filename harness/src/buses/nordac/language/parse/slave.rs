@@ -3,12 +3,13 @@
 use super::super::syntax::{Outside, Setup, Step};
 use super::value;
 use crate::scenario::expression::{self, Located};
-use crate::scenario::parse::words::{named, required};
+use crate::scenario::parse::words::{deviation, named, required};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::Properties;
 use harness_proto::nordac::properties::{Accepts, Description, PROPERTIES};
+use harness_sim::nordac::deviation::{Deviation, deviations};
 
 /// What a line about a slave is.
 pub(super) enum Line {
@@ -24,16 +25,18 @@ enum Word {
     Posicon,
     Property,
     Parameter,
+    Deviates,
     Link,
     Fault,
     Restart,
 }
 
-const WORDS: [(&str, Word); 7] = [
+const WORDS: [(&str, Word); 8] = [
     ("ppo", Word::Ppo),
     ("posicon", Word::Posicon),
     ("parameter", Word::Parameter),
     ("property", Word::Property),
+    ("deviates", Word::Deviates),
     ("link", Word::Link),
     ("fault", Word::Fault),
     ("restart", Word::Restart),
@@ -55,6 +58,14 @@ pub(super) fn line(scanner: &mut Scanner<'_>) -> Result<(Located, Line), Problem
         Word::Parameter => {
             let (name, value) = value::assigned(scanner)?;
             Line::Setup(Setup::Parameter(name, value))
+        }
+        Word::Deviates => {
+            let names: Vec<(&str, &'static Deviation)> =
+                deviations().map(|own| (own.name, own)).collect();
+            let line = "`slave 8 deviates NAME`";
+            Line::Setup(Setup::Deviates(deviation(
+                scanner, &names, "a slave", line,
+            )?))
         }
         Word::Link => {
             let ends = [("lost", false), ("found", true)];

@@ -139,7 +139,12 @@ pub(super) fn settle(
         return Err(Problem::new(span, what, "as many `slave` lines expected"));
     }
     let rate = header.rate.unwrap_or_default();
-    Ok(resume(&simulate::Setup { rate, slaves }))
+    let master = header.master.as_ref().map(|own| own.value);
+    Ok(resume(&simulate::Setup {
+        rate,
+        slaves,
+        master,
+    }))
 }
 
 /// What settles one more step.
@@ -171,6 +176,7 @@ fn apply(line: &SlaveLine, slaves: &mut Vec<SlaveSetup>) -> Result<(), Problem> 
                 return Err(Problem::new(line.span, what, "another value expected"));
             }
         }
+        Setup::Deviates(deviation) => own.deviation = Some(deviation),
         Setup::Parameter(name, given) => {
             let parameter = parameter(name, Scope::default())?;
             let raw = raw(given, parameter, Scope::default())?;
@@ -462,14 +468,16 @@ impl Settle<Nordac> for Planner {
         let needs = lines.filter_map(|line| match &line.what {
             Setup::There { .. } => None,
             Setup::Parameter(..) => Some(Capability::Memory),
-            Setup::Property(..) => Some(Capability::Simulator),
+            Setup::Property(..) | Setup::Deviates(_) => Some(Capability::Simulator),
         });
         let sends = scenario.steps.iter().filter_map(|step| match &step.action {
             Action::Send { message, .. } => Some(message),
             _ => None,
         });
         let damaged = sends.filter(|own| !own.bad.is_empty());
+        let master = scenario.header.master.iter();
         needs
+            .chain(master.map(|_| Capability::Simulator))
             .chain(damaged.map(|_| Capability::Interposer))
             .collect()
     }

@@ -4,7 +4,7 @@ use super::super::syntax::{Outside, PropertyValue, Setup, Step};
 use super::message::identifier;
 use super::value;
 use crate::scenario::expression::{self, Located};
-use crate::scenario::parse::words::{equals, named};
+use crate::scenario::parse::words::{deviation, equals, named};
 use crate::scenario::problem::Problem;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::times;
@@ -198,22 +198,4 @@ fn force(scanner: &mut Scanner<'_>) -> Result<Outside, Problem> {
     }
     let unit = value::register_of_force(name).map(|own| own.unit);
     Ok(Outside::Force(name, Some(value::value(scanner, unit)?)))
-}
-
-/// The name of a deviation.
-pub(super) fn deviation<T: Copy>(
-    scanner: &mut Scanner<'_>,
-    names: &[(&str, T)],
-    of: &str,
-    line: &str,
-) -> Result<T, Problem> {
-    let before = scanner.clone();
-    let word = scanner.word().map_or("", |word| word.value);
-    if let Some((_, found)) = names.iter().find(|(name, _)| *name == word) {
-        return Ok(*found);
-    }
-    *scanner = before;
-    let known: Vec<_> = names.iter().map(|(name, _)| *name).collect();
-    let expected = format!("the name of a deviation of {of}, as in {line}");
-    Err(scanner.unexpected(&expected).did_you_mean(word, &known))
 }
