@@ -63,7 +63,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// The manuals of the buses; that of [`Bus::DEFAULT`] first.
-pub(crate) const MANUALS: [Manual; 2] = [novobus::manual::MANUAL, unitek::manual::MANUAL];
+pub(crate) const MANUALS: [Manual; 3] = [
+    novobus::manual::MANUAL,
+    unitek::manual::MANUAL,
+    nordac::manual::MANUAL,
+];
 
 /// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
 type Found = Result<(Scenario, Arc<dyn Settled>), Problems>;
@@ -170,12 +174,12 @@ pub(crate) fn pictures(trace: &Trace, id: &str, title: &str) -> Vec<(&'static st
         ),
         Some(Bus::Nordac) => (
             nordac::report::sequence::sequence(&mut said, id, title, trace),
-            false,
+            nordac::report::curves::curves(&mut values, id, trace),
         ),
         Some(Bus::Novobus) | None => (false, false),
     };
     let said = drawn.0.then_some(("What was said", said));
-    let values = drawn.1.then_some(("Registers against time", values));
+    let values = drawn.1.then_some(("Values against time", values));
     said.into_iter().chain(values).collect()
 }
 

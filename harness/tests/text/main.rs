@@ -10,6 +10,7 @@ mod help;
 mod html;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;
+mod nordac;
 mod public_api;
 #[path = "../common/record.rs"]
 mod record;

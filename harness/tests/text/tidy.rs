@@ -403,6 +403,19 @@ fn every_property_is_exercised_and_described() {
             assert!(texts.contains(&set), "no scenario has the line: {set}");
         }
     }
+    let page = read(&root().join("harness/src/buses/nordac/LANGUAGE.md"));
+    for property in harness_proto::nordac::properties::PROPERTIES {
+        let name = property.name;
+        assert!(page.contains(&format!("| `{name}` |")), "{name}");
+        let values: &[&str] = match property.accepts {
+            harness_proto::nordac::properties::Accepts::Words(words) => words,
+            harness_proto::nordac::properties::Accepts::Count { .. } => &[""],
+        };
+        for value in values {
+            let set = format!("property {name} = {value}");
+            assert!(texts.contains(&set), "no scenario has the line: {set}");
+        }
+    }
 }
 
 #[test]

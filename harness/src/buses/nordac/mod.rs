@@ -2,5 +2,6 @@
 
 pub(crate) mod deviations;
 pub mod language;
+pub(crate) mod manual;
 pub mod report;
 pub mod simulate;

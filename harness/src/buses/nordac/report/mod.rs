@@ -1,6 +1,7 @@
 //! How telegrams of PROFIBUS read: a row a telegram, JSON, CSV, a picture.
 
 pub mod csv;
+pub(crate) mod curves;
 pub mod json;
 pub(crate) mod sequence;
 pub mod table;
@@ -8,4 +9,4 @@ mod telegrams;
 mod words;
 
 pub use telegrams::{Said, said};
-pub use words::Reader;
+pub use words::{ProcessImage, Reader};

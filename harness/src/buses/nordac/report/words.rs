@@ -2,7 +2,7 @@
 
 use super::telegrams::Said;
 use harness_proto::decode::Decoded;
-use harness_proto::nordac::words::{STW, WordBit, ZSW};
+use harness_proto::nordac::words::{State, ZSW, stw, zsw};
 use harness_proto::nordac::{Answer, Image, Parameter, Pkw, PpoType, Task};
 use harness_proto::profibus::dp::{Diagnosis, GlobalControl, Service, SetPrm};
 use harness_proto::profibus::fdl::Status;
@@ -16,6 +16,17 @@ pub struct Reader {
     types: BTreeMap<u8, PpoType>,
     /// The service of the last request, and the slave that was asked.
     asked: Option<(u8, Service)>,
+}
+
+/// The process data of a Data_Exchange, in one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ProcessImage {
+    /// The slave.
+    pub slave: u8,
+    /// Whether they are the slave's inputs, rather than what the master sent.
+    pub of_slave: bool,
+    /// The words.
+    pub image: Image,
 }
 
 /// A telegram in words.
@@ -61,6 +72,23 @@ impl Reader {
                 ..Words::default()
             },
         }
+    }
+
+    /// The process data of the telegram that was read last, if it was one of a Data_Exchange.
+    #[must_use]
+    pub fn exchanged(&self, said: &Said) -> Option<ProcessImage> {
+        let telegram = said.telegram()?;
+        let pdu = telegram.pdu()?;
+        let (asked, service) = self.asked?;
+        let of_slave = !pdu.fc().is_request();
+        let slave = if of_slave { pdu.sa() } else { pdu.da() };
+        let fits = service == Service::DataExchange && asked == slave && pdu.dsap().is_none();
+        let (_, image) = self.image(slave, pdu.data()).filter(|_| fits)?;
+        Some(ProcessImage {
+            slave,
+            of_slave,
+            image,
+        })
     }
 
     fn pdu(&mut self, pdu: &Pdu) -> Words {
@@ -117,7 +145,7 @@ impl Reader {
             }
             Service::DataExchange => match self.image(slave, data) {
                 Some((ppo, image)) => {
-                    let words = words(ppo, &image, ("STW", "HSW"), &STW);
+                    let words = words(ppo, &image, ("STW", "HSW"), control);
                     let task = image.pkw.task();
                     let pkw = (task != Task::None).then(|| asks(image.pkw));
                     joined(words, pkw)
@@ -139,7 +167,7 @@ impl Reader {
             }
             Service::DataExchange | Service::RdInp => match self.image(pdu.sa(), data) {
                 Some((ppo, image)) => {
-                    let words = words(ppo, &image, ("ZSW", "HIW"), &ZSW);
+                    let words = words(ppo, &image, ("ZSW", "HIW"), status);
                     let pkw = (image.pkw != Pkw::default()).then(|| says(image.pkw));
                     joined(words, pkw)
                 }
@@ -168,17 +196,15 @@ fn joined(words: String, pkw: Option<String>) -> String {
     pkw.map_or(words.clone(), |pkw| format!("{words}  {pkw}"))
 }
 
-/// The process words, and what the bits of the first mean.
+/// The process words, and what the first says.
 fn words(
     ppo: PpoType,
     image: &Image,
     (first, main): (&str, &str),
-    bits: &'static [WordBit; 16],
+    says: fn(u16) -> String,
 ) -> String {
     let word = image.first();
-    let names = bits.iter().filter(|bit| word >> bit.number & 1 == 1);
-    let names: Vec<_> = names.map(|bit| bit.name).collect();
-    let mut text = format!("{first} {word:04X} ({})", names.join(" "));
+    let mut text = format!("{first} {word:04X} ({})", says(word));
     let percent = f64::from(image.main().cast_signed()) * 100.0 / 16384.0;
     text.push_str(&format!(", {main} {:04X} ({percent:.1} %)", image.main()));
     if ppo.words() > 2 {
@@ -189,6 +215,60 @@ fn words(
         ));
     }
     text
+}
+
+/// What a control word commands: by the priority of its bits, and what else is not as in normal operation (3.2.1, 3.3).
+fn control(word: u16) -> String {
+    let is = |bit: u16| word & bit != 0;
+    let mut words = vec![if !is(stw::NO_OFF2) {
+        "OFF2"
+    } else if !is(stw::NO_OFF3) {
+        "OFF3"
+    } else if !is(stw::ON) {
+        "OFF1"
+    } else if is(stw::ENABLE) {
+        "enable"
+    } else {
+        "ON"
+    }];
+    let more = [
+        (!is(stw::VALID), "not valid"),
+        (!is(stw::RAMP), "ramp to zero"),
+        (!is(stw::RUN), "ramp stopped"),
+        (!is(stw::SETPOINT), "setpoint 0"),
+        (is(stw::ACKNOWLEDGE), "acknowledge"),
+        (is(stw::CLOCKWISE), "clockwise"),
+        (is(stw::ANTICLOCKWISE), "anticlockwise"),
+    ];
+    words.extend(more.into_iter().filter(|(so, _)| *so).map(|(_, own)| own));
+    in_set(words.join(", "), word)
+}
+
+/// The state that a status word shows, and its other bits (3.2.2).
+fn status(word: u16) -> String {
+    let state = State::of_zsw(word).map_or("no state", State::short);
+    let shown = State::ALL.into_iter().fold(0, |all, own| all | own.bits());
+    let others = ZSW.iter().filter(|bit| {
+        let set = word & !shown & !(zsw::NO_OFF2 | zsw::NO_OFF3) & 0x3FFF;
+        set >> bit.number & 1 == 1
+    });
+    let mut words = vec![state];
+    words.extend(others.map(|bit| bit.name));
+    if word & zsw::NO_OFF2 == 0 {
+        words.push("OFF2 active");
+    }
+    if word & zsw::NO_OFF3 == 0 {
+        words.push("OFF3 active");
+    }
+    in_set(words.join(", "), word)
+}
+
+/// The same with the parameter set of bits 15 and 14, where it is not the first.
+fn in_set(text: String, word: u16) -> String {
+    match word >> 14 {
+        0 => text,
+        set => format!("{text}, set {}", set + 1),
+    }
 }
 
 /// A parameter with its name and its index.
