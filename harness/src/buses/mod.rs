@@ -34,19 +34,24 @@ use crate::cli::args::CellsArguments;
 use crate::cli::deviations::DeviationRow;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
+use crate::cli::fuzz::{FuzzRunArguments, verify};
 use crate::cli::output::Output;
 use crate::cli::rig::ListFormat;
 use crate::cli::rig_failure::find_any_rig;
+use crate::evidence::Signer;
+use crate::explore::read_as;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
 use crate::report::html::Html;
+use crate::rig::Rig;
 use crate::rig::port_file::{Node, Port};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::settled::{self, Settled};
 use crate::scenario::source::{Source, line_number};
 use crate::scenario::syntax::Scenario;
+use crate::scenario::verdict::Verdict;
 use crate::serve::frames::FrameJob;
 use crate::serve::{End, Host, ServeError};
 use commands::rig_check::CheckRigArguments;
@@ -59,6 +64,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -214,6 +220,30 @@ pub(crate) fn frame_scenario(
     unitek::capture::scenario(traces, title, setup)
 }
 
+/// What came of judging a capture of frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct JudgedFrames {
+    /// Passed, failed, or inconclusive where nothing was compared.
+    pub(crate) verdict: Verdict,
+    /// How many frames of drives were compared.
+    pub(crate) compared: usize,
+    /// What differs, a sentence each.
+    pub(crate) differences: Vec<String>,
+    /// What was not compared, a sentence each.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// Judges a capture of frames; `setup` describes the drives.
+///
+/// # Errors
+/// It does not say enough of the drives, in a sentence.
+pub(crate) fn judge_frames(
+    traces: &[Trace],
+    setup: Option<&Source>,
+) -> Result<JudgedFrames, String> {
+    unitek::capture::judged(traces, setup)
+}
+
 /// The dissector of a bus for Wireshark; `None` if it is not built.
 pub(crate) fn dissector(bus: Bus) -> Option<String> {
     match bus {
@@ -298,6 +328,44 @@ pub(crate) fn check_rig(
         Some(PortBus::Unitek) => {
             let end = unitek::cli::check(&rig, &arguments.options(), for_tools, output);
             told(end, output)
+        }
+    }
+}
+
+/// Explores the drives of a rig with `[port.1]`.
+pub(crate) fn fuzz_port(
+    rig: &Rig,
+    arguments: &FuzzRunArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    match rig.port().map(|port| port.bus) {
+        Some(PortBus::Unitek) => unitek::cli::fuzz::run(rig, arguments, output),
+        None => Ok(Exit::Usage),
+    }
+}
+
+/// Judges the findings of a run on drives of a bus of frames again; `None` if the folder has no such run.
+pub(crate) fn verify_frames(
+    folder: &Path,
+    signer: Option<Signer<'_>>,
+    output: &mut Output,
+) -> Option<std::io::Result<Exit>> {
+    let (kept, _) = read_as::<unitek::explore::FrameTalk>(folder).ok()?;
+    Some(verify(folder, &kept, signer, output))
+}
+
+/// Makes a finding on drives of a bus of frames small.
+pub(crate) fn shrink_frames(
+    bus: Bus,
+    finding: &Path,
+    most: u32,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    match bus {
+        Bus::Unitek => unitek::cli::fuzz::shrink(finding, most, output),
+        Bus::Novobus | Bus::Nordac => {
+            output.complain("the finding is of a bus without frames");
+            Ok(Exit::Usage)
         }
     }
 }

@@ -24,7 +24,7 @@ use harness_proto::line::Rate;
 use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
-use harness_sim::record::{Channel, Remark, Trace};
+use harness_sim::record::{Carried, Channel, Remark, Trace};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
@@ -274,8 +274,11 @@ impl Capture {
     #[must_use]
     pub fn end(&self) -> Instant {
         let links = self.traces.iter().flat_map(|trace| &trace.channels);
-        let last = links.filter_map(|link| link.octets().last());
-        last.map(|byte| byte.at).max().unwrap_or(Instant::START)
+        let last = links.filter_map(|link| match &link.carried {
+            Carried::Octets(octets) => octets.last().map(|own| own.at),
+            Carried::Frames(frames) => frames.last().map(|own| own.at),
+        });
+        last.max().unwrap_or(Instant::START)
     }
 }
 

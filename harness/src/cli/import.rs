@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::buses::{self, Bus, carry_frames};
+use crate::buses::{self, Bus, JudgedFrames, carry_frames};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
     Capture, ComparedRun, Judged, Options, diff as compare, is_capture, judge, read_file, scenario,
@@ -113,7 +113,32 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     Ok(Exit::of(&[judged.verdict], false))
 }
 
-/// Makes a scenario of frames.
+/// Reports what came of judging frames.
+fn told(
+    judged: &JudgedFrames,
+    capture: &Capture,
+    title: &str,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let frames = capture.traces.iter().flat_map(|trace| &trace.channels);
+    let frames: usize = frames.map(|channel| channel.frames().len()).sum();
+    output.result(&format!(
+        "{} {title}: {} in {}, {} of drives compared\n",
+        output.verdict(judged.verdict).trim_end_matches(' '),
+        counted(frames, "frame"),
+        capture.end(),
+        judged.compared,
+    ))?;
+    for line in &judged.differences {
+        output.result(&format!("  {line}\n"))?;
+    }
+    for remark in &judged.remarks {
+        output.say(&format!("  note: {remark}\n"));
+    }
+    Ok(Exit::of(&[judged.verdict], false))
+}
+
+/// Judges frames, or makes a scenario of them.
 fn frames(
     capture: &Capture,
     title: &str,
@@ -123,11 +148,13 @@ fn frames(
 ) -> std::io::Result<Exit> {
     let path = arguments.file.display();
     if !arguments.scenario {
-        output.complain(&format!(
-            "{path}: frames of CAN are not compared with a model; `--format table` shows them, `--scenario` makes a scenario of them that \
-             `drivebench run` plays, and `drivebench diff` compares them with another capture"
-        ));
-        return Ok(Exit::Usage);
+        return match buses::judge_frames(&capture.traces, setup) {
+            Ok(judged) => told(&judged, capture, title, output),
+            Err(error) => {
+                output.complain(&format!("{path}: {error}"));
+                Ok(Exit::Usage)
+            }
+        };
     }
     match buses::frame_scenario(&capture.traces, title, setup) {
         Ok(text) => write_scenario(&text, arguments, output),

@@ -26,7 +26,7 @@ pub(crate) mod rig_failure;
 pub(crate) mod run;
 mod run_rig;
 mod schema;
-mod shrink;
+pub(crate) mod shrink;
 mod tally;
 mod trace;
 mod verify;

@@ -5,10 +5,12 @@ use super::exit::Exit;
 use super::fuzz::{Use, on_ports, scope, sizes, tell};
 use super::output::Output;
 use super::rig_failure::find_rig;
+use crate::buses::shrink_frames;
 use crate::counted::counted;
 use crate::explore::shrink::{Shrunk, Subject, shrink as make_small};
 use crate::explore::{
-    Case, Difference, ExploreError, Finding, OnRig, OnSim, Planted, RingSetup, Target,
+    Case, Difference, ExploreError, Finding, FuzzCase, OnRig, OnSim, Planted, RingSetup, Target,
+    bus_of,
 };
 use crate::rig::Run;
 use clap::Args;
@@ -43,6 +45,10 @@ pub struct ShrinkArguments {
 
 /// Makes a finding small, and writes what came of it beside it.
 pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
+    if let Some(bus) = bus_of(&arguments.finding) {
+        let most = arguments.runs.unwrap_or(RUNS);
+        return shrink_frames(bus, &arguments.finding, most, output);
+    }
     let (finding, path) = match Finding::read(&arguments.finding) {
         Ok(read) => read,
         Err(error) => return Ok(tell(&error, output)),
@@ -218,6 +224,19 @@ fn settle(
         attempts: Vec::new(),
         ..finding.clone()
     };
+    let (end, runs) = (small.complete, small.runs);
+    let became = format!("{} became {after}", counted(before, "byte"));
+    write_smaller(&new, path, &became, (runs, end), output)
+}
+
+/// Writes a finding that was made small beside the old one, and shows it.
+pub(crate) fn write_smaller<C: FuzzCase>(
+    new: &Finding<C>,
+    path: &Path,
+    became: &str,
+    (runs, complete): (u32, bool),
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let stem = path
         .file_stem()
         .and_then(|stem| stem.to_str())
@@ -235,14 +254,13 @@ fn settle(
         Err(error) => return Ok(tell(&error, output)),
     };
     output.result(&text)?;
-    let end = match small.complete {
+    let end = match complete {
         true => "nothing more can be taken away",
         false => "the runs are used up; --runs allows more",
     };
     output.say(&format!(
-        "{} became {after} in {}; {end}\n{}\ndrivebench promote {} --name NAME\n",
-        counted(before, "byte"),
-        counted(small.runs, "run"),
+        "{became} in {}; {end}\n{}\ndrivebench promote {} --name NAME\n",
+        counted(runs, "run"),
         files[1].display(),
         files[0].display()
     ));

@@ -3,6 +3,7 @@
 use super::Case;
 use super::files::{read_text, write_whole};
 use super::{ExploreError, FuzzCase};
+use crate::buses::Bus;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -52,10 +53,7 @@ impl<C: FuzzCase> Finding<C> {
     /// # Errors
     /// There is no finding, or it is damaged.
     pub fn read_as(path: &Path) -> Result<(Self, PathBuf), ExploreError> {
-        let file = match path.extension() {
-            Some(ending) if ending == "scn" => path.with_extension("json"),
-            _ => path.to_owned(),
-        };
+        let file = json_of(path);
         if file.is_dir() || !file.exists() {
             return Err(ExploreError::Usage(format!(
                 "there is no finding {}: name a file `finding-....json` of a folder that `drivebench fuzz run` has written",
@@ -106,4 +104,22 @@ impl<C: FuzzCase> Finding<C> {
         form.push('\n');
         Ok(form)
     }
+}
+
+/// The JSON of a finding that is named by it, or by the scenario beside it.
+fn json_of(path: &Path) -> PathBuf {
+    match path.extension() {
+        Some(ending) if ending == "scn" => path.with_extension("json"),
+        _ => path.to_owned(),
+    }
+}
+
+/// The bus of a finding, by its name; that of rings says none.
+#[must_use]
+pub fn bus_of(path: &Path) -> Option<Bus> {
+    let text = read_text(&json_of(path)).ok()?;
+    let finding: serde_json::Value = serde_json::from_str(&text).ok()?;
+    let name = finding.get("setup")?.get("bus")?.as_str()?;
+    let known = Bus::NAMES.iter().find(|(own, _)| *own == name);
+    known.map(|(_, bus)| *bus)
 }

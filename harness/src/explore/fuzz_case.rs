@@ -5,6 +5,7 @@ use super::{ExploreError, Finding, FuzzSettings, Pool, Rehearsal, Swarm, Target}
 use crate::explore::Dice;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 /// Something that a conversation can have.
@@ -27,6 +28,17 @@ pub trait Differing: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwn
     fn place(&self) -> Option<usize>;
     /// Whether only the time of that byte or frame differs.
     fn is_time(&self) -> bool;
+}
+
+/// What came of judging a finding again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Again {
+    /// The same.
+    Same,
+    /// Something else, and what.
+    Differs(String),
+    /// The folder does not have what it rests on.
+    Unknown,
 }
 
 /// A conversation with drives of one bus.
@@ -71,6 +83,17 @@ pub trait FuzzCase:
     /// # Errors
     /// The model cannot be made.
     fn text(finding: &Finding<Self>) -> Result<String, ExploreError>;
+
+    /// Judges a finding again: on simulated drives it is played again, on a rig with ports its attempts are in its file. `known` says how
+    /// often each difference was found before, by its key.
+    ///
+    /// # Errors
+    /// The model cannot be made, or the attempts are not those of a run.
+    fn again(
+        finding: &Finding<Self>,
+        about: &FuzzSettings<Self>,
+        known: &BTreeMap<String, u8>,
+    ) -> Result<Again, ExploreError>;
 
     /// Whether a finding that was read is within the bounds of what a run writes.
     fn is_sound(finding: &Finding<Self>) -> bool;

@@ -22,10 +22,12 @@ pub use campaign::{Bounds, FuzzRun, RunEnd, Watcher};
 pub use confirm::Confirmation;
 pub use dice::Dice;
 pub use error::ExploreError;
-pub use finding::Finding;
-pub use fuzz_case::{Differing, FuzzCase, Spiced};
+pub use finding::{Finding, bus_of};
+pub use fuzz_case::{Again, Differing, FuzzCase, Spiced};
 pub use pool::{MOST_KEPT, Pool};
-pub use record::{FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read, read_as};
+pub use record::{
+    FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read, read_as, rig_of,
+};
 pub use swarm::Swarm;
 pub use target::{Rehearsal, Target, Tried};
 

@@ -210,6 +210,34 @@ fn hold(file: &File, folder: &Path) -> Result<(), ExploreError> {
     })
 }
 
+/// The rig of the run in a folder, whatever its bus.
+///
+/// # Errors
+/// There is no record, or its first line is damaged.
+pub fn rig_of(folder: &Path) -> Result<String, ExploreError> {
+    let path = folder.join(RECORD);
+    let text = match path.exists() {
+        true => read_text(&path)?,
+        false => return Err(no_run(folder)),
+    };
+    let first = text.lines().next().unwrap_or_default();
+    let line: Option<serde_json::Value> = serde_json::from_str(first).ok();
+    let rig = line.and_then(|line| Some(line.get("rig")?.as_str()?.to_owned()));
+    rig.ok_or_else(|| {
+        ExploreError::File(format!(
+            "{}, line 1: a record begins with what the run is",
+            path.display()
+        ))
+    })
+}
+
+fn no_run(folder: &Path) -> ExploreError {
+    ExploreError::Usage(format!(
+        "{} holds no run: there is no {RECORD} in it",
+        folder.display()
+    ))
+}
+
 /// What the folder of a run on a ring holds, and how long its record is up to the last line of progress.
 ///
 /// # Errors
@@ -225,10 +253,7 @@ pub fn read(folder: &Path) -> Result<(KeptRun, usize), ExploreError> {
 pub fn read_as<C: FuzzCase>(folder: &Path) -> Result<(KeptRun<C>, usize), ExploreError> {
     let path = folder.join(RECORD);
     if !path.exists() {
-        return Err(ExploreError::Usage(format!(
-            "{} holds no run: there is no {RECORD} in it",
-            folder.display()
-        )));
+        return Err(no_run(folder));
     }
     let text = read_text(&path)?;
     let damaged = |number: usize, why: &str| {

@@ -1,8 +1,13 @@
-//! A scenario made of a capture: what hosts have sent is sent again at its time, and what drives have sent is expected.
+//! Captures: judged, and made into a scenario, in which what hosts have sent is sent again at its time and what drives have sent is
+//! expected.
 
+use super::judge::{Breach, judge};
 use super::language::{identifier, written};
+use super::serve::bench;
+use crate::buses::JudgedFrames;
 use crate::report::pcapng_frames::rate_of;
 use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, BusError, Frame};
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
@@ -68,6 +73,54 @@ pub(crate) fn scenario(
         step(own, &mut steps);
     }
     Ok(text + &steps)
+}
+
+/// Judges a capture: what drives have sent is compared with the manual, with any value of what that leaves open.
+///
+/// # Errors
+/// A drive has other identifiers and there is no `setup`, in a sentence with the remedy; or the setup has mistakes.
+pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedFrames, String> {
+    let channels = traces.iter().flat_map(|trace| &trace.channels);
+    let frames: Vec<LineFrame> = channels
+        .flat_map(|own| own.frames().iter().copied())
+        .collect();
+    let drives = match setup {
+        Some(setup) => {
+            let plan = bench(None, Some(setup)).map_err(|problems| problems.to_string())?;
+            let drives = plan.setup.setup.drives.iter();
+            drives.map(|own| (own.node, own.identifiers)).collect()
+        }
+        None => {
+            let all: Vec<&LineFrame> = frames.iter().collect();
+            let own = |node: u16| {
+                let number = u8::try_from(node).unwrap_or(u8::MAX);
+                (number, (DEFAULT_RX - 1 + node, DEFAULT_TX - 1 + node))
+            };
+            let nodes = nodes(&all)?;
+            nodes.into_iter().map(own).collect::<Vec<_>>()
+        }
+    };
+    let judged = judge(&frames, &drives);
+    let difference = |own: &Breach| {
+        format!(
+            "frame {}, drive {} (UNITEK {}): {}",
+            own.frame, own.drive, own.section, own.about
+        )
+    };
+    let mut remarks = judged.remarks;
+    if judged.compared == 0 {
+        remarks.push("nothing was compared: no frame of a drive is in it".to_owned());
+    }
+    Ok(JudgedFrames {
+        verdict: match (judged.breaches.is_empty(), judged.compared) {
+            (false, _) => Verdict::Failed,
+            (true, 0) => Verdict::Inconclusive,
+            (true, _) => Verdict::Passed,
+        },
+        compared: judged.compared,
+        differences: judged.breaches.iter().map(difference).collect(),
+        remarks,
+    })
 }
 
 fn step(own: &LineFrame, steps: &mut String) {

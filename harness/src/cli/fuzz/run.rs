@@ -2,23 +2,23 @@
 
 use super::rig::{Use, on_ports, scope, simulated, sizes, tell};
 use super::watch::{Telling, summary};
+use crate::buses::{Bus, deviations, fuzz_port};
 use crate::cli::args::{WIRE_TIME_HELP, duration};
 use crate::cli::exit::Exit;
 use crate::cli::output::Output;
 use crate::cli::page::{writable, write};
-use crate::cli::rig_failure::find_rig;
+use crate::cli::rig_failure::find_any_rig;
 use crate::counted::counted;
 use crate::evidence::{can_sign, seal};
 use crate::explore::{
-    Bounds, CaseScope, ExploreError, FuzzRecord, FuzzRun, FuzzSettings, KeptRun, OnRig, OnSim,
-    Planted, RingSetup, RunEnd, Target, page, read,
+    Bounds, CaseScope, ExploreError, FuzzCase, FuzzRecord, FuzzRun, FuzzSettings, KeptRun, OnRig,
+    OnSim, Planted, RingSetup, RunEnd, Target, page, read, rig_of,
 };
 use crate::guard::Limits;
 use crate::rig::{Rig, state};
 use crate::scenario::problem::nearest;
 use clap::Args;
 use harness_proto::time::Span;
-use harness_sim::novobus::deviation;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
@@ -95,9 +95,9 @@ fn planted(text: &str) -> Result<Planted, String> {
         },
     };
     let drive = drive.trim().parse().map_err(|_| form)?;
-    let known = deviation::deviation(name.trim());
+    let names = deviation_names();
+    let known = names.iter().find(|own| **own == name.trim());
     let known = known.ok_or_else(|| {
-        let names: Vec<_> = deviation::deviations().map(|own| own.name).collect();
         let remedy = match nearest(name.trim(), &names) {
             Some(near) => format!("did you mean `{near}`?"),
             None => "`drivebench deviations` lists them".to_owned(),
@@ -107,8 +107,15 @@ fn planted(text: &str) -> Result<Planted, String> {
     Ok(Planted {
         ring,
         drive,
-        name: known.name.to_owned(),
+        name: (*known).to_owned(),
     })
+}
+
+/// The deviations of drives of all buses.
+fn deviation_names() -> Vec<&'static str> {
+    let buses = Bus::NAMES.iter().map(|(_, bus)| *bus);
+    let rows = buses.flat_map(|bus| deviations(bus).into_iter().next().unwrap_or_default());
+    rows.map(|row| row.name).collect()
 }
 
 /// `2/3`.
@@ -131,16 +138,36 @@ pub(crate) fn run(arguments: &FuzzRunArguments, output: &mut Output) -> std::io:
         return Ok(Exit::Usage);
     }
     // What a run that goes on is, its record says.
+    let name = match arguments.resume.as_deref().map(rig_of).transpose() {
+        Ok(name) => name.unwrap_or_else(|| arguments.rig.clone()),
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    let Some(rig) = find_any_rig(&name, output) else {
+        return Ok(Exit::Usage);
+    };
+    match rig.port() {
+        Some(_) => fuzz_port(&rig, arguments, output),
+        None => on_rings(rig, arguments, output),
+    }
+}
+
+fn on_rings(
+    mut rig: Rig,
+    arguments: &FuzzRunArguments,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
     let before = match arguments.resume.as_deref().map(read).transpose() {
         Ok(before) => before.map(|(kept, _)| kept),
         Err(error) => return Ok(tell(&error, output)),
     };
-    let name = before
-        .as_ref()
-        .map_or(&arguments.rig, |kept| &kept.about.rig);
-    let Some(mut rig) = find_rig(name, output) else {
+    let others = |own: &&Planted| own.setup().is_none();
+    if let Some(planted) = arguments.deviates.iter().find(others) {
+        output.complain(&format!(
+            "drives on a ring have no deviation `{}`; `drivebench deviations` lists them",
+            planted.name
+        ));
         return Ok(Exit::Usage);
-    };
+    }
     let behind_port = match &before {
         Some(kept) => kept.about.ports,
         None => arguments.behind_port || !rig.is_simulated(),
@@ -221,7 +248,14 @@ fn on_simulated(
         Ok(target) => target,
         Err(error) => return Ok(tell(&error, output)),
     };
-    let bounds = Bounds {
+    let bounds = bounds_of_simulated(arguments);
+    let about = about(arguments, (setup, false), &scope);
+    explore(arguments, (about, scope), &mut target, &bounds, output)
+}
+
+/// The bounds of a run on simulated drives.
+pub(crate) fn bounds_of_simulated(arguments: &FuzzRunArguments) -> Bounds {
+    Bounds {
         cases: arguments.cases.unwrap_or(match arguments.wire_time {
             Some(_) => u64::MAX,
             None => CASES,
@@ -229,9 +263,7 @@ fn on_simulated(
         wire: arguments.wire_time.map(span),
         findings: arguments.findings.max(1),
         every: EVERY,
-    };
-    let about = about(arguments, (setup, false), &scope);
-    explore(arguments, (about, scope), &mut target, &bounds, output)
+    }
 }
 
 fn about(
@@ -255,10 +287,10 @@ fn about(
 }
 
 /// Begins a run or goes on with one, and tells what came of it.
-fn explore(
+pub(crate) fn explore<C: FuzzCase>(
     arguments: &FuzzRunArguments,
-    (about, scope): (FuzzSettings, CaseScope),
-    target: &mut dyn Target,
+    (about, scope): (FuzzSettings<C>, C::Scope),
+    target: &mut dyn Target<C>,
     bounds: &Bounds,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -347,14 +379,14 @@ fn beyond(end: &RunEnd, bounds: &Bounds) -> String {
     format!("nothing was played: {remedy}\n")
 }
 
-fn resume(
+fn resume<C: FuzzCase>(
     folder: &std::path::Path,
-    about: &FuzzSettings,
-    scope: &CaseScope,
-    target: &mut dyn Target,
-) -> Result<(FuzzRecord, FuzzRun), ExploreError> {
+    about: &FuzzSettings<C>,
+    scope: &C::Scope,
+    target: &mut dyn Target<C>,
+) -> Result<(FuzzRecord, FuzzRun<C>), ExploreError> {
     let (record, kept) = FuzzRecord::resume(folder)?;
-    let is = |about: &FuzzSettings| (about.drives, about.second, about.spices.clone());
+    let is = |about: &FuzzSettings<C>| (about.drives, about.second, about.spices.clone());
     if is(&kept.about) != is(about) {
         return Err(ExploreError::Usage(format!(
             "the rig {} is another one than when the run in {} began: other drives, or other leave; begin another run",

@@ -6,7 +6,7 @@ use crate::counted::counted;
 use crate::evidence::{Signer, sealed};
 use crate::explore::files::read_text;
 use crate::explore::{
-    ExploreError, Finding, KeptRun, LogLine, OnSim, Target as _, count_finding, judged_again,
+    Again, Differing as _, ExploreError, Finding, FuzzCase, KeptRun, LogLine, count_finding,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,9 +16,9 @@ const UNCONFIRMED: &str =
     "unconfirmed  which cases were tried and showed nothing: the record has their number only\n";
 
 /// Checks the files of a run, and judges its findings again.
-pub(crate) fn verify(
+pub(crate) fn verify<C: FuzzCase>(
     folder: &Path,
-    kept: &KeptRun,
+    kept: &KeptRun<C>,
     signer: Option<Signer<'_>>,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
@@ -49,23 +49,23 @@ pub(crate) fn verify(
             continue;
         };
         let text = match again(folder, file, kept, &known) {
-            Ok(Again::Same(finding)) if !is_of(&finding, line) => {
+            Ok((finding, Again::Same)) if !is_of(&finding, line) => {
                 wrong += 1;
                 format!(
                     "differs      case {number}: {file}.json is not the finding of the record\n"
                 )
             }
-            Ok(Again::Same(_)) => {
+            Ok((_, Again::Same)) => {
                 judged += 1;
                 format!("found again  case {number}\n")
             }
-            Ok(Again::Unknown) => {
+            Ok((_, Again::Unknown)) => {
                 complete = false;
                 format!(
                     "unconfirmed  case {number}: what the drives behind the ports answered is not in the folder\n"
                 )
             }
-            Ok(Again::Differs(why)) => {
+            Ok((_, Again::Differs(why))) => {
                 wrong += 1;
                 format!("differs      case {number}: {why}\n")
             }
@@ -97,77 +97,35 @@ pub(crate) fn verify(
     })
 }
 
-/// What came of judging a finding again.
-enum Again {
-    /// The same.
-    Same(Box<Finding>),
-    /// Something else, and what.
-    Differs(String),
-    /// The folder does not have what it rests on.
-    Unknown,
-}
-
 /// Whether a line of the record is about a finding.
-fn is_of(finding: &Finding, line: &LogLine) -> bool {
+fn is_of<C: FuzzCase>(finding: &Finding<C>, line: &LogLine<C>) -> bool {
     matches!(line, LogLine::Finding { number, signature, confirmed, .. }
         if *number == finding.number && *signature == finding.difference.key() && *confirmed == finding.confirmed)
 }
 
-/// Judges a finding again: on simulated drives it is played again, on a ring with ports its attempts are in its file.
-fn again(
+/// Judges a finding again, beside its scenario and the record.
+fn again<C: FuzzCase>(
     folder: &Path,
     file: &str,
-    kept: &KeptRun,
+    kept: &KeptRun<C>,
     known: &BTreeMap<String, u8>,
-) -> Result<Again, ExploreError> {
-    let (finding, path) = Finding::read(&folder.join(file).with_extension("json"))?;
+) -> Result<(Finding<C>, Again), ExploreError> {
+    let (finding, path) = Finding::<C>::read_as(&folder.join(file).with_extension("json"))?;
     let scenario = path.with_extension("scn");
-    if read_text(&scenario)? != finding.text()? {
-        let why = format!("{file}.scn is not the scenario of its finding");
-        return Ok(Again::Differs(why));
-    }
     let about = &kept.about;
-    let of = |own: &Finding| (own.rig.clone(), own.setup.clone(), own.ports, own.seed);
-    if of(&finding)
-        != (
-            about.rig.clone(),
-            about.setup.clone(),
-            about.ports,
-            about.seed,
-        )
-    {
-        let why = "it is of another run than the record";
-        return Ok(Again::Differs(why.to_owned()));
-    }
-    if about.ports {
-        return Ok(match judged_again(&finding, about, known)? {
-            None => Again::Unknown,
-            Some(own) if own == finding => Again::Same(Box::new(finding)),
-            Some(own) => Again::Differs(format!(
-                "the file has \"{}\", its attempts give \"{}\"",
-                told(&finding),
-                told(&own)
-            )),
-        });
-    }
-    let mut target = OnSim::new(finding.setup.clone());
-    let rehearsal = target.rehearse(&finding.case)?;
-    let tried = target.attempt(&finding.case, &rehearsal)?;
-    let same = tried.difference.is_some_and(|found| {
-        found.is_like(&finding.difference) && found.byte == finding.difference.byte
-    });
-    Ok(match same {
-        true => Again::Same(Box::new(finding)),
-        false => Again::Differs("its conversation does not differ as the finding says".to_owned()),
-    })
-}
-
-/// A finding in a line.
-fn told(finding: &Finding) -> String {
-    let Finding { seen_again, of, .. } = finding;
-    let sent = counted(finding.case.bytes().len(), "byte");
-    format!(
-        "{}; seen again {seen_again} of {of} times; {sent} sent",
-        finding.difference.about
-    )
+    let of = |own: &Finding<C>| (own.rig.clone(), own.setup.clone(), own.ports, own.seed);
+    let same = (
+        about.rig.clone(),
+        about.setup.clone(),
+        about.ports,
+        about.seed,
+    );
+    let again = if read_text(&scenario)? != C::text(&finding)? {
+        Again::Differs(format!("{file}.scn is not the scenario of its finding"))
+    } else if of(&finding) != same {
+        Again::Differs("it is of another run than the record".to_owned())
+    } else {
+        C::again(&finding, about, known)?
+    };
+    Ok((finding, again))
 }

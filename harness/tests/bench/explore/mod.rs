@@ -2,6 +2,7 @@
 
 mod command;
 mod findings;
+mod frames;
 mod masters;
 mod rings;
 mod runs;

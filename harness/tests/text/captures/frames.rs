@@ -126,8 +126,6 @@ fn frames_are_written_read_and_compared() {
         said.contains("only in frames.candump: ") && said.contains("181#3133F300"),
         "{said}"
     );
-    let said = ended(&drivebench(&["import", plain(&candump)]), 2);
-    assert!(said.contains("--format table"), "{said}");
     let said = ended(&drivebench(&["diff", plain(&candump), "10.1-read-byte"]), 2);
     assert!(said.contains("bytes of a ring"), "{said}");
     let said = ended(
@@ -275,4 +273,58 @@ fn a_scenario_is_made_of_a_capture() {
         text.contains("drive 3\n\n@0.000000ms > 203 3D 1B 00\n< 183 1B D8 01 xx\n"),
         "{text}"
     );
+}
+
+/// A capture is judged: what a right drive sends passes, and what differs is named with its frame, register and section.
+#[test]
+fn frames_are_judged() {
+    let scenario = scenario("judged.scn");
+    for form in ["pcapng", "candump", "json"] {
+        let capture = file(&format!("judged.{form}"));
+        let form = ["trace", plain(&scenario), "--format", form, "-o"];
+        ended(&drivebench(&[&form[..], &[plain(&capture)]].concat()), 0);
+        let judge = ["import", plain(&capture), "--setup", plain(&scenario)];
+        let said = ended(&drivebench(&judge), 0);
+        assert!(
+            said.starts_with("passed judged.") && said.contains("8 of drives compared"),
+            "{said}"
+        );
+    }
+    let log = std::fs::read_to_string(file("judged.candump")).expect("a log");
+    let setup = ["--setup", plain(&scenario)];
+    let judged = |name: &str, log: &str, code: i32| {
+        let path = file(name);
+        std::fs::write(&path, log).expect("room");
+        ended(
+            &drivebench(&[&["import", plain(&path)], &setup[..]].concat()),
+            code,
+        )
+    };
+    let other = judged("value.log", &log.replacen("181#3133F3", "181#3133F4", 1), 1);
+    let wanted =
+        "frame 5, drive 1 (UNITEK ex 3): register 31 (SPEED_CMD) reads F433, and F333 is expected";
+    assert!(
+        other.starts_with("failed value.log") && other.contains(wanted),
+        "{other}"
+    );
+    let long = judged(
+        "length.log",
+        &log.replacen("181#3133F300", "181#3133F3000000", 1),
+        1,
+    );
+    assert!(
+        long.contains("(UNITEK 4.5): 181 31 33 F3 00 00 00 is no reply"),
+        "{long}"
+    );
+    let none: String = log
+        .lines()
+        .filter(|line| !line.contains(" 1"))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let silent = judged(
+        "none.log",
+        &none.replace(" 18", " 28").replace(" 190", " 290"),
+        5,
+    );
+    assert!(silent.contains("nothing was compared"), "{silent}");
 }

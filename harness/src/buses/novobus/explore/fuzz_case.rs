@@ -1,17 +1,21 @@
 //! The ring's conversations as the engine explores them.
 
 use super::case::{Act, Case};
+use super::confirm::judged_again;
 use super::generate::{CaseScope, Generator};
 use super::mutate::mutate;
+use super::on_sim::OnSim;
 use super::oracle::Difference;
 use super::play::MasterView;
 use super::setup::RingSetup;
 use super::tour::tour;
 use super::{AttemptRecord, Spice};
+use crate::counted::counted;
 use crate::explore::{
-    Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, Pool, Rehearsal,
-    Swarm, Target,
+    Again, Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, Pool,
+    Rehearsal, Swarm, Target,
 };
+use std::collections::BTreeMap;
 
 impl Differing for Difference {
     fn is_like(&self, other: &Self) -> bool {
@@ -87,6 +91,36 @@ impl FuzzCase for Case {
         finding.text()
     }
 
+    fn again(
+        finding: &Finding,
+        about: &FuzzSettings,
+        known: &BTreeMap<String, u8>,
+    ) -> Result<Again, ExploreError> {
+        if about.ports {
+            return Ok(match judged_again(finding, about, known)? {
+                None => Again::Unknown,
+                Some(own) if own == *finding => Again::Same,
+                Some(own) => Again::Differs(format!(
+                    "the file has \"{}\", its attempts give \"{}\"",
+                    told(finding),
+                    told(&own)
+                )),
+            });
+        }
+        let mut target = OnSim::new(finding.setup.clone());
+        let rehearsal = target.rehearse(&finding.case)?;
+        let tried = target.attempt(&finding.case, &rehearsal)?;
+        let same = tried.difference.is_some_and(|found| {
+            found.is_like(&finding.difference) && found.byte == finding.difference.byte
+        });
+        Ok(match same {
+            true => Again::Same,
+            false => {
+                Again::Differs("its conversation does not differ as the finding says".to_owned())
+            }
+        })
+    }
+
     fn is_sound(finding: &Finding) -> bool {
         finding.is_bounded()
     }
@@ -100,6 +134,16 @@ impl FuzzCase for Case {
     ) -> Result<(), ExploreError> {
         confirmation.on_ring(finding, rehearsal, before, target)
     }
+}
+
+/// A finding in a line.
+fn told(finding: &Finding) -> String {
+    let Finding { seen_again, of, .. } = finding;
+    let sent = counted(finding.case.bytes().len(), "byte");
+    format!(
+        "{}; seen again {seen_again} of {of} times; {sent} sent",
+        finding.difference.about
+    )
 }
 
 /// Interleaves the cases of several tours.

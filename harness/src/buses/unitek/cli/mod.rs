@@ -5,6 +5,7 @@ pub(crate) mod cells;
 mod check;
 mod control;
 pub(crate) mod deviations;
+pub(crate) mod fuzz;
 mod info;
 mod params;
 mod position;

@@ -1,0 +1,131 @@
+//! What is known of the cycle of one register.
+
+use harness_proto::time::{Instant, Span};
+
+/// How far a single gap may be off: the drive's scan is 1 ms, and so is the clock of many adapters (UNITEK 5.2).
+const GAP: Span = Span::from_millis(2);
+
+/// How long a frame may wait in the drive when its cycle is stopped.
+const IN_FLIGHT: Span = Span::from_millis(20);
+
+/// From how many intervals on their mean is judged.
+const ENOUGH: u64 = 10;
+
+/// The cycle of a register.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Cycle {
+    /// It may run since before the first frame.
+    #[default]
+    Unknown,
+    /// It does not run since then; one frame may still be in flight.
+    Off(Instant),
+    /// It runs.
+    On(Running),
+}
+
+/// A cycle that runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Running {
+    every: Span,
+    /// When it was asked for, or when a frame of the register last came.
+    alive: Instant,
+    /// Whether it certainly runs: the request was heard, and the table had a place.
+    pub(super) sure: bool,
+    /// First and last frame of an unbroken series, and how many intervals are between them.
+    series: Option<(Instant, Instant, u64)>,
+    /// How long the bus was used when the last frame came.
+    used: Span,
+}
+
+/// How a frame of a cycle is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Untimely {
+    /// One gap.
+    Gap(Span),
+    /// The mean of so many gaps.
+    Mean(Span, u64),
+}
+
+impl Running {
+    /// A cycle that was asked for.
+    pub(super) const fn new(every: u8, asked: Instant, sure: bool) -> Self {
+        Self {
+            every: Span::from_millis(every as u64),
+            alive: asked,
+            sure,
+            series: None,
+            used: Span::ZERO,
+        }
+    }
+
+    /// The interval.
+    pub(super) const fn every(&self) -> Span {
+        self.every
+    }
+
+    /// A frame that may belong to the cycle or not has begun at `at`: the series begins again.
+    pub(super) const fn blur(&mut self, at: Instant) {
+        self.series = None;
+        self.alive = at;
+    }
+
+    /// A frame has begun at `at`, when the bus had been used for `used`.
+    pub(super) fn comes(&mut self, at: Instant, used: Span) -> Option<Untimely> {
+        self.sure = true;
+        self.alive = at;
+        // Behind a busy bus a frame waits, and one that waits is replaced by its successor.
+        let busy = |since: Instant, before: Span| {
+            let gap = at.since(since).units();
+            let load = (used.units() - before.units()).saturating_mul(2);
+            load > gap
+        };
+        let Some((first, last, count)) = self.series else {
+            self.series = Some((at, at, 0));
+            self.used = used;
+            return None;
+        };
+        let gap = at.since(last);
+        if busy(last, self.used) {
+            self.series = Some((at, at, 0));
+            self.used = used;
+            return None;
+        }
+        self.used = used;
+        self.series = Some((first, at, count + 1));
+        let off = |own: Span, wanted: Span| own.units().abs_diff(wanted.units());
+        if off(gap, self.every) > GAP.units() {
+            self.series = Some((at, at, 0));
+            return Some(Untimely::Gap(gap));
+        }
+        let count = count + 1;
+        let (whole, wanted) = (at.since(first), self.every * count);
+        let most = wanted.units() / 50 + GAP.units();
+        if count >= ENOUGH && off(whole, wanted) > most {
+            self.series = Some((at, at, 0));
+            return Some(Untimely::Mean(
+                Span::from_units(whole.units() / count),
+                count,
+            ));
+        }
+        None
+    }
+
+    /// Whether a frame has been due for long at `now`.
+    pub(super) fn is_missing(&self, now: Instant) -> bool {
+        self.sure && now.since(self.alive) > self.every + self.every + IN_FLIGHT
+    }
+}
+
+impl Cycle {
+    /// Whether a frame that begins at `at` may be one that was in flight when the cycle ended; it is the last one.
+    pub(super) fn in_flight(&mut self, at: Instant) -> bool {
+        match *self {
+            Self::Off(since) => {
+                let may = at.since(since) <= IN_FLIGHT;
+                *self = Self::Off(Instant::START);
+                may && since != Instant::START
+            }
+            Self::Unknown | Self::On(_) => true,
+        }
+    }
+}

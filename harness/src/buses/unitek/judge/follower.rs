@@ -1,0 +1,588 @@
+//! Follows the frames of a bus, drive by drive.
+
+use super::cycle::{Cycle, Running, Untimely};
+use super::held::{Held, is_live, takes_writes};
+use crate::buses::unitek::language::{identifier, written};
+use crate::buses::unitek::report::sender_of;
+use harness_proto::can::Frame;
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::frame::{CYCLES, Reply};
+use harness_proto::unitek::properties::Dlc4;
+use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK, status};
+use harness_proto::unitek::{Access, Data, REGISTERS, Register, Request, Width};
+use harness_sim::record::{FrameEnd, LineFrame};
+use std::collections::{BTreeMap, VecDeque};
+
+/// How much later than the slowest reply so far a reply may be.
+const PATIENCE: Span = Span::from_millis(20);
+
+/// Requests of a drive that are kept at most while they wait for their replies.
+const MOST_ASKED: usize = 1_000;
+
+/// The longest interval of a cycle, and some more.
+const LONGEST_CYCLE: Span = Span::from_millis(300);
+
+/// Differences that are kept at most.
+const MOST_BREACHES: usize = 50;
+
+/// Something that a drive does, and that no value of what the manual leaves open explains.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Breach {
+    /// The number of the frame where it shows, counted from 1.
+    pub frame: usize,
+    /// The drive.
+    pub drive: u8,
+    /// The register.
+    pub register: u8,
+    /// The section, example or appendix item, such as `ex 9`.
+    pub section: &'static str,
+    /// What was expected and what has come.
+    pub about: String,
+}
+
+/// What came of judging frames.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct JudgedDrives {
+    /// What differs, in order.
+    pub breaches: Vec<Breach>,
+    /// Frames of drives that were compared.
+    pub compared: usize,
+    /// Values that were compared with what had been written.
+    pub values: usize,
+    /// What was not compared, in sentences.
+    pub remarks: Vec<String>,
+}
+
+/// A request that waits for its reply.
+#[derive(Clone, Debug)]
+struct Asked {
+    register: u8,
+    at: Instant,
+    frame: usize,
+    /// Whether the drive has certainly heard it and answers it.
+    sure: bool,
+    /// What the register could hold at the request: a drive may read it then, or when it replies.
+    held: Held,
+}
+
+/// What the frames show of one drive.
+#[derive(Debug)]
+pub struct Follower {
+    drive: u8,
+    /// On which it may receive and send: after a change the old and the new ones, since it is open when a drive changes.
+    rx: Vec<u16>,
+    tx: Vec<u16>,
+    held: Vec<Held>,
+    cycles: [Cycle; 256],
+    asked: VecDeque<Asked>,
+    /// The latest of all replies, behind its request.
+    slowest: Option<Span>,
+    /// Whether replies with 8F are short, once it is known (`map-reply`).
+    short_map: Option<bool>,
+    /// Whether all replies have 6 bytes, where it is known (bit 8 of DC), and when that may have changed.
+    wide: Option<bool>,
+    wide_at: Instant,
+    /// When MODE was last written, or may have been.
+    mode_at: Instant,
+    /// Homing may run, which sets the destination at its end.
+    homes: bool,
+    /// When the first frame began.
+    begin: Option<Instant>,
+    /// Registers of which a frame came that nothing here asks for, and when last: their cycles run since before the first frame.
+    unsolicited: BTreeMap<u8, Instant>,
+    /// What was written to registers that cannot be written, and held something else.
+    refused: BTreeMap<u8, u32>,
+    /// The numbers of the other drives.
+    others: Vec<u8>,
+    /// The time that frames have used.
+    used: Span,
+    judged: JudgedDrives,
+}
+
+/// Judges frames with these drives: number, and the identifiers on which each receives and sends.
+#[must_use]
+pub fn judge(frames: &[LineFrame], drives: &[(u8, (u16, u16))]) -> JudgedDrives {
+    let mut all = JudgedDrives::default();
+    for &(drive, identifiers) in drives {
+        let shared = |other: &&(u8, (u16, u16))| {
+            let (rx, tx) = other.1;
+            other.0 != drive && (rx == identifiers.0 || tx == identifiers.1)
+        };
+        if let Some((other, _)) = drives.iter().find(shared) {
+            let remark = format!("drives {drive} and {other} share an identifier: not compared");
+            all.remarks.push(remark);
+            continue;
+        }
+        let mut follower = Follower::new(drive, identifiers);
+        follower.others = drives.iter().map(|own| own.0).collect();
+        for (index, frame) in frames.iter().enumerate() {
+            follower.hear(index + 1, frame);
+        }
+        let own = follower.end(frames);
+        all.breaches.extend(own.breaches);
+        all.compared += own.compared;
+        all.values += own.values;
+        all.remarks.extend(own.remarks);
+    }
+    all.breaches.sort_by_key(|own| own.frame);
+    all
+}
+
+impl Follower {
+    /// A drive of which nothing is known but its identifiers.
+    #[must_use]
+    pub fn new(drive: u8, (rx, tx): (u16, u16)) -> Self {
+        let mut held = vec![Held::any(); REGISTERS.len()];
+        held[0x68] = Held::one(rx.into());
+        held[0x69] = Held::one(tx.into());
+        Self {
+            drive,
+            rx: vec![rx],
+            tx: vec![tx],
+            held,
+            cycles: [Cycle::Unknown; 256],
+            asked: VecDeque::new(),
+            slowest: None,
+            short_map: None,
+            wide: None,
+            wide_at: Instant::START,
+            homes: false,
+            begin: None,
+            unsolicited: BTreeMap::new(),
+            refused: BTreeMap::new(),
+            others: Vec::new(),
+            mode_at: Instant::START,
+            used: Span::ZERO,
+            judged: JudgedDrives::default(),
+        }
+    }
+
+    /// A frame of the bus.
+    pub fn hear(&mut self, number: usize, own: &LineFrame) {
+        self.used = self.used + own.at.since(own.start);
+        self.begin.get_or_insert(own.start);
+        if self.sent_it(own) {
+            // An error frame ends a frame that is repeated.
+            if !matches!(own.ended, FrameEnd::Error(_)) {
+                self.missing(number, own.start);
+                self.sends(number, own);
+            }
+        } else if among(&self.rx, &own.frame) {
+            self.hears(number, own);
+        }
+    }
+
+    /// Whether a frame is the drive's: by its number, or by an identifier that it may have taken.
+    fn sent_it(&self, own: &LineFrame) -> bool {
+        let moved = among(&self.tx, &own.frame);
+        match own.from {
+            Some(drive) if drive == self.drive => true,
+            Some(drive) => moved && !self.others.contains(&drive),
+            None => moved && sender_of(&own.frame).is_none(),
+        }
+    }
+
+    /// The judgement, after the last frame.
+    #[must_use]
+    pub fn end(mut self, frames: &[LineFrame]) -> JudgedDrives {
+        if let Some(last) = frames.last() {
+            self.missing(frames.len(), last.at);
+        }
+        if self.slowest.is_none() && !self.asked.is_empty() {
+            self.judged.remarks.push(format!(
+                "drive {} answers no request: it is off, or has other identifiers than {:03X} and {:03X}",
+                self.drive, self.rx[0], self.tx[0]
+            ));
+        }
+        self.judged
+    }
+
+    fn breach(&mut self, frame: usize, register: u8, section: &'static str, about: String) {
+        if self.judged.breaches.len() < MOST_BREACHES {
+            self.judged.breaches.push(Breach {
+                frame,
+                drive: self.drive,
+                register,
+                section,
+                about,
+            });
+        }
+    }
+
+    /// What the drive may read out of a frame.
+    fn hears(&mut self, number: usize, own: &LineFrame) {
+        let id = own.frame.id().number();
+        let rx = u16::try_from(id).unwrap_or(0);
+        let Ok(request) = Request::decode(&own.frame, rx, Dlc4::As3) else {
+            return;
+        };
+        // What an error ended may have been taken before; 4 bytes may be ignored (`dlc4`).
+        let sure = own.ended == FrameEnd::Good && self.rx.len() == 1 && own.frame.dlc() != 4;
+        match request {
+            Request::Read { register } => {
+                if let Cycle::On(running) = &mut self.cycles[usize::from(register)] {
+                    // It may end the cycle (`oneshot-stops`).
+                    running.sure = false;
+                    running.blur(own.at);
+                }
+                let silent = Register::of(register).dump == 0xFACE;
+                self.ask(register, own.at, number, sure && !silent);
+            }
+            Request::Cycle { register, every } => self.starts(register, every, own.at, sure),
+            Request::Stop { register } => {
+                let cycle = &mut self.cycles[usize::from(register)];
+                match (sure, &mut *cycle) {
+                    (true, Cycle::Off(_)) => {}
+                    (true, _) => *cycle = Cycle::Off(own.at),
+                    (false, Cycle::On(running)) => running.sure = false,
+                    (false, _) => {}
+                }
+            }
+            Request::Write { register, data } => self.writes(register, data, own.at, sure),
+        }
+    }
+
+    fn ask(&mut self, register: u8, at: Instant, frame: usize, sure: bool) {
+        if self.asked.len() >= MOST_ASKED {
+            self.asked.pop_front();
+        }
+        let place = if register == 0x40 { 0x51 } else { register };
+        self.asked.push_back(Asked {
+            register,
+            at,
+            frame,
+            sure,
+            held: self.held[usize::from(place)].clone(),
+        });
+    }
+
+    fn starts(&mut self, register: u8, every: u8, at: Instant, sure: bool) {
+        let runs = |cycle: &&Cycle| !matches!(cycle, Cycle::Off(_) | Cycle::Unknown);
+        let known = self.cycles.iter().filter(runs).count();
+        let was_on = matches!(self.cycles[usize::from(register)], Cycle::On(_));
+        // A full table refuses, or gives up another cycle (`table-full`).
+        let full = !was_on && known >= CYCLES;
+        if full {
+            for cycle in &mut self.cycles {
+                if let Cycle::On(running) = cycle {
+                    running.sure = false;
+                }
+            }
+        }
+        let silent = Register::of(register).dump == 0xFACE;
+        // Cycles from before the first frame may fill the table; each shows itself within 254 ms.
+        let old = self
+            .begin
+            .is_some_and(|begin| at.since(begin) > LONGEST_CYCLE);
+        let unknown =
+            self.cycles.contains(&Cycle::Unknown) && !(old && self.unsolicited.is_empty());
+        let certain = sure && !full && !silent && !unknown;
+        self.cycles[usize::from(register)] = Cycle::On(Running::new(every, at, certain));
+    }
+
+    fn writes(&mut self, number: u8, data: Data, at: Instant, sure: bool) {
+        let register = Register::of(number);
+        let place = usize::from(number);
+        if number == 0x51 {
+            self.mode_at = at;
+        }
+        match number {
+            // A load brings every parameter back; the EEPROM is not known.
+            0x83 => {
+                for other in REGISTERS.iter().filter(|own| own.access == Access::RW) {
+                    self.held[usize::from(other.number)] = Held::any();
+                }
+                (self.wide, self.wide_at) = (None, at);
+            }
+            0x78 => self.homes = true,
+            0xDC => {
+                let wide = data.bits() & 0x0100 != 0;
+                self.wide = sure.then_some(wide);
+                self.wide_at = at;
+            }
+            _ => {}
+        }
+        if !takes_writes(register) {
+            return self.refuses(register, data.bits());
+        }
+        let before = self.held[place].clone();
+        // Identifiers out of a range are ignored (`id-range`).
+        let takes = sure && !matches!(number, 0x68 | 0x69);
+        self.held[place] = before.written(register, data, takes);
+        if number == 0x51 && data.bits() & u32::from(MODE_LOCK) != 0 {
+            // `lock-clears-command`.
+            for command in [0x31, 0x90] {
+                self.held[command] = self.held[command].may_be(0);
+            }
+        }
+        if let (0x68 | 0x69, Ok(id @ 1..=0x7FF)) = (number, u16::try_from(data.bits() & 0xFFFF)) {
+            let all = if number == 0x68 {
+                &mut self.rx
+            } else {
+                &mut self.tx
+            };
+            if !all.contains(&id) {
+                all.push(id);
+            }
+        }
+    }
+
+    /// A write to a register that cannot be written. A value that it may have by chance shows nothing.
+    fn refuses(&mut self, register: &Register, raw: u32) {
+        let raw = raw & register.mask();
+        let held = self.held[usize::from(register.number)].sure();
+        let telling = held.is_some_and(|held| held != raw) && raw > 1;
+        let never = matches!(register.access, Access::RO | Access::UK);
+        if telling && never && !is_live(register.number) {
+            self.refused.insert(register.number, raw);
+        }
+    }
+
+    /// Frames that have been due for long.
+    fn missing(&mut self, number: usize, now: Instant) {
+        let patience = self.slowest.map(|slowest| slowest + slowest + PATIENCE);
+        while let (Some(first), Some(patience)) = (self.asked.front().cloned(), patience)
+            && now.since(first.at) > patience
+        {
+            self.asked.pop_front();
+            if first.sure {
+                let name = Register::of(first.register).name;
+                self.breach(
+                    first.frame,
+                    first.register,
+                    "5.2",
+                    format!(
+                        "the request for register {:02X} ({name}) is not answered",
+                        first.register
+                    ),
+                );
+            }
+        }
+        for register in 0..=u8::MAX {
+            if let Cycle::On(running) = &mut self.cycles[usize::from(register)]
+                && running.is_missing(now)
+            {
+                running.sure = false;
+                running.blur(now);
+                let every = running.every();
+                let name = Register::of(register).name;
+                let about = format!(
+                    "no frame of register {register:02X} ({name}) comes, which is asked for every {every}"
+                );
+                self.breach(number, register, "ex 9", about);
+            }
+        }
+    }
+
+    /// A frame of the drive.
+    fn sends(&mut self, number: usize, own: &LineFrame) {
+        self.judged.compared += 1;
+        let tx = u16::try_from(own.frame.id().number()).unwrap_or(0);
+        let first = own.frame.data().first().copied().unwrap_or(0);
+        if !self.tx.contains(&tx) || own.frame.id().is_extended() {
+            let id = identifier(own.frame.id());
+            let about = format!("it has identifier {id}, and {:03X} is expected", self.tx[0]);
+            return self.breach(number, first, "3.1", about);
+        }
+        let reply = match Reply::decode(&own.frame, tx) {
+            Ok(reply) => reply,
+            Err(why) => {
+                let about = format!("{} is no reply: {why}", written(&own.frame));
+                return self.breach(number, first, "4.5", about);
+            }
+        };
+        let asked = self.why(number, own, &reply);
+        self.length(number, own.start, &reply);
+        self.value(number, &reply, asked.as_ref());
+    }
+
+    /// Why the drive sends it: the request that it answers, if it is one. What nothing asks for differs.
+    fn why(&mut self, number: usize, own: &LineFrame, reply: &Reply) -> Option<Asked> {
+        let register = reply.register;
+        let used = self.used;
+        let place = self.asked.iter().position(|own| own.register == register);
+        let cycle = &mut self.cycles[usize::from(register)];
+        if let Some(asked) = place.and_then(|place| self.asked.remove(place)) {
+            // A frame of a cycle or an event would not show how long a reply takes.
+            let may_be_other = match cycle {
+                Cycle::On(running) => {
+                    running.blur(own.start);
+                    true
+                }
+                Cycle::Unknown => self.unsolicited.contains_key(&register),
+                Cycle::Off(_) => false,
+            };
+            if !may_be_other && register != 0x40 {
+                let late = own.start.since(asked.at);
+                self.slowest = Some(self.slowest.map_or(late, |slowest| slowest.max(late)));
+            }
+            return Some(asked);
+        }
+        if self.may_be_event(register, own.start) {
+            if let Cycle::On(running) = &mut self.cycles[usize::from(register)] {
+                running.blur(own.start);
+            }
+            return None;
+        }
+        let cycle = &mut self.cycles[usize::from(register)];
+        let untimely = match cycle {
+            Cycle::On(running) => running
+                .comes(own.start, used)
+                .map(|why| (why, running.every())),
+            Cycle::Unknown => {
+                self.from_before(number, own);
+                None
+            }
+            Cycle::Off(_) => {
+                if !self.cycles[usize::from(register)].in_flight(own.start) {
+                    let name = Register::of(register).name;
+                    let about = format!(
+                        "{} comes, and nothing asks for register {register:02X} ({name})",
+                        written(&own.frame)
+                    );
+                    self.breach(number, register, "5.2", about);
+                }
+                None
+            }
+        };
+        if let Some((untimely, every)) = untimely {
+            let name = Register::of(register).name;
+            let (what, gap) = match untimely {
+                Untimely::Gap(gap) => ("it comes".to_owned(), gap),
+                Untimely::Mean(gap, count) => (format!("{count} intervals last on average"), gap),
+            };
+            let about = format!(
+                "register {register:02X} ({name}) is asked for every {every}: {what} {gap} behind the one before"
+            );
+            self.breach(number, register, "ex 9", about);
+        }
+        None
+    }
+
+    /// A frame that no request of these frames asks for: of a cycle that runs since before the first of them. Such a cycle shows itself
+    /// within 254 ms, again and again.
+    fn from_before(&mut self, number: usize, own: &LineFrame) {
+        let register = own.frame.data().first().copied().unwrap_or(0);
+        let before = self.unsolicited.get(&register).copied().or(self.begin);
+        if before.is_some_and(|before| own.start.since(before) > LONGEST_CYCLE) {
+            let name = Register::of(register).name;
+            let about = format!(
+                "{} comes, and nothing asks for register {register:02X} ({name}): no cycle is as long",
+                written(&own.frame)
+            );
+            self.breach(number, register, "5.2", about);
+        }
+        self.unsolicited.insert(register, own.start);
+    }
+
+    /// Whether a frame can have been sent by event (ex 10).
+    fn may_be_event(&self, register: u8, at: Instant) -> bool {
+        let off = self.held[0x51].sure();
+        let off = off.is_some_and(|mode| mode & u32::from(MODE_EVENT) == 0);
+        register == 0x40 && (!off || at.since(self.mode_at) <= PATIENCE)
+    }
+
+    /// How long a reply must be.
+    fn length(&mut self, number: usize, at: Instant, reply: &Reply) {
+        let register = Register::of(reply.register);
+        let long = matches!(reply.data, Data::Long(_));
+        let map = matches!(reply.register, 0x40 | 0x8F);
+        // What was read before DC was written may come behind it.
+        let settled = at.since(self.wide_at) > self.slowest.unwrap_or_default() + PATIENCE;
+        let wide = self
+            .wide
+            .filter(|_| settled || self.wide_at == Instant::START);
+        if settled && self.wide.is_none() && register.width == Width::Bits16 {
+            self.wide = Some(long);
+        }
+        let wrong = match (register.width, wide) {
+            (Width::Bits16, Some(wide)) => long != wide,
+            (Width::Bits16, None) => false,
+            (Width::Bits32, Some(true)) => !long,
+            (Width::Bits32, _) => !long && !map,
+        };
+        if wrong {
+            let (bytes, wanted) = if long { (6, 4) } else { (4, 6) };
+            let about = format!(
+                "register {:02X} ({}) comes with {bytes} bytes, and {wanted} are expected",
+                reply.register, register.name
+            );
+            self.breach(number, reply.register, "App 2", about);
+        } else if map && wide == Some(false) && reply.register == 0x8F {
+            // 8F is never sent by event, so that its length is that of `map-reply` for good.
+            if self.short_map.is_some_and(|short| short == long) {
+                let about = "register 8F comes with another length than before".to_owned();
+                self.breach(number, reply.register, "App 7", about);
+            }
+            self.short_map = Some(!long);
+        }
+    }
+
+    /// Whether a register can read this.
+    fn value(&mut self, number: usize, reply: &Reply, asked: Option<&Asked>) {
+        let register = Register::of(reply.register);
+        let raw = reply.data.bits();
+        let locks = |held: &Held| {
+            let mode = held.sure();
+            mode.is_some_and(|mode| mode & u32::from(MODE_LOCK) != 0)
+        };
+        if reply.register == 0x40
+            && asked.is_some_and(|own| locks(&own.held) && locks(&self.held[0x51]))
+            && raw & status::ENABLED != 0
+        {
+            let about = "STATUS shows the drive enabled, and MODE locks it".to_owned();
+            self.breach(number, reply.register, "ex 2", about);
+        }
+        if is_live(reply.register) {
+            return;
+        }
+        let mask = match (register.width, reply.data) {
+            (Width::Bits32, Data::Long(_)) => u32::MAX,
+            _ => 0xFFFF,
+        };
+        let place = usize::from(reply.register);
+        let Some(asked) = asked else {
+            return;
+        };
+        let whole = mask == u32::MAX || register.width == Width::Bits16;
+        if self.refused.get(&reply.register) == Some(&(raw & mask)) && whole {
+            let about = format!(
+                "register {:02X} ({}) cannot be written, and reads what was written to it",
+                reply.register, register.name
+            );
+            self.refused.remove(&reply.register);
+            self.breach(number, reply.register, "dump", about);
+        }
+        let homes = self.homes && reply.register == 0x6E;
+        if register.access == Access::FN || homes {
+            return;
+        }
+        let held = self.held[place].clone();
+        if takes_writes(register) {
+            self.judged.values += usize::from(held != Held::any());
+            if !held.can_be(raw, mask) && !asked.held.can_be(raw, mask) {
+                let digits = register.width.bits() as usize / 4;
+                let about = format!(
+                    "register {:02X} ({}) reads {:0digits$X}, and {} is expected by what was written or read before",
+                    reply.register,
+                    register.name,
+                    raw & mask,
+                    held.words(register.width)
+                );
+                self.breach(number, reply.register, register.origin, about);
+            }
+        }
+        if reply.register == 0xDC && asked.held == held {
+            self.wide = Some(raw & 0x0100 != 0);
+        }
+        if whole && asked.held == held {
+            self.held[place] = Held::one(raw & mask);
+        }
+    }
+}
+
+/// Whether a frame has one of these identifiers.
+fn among(all: &[u16], frame: &Frame) -> bool {
+    let id = frame.id();
+    !id.is_extended() && all.iter().any(|own| u32::from(*own) == id.number())
+}

@@ -1,0 +1,13 @@
+//! Judges frames of drives whose history is unknown: a capture, or drives behind an adapter.
+//!
+//! A [`Follower`] hears every frame of the bus and knows no more of a drive than these frames show. What the manual leaves open
+//! (UNITEK 7) may have any value, and what a plant decides is not compared. It compares which registers are sent and when, how long
+//! replies are, and what a register reads that was written.
+
+mod cycle;
+mod follower;
+mod held;
+#[cfg(test)]
+mod tests;
+
+pub use follower::{Breach, Follower, JudgedDrives, judge};

@@ -1,0 +1,149 @@
+//! Right drives are never accused, whatever the value of an open point; wrong ones are.
+
+use super::judge;
+use crate::library::{Entry, sources};
+use crate::scenario::run::AtMismatch;
+use crate::scenario::source::Source;
+use harness_proto::can::Frame;
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::properties::{Accepts, PROPERTIES};
+use harness_sim::record::{FrameEnd, LineFrame};
+use harness_sim::unitek::deviation::deviations;
+use std::collections::BTreeSet;
+
+const BUS: &str = "bus     unitek\n";
+
+/// What a capture does not show: power, inputs of registers beside the bus, frames that only some have heard, hosts with a drive's
+/// identifier, two drives with the same one.
+const UNSEEN: [&str; 9] = [
+    "restart",
+    ": off",
+    ": on",
+    "bus-off",
+    ": lost",
+    "-same-identifiers",
+    "> 181",
+    "> 182",
+    "no-acknowledge",
+];
+
+fn scenarios() -> Vec<Source> {
+    let all = sources(&[]).expect("built-in scenarios");
+    let seen = |own: &Source| {
+        UNSEEN
+            .iter()
+            .all(|word| !own.text.contains(word) && !own.name.contains(word))
+    };
+    all.into_iter()
+        .filter(|own| own.text.contains(BUS) && seen(own))
+        .collect()
+}
+
+/// How long the bus may be idle before a scenario.
+const IDLE: Span = Span::from_millis(400);
+
+/// The frames of a scenario with these lines in its header, and its drives.
+fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Vec<(u8, (u16, u16))>) {
+    let text = source.text.replace(BUS, &format!("{BUS}{lines}"));
+    let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
+    let entry = Entry::new(source.clone(), None).unwrap_or_else(|p| panic!("{:#?}", p.all()));
+    let plan = entry.settled().expect("a bus that is built");
+    let mut link = plan.simulate();
+    plan.play(&mut *link, AtMismatch::GoOn);
+    let mut frames = link.trace(0).channels[0].frames().to_vec();
+    if idle {
+        // A frame to nobody, long before the others.
+        let other = LineFrame {
+            from: None,
+            start: Instant::START,
+            at: Instant::START + Span::from_micros(100),
+            frame: Frame::base(0x7FF, &[]).expect("a frame"),
+            ended: FrameEnd::Good,
+        };
+        for own in &mut frames {
+            own.start = own.start + IDLE;
+            own.at = own.at + IDLE;
+        }
+        frames.insert(0, other);
+    }
+    let header = crate::buses::unitek::serve::bench(None, Some(&source)).expect("a header");
+    let drives = header.setup.setup.drives.iter();
+    (
+        frames,
+        drives.map(|own| (own.node, own.identifiers)).collect(),
+    )
+}
+
+fn of_all(source: &Source, line: &str) -> String {
+    let lines = source.text.lines();
+    let numbers = lines.filter_map(|line| line.strip_prefix("drive ")?.split(' ').next());
+    let numbers: BTreeSet<_> = numbers.collect();
+    numbers
+        .iter()
+        .map(|number| format!("drive {number} {line}\n"))
+        .collect()
+}
+
+#[test]
+fn no_right_drive_is_accused() {
+    let mut lines = vec![String::new(), "profile fw472".to_owned()];
+    for property in PROPERTIES {
+        let values: Vec<_> = match property.accepts {
+            Accepts::Words(words) => words.iter().skip(1).map(|own| (*own).to_owned()).collect(),
+            Accepts::Byte => vec!["A5".to_owned()],
+            Accepts::TimeUpTo(_) => ["3ms", "30ms"].map(str::to_owned).to_vec(),
+        };
+        lines.extend(
+            values
+                .iter()
+                .map(|value| format!("property {} = {value}", property.name)),
+        );
+    }
+    let mut values = 0;
+    for source in scenarios() {
+        for (line, idle) in lines.iter().flat_map(|own| [(own, false), (own, true)]) {
+            // A scenario's own lines come behind and win.
+            let header = if line.is_empty() {
+                String::new()
+            } else {
+                of_all(&source, line)
+            };
+            let (frames, drives) = frames(&source, &header, idle);
+            let judged = judge(&frames, &drives);
+            let table: Vec<_> = frames
+                .iter()
+                .map(|own| format!("{} {}", own.start, own.frame))
+                .collect();
+            assert!(
+                judged.breaches.is_empty(),
+                "{} {line}\n{:#?}\n{}",
+                source.name,
+                judged.breaches,
+                table.join("\n")
+            );
+            values += judged.values;
+        }
+    }
+    assert!(values > 500, "{values}");
+}
+
+/// Deviations that a capture alone does not show: they lie in what a plant or inputs decide, in lengths that DC may ask for, or in a
+/// frame that is not sent.
+const NOT_SHOWN: usize = 35;
+
+#[test]
+fn wrong_drives_are_accused() {
+    let scenarios = scenarios();
+    let found = |name: &str| {
+        scenarios.iter().any(|source| {
+            let (frames, drives) =
+                frames(source, &of_all(source, &format!("deviates {name}")), true);
+            !judge(&frames, &drives).breaches.is_empty()
+        })
+    };
+    let missed: Vec<_> = deviations()
+        .map(|own| own.name)
+        .filter(|name| !found(name))
+        .collect();
+    assert!(missed.len() <= NOT_SHOWN, "{} {missed:?}", missed.len());
+}
