@@ -32,7 +32,7 @@ pub trait Differing: Clone + Debug + PartialEq + Eq + Serialize + DeserializeOwn
 
 /// What came of judging a finding again.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Again {
+pub enum JudgedAgain {
     /// The same.
     Same,
     /// Something else, and what.
@@ -93,7 +93,7 @@ pub trait FuzzCase:
         finding: &Finding<Self>,
         about: &FuzzSettings<Self>,
         known: &BTreeMap<String, u8>,
-    ) -> Result<Again, ExploreError>;
+    ) -> Result<JudgedAgain, ExploreError>;
 
     /// Whether a finding that was read is within the bounds of what a run writes.
     fn is_sound(finding: &Finding<Self>) -> bool;

@@ -23,7 +23,7 @@ pub use confirm::Confirmation;
 pub use dice::Dice;
 pub use error::ExploreError;
 pub use finding::{Finding, bus_of};
-pub use fuzz_case::{Again, Differing, FuzzCase, Spiced};
+pub use fuzz_case::{Differing, FuzzCase, JudgedAgain, Spiced};
 pub use pool::{MOST_KEPT, Pool};
 pub use record::{
     FuzzRecord, FuzzSettings, KeptRun, LogLine, Progress, RECORD, read, read_as, rig_of,

@@ -21,8 +21,15 @@ const MOTION: &str = "allow_motion = true\n";
 impl Desk {
     /// A rig at one of the ways in: `slcan`, `pty` or `socketcand`.
     fn new(way: &str, limits: &str) -> Self {
+        Self::of(way, limits, "")
+    }
+
+    /// The same with drives of these header lines.
+    fn of(way: &str, limits: &str, setup: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let terminal = folder.path().join("terminal");
+        let header = folder.path().join("setup.scn");
+        std::fs::write(&header, setup).expect("room");
         let mut sim = Sim::start(&[
             "--bus",
             "unitek",
@@ -34,6 +41,8 @@ impl Desk {
             "127.0.0.1:0",
             "--slcan-pty",
             terminal.to_str().expect("text"),
+            "--setup",
+            header.to_str().expect("text"),
         ]);
         let (slcan, socketcand, terminal) = (sim.address(), sim.address(), sim.address());
         let port = match way {
@@ -276,4 +285,38 @@ fn a_signal_while_the_bench_is_opened() {
     assert!(sent.expect("kill").success());
     let output = child.wait_with_output().expect("its end");
     ended(&output, 130, "interrupted");
+}
+
+/// Drives behind an adapter are explored: right ones are not accused, whatever the manual leaves open; a wrong one is found.
+#[test]
+fn drives_behind_an_adapter_are_explored() {
+    let run = |desk: &Desk, more: &str| {
+        let line = format!("fuzz run --wire-time 6s --allow-motion --out run {more}");
+        desk.run(line.trim_end())
+    };
+    let other = "drive 1 profile fw472\ndrive 2 property cyclic-first = at-once\ndrive 2 property unknown-register = silent\n\
+                 drive 2 property stuff = A5\ndrive 2 property reply-delay = 3ms\n";
+    let desk = Desk::of("slcan", MOTION, other);
+    let right = run(&desk, "--seed 3");
+    ended(&right, 0, "0 found, 0 flaky");
+    assert!(said(&right).contains(SAFE), "{}", said(&right));
+    desk.shows("read 1 VAR1", "0000003E");
+    ended(
+        &run(&desk, "--deviates 1=no-lock"),
+        2,
+        "--deviates is for simulated drives",
+    );
+    let desk = Desk::of(
+        "socketcand",
+        "",
+        "drive 1\ndrive 2 deviates always-four-bytes\n",
+    );
+    let wrong = run(&desk, "--findings 1");
+    ended(&wrong, 1, "1 found, 0 flaky");
+    ended(&wrong, 1, "drive 2: ");
+    ended(
+        &desk.command("verify run").output().expect("the program"),
+        5,
+        "unconfirmed",
+    );
 }

@@ -11,7 +11,7 @@ use super::output::Output;
 use clap::Subcommand;
 
 pub(crate) use rig::{Use, on_ports, scope, sizes, tell};
-pub(crate) use run::{FuzzRunArguments, bounds_of_simulated, explore};
+pub(crate) use run::{FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore};
 pub(crate) use verify::verify;
 
 /// The commands of `fuzz`.

@@ -198,12 +198,7 @@ fn on_rings(
             (RingSetup::of_ports(rig.rings().count()), true),
             &scope,
         );
-        let bounds = Bounds {
-            cases: arguments.cases.unwrap_or(u64::MAX),
-            wire: Some(span(arguments.wire_time.unwrap_or(WIRE))),
-            findings: arguments.findings.max(1),
-            every: 1,
-        };
+        let bounds = bounds_on_ports(arguments);
         explore(arguments, (about, scope), &mut target, &bounds, output)
     })
 }
@@ -251,6 +246,16 @@ fn on_simulated(
     let bounds = bounds_of_simulated(arguments);
     let about = about(arguments, (setup, false), &scope);
     explore(arguments, (about, scope), &mut target, &bounds, output)
+}
+
+/// The bounds of a run on a rig with ports.
+pub(crate) fn bounds_on_ports(arguments: &FuzzRunArguments) -> Bounds {
+    Bounds {
+        cases: arguments.cases.unwrap_or(u64::MAX),
+        wire: Some(span(arguments.wire_time.unwrap_or(WIRE))),
+        findings: arguments.findings.max(1),
+        every: 1,
+    }
 }
 
 /// The bounds of a run on simulated drives.

@@ -6,7 +6,7 @@ use crate::counted::counted;
 use crate::evidence::{Signer, sealed};
 use crate::explore::files::read_text;
 use crate::explore::{
-    Again, Differing as _, ExploreError, Finding, FuzzCase, KeptRun, LogLine, count_finding,
+    Differing as _, ExploreError, Finding, FuzzCase, JudgedAgain, KeptRun, LogLine, count_finding,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -49,23 +49,23 @@ pub(crate) fn verify<C: FuzzCase>(
             continue;
         };
         let text = match again(folder, file, kept, &known) {
-            Ok((finding, Again::Same)) if !is_of(&finding, line) => {
+            Ok((finding, JudgedAgain::Same)) if !is_of(&finding, line) => {
                 wrong += 1;
                 format!(
                     "differs      case {number}: {file}.json is not the finding of the record\n"
                 )
             }
-            Ok((_, Again::Same)) => {
+            Ok((_, JudgedAgain::Same)) => {
                 judged += 1;
                 format!("found again  case {number}\n")
             }
-            Ok((_, Again::Unknown)) => {
+            Ok((_, JudgedAgain::Unknown)) => {
                 complete = false;
                 format!(
                     "unconfirmed  case {number}: what the drives behind the ports answered is not in the folder\n"
                 )
             }
-            Ok((_, Again::Differs(why))) => {
+            Ok((_, JudgedAgain::Differs(why))) => {
                 wrong += 1;
                 format!("differs      case {number}: {why}\n")
             }
@@ -109,7 +109,7 @@ fn again<C: FuzzCase>(
     file: &str,
     kept: &KeptRun<C>,
     known: &BTreeMap<String, u8>,
-) -> Result<(Finding<C>, Again), ExploreError> {
+) -> Result<(Finding<C>, JudgedAgain), ExploreError> {
     let (finding, path) = Finding::<C>::read_as(&folder.join(file).with_extension("json"))?;
     let scenario = path.with_extension("scn");
     let about = &kept.about;
@@ -121,9 +121,9 @@ fn again<C: FuzzCase>(
         about.seed,
     );
     let again = if read_text(&scenario)? != C::text(&finding)? {
-        Again::Differs(format!("{file}.scn is not the scenario of its finding"))
+        JudgedAgain::Differs(format!("{file}.scn is not the scenario of its finding"))
     } else if of(&finding) != same {
-        Again::Differs("it is of another run than the record".to_owned())
+        JudgedAgain::Differs("it is of another run than the record".to_owned())
     } else {
         C::again(&finding, about, known)?
     };

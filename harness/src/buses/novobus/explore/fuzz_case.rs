@@ -12,8 +12,8 @@ use super::tour::tour;
 use super::{AttemptRecord, Spice};
 use crate::counted::counted;
 use crate::explore::{
-    Again, Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, Pool,
-    Rehearsal, Swarm, Target,
+    Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
+    Pool, Rehearsal, Swarm, Target,
 };
 use std::collections::BTreeMap;
 
@@ -95,12 +95,12 @@ impl FuzzCase for Case {
         finding: &Finding,
         about: &FuzzSettings,
         known: &BTreeMap<String, u8>,
-    ) -> Result<Again, ExploreError> {
+    ) -> Result<JudgedAgain, ExploreError> {
         if about.ports {
             return Ok(match judged_again(finding, about, known)? {
-                None => Again::Unknown,
-                Some(own) if own == *finding => Again::Same,
-                Some(own) => Again::Differs(format!(
+                None => JudgedAgain::Unknown,
+                Some(own) if own == *finding => JudgedAgain::Same,
+                Some(own) => JudgedAgain::Differs(format!(
                     "the file has \"{}\", its attempts give \"{}\"",
                     told(finding),
                     told(&own)
@@ -114,10 +114,10 @@ impl FuzzCase for Case {
             found.is_like(&finding.difference) && found.byte == finding.difference.byte
         });
         Ok(match same {
-            true => Again::Same,
-            false => {
-                Again::Differs("its conversation does not differ as the finding says".to_owned())
-            }
+            true => JudgedAgain::Same,
+            false => JudgedAgain::Differs(
+                "its conversation does not differ as the finding says".to_owned(),
+            ),
         })
     }
 

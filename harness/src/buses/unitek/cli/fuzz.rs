@@ -2,16 +2,20 @@
 
 use crate::buses::unitek::explore::shrink::smaller;
 use crate::buses::unitek::explore::{
-    FrameScope, FrameSetup, FrameSpice, FrameTalk, OnBench, PlantedDrive,
+    FrameScope, FrameSetup, FrameSpice, FrameTalk, OnAdapter, OnBench, PlantedDrive,
 };
-use crate::buses::unitek::rig::axes;
+use crate::buses::unitek::rig::{Session, axes, limits};
+use crate::buses::unitek::simulate::Setup;
 use crate::cli::exit::Exit;
-use crate::cli::fuzz::{FuzzRunArguments, bounds_of_simulated, explore, tell};
+use crate::cli::fuzz::{FuzzRunArguments, bounds_of_simulated, bounds_on_ports, explore, tell};
 use crate::cli::output::Output;
+use crate::cli::rig_failure::{alarm, exit_of, tell_end};
 use crate::cli::shrink::write_smaller;
 use crate::counted::counted;
-use crate::explore::{Finding, FuzzSettings, KeptRun, Spiced as _, read_as};
-use crate::rig::Rig;
+use crate::explore::{ExploreError, Finding, FuzzSettings, KeptRun, Spiced as _, read_as};
+use crate::link::{Line as _, Trouble};
+use crate::rig::{Options, Rig};
+use crate::signals::interrupt_flag;
 use std::path::Path;
 
 /// Explores the drives of a rig.
@@ -40,21 +44,18 @@ pub(crate) fn run(
         Some(kept) => kept.about.setup,
         None => FrameSetup::of_rig(rig, planted.collect()),
     };
-    let mut target = match OnBench::new(&setup) {
-        Ok(target) => target,
-        Err(error) => return Ok(tell(&error, output)),
-    };
+    let ports = !rig.is_simulated();
     let drives = rig.port().map(axes).unwrap_or_default();
     let scope = FrameScope {
         drives: drives.iter().map(|own| (own.node, own.rx)).collect(),
-        spices: FrameSpice::NAMES.iter().map(|(_, own)| *own).collect(),
+        spices: spices(rig, arguments),
     };
     let about = FuzzSettings {
         schema: FuzzSettings::<FrameTalk>::SCHEMA,
         rig: name.unwrap_or_else(|| arguments.rig.clone()),
         drives: u8::try_from(scope.drives.len()).unwrap_or(u8::MAX),
         second: None,
-        ports: false,
+        ports,
         seed: arguments.seed,
         confirm: arguments.confirm.0,
         of: arguments.confirm.1,
@@ -65,23 +66,92 @@ pub(crate) fn run(
             .map(|own| own.name().to_owned())
             .collect(),
     };
+    let simulated = match setup_of(&about) {
+        Ok(simulated) => simulated,
+        Err(error) => return Ok(tell(&error, output)),
+    };
+    if ports {
+        return on_adapter(rig, arguments, (about, scope), simulated, output);
+    }
+    let mut target = OnBench::new(simulated);
     let bounds = bounds_of_simulated(arguments);
     let exit = explore(arguments, (about, scope), &mut target, &bounds, output)?;
     if target.undecided() > 0 {
         output.say(&format!(
-            "{} of the cases not judged: more values of open points than are tried could explain them\n",
-            target.undecided()
+            "{} not judged: more values of open points than are tried could explain what was seen\n",
+            counted(target.undecided(), "case")
         ));
     }
     Ok(exit)
 }
 
+fn setup_of(about: &FuzzSettings<FrameTalk>) -> Result<Setup, ExploreError> {
+    about.setup.under_test()
+}
+
+/// What cases may have: behind an adapter only what a drive takes back.
+fn spices(rig: &Rig, arguments: &FuzzRunArguments) -> Vec<FrameSpice> {
+    let all = FrameSpice::NAMES.iter().map(|(_, own)| *own);
+    if rig.is_simulated() {
+        return all.collect();
+    }
+    let limits = limits(rig, arguments.allow_motion);
+    let possible = |own: &FrameSpice| match own {
+        FrameSpice::Read | FrameSpice::Cycles | FrameSpice::Mode => true,
+        FrameSpice::Write => limits.motion,
+        FrameSpice::Foreign => limits.other_identifiers,
+        _ => false,
+    };
+    all.filter(possible).collect()
+}
+
+/// Explores drives behind an adapter, and gives the rig back in its safe state.
+fn on_adapter(
+    rig: &Rig,
+    arguments: &FuzzRunArguments,
+    (about, scope): (FuzzSettings<FrameTalk>, FrameScope),
+    simulated: Setup,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let options = Options {
+        purpose: "fuzz".to_owned(),
+        wait: arguments.wait.unwrap_or_default(),
+        allow_motion: arguments.allow_motion,
+        interrupt: interrupt_flag(),
+        alarm: alarm(),
+        ..Options::default()
+    };
+    let mut session = match Session::open(rig, &options) {
+        Ok(session) => session,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(exit_of(&error));
+        }
+    };
+    let explored = match OnAdapter::new(&mut session, simulated) {
+        Ok(mut target) => {
+            let bounds = bounds_on_ports(arguments);
+            let exit = explore(arguments, (about, scope), &mut target, &bounds, output);
+            for remark in target.restore() {
+                output.complain(&remark);
+            }
+            exit
+        }
+        Err(error) => Ok(tell(&error, output)),
+    };
+    let exit = match session.link().trouble() {
+        Some(Trouble::Interrupted) => Exit::Interrupted,
+        Some(Trouble::Lost(_) | Trouble::Garbled(_)) => Exit::RigError,
+        _ => explored.unwrap_or_else(|error| output.unwritable(&error)),
+    };
+    let end = session.close(matches!(exit, Exit::RigError | Exit::Interlock));
+    Ok(tell_end(&end, exit, output))
+}
+
 /// Why a run is not possible.
 fn refused(rig: &Rig, arguments: &FuzzRunArguments) -> Option<&'static str> {
-    if !rig.is_simulated() {
-        return Some(
-            "fuzz run on UNITEK drives behind an adapter is not built yet; name a simulated rig, such as sim:unitek:1",
-        );
+    if !rig.is_simulated() && !arguments.deviates.is_empty() {
+        return Some("--deviates is for simulated drives; this rig has an adapter");
     }
     if arguments.whole || arguments.behind_port {
         return Some("--whole and --behind-port are for rings; leave them out for UNITEK drives");
@@ -98,11 +168,20 @@ fn refused(rig: &Rig, arguments: &FuzzRunArguments) -> Option<&'static str> {
 /// Makes a finding small, in at most `most` runs, and writes what came of it beside it.
 pub(crate) fn shrink(path: &Path, most: u32, output: &mut Output) -> std::io::Result<Exit> {
     let read = Finding::<FrameTalk>::read_as(path);
-    let small = read.and_then(|(finding, file)| Ok((smaller(&finding, most)?, finding, file)));
+    let small = read.and_then(|(finding, file)| {
+        let most = if finding.ports { 0 } else { most };
+        Ok((smaller(&finding, most)?, finding, file))
+    });
     let (small, finding, file) = match small {
         Ok(small) => small,
         Err(error) => return Ok(tell(&error, output)),
     };
+    if finding.ports {
+        output.complain(
+            "this finding was made on drives behind an adapter: only findings of simulated drives are made small; its scenario is beside it",
+        );
+        return Ok(Exit::Usage);
+    }
     let acts = |finding: &Finding<FrameTalk>| finding.case.acts.len();
     let became = format!(
         "{} became {}",

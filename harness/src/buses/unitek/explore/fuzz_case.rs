@@ -9,8 +9,8 @@ use super::setup::FrameSetup;
 use super::text::text;
 use crate::buses::Bus;
 use crate::explore::{
-    Again, Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, Pool,
-    Rehearsal, Swarm, Target,
+    Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
+    Pool, Rehearsal, Swarm, Target,
 };
 use harness_proto::unitek::Register;
 use serde::{Deserialize, Serialize};
@@ -97,17 +97,20 @@ impl FuzzCase for FrameTalk {
 
     fn again(
         finding: &Finding<Self>,
-        _: &FuzzSettings<Self>,
+        about: &FuzzSettings<Self>,
         _: &BTreeMap<String, u8>,
-    ) -> Result<Again, ExploreError> {
-        let mut target = OnBench::new(&finding.setup)?;
+    ) -> Result<JudgedAgain, ExploreError> {
+        if about.ports {
+            return Ok(JudgedAgain::Unknown);
+        }
+        let mut target = OnBench::new(finding.setup.under_test()?);
         let rehearsal = target.rehearse(&finding.case)?;
         let found = target.attempt(&finding.case, &rehearsal)?.difference;
         Ok(match found == Some(finding.difference.clone()) {
-            true => Again::Same,
-            false => {
-                Again::Differs("its conversation does not differ as the finding says".to_owned())
-            }
+            true => JudgedAgain::Same,
+            false => JudgedAgain::Differs(
+                "its conversation does not differ as the finding says".to_owned(),
+            ),
         })
     }
 

@@ -1,6 +1,7 @@
 //! Makes and changes cases: requests, writes and inputs that mean something to a drive, and frames that it must not take.
 
 use super::act::{FrameAct, FrameActKind, FrameTalk, LONGEST_WAIT, MOST_ACTS};
+use super::idiom::idiom;
 use crate::explore::{Dice, Spiced, Swarm};
 use harness_proto::can::{Frame, Id};
 use harness_proto::unitek::frame::STOP;
@@ -99,8 +100,10 @@ impl<'s> Maker<'s> {
     /// A case. What it has written it reads again at its end.
     pub(super) fn case(&self, dice: &mut Dice) -> FrameTalk {
         let count = 2 + dice.below(18);
-        let acts = (0..count).map(|_| self.act(dice)).collect();
-        self.asked(FrameTalk { acts }, dice)
+        let acts = (0..count).flat_map(|_| self.acts(dice)).collect();
+        let mut case = FrameTalk { acts };
+        case.acts.truncate(MOST_ACTS - 16);
+        self.asked(case, dice)
     }
 
     /// A case made of another one.
@@ -125,7 +128,7 @@ impl<'s> Maker<'s> {
                 _ => acts.insert(at, self.act(dice)),
             }
         }
-        acts.truncate(MOST_ACTS - 8);
+        acts.truncate(MOST_ACTS - 16);
         self.asked(FrameTalk { acts }, dice)
     }
 
@@ -168,10 +171,26 @@ impl<'s> Maker<'s> {
         dice.pick(&self.scope.drives).copied().unwrap_or((1, 0x201))
     }
 
-    fn act(&self, dice: &mut Dice) -> FrameAct {
+    fn spice(&self, dice: &mut Dice) -> FrameSpice {
         let own: Vec<_> = FrameSpice::NAMES.iter().map(|(_, own)| *own).collect();
         let own = self.swarm.of(&own);
-        let spice = dice.pick(&own).copied().unwrap_or(FrameSpice::Read);
+        dice.pick(&own).copied().unwrap_or(FrameSpice::Read)
+    }
+
+    /// An act, or all of an idiom.
+    fn acts(&self, dice: &mut Dice) -> Vec<FrameAct> {
+        let whole = match dice.percent(20) {
+            true => idiom(self.spice(dice), self.drive(dice).1, dice),
+            false => Vec::new(),
+        };
+        match whole.is_empty() {
+            true => vec![self.act(dice)],
+            false => whole,
+        }
+    }
+
+    fn act(&self, dice: &mut Dice) -> FrameAct {
+        let spice = self.spice(dice);
         let (node, rx) = self.drive(dice);
         let what = match spice {
             FrameSpice::Inputs => outside(node, dice),

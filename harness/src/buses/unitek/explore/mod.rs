@@ -6,6 +6,8 @@
 mod act;
 mod fuzz_case;
 mod generate;
+mod idiom;
+mod on_adapter;
 mod on_sim;
 pub mod oracle;
 mod play;
@@ -18,7 +20,8 @@ mod text;
 pub use act::{FrameAct, FrameActKind, FrameTalk};
 pub use fuzz_case::NoAttempt;
 pub use generate::{FrameScope, FrameSpice};
+pub use on_adapter::OnAdapter;
 pub use on_sim::OnBench;
-pub use oracle::{FrameDifference, FrameSymptom};
+pub use oracle::FrameDifference;
 pub use play::{FramesSeen, play};
 pub use setup::{FrameSetup, PlantedDrive};

@@ -4,7 +4,8 @@ use super::act::FrameTalk;
 use super::fuzz_case::features;
 use super::oracle::{Judgement, Oracle};
 use super::play::play;
-use super::setup::{FrameSetup, model};
+use super::setup::model;
+use crate::buses::unitek::simulate::Setup;
 use crate::explore::{ExploreError, Rehearsal, Target, Tried};
 
 /// Plays cases on simulated drives, and judges them beside the model. That the drives are simulated, the judge does not use: it takes any
@@ -17,14 +18,12 @@ pub struct OnBench {
 
 impl OnBench {
     /// Drives of this setup.
-    ///
-    /// # Errors
-    /// The header has mistakes, or a deviation or its drive does not exist.
-    pub fn new(setup: &FrameSetup) -> Result<Self, ExploreError> {
-        Ok(Self {
-            oracle: Oracle::new(setup.under_test()?),
+    #[must_use]
+    pub fn new(under_test: Setup) -> Self {
+        Self {
+            oracle: Oracle::new(under_test),
             undecided: 0,
-        })
+        }
     }
 
     /// What judges.

@@ -8,6 +8,7 @@
 use super::act::{FrameAct, FrameActKind, FrameTalk};
 use super::play::{FramesSeen, play};
 use super::setup::model;
+use crate::buses::unitek::judge::FrameSymptom;
 use crate::buses::unitek::language::written;
 use crate::buses::unitek::simulate::Setup;
 use harness_proto::can::Frame;
@@ -31,39 +32,6 @@ const FOLLOWED: usize = 3;
 
 /// Bits of the intermission behind a frame.
 const INTERMISSION_BITS: u32 = 3;
-
-/// How drives differ from the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FrameSymptom {
-    /// A frame has other contents.
-    Value,
-    /// A frame has another length.
-    Length,
-    /// A frame names another register, or has another identifier.
-    Name,
-    /// A frame is missing.
-    Missing,
-    /// A frame was not asked for.
-    Unasked,
-    /// A frame came at another time.
-    Time,
-}
-
-impl FrameSymptom {
-    /// In words.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Value => "other contents",
-            Self::Length => "another length",
-            Self::Name => "another register or identifier",
-            Self::Missing => "no frame",
-            Self::Unasked => "a frame that nothing asks for",
-            Self::Time => "another time",
-        }
-    }
-}
 
 /// The first frame that no model explains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

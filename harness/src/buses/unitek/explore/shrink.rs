@@ -29,7 +29,7 @@ struct Shrinker {
 /// The header has mistakes.
 pub fn smaller(finding: &Finding<FrameTalk>, most: u32) -> Result<Smaller, ExploreError> {
     let mut shrinker = Shrinker {
-        target: OnBench::new(&finding.setup)?,
+        target: OnBench::new(finding.setup.under_test()?),
         best: finding.case.clone(),
         difference: finding.difference.clone(),
         runs: 0,

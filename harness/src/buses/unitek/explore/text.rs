@@ -1,9 +1,9 @@
 //! The scenario of a finding: it passes if every frame is as the model predicts, and fails if one is not.
 
 use super::act::{FrameActKind, FrameTalk};
-use super::oracle::FrameSymptom;
 use super::play::{FramesSeen, play};
 use super::setup::FrameSetup;
+use crate::buses::unitek::judge::FrameSymptom;
 use crate::buses::unitek::language::written;
 use crate::explore::{ExploreError, Finding};
 use harness_proto::time::{Instant, Span};

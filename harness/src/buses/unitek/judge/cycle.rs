@@ -5,9 +5,6 @@ use harness_proto::time::{Instant, Span};
 /// How far a single gap may be off: the drive's scan is 1 ms, and so is the clock of many adapters (UNITEK 5.2).
 const GAP: Span = Span::from_millis(2);
 
-/// How long a frame may wait in the drive when its cycle is stopped.
-const IN_FLIGHT: Span = Span::from_millis(20);
-
 /// From how many intervals on their mean is judged.
 const ENOUGH: u64 = 10;
 
@@ -42,7 +39,7 @@ pub(super) struct Running {
 pub(super) enum Untimely {
     /// One gap.
     Gap(Span),
-    /// The mean of so many gaps.
+    /// The mean of a number of gaps.
     Mean(Span, u64),
 }
 
@@ -111,19 +108,21 @@ impl Running {
     }
 
     /// Whether a frame has been due for long at `now`.
-    pub(super) fn is_missing(&self, now: Instant) -> bool {
-        self.sure && now.since(self.alive) > self.every + self.every + IN_FLIGHT
+    pub(super) fn is_missing(&self, now: Instant, patience: Span) -> bool {
+        self.sure && now.since(self.alive) > self.every + self.every + patience
     }
 }
 
 impl Cycle {
-    /// Whether a frame that begins at `at` may be one that was in flight when the cycle ended; it is the last one.
-    pub(super) fn in_flight(&mut self, at: Instant) -> bool {
+    /// Whether a frame that begins at `at` may be one that was in flight when the cycle ended; one alone is, or many where the computer
+    /// that stamps them is late.
+    pub(super) fn in_flight(&mut self, at: Instant, patience: Span, many: bool) -> bool {
         match *self {
             Self::Off(since) => {
-                let may = at.since(since) <= IN_FLIGHT;
-                *self = Self::Off(Instant::START);
-                may && since != Instant::START
+                if !many {
+                    *self = Self::Off(Instant::START);
+                }
+                at.since(since) <= patience && since != Instant::START
             }
             Self::Unknown | Self::On(_) => true,
         }

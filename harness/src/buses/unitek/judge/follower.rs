@@ -2,6 +2,7 @@
 
 use super::cycle::{Cycle, Running, Untimely};
 use super::held::{Held, is_live, takes_writes};
+use super::symptom::FrameSymptom::{self, Length, Missing, Name, Time, Unasked, Value};
 use crate::buses::unitek::language::{identifier, written};
 use crate::buses::unitek::report::sender_of;
 use harness_proto::can::Frame;
@@ -13,8 +14,11 @@ use harness_proto::unitek::{Access, Data, REGISTERS, Register, Request, Width};
 use harness_sim::record::{FrameEnd, LineFrame};
 use std::collections::{BTreeMap, VecDeque};
 
-/// How much later than the slowest reply so far a reply may be.
+/// How much later than the slowest reply so far a reply may be, and how long a frame may be in flight.
 const PATIENCE: Span = Span::from_millis(20);
+
+/// The same where a busy computer stamps the frames.
+const LONG_PATIENCE: Span = Span::from_millis(1_000);
 
 /// Requests of a drive that are kept at most while they wait for their replies.
 const MOST_ASKED: usize = 1_000;
@@ -28,6 +32,8 @@ const MOST_BREACHES: usize = 50;
 /// Something that a drive does, and that no value of what the manual leaves open explains.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Breach {
+    /// How it differs.
+    pub what: FrameSymptom,
     /// The number of the frame where it shows, counted from 1.
     pub frame: usize,
     /// The drive.
@@ -94,6 +100,10 @@ pub struct Follower {
     refused: BTreeMap<u8, u32>,
     /// The numbers of the other drives.
     others: Vec<u8>,
+    /// Whether the times of frames are those of the bus.
+    timed: bool,
+    /// How late a frame may be.
+    patience: Span,
     /// The time that frames have used.
     used: Span,
     judged: JudgedDrives,
@@ -152,9 +162,28 @@ impl Follower {
             refused: BTreeMap::new(),
             others: Vec::new(),
             mode_at: Instant::START,
+            timed: true,
+            patience: PATIENCE,
             used: Span::ZERO,
             judged: JudgedDrives::default(),
         }
+    }
+
+    /// The same for a drive on which no cycle runs, and of which a busy computer stamps the frames.
+    #[must_use]
+    pub fn settled(drive: u8, identifiers: (u16, u16)) -> Self {
+        Self {
+            cycles: [Cycle::Off(Instant::START); 256],
+            timed: false,
+            patience: LONG_PATIENCE,
+            ..Self::new(drive, identifiers)
+        }
+    }
+
+    /// Whether a request waits for its reply.
+    #[must_use]
+    pub fn waits(&self) -> bool {
+        self.asked.iter().any(|own| own.sure)
     }
 
     /// A frame of the bus.
@@ -197,9 +226,15 @@ impl Follower {
         self.judged
     }
 
-    fn breach(&mut self, frame: usize, register: u8, section: &'static str, about: String) {
+    fn breach(
+        &mut self,
+        (frame, register): (usize, u8),
+        (what, section): (FrameSymptom, &'static str),
+        about: String,
+    ) {
         if self.judged.breaches.len() < MOST_BREACHES {
             self.judged.breaches.push(Breach {
+                what,
                 frame,
                 drive: self.drive,
                 register,
@@ -340,7 +375,11 @@ impl Follower {
 
     /// Frames that have been due for long.
     fn missing(&mut self, number: usize, now: Instant) {
-        let patience = self.slowest.map(|slowest| slowest + slowest + PATIENCE);
+        let slowest = match self.timed {
+            true => self.slowest,
+            false => Some(self.slowest.unwrap_or_default()),
+        };
+        let patience = slowest.map(|slowest| slowest + slowest + self.patience);
         while let (Some(first), Some(patience)) = (self.asked.front().cloned(), patience)
             && now.since(first.at) > patience
         {
@@ -348,9 +387,8 @@ impl Follower {
             if first.sure {
                 let name = Register::of(first.register).name;
                 self.breach(
-                    first.frame,
-                    first.register,
-                    "5.2",
+                    (first.frame, first.register),
+                    (Missing, "5.2"),
                     format!(
                         "the request for register {:02X} ({name}) is not answered",
                         first.register
@@ -360,7 +398,7 @@ impl Follower {
         }
         for register in 0..=u8::MAX {
             if let Cycle::On(running) = &mut self.cycles[usize::from(register)]
-                && running.is_missing(now)
+                && running.is_missing(now, self.patience)
             {
                 running.sure = false;
                 running.blur(now);
@@ -369,7 +407,7 @@ impl Follower {
                 let about = format!(
                     "no frame of register {register:02X} ({name}) comes, which is asked for every {every}"
                 );
-                self.breach(number, register, "ex 9", about);
+                self.breach((number, register), (Missing, "ex 9"), about);
             }
         }
     }
@@ -382,13 +420,13 @@ impl Follower {
         if !self.tx.contains(&tx) || own.frame.id().is_extended() {
             let id = identifier(own.frame.id());
             let about = format!("it has identifier {id}, and {:03X} is expected", self.tx[0]);
-            return self.breach(number, first, "3.1", about);
+            return self.breach((number, first), (Name, "3.1"), about);
         }
         let reply = match Reply::decode(&own.frame, tx) {
             Ok(reply) => reply,
             Err(why) => {
                 let about = format!("{} is no reply: {why}", written(&own.frame));
-                return self.breach(number, first, "4.5", about);
+                return self.breach((number, first), (Length, "4.5"), about);
             }
         };
         let asked = self.why(number, own, &reply);
@@ -426,21 +464,23 @@ impl Follower {
         }
         let cycle = &mut self.cycles[usize::from(register)];
         let untimely = match cycle {
-            Cycle::On(running) => running
-                .comes(own.start, used)
-                .map(|why| (why, running.every())),
+            Cycle::On(running) => {
+                let why = running.comes(own.start, used);
+                why.filter(|_| self.timed).map(|why| (why, running.every()))
+            }
             Cycle::Unknown => {
-                self.from_before(number, own);
+                self.older_cycle(number, own);
                 None
             }
             Cycle::Off(_) => {
-                if !self.cycles[usize::from(register)].in_flight(own.start) {
+                let patience = self.patience;
+                if !self.cycles[usize::from(register)].in_flight(own.start, patience, !self.timed) {
                     let name = Register::of(register).name;
                     let about = format!(
                         "{} comes, and nothing asks for register {register:02X} ({name})",
                         written(&own.frame)
                     );
-                    self.breach(number, register, "5.2", about);
+                    self.breach((number, register), (Unasked, "5.2"), about);
                 }
                 None
             }
@@ -454,14 +494,14 @@ impl Follower {
             let about = format!(
                 "register {register:02X} ({name}) is asked for every {every}: {what} {gap} behind the one before"
             );
-            self.breach(number, register, "ex 9", about);
+            self.breach((number, register), (Time, "ex 9"), about);
         }
         None
     }
 
     /// A frame that no request of these frames asks for: of a cycle that runs since before the first of them. Such a cycle shows itself
     /// within 254 ms, again and again.
-    fn from_before(&mut self, number: usize, own: &LineFrame) {
+    fn older_cycle(&mut self, number: usize, own: &LineFrame) {
         let register = own.frame.data().first().copied().unwrap_or(0);
         let before = self.unsolicited.get(&register).copied().or(self.begin);
         if before.is_some_and(|before| own.start.since(before) > LONGEST_CYCLE) {
@@ -470,7 +510,7 @@ impl Follower {
                 "{} comes, and nothing asks for register {register:02X} ({name}): no cycle is as long",
                 written(&own.frame)
             );
-            self.breach(number, register, "5.2", about);
+            self.breach((number, register), (Unasked, "5.2"), about);
         }
         self.unsolicited.insert(register, own.start);
     }
@@ -479,7 +519,7 @@ impl Follower {
     fn may_be_event(&self, register: u8, at: Instant) -> bool {
         let off = self.held[0x51].sure();
         let off = off.is_some_and(|mode| mode & u32::from(MODE_EVENT) == 0);
-        register == 0x40 && (!off || at.since(self.mode_at) <= PATIENCE)
+        register == 0x40 && (!off || at.since(self.mode_at) <= self.patience)
     }
 
     /// How long a reply must be.
@@ -488,7 +528,7 @@ impl Follower {
         let long = matches!(reply.data, Data::Long(_));
         let map = matches!(reply.register, 0x40 | 0x8F);
         // What was read before DC was written may come behind it.
-        let settled = at.since(self.wide_at) > self.slowest.unwrap_or_default() + PATIENCE;
+        let settled = at.since(self.wide_at) > self.slowest.unwrap_or_default() + self.patience;
         let wide = self
             .wide
             .filter(|_| settled || self.wide_at == Instant::START);
@@ -507,12 +547,12 @@ impl Follower {
                 "register {:02X} ({}) comes with {bytes} bytes, and {wanted} are expected",
                 reply.register, register.name
             );
-            self.breach(number, reply.register, "App 2", about);
+            self.breach((number, reply.register), (Length, "App 2"), about);
         } else if map && wide == Some(false) && reply.register == 0x8F {
             // 8F is never sent by event, so that its length is that of `map-reply` for good.
             if self.short_map.is_some_and(|short| short == long) {
                 let about = "register 8F comes with another length than before".to_owned();
-                self.breach(number, reply.register, "App 7", about);
+                self.breach((number, reply.register), (Length, "App 7"), about);
             }
             self.short_map = Some(!long);
         }
@@ -531,7 +571,7 @@ impl Follower {
             && raw & status::ENABLED != 0
         {
             let about = "STATUS shows the drive enabled, and MODE locks it".to_owned();
-            self.breach(number, reply.register, "ex 2", about);
+            self.breach((number, reply.register), (Value, "ex 2"), about);
         }
         if is_live(reply.register) {
             return;
@@ -551,7 +591,7 @@ impl Follower {
                 reply.register, register.name
             );
             self.refused.remove(&reply.register);
-            self.breach(number, reply.register, "dump", about);
+            self.breach((number, reply.register), (Value, "dump"), about);
         }
         let homes = self.homes && reply.register == 0x6E;
         if register.access == Access::FN || homes {
@@ -569,7 +609,7 @@ impl Follower {
                     raw & mask,
                     held.words(register.width)
                 );
-                self.breach(number, reply.register, register.origin, about);
+                self.breach((number, reply.register), (Value, register.origin), about);
             }
         }
         if reply.register == 0xDC && asked.held == held {

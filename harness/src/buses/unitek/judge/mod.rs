@@ -7,7 +7,9 @@
 mod cycle;
 mod follower;
 mod held;
+mod symptom;
 #[cfg(test)]
 mod tests;
 
 pub use follower::{Breach, Follower, JudgedDrives, judge};
+pub use symptom::FrameSymptom;

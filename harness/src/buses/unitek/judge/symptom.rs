@@ -1,0 +1,36 @@
+//! How frames of a drive can differ.
+
+use serde::{Deserialize, Serialize};
+
+/// How drives differ from the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrameSymptom {
+    /// A frame has other contents.
+    Value,
+    /// A frame has another length.
+    Length,
+    /// A frame names another register, or has another identifier.
+    Name,
+    /// A frame is missing.
+    Missing,
+    /// A frame was not asked for.
+    Unasked,
+    /// A frame came at another time.
+    Time,
+}
+
+impl FrameSymptom {
+    /// In words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Value => "other contents",
+            Self::Length => "another length",
+            Self::Name => "another register or identifier",
+            Self::Missing => "no frame",
+            Self::Unasked => "a frame that nothing asks for",
+            Self::Time => "another time",
+        }
+    }
+}
