@@ -1,5 +1,6 @@
 //! NOVOBUS: what the bench knows of this bus alone (ND21 8 to 11).
 
+pub(crate) mod calm;
 pub mod campaign;
 pub mod capture;
 pub(crate) mod cli;

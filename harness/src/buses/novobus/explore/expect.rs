@@ -321,7 +321,8 @@ impl RingModel {
         self.sum(role).is_some()
     }
 
-    fn any_in_error(&self) -> bool {
+    /// Whether a drive is in the error mode.
+    pub(crate) fn any_in_error(&self) -> bool {
         let mut ends = self.drives.iter().flat_map(|drive| &drive.ends);
         ends.any(BusEnd::in_error)
     }

@@ -58,6 +58,8 @@ struct Mismatch {
     must: Option<Must>,
     role: Role,
     section: &'static str,
+    /// The drive that the telegram of the byte addresses. `None` behind an error: drives in the error mode read no telegrams (ND21 9.7).
+    meant: Option<u8>,
 }
 
 /// What a ring has done since its drives were made ready.
@@ -168,6 +170,7 @@ impl Judge {
         let mut counts = vec![0; usize::from(self.size.drives()) + 1];
         let mut index = 0;
         for ((byte, _), role) in exchange.sent.iter().zip(&roles[self.sent.len()..]) {
+            let meant = role.drive().filter(|_| !self.model.any_in_error());
             for out in around(&mut self.model, *byte, &mut counts, &exchange.harms) {
                 let Some(must) = self.model.must(out, *role) else {
                     continue;
@@ -183,7 +186,8 @@ impl Judge {
                         twin::Symptom::Value if self.is_shifted(exchange) => twin::Symptom::Surplus,
                         other => other,
                     };
-                    return Err(self.mismatch(index, what, Some(must), *role));
+                    let found = self.mismatch(index, what, Some(must), *role);
+                    return Err(Mismatch { meant, ..found });
                 }
             }
             if self.model.was_reset() {
@@ -229,6 +233,7 @@ impl Judge {
             must,
             role,
             section,
+            meant: None,
         }
     }
 
@@ -261,7 +266,7 @@ impl Judge {
             rule: rule.to_owned(),
             ring: self.ring,
             drive: None,
-            meant: found.role.drive(),
+            meant: found.meant,
             byte: Some(number),
             time: false,
             about: format!(

@@ -6,6 +6,7 @@ use super::order::CommandSent;
 use super::play::MasterView;
 use super::setup::{drive_name, is_first};
 use crate::buses::SimulatedLink;
+use crate::buses::novobus::calm::calm;
 use crate::buses::novobus::link::BesideTheBus;
 use crate::buses::novobus::twin::{self, Symptom};
 use crate::link::{Link, Octets, link_name};
@@ -133,8 +134,9 @@ pub fn against_model(case: &Case, model: &MasterView, seen: &MasterView) -> Opti
         None => (pairs().position(|(a, b)| a.0 != b.0)?, Symptom::Time),
     };
     let sent = sent(case);
-    let role = answered(&roles(size, &sent), &sent).nth(index);
-    let role = role.unwrap_or(Role::Foreign);
+    let found = answered(&roles(size, &sent), &sent).nth(index);
+    let (place, role) = found.unwrap_or((sent.len(), Role::Foreign));
+    let is_calm = calm(size, &sent).get(place) == Some(&true);
     let divergence = twin::Divergence {
         ring: case.ring(),
         byte: index + 1,
@@ -145,7 +147,11 @@ pub fn against_model(case: &Case, model: &MasterView, seen: &MasterView) -> Opti
         step: None,
         drive: None,
     };
-    Some(Difference::from(&divergence))
+    let found = Difference::from(&divergence);
+    Some(Difference {
+        meant: found.meant.filter(|_| is_calm),
+        ..found
+    })
 }
 
 /// The bytes that a case sends, and whether each goes round whole; what comes late is whole.
@@ -158,15 +164,15 @@ pub(crate) fn sent(case: &Case) -> Vec<(u8, bool)> {
     whole.collect()
 }
 
-/// The roles of bytes that are answered: a PAUSE where a sync byte is due is not (ND21 9.2).
+/// The bytes that are answered, by their places, and their roles: a PAUSE where a sync byte is due is not answered (ND21 9.2).
 pub(crate) fn answered<'a>(
     roles: &'a [Role],
     sent: &'a [(u8, bool)],
-) -> impl Iterator<Item = Role> + 'a {
-    let pairs = roles.iter().zip(sent);
+) -> impl Iterator<Item = (usize, Role)> + 'a {
+    let pairs = roles.iter().zip(sent).enumerate();
     pairs
-        .filter(|(role, (byte, _))| (**role, *byte) != (Role::Idle, PAUSE))
-        .map(|(role, _)| *role)
+        .filter(|(_, (role, (byte, _)))| (**role, *byte) != (Role::Idle, PAUSE))
+        .map(|(place, (role, _))| (place, *role))
 }
 
 /// The first place where a simulated ring of plain drives differs from the reference model. `None` also if the model does not cover

@@ -4,12 +4,14 @@
 //! drive's, unless another drive damages the bytes that it passes on: then bytes differ in telegrams to any drive. To tell these cases
 //! apart, the attempt is played again with the drives' roles exchanged.
 
-use super::diagnose::{Named, Whose};
+use super::diagnose::{Named, Whose, proven};
 use super::exchange::{Sent, begin};
 use super::pinned::Pinned;
+use crate::buses::novobus::calm::calm;
 use crate::buses::novobus::twin::{Conversation, Divergence};
 use crate::library::Entry;
 use crate::scenario::source::Source;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::Role;
 use harness_proto::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte};
 use harness_proto::time::Span;
@@ -259,18 +261,18 @@ pub fn culprit(drives: u8, seen: &[Meant], trials: &[Trial], pinned: &[Pinned]) 
     })
 }
 
-/// The drive to blame, and the deviations that agree with it. A known deviation that explains every byte is more specific than a drive: if
-/// none agrees with the drive, all deviations are returned and no drive.
+/// The drive to blame, and the deviations that agree with it. Where none agrees with the drive, no drive is proven: all deviations are
+/// returned, and each may be one of any drive that one of them accuses.
 #[must_use]
 pub fn agreed(culprit: Option<Culprit>, named: &[Named]) -> (Option<Culprit>, Vec<Named>) {
     let Some(blamed) = culprit else {
-        return (None, named.to_vec());
+        return (None, proven(named.to_vec()));
     };
     let may_be =
         |own: &&Named| matches!(&own.whose, Whose::OneOf(all) if all.contains(&blamed.drive));
     let agreed: Vec<_> = named.iter().filter(may_be).cloned().collect();
     if agreed.is_empty() && !named.is_empty() {
-        return (None, named.to_vec());
+        return (None, proven(named.to_vec()));
     }
     let of_it = agreed.into_iter().map(|own| Named {
         whose: Whose::OneOf(vec![blamed.drive]),
@@ -316,7 +318,7 @@ impl Sent {
         found: &Divergence,
         came: &dyn Fn(usize) -> Option<u8>,
     ) -> (Meant, &'static str, usize) {
-        let (meant, end) = self.meant(index);
+        let (meant, end) = self.meant(index, drives);
         let refused = came(index) == Some(0);
         let expected = found.expected.map(|(_, due)| due.byte);
         // Behind an error the byte of the master has come: the drive with the error has passed it on.
@@ -351,9 +353,13 @@ impl Sent {
     }
 
     /// The drive that a byte belongs to, and where its telegram ends.
-    fn meant(&self, index: usize) -> (Meant, usize) {
+    fn meant(&self, index: usize, drives: u8) -> (Meant, usize) {
         let is_sync = |at: &usize| self.roles[*at] == Role::Sync;
-        let Some(start) = (0..=index).rev().find(is_sync) else {
+        let calm = RingSize::new(drives.into()).map(|size| calm(size, &self.bytes[..=index]));
+        let begins = (0..=index).rev().find(is_sync);
+        // Drives in the error mode read no telegrams (9.7).
+        let is_calm = |start: &usize| calm.as_ref().is_ok_and(|calm| calm[*start]);
+        let Some(start) = begins.filter(is_calm) else {
             return (Meant::Nobody, index + 1);
         };
         let Ok(SyncByte::Telegram(header)) = SyncByte::decode(self.bytes[start].0) else {

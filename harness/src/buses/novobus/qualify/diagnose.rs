@@ -110,14 +110,47 @@ impl Candidate {
 /// explains everything. An attempt that the model of the manual explains from its power-up on can refute a deviation, but not prove it.
 ///
 /// Simulated drives keep their state from earlier scenarios, which a fresh twin does not have, so no twin may give every byte. For them
-/// the deviation that explains the most attempts is named. Relatives of deviations with other numbers are tried only if no other
-/// deviation explains everything.
+/// the deviation that explains the most attempts is named. Relatives of deviations with other numbers are named only if no other
+/// deviation explains everything, or if they accuse another drive: then it is not proven which drive it is.
 pub fn name<E>(seen: &RingSeen<'_>, twin: &dyn Fn(&Header) -> Result<Twin, E>) -> Vec<Named> {
-    let named = name_among(seen, candidates(seen, deviations()), twin);
-    match named.is_empty() {
-        true => name_among(seen, candidates(seen, relatives()), twin),
-        false => named,
+    let mut named = name_among(seen, candidates(seen, deviations()), twin);
+    if !named.is_empty() && seen.exactness.knows_cells {
+        return named;
     }
+    let mut relatives = name_among(seen, candidates(seen, relatives()), twin);
+    let of_all = |named: &[Named]| named.iter().any(|own| own.whose == Whose::Every);
+    if named.is_empty() || of_all(&named) && !of_all(&relatives) && !relatives.is_empty() {
+        return relatives;
+    }
+    let accused = drives(&named);
+    relatives.retain(|own| match &own.whose {
+        Whose::Every => false,
+        Whose::OneOf(some) => some.iter().any(|drive| !accused.contains(drive)),
+    });
+    named.extend(relatives.into_iter().filter(|_| !accused.is_empty()));
+    named
+}
+
+/// The drives that some of these accuse.
+fn drives(named: &[Named]) -> BTreeSet<u8> {
+    let whose = named.iter().map(|own| &own.whose);
+    let some = whose.filter_map(|own| match own {
+        Whose::OneOf(some) => Some(some),
+        Whose::Every => None,
+    });
+    some.flatten().copied().collect()
+}
+
+/// What is proven by deviations that each explain everything: a drive only if all of them accuse it alone. Where they do not, each may be
+/// a deviation of any drive that one of them accuses.
+pub(super) fn proven(mut named: Vec<Named>) -> Vec<Named> {
+    let all: Vec<u8> = drives(&named).into_iter().collect();
+    for own in &mut named {
+        if own.whose != Whose::Every {
+            own.whose = Whose::OneOf(all.clone());
+        }
+    }
+    named
 }
 
 fn name_among<E>(
@@ -222,4 +255,43 @@ pub fn deviating_masters(attempts: &[Driven]) -> Vec<&'static MasterDeviation> {
         all.all(|driven| driven.is_explained_by(Some(deviation)))
     };
     master_deviations().filter(explains).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use harness_sim::novobus::deviation::deviation;
+
+    fn named(name: &str, drives: &[u8]) -> Named {
+        Named {
+            deviation: deviation(name).expect("a deviation"),
+            whose: Whose::OneOf(drives.to_vec()),
+            perhaps_of_all: false,
+        }
+    }
+
+    /// A drive is accused only where every explanation accuses it.
+    #[test]
+    fn a_drive_is_proven_only_if_all_explanations_agree() {
+        let text = |named: Vec<Named>| -> Vec<String> {
+            let proven = proven(named);
+            proven.iter().map(Named::to_string).collect()
+        };
+        let zeros = |drives: &[u8]| named("increments-zeros-only", drives);
+        let none = |drives: &[u8]| named("adds-0-in-error-mode", drives);
+        for lines in [text(vec![none(&[1])]), text(vec![none(&[1]), zeros(&[1])])] {
+            assert!(
+                lines.iter().all(|own| own.starts_with("drive 1: ")),
+                "{lines:?}"
+            );
+        }
+        for lines in [
+            text(vec![none(&[1]), zeros(&[0])]),
+            text(vec![none(&[0, 1]), zeros(&[0])]),
+        ] {
+            let unknown = "not known which drive: one of 0, 1";
+            let open = |own: &String| own.ends_with(unknown) && !own.starts_with("drive");
+            assert!(lines.iter().all(open), "{lines:?}");
+        }
+    }
 }
