@@ -3,6 +3,7 @@
 use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, Symptom, Unasked};
 use super::follow::{Conversation, TwinBytes};
 use super::known::{ByteRead, CellByte, Knowledge, writes};
+use super::rows::{Rows, answer_of};
 use super::unasked::Sent;
 use harness_proto::line::Received;
 use harness_proto::nd21::cells::changes_by_itself;
@@ -20,50 +21,6 @@ const LONGEST_RUN: usize = 32;
 
 /// How much later than its model a drive may detect a time-out: after 20 ms instead of 10 (ND21 9.9).
 const LATEST_TIME_OUT: Span = Span::from_millis(10);
-
-/// What a ring sent back, beside what its twin received.
-struct Rows<'a> {
-    ring: usize,
-    /// What each byte is for, as far as that is known.
-    roles: &'a [Role],
-    /// The bytes that the master sent, one for each role.
-    sent: &'a [u8],
-    /// Up to which byte the roles stand at their places.
-    known: usize,
-    expected: &'a [(Instant, Received)],
-    received: &'a [(Instant, Received)],
-}
-
-impl Rows<'_> {
-    fn role(&self, index: usize) -> Role {
-        self.roles.get(index).copied().unwrap_or(Role::Foreign)
-    }
-
-    /// Whether a byte is the low byte of process data (ND21 9.4).
-    fn is_second_of_process_data(&self, index: usize) -> bool {
-        let sync_before = |back: usize| index.checked_sub(back).map(|before| self.role(before));
-        let own = Some(self.role(index));
-        sync_before(1) == own && sync_before(2) != own
-    }
-
-    /// The command whose checking byte the master sent at `index`, if that byte is right.
-    fn command(&self, index: usize, drive: u8, length: u8) -> Option<Command> {
-        let before = answer_of(self.roles.get(..index)?, drive, length);
-        let mut bytes: Vec<u8> = before.map(|(place, _)| self.sent[place]).collect();
-        bytes.reverse();
-        bytes.push(*self.sent.get(index)?);
-        Command::decode(&bytes).value()
-    }
-
-    /// Whether the conversation ended before a byte that is missing could be called late. One that came although the twin does not send it,
-    /// not even later, is never excused.
-    fn cut_short(&self, index: usize, what: &Symptom, tail: Instant) -> bool {
-        match (what, self.expected.get(index), self.received.get(index)) {
-            (Symptom::Missing, Some((at, _)), None) => *at >= tail,
-            _ => false,
-        }
-    }
-}
 
 /// What is compared, ring by ring.
 pub(crate) struct Comparer<'a> {
@@ -158,12 +115,24 @@ impl Comparer<'_> {
                 1 => Some(0),
                 _ => aligned.then(|| self.culprit(&rows, index)).flatten(),
             };
+            let came = received.get(index).copied();
+            let mut due = expected.get(index).copied();
+            if let (Some((_, due)), Some((_, came)), Role::Data { drive, address }) =
+                (&mut due, came, role)
+                && due.byte == came.byte
+                && let Some(drive) = drive
+            {
+                due.byte = self
+                    .knowledge
+                    .held((ring, drive, address))
+                    .unwrap_or(due.byte);
+            }
             let found = Divergence {
                 ring,
                 byte: index + 1,
                 what,
-                expected: expected.get(index).copied(),
-                received: received.get(index).copied(),
+                expected: due,
+                received: came,
                 role,
                 step: step_at(index),
                 drive,
@@ -230,11 +199,11 @@ impl Comparer<'_> {
             true => self.is_right(rows, (wanted.byte, found.byte), index),
             false => None,
         };
-        // A command that the model refuses is answered with 00 in the place of data and of the checking byte too (ND21 9.7), and no checking
-        // byte is 00 (9.6).
         let equal = wanted.byte == found.byte;
-        let refused = wanted.byte == 0 || !matches!(role, Role::Check { .. });
-        let same = right.is_some_and(|right| right || equal && refused) || right.is_none() && equal;
+        let same = match right {
+            Some(right) => right || equal && rows.is_refused(index),
+            None => equal,
+        };
         self.note_write(ring, rows, index);
         match (same, wanted_good == found_good) {
             (true, true) => {
@@ -242,6 +211,8 @@ impl Comparer<'_> {
                 None
             }
             (true, false) => Some(Symptom::LineStatus),
+            // The model's byte, where the drive itself has shown another one.
+            (false, _) if equal => Some(Symptom::Value),
             (false, _) => Some(what_of(expected, received, index)),
         }
     }
@@ -444,16 +415,6 @@ impl Comparer<'_> {
             });
         }
     }
-}
-
-/// The bytes of an answer of a drive in front of its checking byte, the last one first, with their places. A command may be cut over
-/// several telegrams (9.5): its bytes need not stand together.
-fn answer_of(roles: &[Role], drive: u8, length: u8) -> impl Iterator<Item = (usize, &Role)> {
-    let own = move |(_, role): &(usize, &Role)| {
-        matches!(role, Role::Command { .. } | Role::Data { .. }) && role.drive() == Some(drive)
-    };
-    let before = roles.iter().enumerate().rev().filter(own);
-    before.take(usize::from(length).saturating_sub(1))
 }
 
 /// The bytes that are answered, by their places among those sent, and their roles: a PAUSE where a sync byte is due is swallowed (9.2).

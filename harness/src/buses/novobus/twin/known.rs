@@ -117,12 +117,11 @@ pub(crate) enum ByteRead {
     Own,
 }
 
-/// Whether a reset must replace what a master wrote to a cell: all data "which has not been saved on the EEPROM will be lost" (ND21
-/// 10.5). The recording of the oscilloscope has no value that a drive must set.
+/// Whether a reset must replace what a master wrote to a cell: "every data which has not been saved on the EEPROM will be lost" (ND21
+/// 10.5). What stands there after it is the drive's choice.
 fn is_lost(address: u16) -> bool {
     let kept = own::kept(address, 0).bits == 0xFF;
     kept && (ram::POLE_JUMP..=ram::VCO_LIN_L).contains(&address)
-        && !own::SCOPE_BUFFER.contains(&address)
 }
 
 /// What is known of all drives.
@@ -283,6 +282,11 @@ impl Knowledge {
         wanted & status::RESET == 0 && !self.disturbed && self.working.contains(&drive)
     }
 
+    /// What a byte must hold, as far as it was written or read.
+    pub(crate) fn held(&self, place: CellByte) -> Option<u8> {
+        self.cells.get(&place).map(|own| own.value)
+    }
+
     /// The bits of a byte that hold what the master has written in the present attempt.
     pub(crate) fn written_now(&self, place: CellByte, value: u8) -> u8 {
         let written = self.cells.get(&place).map_or(0, |own| own.now);
@@ -435,19 +439,33 @@ mod tests {
     /// ND21 10.5: what was not saved in the EEPROM is lost with a reset. One value may be what the drive loads; three are not.
     #[test]
     fn a_cell_that_outlives_three_resets_was_not_reset() {
-        let outlives = |values: [u8; 3], read: &dyn Fn(u8) -> u8, save: bool| {
+        let outlives_at = |place, values: [u8; 3], read: &dyn Fn(u8) -> u8, save: bool| {
             let mut known = Knowledge::default();
             known.begin();
             let readings = values.map(|value| {
-                known.write(CELL, Write::Set(value));
+                known.write(place, Write::Set(value));
                 if save {
                     known.write((0, 1, ram::EEPROM_CONTROL), Write::Set(0x84));
                 }
                 known.reset(0, 1);
-                known.read(CELL, 0, read(value))
+                known.read(place, 0, read(value))
             });
             readings[2]
         };
+        let outlives =
+            |values, read: &dyn Fn(u8) -> u8, save| outlives_at(CELL, values, read, save);
+        // The recording of the oscilloscope: "every data".
+        for recorded in [0xFDA0, 0xFE40, 0xFE97] {
+            let place = (0, 1, recorded);
+            assert_eq!(
+                outlives_at(place, [1, 2, 3], &|own| own, false),
+                ByteRead::Wrong
+            );
+            assert_eq!(
+                outlives_at(place, [1, 2, 3], &|_| 2, false),
+                ByteRead::Learned
+            );
+        }
         assert_eq!(outlives([1, 2, 3], &|own| own, false), ByteRead::Wrong);
         assert_eq!(outlives([1, 2, 3], &|_| 2, false), ByteRead::Learned);
         assert_eq!(outlives([2, 2, 2], &|own| own, false), ByteRead::Learned);

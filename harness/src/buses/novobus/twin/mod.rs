@@ -10,6 +10,7 @@ mod comparison;
 mod follow;
 mod known;
 mod program;
+mod rows;
 mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};

@@ -17,6 +17,9 @@ const READ_BYTE: u8 = 0x81;
 const WRITE_BYTE: u8 = 0x82;
 const READ: u8 = 1 << 5;
 
+/// Its bit that says that a byte has been written, or that nothing is going on.
+const READY: u8 = 1 << 4;
+
 /// The cells of the EEPROM that only a master changes (14.2.2): the parameters and settings, the customer's cells, and the positions of
 /// the cycle control. The drive itself counts its hours, notes errors and dates, and may note its reference point.
 const STEADY: [RangeInclusive<u8>; 4] = [0x20..=0x4B, 0x50..=0x57, 0x5A..=0x5F, 0x60..=0xFF];
@@ -41,6 +44,10 @@ pub(super) struct Program {
     eeprom: BTreeMap<u8, u8>,
     /// The cell that is read, and whether the drive has said that it is done.
     reading: Option<(u8, bool)>,
+    /// Whether `EEPROMcontrol` was read since the last order that writes and showed that nothing is going on.
+    ready: bool,
+    /// Whether it did so before the byte that is read was ordered: then it cannot report the end of an earlier order.
+    was_ready: bool,
 }
 
 impl Program {
@@ -75,6 +82,8 @@ impl Program {
     fn order(&mut self, command: u8) {
         let (address, data) = (self.address.take(), self.data.take());
         self.reading = None;
+        self.was_ready = self.ready;
+        self.ready &= command <= READ_BYTE;
         match (command, address, data) {
             (READ_BYTE, Some(address), _) => self.reading = Some((address, false)),
             (WRITE_BYTE, Some(address), Some(data)) => {
@@ -113,10 +122,12 @@ impl Program {
                 (high_is_right && self.zeros == HIGH | LOW).then_some(value == wanted)
             }
             ram::EEPROM_CONTROL => {
-                if let Some((_, done)) = &mut self.reading {
-                    *done |= value & READ != 0;
-                }
-                None
+                let shown = value & (READ | READY);
+                self.ready |= shown != 0;
+                let (_, done) = self.reading.as_mut()?;
+                *done |= shown & READ != 0;
+                // Reading a byte does not end with the report that one was written.
+                (shown == READY && self.was_ready).then_some(false)
             }
             ram::EEPROM_BUFFER => {
                 let (address, _) = self.reading.filter(|(_, done)| *done)?;
@@ -167,6 +178,29 @@ mod tests {
         // The parameters are copied into it.
         drive.write(ram::EEPROM_CONTROL, Write::Set(0x84));
         assert_eq!(read(&mut drive, 0xDC, 0x78), None);
+    }
+
+    /// ND21 14.10.5.2, 14.10.5.3: bit 4 of `EEPROMcontrol` does not report that a byte was read, unless an earlier order may still have been
+    /// going on.
+    #[test]
+    fn a_read_does_not_end_as_a_write() {
+        let control = ram::EEPROM_CONTROL;
+        let mut drive = Program::default();
+        let order = |drive: &mut Program, command| {
+            drive.write(ram::EEPROM_BUFFER, Write::Set(0x5C));
+            drive.write(ram::EEPROM_BUFFER + 1, Write::Set(0xA5));
+            drive.write(control, Write::Set(command));
+        };
+        order(&mut drive, READ_BYTE);
+        assert_eq!(drive.read(control, READ, READY), None);
+        order(&mut drive, READ_BYTE);
+        assert_eq!(drive.read(control, READ, READ_BYTE), None);
+        assert_eq!(drive.read(control, READ, READY), Some(false));
+        assert_eq!(drive.read(control, READ, READ), None);
+        order(&mut drive, WRITE_BYTE);
+        assert_eq!(drive.read(control, READ, WRITE_BYTE), None);
+        order(&mut drive, READ_BYTE);
+        assert_eq!(drive.read(control, READ, READY), None);
     }
 
     /// ND21 14.10.1, 14.11.14: behind a confirmed error the code of the bus's next one is decided, and no other code.
