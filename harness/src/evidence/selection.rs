@@ -109,8 +109,11 @@ fn qualifying(opened: &Opened) -> Vec<Qualifying> {
     let long = thorough(drives).unwrap_or_default();
     list.extend(long.iter().map(|entry| listed(entry, false)));
     for probe in probes(drives).unwrap_or_default() {
+        // A drive that is silent while it tests itself is asked by the other conversation.
+        let other = probe.of_silent.as_ref();
         let entries = probe.entries.iter().enumerate();
-        list.extend(entries.map(|(place, entry)| listed(entry, place == 0)));
+        list.extend(entries.map(|(place, entry)| listed(entry, place == 0 && other.is_none())));
+        list.extend(other.map(|entry| listed(entry, false)));
     }
     list
 }

@@ -163,6 +163,33 @@ fn a_profile_is_loaded_again() {
     );
 }
 
+/// ND21 11.8: a drive that is silent in its self-test cannot be polled. Its time lies between a byte that was lost and one that came back.
+#[test]
+fn a_silent_self_test_is_timed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let open =
+        ", \"drive 0 property self-test-bus = silent\", \"drive 0 property self-test-time = 81ms\"";
+    let output = qualify(folder.path(), "first", &rig(1, true, "", open));
+    let text = said(&output);
+    assert!(
+        text.contains("self-test-bus (nd21 11.8): drive 0: silent"),
+        "{text}"
+    );
+    let words = "self-test-time (nd21 11.8): drive 0: ";
+    let (_, span) = text.split_once(words).expect("a time");
+    let (low, high) = span
+        .lines()
+        .next()
+        .and_then(|own| own.split_once(" to "))
+        .expect("a span");
+    let ms = |text: &str| text.trim_end_matches("ms").parse::<f64>().expect("a time");
+    assert!(
+        ms(low) <= 81.5 && 80.5 <= ms(high) && ms(high) - ms(low) < 3.0,
+        "{low} to {high}"
+    );
+    ended(&verify(&folder.path().join("first")), 0, "0 things wrong");
+}
+
 /// A scenario that asks for something else than the manual does, with cells that are set back behind it.
 const WRONG: &str = "title wrong\nring 4\ndrive 1 memory FE13 = 88\n> 88 FD C0 13 FE D1\n> 80*6\n< 88 01 C0 13 88 A5\n< 81\n";
 

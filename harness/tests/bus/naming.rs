@@ -249,6 +249,15 @@ fn end(planted: &Deviation, whose: Option<u8>) -> (End, bool) {
             "{lines:?}: another drive is blamed"
         );
     }
+    let accused = named.iter().filter_map(|own| match own.whose.clone() {
+        Whose::OneOf(drives) if drives.len() == 1 => Some(drives[0]),
+        _ => None,
+    });
+    let accused: Vec<_> = accused.collect();
+    assert!(
+        accused.iter().all(|own| Some(*own) == whose),
+        "{lines:?}: {named:?}"
+    );
     let is_it = |named: &&Named| {
         let drive = match (&named.whose, whose) {
             (Whose::OneOf(drives), Some(drive)) => drives.contains(&drive),
@@ -463,6 +472,18 @@ fn right_drives_have_no_names() {
     );
 }
 
+/// ND21 9.7: what a follower in the error mode does wrong can look like what the drive behind it does wrong. Errors in each drive, and bytes
+/// of all kinds behind them, tell the two apart.
+#[test]
+fn a_follower_that_adds_nothing_is_told_from_the_drive_behind_it() {
+    let own = verdict(&["drive 1 deviates adds-0-in-error-mode".to_owned()]);
+    let [only] = &own.named[..] else {
+        panic!("{own:?}")
+    };
+    assert_eq!(only.deviation.name, "adds-0-in-error-mode");
+    assert_eq!(only.whose, Whose::OneOf(vec![1]));
+}
+
 /// Relatives of the deviations with other numbers, some of them: each is named, or nothing is.
 #[test]
 fn other_numbers() {
@@ -550,4 +571,23 @@ fn right_drives_with_clocks_of_their_own_have_no_names() {
             assert!(is_manual, "{lines:?}: {}: {found:?}", probe.property);
         }
     }
+}
+
+/// ND21 10.1: what stands in ROM is the drive's choice. A qualification compares what is read with what was read before.
+#[test]
+fn rom_is_compared_with_itself() {
+    let right = [STANDS.to_owned()];
+    let wrong = [
+        right[0].clone(),
+        "drive 1 deviates rom-cell-wrong-at-times".to_owned(),
+    ];
+    let found = |lines: &[String]| {
+        let link = twin(lines).expect("a ring").into_link();
+        let all = played_in_time(&named_plan("qualify-rom"), &link);
+        let model = twin(&right).expect("a ring");
+        let (_, sighting) = Play::default().judge(all, link.byte_time(), model);
+        sighting.map(|own| (own.meant, own.section))
+    };
+    assert_eq!(found(&right), None);
+    assert_eq!(found(&wrong), Some((Meant::Own(1), "10.1")));
 }

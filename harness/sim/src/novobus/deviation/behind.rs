@@ -10,6 +10,9 @@ use harness_proto::novobus::error::BusError;
 const EEPROM_READ: u8 = 0x81;
 /// It writes one (14.10.5.3).
 const EEPROM_WRITE: u8 = 0x82;
+/// What it shows when it has read a byte, and when it has written one.
+const EEPROM_HAS_READ: u8 = 0x20;
+const EEPROM_READY: u8 = 0x10;
 const NIST_HIGH: u16 = ram::NIST;
 const NIST_LOW: u16 = ram::NIST + 1;
 const MSOLL_HIGH: u16 = ram::MSOLL;
@@ -218,6 +221,16 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                     w.data
                 },
             ))
+        }),
+    },
+    Deviation {
+        name: "eeprom-read-ends-as-a-write",
+        section: "14.10.5",
+        about: "it reports that a byte of its EEPROM has been read by bit 4, which reports a write",
+        behind_the_bus: true,
+        how: How::Reads(|peek, a| match (a, peek(a)) {
+            (ram::EEPROM_CONTROL, EEPROM_HAS_READ) => EEPROM_READY,
+            (_, held) => held,
         }),
     },
     Deviation {

@@ -2,11 +2,12 @@
 
 use super::how::{Deviation, How, Moment, Write};
 use harness_proto::nd21::bits::status;
-use harness_proto::nd21::ram;
+use harness_proto::nd21::{own, ram};
 use harness_proto::novobus::bus_end::{Parameter, Place};
 use harness_proto::novobus::command::{Field, Kind};
 use harness_proto::novobus::error_mode::Marks;
 use harness_proto::novobus::memory::{Memory, in_range};
+use harness_proto::time::Span;
 
 /// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
@@ -240,6 +241,17 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
             (!high).then_some((w.address, w.data))
         }),
     ),
+    wrong(
+        "process-data-high-byte-early",
+        "9.4",
+        "it writes the high byte of the process data that come in before the low byte has come",
+        How::Acts(|m, memory| {
+            if m.place == Place::ProcessHigh && m.received.error.is_none() {
+                let low = memory.read(ram::DATA_IN);
+                memory.write(ram::STATUS | u16::from(low), m.received.byte);
+            }
+        }),
+    ),
     // Cells.
     wrong(
         "ram-bit-stuck-at-1",
@@ -352,6 +364,31 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         "10.5",
         "a software stop outlives a reset",
         How::Resets(|memory| keep_status(memory, status::STOP)),
+    ),
+];
+
+/// Deviations that no scenario shows and a qualification does: it compares what is read with what was read before, and times with each other.
+pub(super) static OF_QUALIFICATIONS: &[Deviation] = &[
+    wrong(
+        "sends-checking-bytes-late",
+        "8.2",
+        "it sends the checking bytes of its answers 5 ms late",
+        How::LateAt(|m| m.answers_check().map(|_| Span::from_millis(5))),
+    ),
+    wrong(
+        "rom-cell-wrong-at-times",
+        "10.1",
+        "bit 0 of the ROM cell 2F33 is wrong where every 9th command reads it",
+        How::Misreads(|nth, address, data| data ^ u8::from(address == 0x2F33 && nth % 9 == 0)),
+    ),
+    wrong(
+        "reset-keeps-the-recording",
+        "10.5",
+        "the recording of the oscilloscope outlives a reset",
+        How::Resets(|memory| {
+            let cells: Vec<u16> = own::SCOPE_BUFFER.collect();
+            keep(memory, &cells);
+        }),
     ),
 ];
 

@@ -173,9 +173,16 @@ impl Deviant {
     }
 
     /// Puts a byte behind those that are held back, or lets it go where there is nothing to wait for.
-    fn send(&mut self, now: Instant, byte: Option<u8>, twice: bool) -> Option<u8> {
+    fn send(
+        &mut self,
+        now: Instant,
+        byte: Option<u8>,
+        twice: bool,
+        moment: Option<&Moment>,
+    ) -> Option<u8> {
         let late = self.deviations.iter().find_map(|d| match d.how {
             How::Late(late) => Some(late),
+            How::LateAt(late) => moment.and_then(late),
             _ => None,
         });
         let due = late.map_or(Deadline::LineFree(now), |late| Deadline::At(now + late));
@@ -185,7 +192,8 @@ impl Deviant {
             self.held
                 .extend(std::iter::repeat_n((due, byte), room.min(copies)));
         }
-        if late.is_some() {
+        let waits = |held: &(Deadline, u8)| matches!(held.0, Deadline::At(at) if at > now);
+        if late.is_some() || self.held.front().is_some_and(waits) {
             return None;
         }
         self.held.pop_front().map(|(_, byte)| byte)
@@ -270,7 +278,7 @@ impl Device for Deviant {
         let (byte, twice) = self.said(&moment);
         let byte = self.told(&moment, byte);
         Reaction {
-            byte: self.send(now, byte, twice),
+            byte: self.send(now, byte, twice, Some(&moment)),
             marks: moment.step.marks,
         }
     }
@@ -312,7 +320,7 @@ impl Device for Deviant {
             bus_end.handle_deadline(now, memory)
         });
         Reaction {
-            byte: self.send(now, step.byte, false),
+            byte: self.send(now, step.byte, false, None),
             marks: step.marks,
         }
     }

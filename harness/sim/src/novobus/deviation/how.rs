@@ -46,9 +46,10 @@ pub fn deviations() -> impl Iterator<Item = &'static Deviation> {
     tables.into_iter().flatten()
 }
 
-/// Relatives of these with other numbers. They can be planted and are looked for like all others, and no list shows them.
+/// Relatives of these with other numbers, and deviations that only a qualification shows. They can be planted and are looked for like all
+/// others, and no list shows them.
 pub fn relatives() -> impl Iterator<Item = &'static Deviation> {
-    numbered::numbered_ones()
+    numbered::numbered_ones().chain(cells::OF_QUALIFICATIONS)
 }
 
 /// The deviation of this name, the relatives among them.
@@ -201,6 +202,8 @@ pub(super) enum How {
     Repeats(fn(&Moment) -> bool),
     /// It sends every byte later by this time.
     Late(Span),
+    /// It sends some bytes later by a time, and what stands behind them when they are out.
+    LateAt(fn(&Moment) -> Option<Span>),
     /// It sends every byte earlier by this time.
     Early(Span),
     /// It leaves the error mode after this byte.

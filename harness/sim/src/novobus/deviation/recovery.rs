@@ -75,6 +75,17 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
         How::Leaves(|m| m.in_order),
     ),
     wrong(
+        "damaged-check-sequence-accepted",
+        "9.8",
+        "it takes a byte of a check sequence with a line error for a good one",
+        How::Hears(|m| match SEQUENCE.get(usize::from(m.matched)) {
+            Some(due) if m.place == Place::ErrorMode && m.received.byte == *due => {
+                Received::good(*due)
+            }
+            _ => m.received,
+        }),
+    ),
+    wrong(
         "check-sequence-third-byte-any",
         "9.8",
         "it takes any byte for the 72 of a check sequence",

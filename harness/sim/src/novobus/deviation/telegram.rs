@@ -10,6 +10,9 @@ use harness_proto::time::Span;
 /// Bit 4 of a sync byte, which is 0 (ND21 9.2).
 const BIT_4: u8 = 1 << 4;
 
+/// Bit 7 of a sync byte, which is 1.
+const BIT_7: u8 = 1 << 7;
+
 /// The table.
 pub(super) static DEVIATIONS: &[Deviation] = &[
     Deviation {
@@ -63,6 +66,25 @@ pub(super) static DEVIATIONS: &[Deviation] = &[
                 } else {
                     m.received
                 }
+            },
+            |m, byte| {
+                Some(if m.place == Place::Sync && byte != 0 {
+                    m.received.byte
+                } else {
+                    byte
+                })
+            },
+        ),
+    },
+    Deviation {
+        name: "ignores-bit-7-of-sync-bytes",
+        section: "9.2",
+        about: "it takes 02 to 0F for sync bytes, as if bit 7 were set",
+        behind_the_bus: false,
+        how: How::Mistakes(
+            |m| match (m.place, m.received.byte) {
+                (Place::Sync, 0x02..=0x0F) => m.good(m.received.byte | BIT_7),
+                _ => m.received,
             },
             |m, byte| {
                 Some(if m.place == Place::Sync && byte != 0 {

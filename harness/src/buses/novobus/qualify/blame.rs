@@ -8,9 +8,10 @@ use super::diagnose::{Named, Whose, proven};
 use super::exchange::{Sent, begin};
 use super::pinned::Pinned;
 use crate::buses::novobus::calm::calm;
-use crate::buses::novobus::twin::{Conversation, Divergence};
+use crate::buses::novobus::twin::{Conversation, Divergence, Symptom};
 use crate::library::Entry;
 use crate::scenario::source::Source;
+use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::role::Role;
 use harness_proto::novobus::sync::{Addressing, PAUSE, SYNCO, SyncByte};
@@ -71,7 +72,8 @@ impl Sighting {
     ) -> Option<Self> {
         // The computer may cause a missing or late byte, but not another value.
         let values = found.expected.zip(found.received);
-        if found.ring != 0 || values.is_none_or(|((_, due), (_, came))| due.byte == came.byte) {
+        let alike = |((_, due), (_, came)): ((_, Received), (_, Received))| due.byte == came.byte;
+        if found.ring != 0 || found.what != Symptom::Value && values.is_none_or(alike) {
             return None;
         }
         let first = begin(attempt, drives);

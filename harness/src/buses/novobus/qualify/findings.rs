@@ -57,6 +57,8 @@ pub(super) struct Findings {
     failed: bool,
     /// What was not compared, or not equal, with its name.
     open: Vec<String>,
+    /// The bytes that drives hold back, as far as the tolerance permits.
+    held_back: Vec<String>,
 }
 
 impl Findings {
@@ -203,6 +205,11 @@ impl Findings {
         self.open.push(why);
     }
 
+    /// Notes that a drive holds a byte back each time.
+    pub(super) fn note_held_back(&mut self, what: String) {
+        self.held_back.push(what);
+    }
+
     /// Whether something differed that a drive is to blame for.
     pub(super) fn differ(&self) -> bool {
         !self.differing.is_empty() || !self.with_driver.is_empty() || self.culprit().is_some()
@@ -213,7 +220,9 @@ impl Findings {
         match self.master_is_wrong {
             true => Verdict::RigError,
             false if self.differ() && self.failed => Verdict::Failed,
-            false if self.differ() || self.is_open() => Verdict::Inconclusive,
+            false if self.differ() || self.is_open() || !self.held_back.is_empty() => {
+                Verdict::Inconclusive
+            }
             false => Verdict::Passed,
         }
     }
@@ -257,7 +266,8 @@ impl Findings {
 
     /// Which deviations there are, as far as is known.
     fn verdict(&self, named: Option<&[Named]>, known: &[String]) -> String {
-        let mut text = String::new();
+        let held_back = self.held_back.iter();
+        let mut text: String = held_back.map(|own| format!("deviation: {own}\n")).collect();
         let count = self.counts();
         // Writing to a String cannot fail.
         if self.differ() && named.is_none() {
@@ -285,7 +295,7 @@ impl Findings {
                 }
             }
             let _infallible = writeln!(text, "compared: {count}");
-        } else if self.is_open() || self.equal == 0 {
+        } else if self.is_open() || self.equal == 0 || !self.held_back.is_empty() {
             let _infallible = writeln!(
                 text,
                 "deviations: not known; no byte is known to differ, but not everything was compared: {count}"

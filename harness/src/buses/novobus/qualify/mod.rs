@@ -1,6 +1,7 @@
 //! The hypotheses about drives of a ring, and the probes that settle them.
 
 mod blame;
+mod delays;
 mod diagnose;
 mod eeprom;
 mod exchange;

@@ -14,7 +14,7 @@ use harness_proto::nd21::io::Input;
 use harness_proto::nd21::ram;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::properties::PROPERTIES;
-use harness_sim::nd21::{PROPERTIES as OF_THE_DRIVE, Stimulus};
+use harness_sim::nd21::{PROPERTIES as OF_THE_DRIVE, Property, Stimulus};
 use include_dir::{Dir, include_dir};
 use std::collections::BTreeSet;
 
@@ -62,7 +62,15 @@ pub struct Probe {
     pub assumed: Header,
     /// The conversations.
     pub entries: Vec<Entry>,
+    /// The conversation in place of them for a drive that is silent while it tests itself (property `self-test-bus`): it cannot be polled.
+    pub of_silent: Option<Entry>,
 }
+
+/// The property that says whether a drive is silent while it tests itself: it is asked before the others of a drive.
+pub(super) const SELF_TEST_BUS: &str = "self-test-bus";
+
+/// What the names of conversations for silent drives end with.
+const OF_SILENT: &str = "-silent";
 
 /// What a probe asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,9 +154,15 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
             asked: Asked::Ring,
             assumed: Header::default(),
             entries,
+            of_silent: None,
         });
     }
-    for property in &OF_THE_DRIVE {
+    let is_first = |first| move |own: &&Property| (own.name == SELF_TEST_BUS) == first;
+    let (first, then) = (OF_THE_DRIVE.iter(), OF_THE_DRIVE.iter());
+    for property in first
+        .filter(is_first(true))
+        .chain(then.filter(is_first(false)))
+    {
         let looks = LOOKS.iter().find(|(name, _)| *name == property.name);
         let Some((text, (_, looks))) = text(&OF_DRIVES, property.name).zip(looks) else {
             continue;
@@ -156,6 +170,11 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
         for drive in some_drives(drives) {
             let name = format!("{}-drive-{drive}", property.name);
             let text = text.replace(EACH, &drive.to_string());
+            let of_silent = self::text(&OF_DRIVES, &format!("{}{OF_SILENT}", property.name));
+            let of_silent = of_silent.map(|text| {
+                let text = text.replace(EACH, &drive.to_string());
+                probe(&format!("{name}{OF_SILENT}"), &text, drives)
+            });
             probes.push(Probe {
                 property: property.name,
                 section: property.section,
@@ -163,6 +182,7 @@ pub fn probes(drives: u8) -> Result<Vec<Probe>, Box<Problems>> {
                 asked: Asked::Drive(drive, looks),
                 assumed: released(drive).into(),
                 entries: vec![probe(&name, &text, drives)?],
+                of_silent: of_silent.transpose()?,
             });
         }
     }

@@ -3,12 +3,13 @@
 //! It runs twice: on a rig in use, and on the record of that run, from which `verify` makes `profile.toml` and `deviations.txt` again.
 
 use super::blame::exchange;
+use super::delays::{DELAYS, held_back};
 use super::diagnose::{deviating_masters, name};
 use super::eeprom::{dumps, marches};
 use super::findings::Findings;
 use super::pinned::questions;
-use super::probes::{Asked, Probe, conversations, probes, thorough};
-use super::settle::{Answer, answer};
+use super::probes::{Asked, Probe, SELF_TEST_BUS, conversations, probes, thorough};
+use super::settle::{Answer, answer, silence};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::{Exactness, Twin};
 use crate::library::Entry;
@@ -16,7 +17,7 @@ use crate::rig::{Played, Profile, Rig};
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The most deviations of the master that are listed.
 const MOST_TOLD: usize = 8;
@@ -98,7 +99,12 @@ pub(crate) struct Qualification {
     /// The choices of the manual that show in every attempt, before the scenario begins.
     assumed: Header,
     ill: bool,
+    /// The drives that are silent while they test themselves (11.8).
+    silent: BTreeSet<u8>,
 }
+
+/// The value of [`SELF_TEST_BUS`] of such a drive.
+const SILENT: &str = "silent";
 
 impl Qualification {
     /// One of which nothing was played yet.
@@ -109,6 +115,7 @@ impl Qualification {
             findings: Findings::new(drives, facts.byte_time, facts.exactness.tolerance),
             assumed: Header::default(),
             ill: false,
+            silent: BTreeSet::new(),
             facts,
         }
     }
@@ -177,8 +184,11 @@ impl Qualification {
             read = dumps(drives);
         }
         for entry in entries {
-            if self.compare(bench, &entry)?.is_none() {
+            let Some(played) = self.compare(bench, &entry)? else {
                 return Ok(true);
+            };
+            if entry.short_name() == DELAYS {
+                self.measure(&played);
             }
         }
         for (drive, entry) in read {
@@ -187,6 +197,18 @@ impl Qualification {
             }
         }
         Ok(false)
+    }
+
+    /// Notes which drives hold bytes back. Where times are exact the model has judged them.
+    fn measure(&mut self, played: &Played) {
+        let last = played
+            .last_played()
+            .and_then(|own| own.conversations.last());
+        let last = last.filter(|_| self.facts.exactness.tolerance > Span::ZERO);
+        let held = last.map(|own| held_back(self.drives, self.facts.byte_time, own));
+        for own in held.into_iter().flatten() {
+            self.findings.note_held_back(own.to_string());
+        }
     }
 
     /// Plays a conversation that is judged by the model; `None` where nothing more can or may be played.
@@ -324,8 +346,14 @@ impl Qualification {
             match self.ask(bench, &probe, &known)? {
                 Asking::Settled { value, header } => {
                     bench.tell(&format!("{property} ({section}): {whose}{value}\n"))?;
-                    if probe.asked == Asked::Ring {
-                        known = known.and(&header);
+                    match probe.asked {
+                        Asked::Ring => known = known.and(&header),
+                        Asked::Drive(drive, _)
+                            if (property, &value[..]) == (SELF_TEST_BUS, SILENT) =>
+                        {
+                            self.silent.insert(drive);
+                        }
+                        Asked::Drive(..) => {}
                     }
                     profile.settle(property, &section, &format!("{whose}{value}"), &header);
                 }
@@ -378,6 +406,11 @@ impl Qualification {
         probe: &Probe,
         known: &Header,
     ) -> Result<Result<Answer, String>, B::Stop> {
+        if let (Some(entry), Asked::Drive(drive, _)) = (&probe.of_silent, probe.asked)
+            && self.silent.contains(&drive)
+        {
+            return self.answer_of_silent(bench, (probe.property, drive), entry);
+        }
         let own = self.facts.exactness;
         let exactness = Exactness {
             // A fresh twin does not hold what earlier scenarios have left in drives that are not reset.
@@ -416,6 +449,26 @@ impl Qualification {
             self.findings.note_attempts(name, played);
         }
         Ok(Ok(Answer::Unexplained))
+    }
+}
+
+impl Qualification {
+    /// Asks a drive that is silent while it tests itself for how long it does. The inner error says why it cannot be asked.
+    fn answer_of_silent<B: Bench>(
+        &mut self,
+        bench: &mut B,
+        (property, drive): (&str, u8),
+        entry: &Entry,
+    ) -> Result<Result<Answer, String>, B::Stop> {
+        let played = bench.play(entry)?;
+        let Some(attempt) = played.last_played().filter(|own| own.was_played()) else {
+            return Ok(Err(played.outcome.remarks.join("; ")));
+        };
+        let mut own = attempt.conversations.iter();
+        let last = own.rfind(|own| own.has_steps());
+        let place = (self.drives, drive);
+        let answer = last.map(|own| silence(property, place, own, self.facts.byte_time));
+        Ok(Ok(answer.unwrap_or(Answer::Unexplained)))
     }
 }
 

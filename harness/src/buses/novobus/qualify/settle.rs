@@ -5,7 +5,8 @@ use super::probes::{Asked, Probe, hypotheses};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup, SetupKind};
 use crate::buses::novobus::twin::{Conversation, Exactness, Twin};
 use crate::scenario::times::Duration;
-use harness_proto::novobus::role::Role;
+use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::role::{Role, roles};
 use harness_proto::time::Span;
 use harness_sim::nd21::PROPERTIES;
 
@@ -130,6 +131,41 @@ fn of_the_drive<E>(
         },
         _ => Answer::NoDifference,
     })
+}
+
+/// How long a drive of a ring of `drives` was silent behind its reset (ND21 11.8): between the last SYNCO that was lost and the first that came
+/// back. Bytes that a drive does not pass on are lost in one piece.
+pub(super) fn silence(
+    property: &str,
+    (drives, drive): (u8, u8),
+    conversation: &Conversation,
+    byte_time: Span,
+) -> Answer {
+    let (sent, times) = (conversation.sent_in(0), conversation.sent_at(0));
+    let lost = sent.len().saturating_sub(conversation.received_in(0).len());
+    let Ok(size) = RingSize::new(u64::from(drives)) else {
+        return Answer::Unexplained;
+    };
+    let roles = roles(size, &sent);
+    let is_check =
+        |role: &Role| matches!(role, Role::Check { drive: Some(own), .. } if *own == drive);
+    let Some(reset) = roles.iter().position(is_check).filter(|_| lost > 0) else {
+        return Answer::Unexplained;
+    };
+    let began = times[reset] + byte_time * u64::from(drives - drive);
+    let since = |place: usize| tenths(times[place].since(began));
+    let last = reset + lost;
+    match roles.get(last + 1) {
+        Some(Role::Idle) => {
+            let (from, to) = (since(last), since(last + 1));
+            let time = SetupKind::time(property, written(from.midpoint(to)));
+            Answer::Settled {
+                value: format!("{} to {}", written(from), written(to)),
+                header: Setup::new(DriveRange::one(0, drive), time).into(),
+            }
+        }
+        _ => Answer::NotDone(written(since(last.min(roles.len() - 1))).to_string()),
+    }
 }
 
 /// The hypotheses that explain each of several sets of conversations.

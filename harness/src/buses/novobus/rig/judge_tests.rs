@@ -367,6 +367,28 @@ fn every_command_that_sets_data_in_is_followed() {
     }
 }
 
+/// ND21 9.7, 10.1: 00 stands in the place of data where a command is refused, whatever the cell held when it was read before. A cell of
+/// ROM that was read with another value holds that value, also where the model's own is 00.
+#[test]
+fn a_refused_read_says_nothing_of_a_cell() {
+    let judged = |ring: &str, scenario: &str| {
+        let plan = plan(format!("title x\nring 3\n{scenario}"));
+        let way = Way {
+            rings: plan.rings.clone(),
+            attempts: None,
+            anew: false,
+        };
+        judged_on(&mut link(ring), "", (&plan, &way), &|_| {}).verdict
+    };
+    let contents = "drive 0..last memory FF7D = 40 50 60\ndrive 0..last memory 2F00 = 5A";
+    let refused = "read-byte 1 FF7D\n> 8C FE C7 7D FF 31 32 A6 80*40\nrecover\nread-byte 1 FF7D\n";
+    assert_eq!(judged(contents, refused), Passed);
+    let again = "read-byte 1 2F33\n".repeat(20);
+    assert_eq!(judged(contents, &again), Passed);
+    let wrong = format!("{contents}\ndrive 1 deviates rom-cell-wrong-at-times");
+    assert_eq!(judged(&wrong, &again), Failed);
+}
+
 /// ND21 11.8: drives that are silent while they test themselves lose bytes. A value read behind that is still known to be the drive's.
 #[test]
 fn silent_self_tests_accuse_no_drive() {

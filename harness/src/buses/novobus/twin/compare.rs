@@ -75,6 +75,7 @@ impl Comparer<'_> {
         let tail = conversation.end - self.exactness.tolerance;
         let rows = Rows {
             ring,
+            size,
             roles: &roles,
             sent: &answered,
             known,

@@ -1,14 +1,21 @@
 //! What a ring sent back, beside what its twin received.
 
 use super::comparison::Symptom;
+use crate::buses::novobus::calm::calm;
 use harness_proto::line::Received;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::Command;
 use harness_proto::novobus::role::Role;
+use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Instant;
+
+/// The bytes of the longest answer (10.1): so many zeros in a row are no answer.
+const LONGEST_ANSWER: usize = 6;
 
 /// What a ring sent back, beside what its twin received.
 pub(super) struct Rows<'a> {
     pub(super) ring: usize,
+    pub(super) size: RingSize,
     /// What each byte is for, as far as that is known.
     pub(super) roles: &'a [Role],
     /// The bytes that the master sent, one for each role.
@@ -24,15 +31,15 @@ impl Rows<'_> {
         self.roles.get(index).copied().unwrap_or(Role::Foreign)
     }
 
-    /// Whether the model refuses the command of an answer: then 00 stands in the place of data and of the checking byte too (ND21 9.7), and
-    /// no checking byte is 00 (9.6). Also where no checking byte follows.
+    /// Whether the model refuses the command of an answer, or is in the error mode: then 00 stands in the place of data too (ND21 9.7).
     pub(super) fn is_refused(&self, index: usize) -> bool {
-        let drive = self.role(index).drive();
-        let is_check =
-            |at: &usize| matches!(self.role(*at), Role::Check { drive: own, .. } if own == drive);
-        let check = (index..self.roles.len()).find(is_check);
-        let due = check.and_then(|check| self.expected.get(check));
-        due.is_none_or(|(_, due)| due.byte == 0)
+        let behind = self.expected.iter().skip(index).take(LONGEST_ANSWER);
+        if behind.clone().all(|(_, due)| due.byte == 0) {
+            return true;
+        }
+        let sent = self.sent.iter().take(index + 1).chain(&[SYNCO]);
+        let sent: Vec<_> = sent.map(|byte| (*byte, true)).collect();
+        calm(self.size, &sent).last() == Some(&false)
     }
 
     /// Whether a byte is the low byte of process data (ND21 9.4).
