@@ -101,6 +101,8 @@ pub struct Inverter {
     apart: Option<Instant>,
     /// The fault whose cause is there.
     cause: Option<u8>,
+    /// What happens next by itself.
+    due: Option<(Instant, Event)>,
     now: Instant,
 }
 
@@ -132,6 +134,7 @@ impl Inverter {
             lost: None,
             apart: None,
             cause: None,
+            due: None,
             now: at,
         };
         inverter.power_up(at);
@@ -160,16 +163,15 @@ impl Inverter {
         if let Some(code) = self.cause {
             self.fail(code);
         }
+        self.settle();
     }
 
     /// Lets the time pass until `to`.
     pub fn advance(&mut self, to: Instant) {
-        while let Some((at, event)) = self.next_event() {
-            if at > to {
-                break;
-            }
+        while let Some((at, event)) = self.due.filter(|(at, _)| *at <= to) {
             self.now = self.now.max(at);
             self.happen(event);
+            self.due = self.next_event();
         }
         self.now = self.now.max(to);
     }
@@ -177,7 +179,7 @@ impl Inverter {
     /// When something happens by itself: the state, the fault memory or the status word change then. Ramps are no events.
     #[must_use]
     pub fn next_action(&self) -> Option<Instant> {
-        self.next_event().map(|(at, _)| at)
+        self.due.map(|(at, _)| at)
     }
 
     /// Takes over the process words of an exchange.
@@ -206,14 +208,14 @@ impl Inverter {
             PzdInvalid::SetpointOnly => self.obey(outputs.stw),
             PzdInvalid::Stop => self.switch_off(),
         }
-        self.advance(at);
+        self.settle();
     }
 
     /// The DP watchdog of the module has expired at `at`, and the drive stops for it (`watchdog-action`).
     pub fn watchdog_expired(&mut self, at: Instant) {
         self.advance(at);
         self.switch_off();
-        self.advance(at);
+        self.settle();
     }
 
     /// Module and inverter lose each other at `at` (2.6).
@@ -223,6 +225,7 @@ impl Inverter {
             self.lost = Some(at);
             self.apart = Some(at + APART);
         }
+        self.settle();
     }
 
     /// Module and inverter find each other again at `at`.
@@ -230,6 +233,7 @@ impl Inverter {
         self.advance(at);
         self.lost = None;
         self.apart = None;
+        self.settle();
     }
 
     /// A cause of a fault (1 to 25) comes at `at`, or goes.
@@ -239,7 +243,7 @@ impl Inverter {
         if let Some(code) = code {
             self.fail(code);
         }
-        self.advance(at);
+        self.settle();
     }
 
     /// What the module works with now.
@@ -325,6 +329,12 @@ impl Inverter {
         self.steer();
     }
 
+    /// Something has changed: finds out what happens next, and lets happen what is due.
+    fn settle(&mut self) {
+        self.due = self.next_event();
+        self.advance(self.now);
+    }
+
     fn next_event(&self) -> Option<(Instant, Event)> {
         let standstill =
             machine::at_standstill(self.state, self.words.stw).and_then(|_| self.ramp.zero_at());
@@ -397,7 +407,7 @@ impl Inverter {
             };
         }
         self.steer();
-        self.advance(self.now);
+        self.settle();
     }
 
     /// The value of a parameter as it reads now; `None` where there is no such parameter or index.

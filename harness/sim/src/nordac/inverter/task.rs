@@ -226,7 +226,10 @@ impl Inverter {
         let loads = match (parameter.number, self.properties.load_default_value) {
             (970, LoadDefaultValue::Zero) => value == 0,
             (970, LoadDefaultValue::One) | (1602, _) => value == 1,
-            (967, _) => return self.obey(u16::try_from(value).unwrap_or(0)),
+            (967, _) => {
+                self.obey(u16::try_from(value).unwrap_or(0));
+                return self.settle();
+            }
             _ => false,
         };
         self.parameters.store(parameter, index, value);
