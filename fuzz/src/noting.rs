@@ -1,7 +1,7 @@
 //! Targets that tell libFuzzer what their cases reach, by the names of `harness_sim::fuzz::Feature`.
 
 use harness_sim::fuzz::{Feature, Notebook};
-use harness_sim::{novobus, unitek};
+use harness_sim::{nordac, novobus, unitek};
 use std::sync::atomic::{AtomicU8, Ordering};
 
 /// How many counters there are for features; two features with one counter are no harm.
@@ -25,7 +25,8 @@ macro_rules! noting {
 /// # Panics
 /// The input breaks a rule, or there is no such target.
 pub fn note(name: &str, data: &[u8], counters: &[AtomicU8; FEATURES]) {
-    let mut all = novobus::fuzz::NOTING.into_iter().chain(unitek::fuzz::NOTING);
+    let own = novobus::fuzz::NOTING.into_iter().chain(unitek::fuzz::NOTING);
+    let mut all = own.chain(nordac::fuzz::NOTING);
     let Some(target) = all.find(|target| target.name == name) else {
         panic!("no target {name}");
     };

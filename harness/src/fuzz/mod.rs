@@ -15,7 +15,7 @@ pub use text::{rig, scenario, written};
 pub use crate::buses::novobus::fuzz::coverage;
 use crate::buses::novobus::fuzz::noted;
 use harness_sim::fuzz::{Body, FuzzTarget, InputPieces, Noting};
-use harness_sim::{novobus, unitek};
+use harness_sim::{nordac, novobus, unitek};
 
 /// The targets whose bodies need the whole bench.
 pub const BENCH_TARGETS: [FuzzTarget; 4] = [
@@ -29,7 +29,8 @@ pub const BENCH_TARGETS: [FuzzTarget; 4] = [
 pub fn targets() -> impl Iterator<Item = FuzzTarget> {
     let of_buses = novobus::fuzz::TARGETS
         .into_iter()
-        .chain(unitek::fuzz::TARGETS);
+        .chain(unitek::fuzz::TARGETS)
+        .chain(nordac::fuzz::TARGETS);
     of_buses.chain(BENCH_TARGETS)
 }
 
@@ -55,6 +56,7 @@ const fn text(name: &'static str, body: Body, ending: &'static str) -> Noting {
 pub fn noting() -> impl Iterator<Item = Noting> {
     let of_buses = novobus::fuzz::NOTING
         .into_iter()
-        .chain(unitek::fuzz::NOTING);
+        .chain(unitek::fuzz::NOTING)
+        .chain(nordac::fuzz::NOTING);
     of_buses.chain(BENCH_NOTING)
 }

@@ -6,6 +6,7 @@ pub mod deviation;
 mod drive;
 pub mod faults;
 pub mod frequency;
+pub mod fuzz;
 pub mod inverter;
 pub mod machine;
 pub mod parameters;

@@ -1,5 +1,7 @@
-//! Models of the drive that share no code with it, to be compared with it.
+//! Models of inverter and module that share no code with them, to be compared with them.
 
 pub mod inverter;
+pub mod slave;
 
 pub use inverter::ReferenceInverter;
+pub use slave::ReferenceSlave;

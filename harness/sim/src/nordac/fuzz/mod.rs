@@ -1,0 +1,37 @@
+//! The bodies of the fuzz targets for NORDAC drives: each takes any bytes and panics where a rule is broken.
+//!
+//! Inputs are read by [`arbitrary`] in records of a fixed length; each target describes its own. Plain `cargo test` plays the inputs that
+//! `corpora/fuzz/<target>/` keeps.
+
+mod cells;
+mod pkw;
+mod slave;
+
+pub use cells::CELLS;
+pub use pkw::pkw;
+pub use slave::{slave, slave_counted};
+
+use crate::fuzz::{FuzzTarget, InputPieces, Noting};
+use cells::Cell;
+
+/// Every target whose body is here.
+pub const TARGETS: [FuzzTarget; 2] = [("nordac-slave", slave), ("nordac-pkw", pkw)];
+
+/// The same, with what their inputs reach.
+pub const NOTING: [Noting; 2] = [
+    Noting {
+        name: "nordac-slave",
+        body: slave::noted,
+        pieces: InputPieces::Bytes {
+            head: 1,
+            record: 12,
+        },
+        of: Some(|| Cell::reachable().count()),
+    },
+    Noting {
+        name: "nordac-pkw",
+        body: pkw::noted,
+        pieces: InputPieces::Bytes { head: 1, record: 9 },
+        of: None,
+    },
+];
