@@ -152,14 +152,16 @@ fn the_corpus_reaches_every_reachable_transition() {
     kept(&snapshot, &coverage.page());
 }
 
-/// Every state of a UNITEK drive, and everything that can happen in it, is in the kept inputs.
+/// Every state of a UNITEK and of a NORDAC drive, and everything that can happen in it, is in the kept inputs.
 #[test]
-fn the_corpus_reaches_every_cell_of_a_unitek_drive() {
+fn the_corpus_reaches_every_cell_of_the_drives() {
     let coverage = Coverage::of_folder(&folder()).expect("a corpus");
-    let mut sums = coverage.targets.iter();
-    let sum = sums.find(|sum| sum.target == "unitek-drive");
-    let sum = sum.expect("the target has inputs");
-    assert_eq!(Some(sum.reached), sum.of, "{sum:?}");
+    for target in ["unitek-drive", "nordac-slave"] {
+        let mut sums = coverage.targets.iter();
+        let sum = sums.find(|sum| sum.target == target);
+        let sum = sum.expect("the target has inputs");
+        assert_eq!(Some(sum.reached), sum.of, "{sum:?}");
+    }
 }
 
 /// The inputs of a target with the names of their files.

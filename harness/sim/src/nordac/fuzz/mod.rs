@@ -4,8 +4,10 @@
 //! `corpora/fuzz/<target>/` keeps.
 
 mod cells;
+mod heard;
 mod pkw;
 mod slave;
+mod telegrams;
 
 pub use cells::CELLS;
 pub use pkw::pkw;

@@ -1,6 +1,8 @@
 //! Telegrams, waits and faults for one drive, beside the reference model of its module.
 
 use super::cells::{Cell, Event, State};
+use super::heard::Heard;
+use super::telegrams::{ADDRESS, any_telegram, parameters, telegram};
 use crate::fuzz::{LONGEST, Notebook};
 use crate::nordac::reference::ReferenceSlave;
 use crate::nordac::{Drive, Setup};
@@ -10,16 +12,12 @@ use harness_proto::line::{LineError, Received};
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::properties::{Accepts, PROPERTIES, Properties};
 use harness_proto::nordac::words::{State as DriveState, stw};
-use harness_proto::nordac::{Answer, PpoType, Task};
 use harness_proto::profibus::BusRate;
 use harness_proto::profibus::dp::DpState;
 use harness_proto::time::{Instant, Span};
 use std::sync::LazyLock;
 
 const RATE: BusRate = BusRate::K1500;
-
-/// The address with which the drive is delivered here.
-const ADDRESS: u8 = 8;
 
 /// Most operations of an input.
 const MOST: usize = 340;
@@ -311,9 +309,7 @@ impl Pair {
         }
         let heard = Heard {
             octets,
-            repeated: damaged.is_none()
-                && octets == self.last
-                && octets.get(6).is_some_and(|fc| fc & 0x10 != 0),
+            repeated: damaged.is_none() && self.reference.repeated(),
             own,
             before: state.dp,
             after: self.drive.slave().state(),
@@ -330,7 +326,7 @@ impl Pair {
         let state = State::of(&self.drive);
         let event = match a % 6 {
             0 | 1 => {
-                let lost = a % 6 == 0;
+                let lost = a.is_multiple_of(6);
                 self.drive.set_link(self.now, lost);
                 self.reference.set_link(self.now, lost);
                 if lost { Event::Lost } else { Event::Found }
@@ -428,160 +424,6 @@ fn master(operation: &Operation) -> u8 {
     2 + (operation.how & 1)
 }
 
-/// Mostly right parameters: byte 0 the status, 1 and 2 the watchdog, 3 the delay, 4 the group, 5 what is wrong.
-fn parameters(data: &[u8; 9]) -> Vec<u8> {
-    let [status, wd1, wd2, tsdr, group, wrong, ..] = *data;
-    let mut all = vec![status, wd1, wd2, tsdr, 0x75, 0x31, group];
-    match wrong % 8 {
-        5 => all[5] = wrong,
-        6 => all.truncate(usize::from(wrong >> 5)),
-        7 => all.push(wrong),
-        _ => {}
-    }
-    all
-}
-
-/// A request: SD1 without data, SD2 with data.
-fn telegram(da: u8, sa: u8, fc: u8, sap: Option<u8>, data: &[u8]) -> Vec<u8> {
-    let flag = if sap.is_some() { 0x80 } else { 0 };
-    let mut body = vec![da | flag, sa | flag, fc];
-    body.extend(sap.map(|sap| [sap, 62]).into_iter().flatten());
-    body.extend(data);
-    framed(&body)
-}
-
-fn framed(body: &[u8]) -> Vec<u8> {
-    let sum = body
-        .iter()
-        .fold(0_u8, |sum, octet| sum.wrapping_add(*octet));
-    let length = u8::try_from(body.len()).unwrap_or(u8::MAX);
-    let mut all = match body.len() {
-        3 => vec![0x10],
-        _ => vec![0x68, length, length, 0x68],
-    };
-    all.extend(body);
-    all.extend([sum, 0x16]);
-    all
-}
-
-/// Any telegram: byte 0 chooses the form and what is wrong, the others are its octets.
-fn any_telegram(data: &[u8; 9]) -> Vec<u8> {
-    let [form, da, sa, fc, rest @ ..] = *data;
-    let usual = [0x49, 0x43, 0x4E, 0x4F, 0x44, 0x4C, 0x6D, 0x45][usize::from(fc % 8)];
-    let fc = if form & 0x80 == 0 { usual } else { fc };
-    let da = if form & 0x40 == 0 {
-        ADDRESS | da & 0x80
-    } else {
-        da
-    };
-    match form % 8 {
-        0 => framed(&[da, sa, fc]),
-        1 => framed(&[&[da, sa, fc], &rest[..usize::from(form >> 3 & 3) + 1]].concat()),
-        2 => {
-            let mut sd3 = framed(&[&[da, sa, fc], &rest[..], &[0; 3]].concat());
-            sd3.splice(..4, [0xA2]);
-            sd3
-        }
-        3 => vec![0xDC, da, sa],
-        4 => vec![0xE5],
-        5 => {
-            let mut wrong = framed(&[da, sa, fc]);
-            wrong[usize::from(rest[0]) % 6] ^= rest[1];
-            wrong
-        }
-        6 => {
-            let mut wrong = framed(&[&[da, sa, fc], &rest[..]].concat());
-            let place = usize::from(rest[0]) % wrong.len();
-            wrong[place] ^= rest[1];
-            wrong
-        }
-        _ => [form, da, sa, fc, rest[0], rest[1]][..usize::from(form >> 3) % 7].to_vec(),
-    }
-}
-
-/// A telegram, and what came of it.
-struct Heard<'a> {
-    octets: &'a [u8],
-    /// It is the last one again.
-    repeated: bool,
-    /// The own master before.
-    own: Option<u8>,
-    before: DpState,
-    after: DpState,
-    ppo: PpoType,
-    /// The answer to its task.
-    executed: Option<Answer>,
-}
-
-impl Heard<'_> {
-    /// What the telegram was to the drive.
-    fn events(&self, reply: Option<&[u8]>) -> Vec<Event> {
-        let octets = self.octets;
-        let own = octets.len() > 6 && self.own == Some(octets[5] & 0x7F);
-        let sap = octets.get(7).copied().unwrap_or(0);
-        let exchange = octets[0] == 0x68 && octets.len() > 6 && (octets[4] | octets[5]) & 0x80 == 0;
-        let event = match reply {
-            None if own && octets[0] == 0x68 && octets[4] & 0x80 != 0 && sap == 58 => {
-                Event::Control
-            }
-            None => Event::Silence,
-            Some(_) if self.repeated => Event::Repeated,
-            Some([0x10, _, _, 0, ..]) => Event::Status,
-            Some([0x10, ..])
-                if exchange
-                    && own
-                    && self.before == DpState::DataExch
-                    && octets[6] & 0x0C == 0x0C =>
-            {
-                Event::WrongLength
-            }
-            Some([0xE5]) if sap == 61 => self.parameters(own),
-            Some([0xE5]) if self.before == DpState::WaitPrm => Event::Refused,
-            Some([0xE5]) if self.after == DpState::DataExch => Event::Configuration,
-            Some([0xE5]) => Event::CfgFault,
-            Some([0x10, ..]) => Event::Refused,
-            Some(_) if exchange => return self.exchange(),
-            Some(_) if sap == 60 => Event::Diagnosis,
-            Some(_) => Event::Read,
-        };
-        vec![event]
-    }
-
-    fn parameters(&self, own: bool) -> Event {
-        let data = &self.octets[9..self.octets.len() - 2];
-        match data {
-            _ if self.own.is_some() && !own => Event::Refused,
-            [status, _, _, _, _, _, _, ..] if status & 0xC0 != 0x80 => Event::Unlock,
-            [_, _, _, _, _, _, _, ..] if self.after == DpState::WaitCfg => Event::Parameters,
-            _ => Event::PrmFault,
-        }
-    }
-
-    /// What the words of an exchange are, and its task.
-    fn exchange(&self) -> Vec<Event> {
-        let words = 7 + self.ppo.words_begin();
-        let word = u16::from_be_bytes([self.octets[words], self.octets[words + 1]]);
-        let clear = |mask: u16| word & mask == 0;
-        let mut events = vec![match word {
-            _ if clear(stw::VALID) => Event::Invalid,
-            _ if !clear(stw::ACKNOWLEDGE) => Event::Acknowledge,
-            _ if clear(stw::NO_OFF2) => Event::Off2,
-            _ if clear(stw::NO_OFF3) => Event::Off3,
-            _ if clear(stw::ON) => Event::Off1,
-            _ if clear(stw::ENABLE) => Event::Disable,
-            _ => Event::Enable,
-        }];
-        let changes = Task::of(self.octets[7] >> 4).is_change();
-        match self.executed {
-            Some(Answer::Error(_)) => events.push(Event::TaskError),
-            Some(Answer::None) | None => {}
-            Some(_) if changes => events.push(Event::Changed),
-            Some(_) => events.push(Event::Requested),
-        }
-        events
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -624,14 +466,16 @@ mod tests {
     #[test]
     fn random_telegrams_agree() {
         property("random_telegrams_agree", &operations(), |bytes| {
-            slave(&bytes)
+            noted(&bytes, &mut Notebook::none())
         });
     }
 
     #[test]
     fn any_octets_agree() {
         let bytes = prop::collection::vec(any::<u8>(), 0..800);
-        property("any_octets_agree", &bytes, |bytes| slave(&bytes));
+        property("any_octets_agree", &bytes, |bytes| {
+            noted(&bytes, &mut Notebook::none())
+        });
     }
 
     #[test]

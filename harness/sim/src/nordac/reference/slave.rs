@@ -77,6 +77,7 @@ pub struct ReferenceSlave {
     delay: u64,
     /// What the last telegram's task was answered, if it had a new one.
     executed: Option<Answer>,
+    repeated: bool,
 }
 
 impl ReferenceSlave {
@@ -112,6 +113,7 @@ impl ReferenceSlave {
             diagnosis_waits: false,
             delay: 11,
             executed: None,
+            repeated: false,
         }
     }
 
@@ -137,6 +139,12 @@ impl ReferenceSlave {
     #[must_use]
     pub const fn executed(&self) -> Option<Answer> {
         self.executed
+    }
+
+    /// Whether the last telegram was a repetition.
+    #[must_use]
+    pub const fn repeated(&self) -> bool {
+        self.repeated
     }
 
     /// Time passes until `to`.
@@ -173,6 +181,7 @@ impl ReferenceSlave {
     pub fn telegram(&mut self, at: Instant, octets: &[u8]) -> Option<Bytes> {
         self.advance(at);
         self.executed = None;
+        self.repeated = false;
         let (da, request) = taken_apart(octets)?;
         if request.sa == 127 || (da != self.address && da != 127) {
             return None;
@@ -208,6 +217,7 @@ impl ReferenceSlave {
             && self.record == Some((request.sa, fcb))
             && let Some(last) = &self.last
         {
+            self.repeated = true;
             return last.clone();
         }
         self.record = (fcv || fcb).then_some((request.sa, fcb));
