@@ -292,8 +292,8 @@ pub struct TraceOutput {
     #[arg(long, value_name = "FIRST..LAST", value_parser = rows)]
     pub rows: Option<Rows>,
     /// Vertical position of a byte in the picture (svg).
-    #[arg(long, value_enum, default_value_t = Layout::Index)]
-    pub time: Layout,
+    #[arg(long, value_enum, default_value_t = TraceLayout::Index)]
+    pub time: TraceLayout,
     /// Write only the lines into a value change dump (vcd); sigrok up to 0.5.2 stops at the first vector.
     #[arg(long)]
     pub lines_only: bool,
@@ -455,7 +455,7 @@ pub enum TraceFormat {
 
 /// How the rows of a picture are placed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Layout {
+pub enum TraceLayout {
     /// Row n is the n-th byte of each link, as in the manual.
     #[default]
     Index,

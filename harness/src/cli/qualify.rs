@@ -13,7 +13,7 @@ use crate::buses::twin::Twin;
 use crate::evidence::{DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;
 use crate::link::{Link as _, Octets as _};
-use crate::qualify::{Bench, Facts, Qualification};
+use crate::qualify::{Bench, Qualification, QualificationFacts};
 use crate::rig::{Played, Run, state};
 use crate::scenario::problem::Problems;
 use std::path::PathBuf;
@@ -92,10 +92,10 @@ impl Bench for Live<'_, '_> {
 }
 
 /// What is known of a qualification that begins.
-pub(super) fn facts(run: &mut Run<'_>, began: String, thorough: bool) -> Facts {
+pub(super) fn facts(run: &mut Run<'_>, began: String, thorough: bool) -> QualificationFacts {
     let rig = run.session().rig().clone();
     let links = 0..usize::from(rig.ring_size());
-    Facts {
+    QualificationFacts {
         rig,
         byte_time: run.session().link().byte_time(),
         exactness: run.exactness(),

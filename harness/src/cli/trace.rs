@@ -1,6 +1,6 @@
 //! `drivebench trace`.
 
-use super::args::{Layout, TraceArguments, TraceFormat, TraceOutput};
+use super::args::{TraceArguments, TraceFormat, TraceLayout, TraceOutput};
 use super::exit::Exit;
 use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
@@ -136,8 +136,8 @@ fn write(
                 title: shown.title,
                 id: "ring",
                 scale: match showing.time {
-                    Layout::Index => RowPlacing::Index,
-                    Layout::True => RowPlacing::Time,
+                    TraceLayout::Index => RowPlacing::Index,
+                    TraceLayout::True => RowPlacing::Time,
                 },
                 rate: shown.rate,
                 rows,

@@ -4,7 +4,7 @@ use super::attempt::reached;
 use super::files::{DEVIATIONS, PROFILE, read_text, sum};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened};
-use crate::buses::qualify::{Bench, Facts, Qualification, Qualified, thorough};
+use crate::buses::qualify::{Bench, Qualification, QualificationFacts, Qualified, thorough};
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::library::Entry;
@@ -157,7 +157,7 @@ fn qualified(opened: &Opened, mut cases: VecDeque<Case>, ended: bool) -> Result<
     let reached = reached(&opened.rig, header);
     let long: Vec<_> = thorough(drives).unwrap_or_default();
     let long = long.first().map(|entry| sum(entry.source.text.as_bytes()));
-    let mut course = Qualification::new(Facts {
+    let mut course = Qualification::new(QualificationFacts {
         rig: opened.rig.clone(),
         byte_time: header.rate.byte_time(),
         exactness: header.exactness,

@@ -215,8 +215,8 @@ pub trait Line: Send {
         Lead::NONE
     }
 
-    /// Adds SYNCO on every ring, behind the bytes that wait to be sent, so that drives with time-out monitoring hear no gap (ND21 9.2,
-    /// 9.9). Returns when it must be called again; `None` for a line that is not kept. The SYNCO comes back like other bytes.
+    /// Adds what the bus carries when it is idle on every port, behind what waits to be sent, so that drives that watch for silence hear no
+    /// gap. Returns when it must be called again; `None` for a line that is not kept. What it adds comes back like all else.
     fn keep(&mut self) -> Option<Instant> {
         None
     }

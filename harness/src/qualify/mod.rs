@@ -8,5 +8,5 @@ pub use crate::buses::novobus::qualify::{
     Sighting, Trial, Whose, agreed, answer, conversations, culprit, deviating_masters, dumps,
     exchange, explaining, hypotheses, marches, name, probes, questions, thorough,
 };
-pub(crate) use crate::buses::novobus::qualify::{Bench, Facts, Qualification};
+pub(crate) use crate::buses::novobus::qualify::{Bench, Qualification, QualificationFacts};
 pub use crate::rig::{Profile, ProfileError, SettledProperty};

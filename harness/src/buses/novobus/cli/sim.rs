@@ -70,8 +70,8 @@ pub struct SimArguments {
     #[arg(long, value_name = "LINK=PLACE")]
     pub cut: Vec<InnerPlace>,
     /// Speed of the simulation.
-    #[arg(long, value_enum, default_value_t = Speed::Line)]
-    pub pace: Speed,
+    #[arg(long, value_enum, default_value_t = SimSpeed::Line)]
+    pub pace: SimSpeed,
     /// How the stream carries line errors.
     #[arg(long, value_enum, default_value_t = MarksForm::None)]
     pub marks: MarksForm,
@@ -97,7 +97,7 @@ pub struct SimArguments {
 
 /// How fast time passes in a served ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Speed {
+pub enum SimSpeed {
     /// As on the line: a byte takes 286 us at 38400 bit/s.
     Line,
     /// As fast as possible while bytes of the client are on the ring.
@@ -232,7 +232,7 @@ fn frames(
         ("--pty", !arguments.pty.is_empty()),
         ("--tap", !arguments.tap.is_empty()),
         ("--cut", !arguments.cut.is_empty()),
-        ("--pace", arguments.pace != Speed::Line),
+        ("--pace", arguments.pace != SimSpeed::Line),
         ("--marks", arguments.marks != MarksForm::None),
         ("--rig", arguments.rig.rig.is_some()),
     ];
@@ -272,8 +272,8 @@ fn rings(
     }
     let (plan, link) = rig::link(&arguments.rig, output)?;
     let pace = match arguments.pace {
-        Speed::Line => Pace::Line,
-        Speed::Free => Pace::Free,
+        SimSpeed::Line => Pace::Line,
+        SimSpeed::Free => Pace::Free,
     };
     let marks = match arguments.marks {
         MarksForm::None => Marks::None,

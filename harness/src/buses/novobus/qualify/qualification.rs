@@ -63,7 +63,7 @@ pub(crate) trait Bench {
 
 /// What is known of a qualification before anything is played.
 #[derive(Clone, Debug)]
-pub(crate) struct Facts {
+pub(crate) struct QualificationFacts {
     /// The rig.
     pub(crate) rig: Rig,
     /// How long a byte takes.
@@ -93,7 +93,7 @@ pub(crate) struct Qualified {
 
 /// A qualification in progress.
 pub(crate) struct Qualification {
-    facts: Facts,
+    facts: QualificationFacts,
     drives: u8,
     findings: Findings,
     /// The choices of the manual that show in every attempt, before the scenario begins.
@@ -108,7 +108,7 @@ const SILENT: &str = "silent";
 
 impl Qualification {
     /// One of which nothing was played yet.
-    pub(crate) fn new(facts: Facts) -> Self {
+    pub(crate) fn new(facts: QualificationFacts) -> Self {
         let drives = facts.rig.ring_size();
         Self {
             drives,

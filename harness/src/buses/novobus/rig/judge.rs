@@ -2,7 +2,7 @@
 
 use super::left_open::{self, Explanation};
 use crate::buses::novobus::language::syntax::{DriveRange, Header, Setup};
-use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, Own};
+use crate::buses::novobus::twin::{Comparison, Conversation, Divergence, Exactness, OwnByte};
 use crate::link::{LinkEvent, Recording};
 use crate::rig::check::Rig;
 use crate::rig::file::Deviation;
@@ -270,8 +270,8 @@ fn in_a_race(finding: &Mismatch, heard: &Heard<'_>) -> bool {
 
 /// The answer of a drive that a finding is about, if its value depends on the drive's own state: the byte that differs, or else one
 /// that the line of the finding asked for. The cells of the scenario's header are not the drive's own.
-fn of_the_drive<'h>(finding: &Mismatch, heard: &Heard<'h>) -> Option<&'h Own> {
-    let set = |own: &Own| {
+fn of_the_drive<'h>(finding: &Mismatch, heard: &Heard<'h>) -> Option<&'h OwnByte> {
+    let set = |own: &OwnByte| {
         let mut setups = heard.plan.memory_setups();
         setups.any(|(ring, drives, from, bytes)| {
             let offset = own.address.and_then(|address| address.checked_sub(from));
@@ -279,7 +279,7 @@ fn of_the_drive<'h>(finding: &Mismatch, heard: &Heard<'h>) -> Option<&'h Own> {
             ring == own.ring && drives.contains(&own.drive) && within
         })
     };
-    let about = |conversation: &Conversation, own: &Own| match &finding.difference {
+    let about = |conversation: &Conversation, own: &OwnByte| match &finding.difference {
         Some(difference) => {
             let asked_for = difference.index < difference.expected.len();
             let differs = match difference.expected.get(difference.index) {

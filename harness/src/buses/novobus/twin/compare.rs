@@ -1,6 +1,6 @@
 //! Byte for byte: what a ring sent back, and what its twin says.
 
-use super::comparison::{Adopted, Comparison, Divergence, Exactness, Own, Symptom, Unasked};
+use super::comparison::{Adopted, Comparison, Divergence, Exactness, OwnByte, Symptom, Unasked};
 use super::follow::{Conversation, TwinBytes};
 use super::known::{ByteRead, CellByte, Knowledge, writes};
 use super::rows::{Rows, answer_of};
@@ -348,7 +348,7 @@ impl Comparer<'_> {
         if known == 0xFF {
             return;
         }
-        self.comparison.own.push(Own {
+        self.comparison.own.push(OwnByte {
             ring,
             at: *at,
             place,

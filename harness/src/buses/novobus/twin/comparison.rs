@@ -164,7 +164,7 @@ pub struct Adopted {
 /// A received byte with bits that are the drive's choice: of a cell that it writes itself, of a cell that was not written since the
 /// attempt began, or the checking byte of such data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Own {
+pub struct OwnByte {
     /// In which ring, counted from 0.
     pub ring: usize,
     /// When it was received.
@@ -202,7 +202,7 @@ pub struct Comparison {
     /// The contents of cells that the model took over.
     pub adopted: Vec<Adopted>,
     /// The bytes whose values are the drives' choice, in order; empty if the twin knows the content of every cell.
-    pub own: Vec<Own>,
+    pub own: Vec<OwnByte>,
     /// The first byte that differs in more than its time.
     pub divergence: Option<Divergence>,
     /// In real time, the first byte of each ring that a drive sent unasked. The bytes behind it are a race of clocks: only properties that

@@ -15,6 +15,6 @@ mod unasked;
 
 pub(crate) use compare::{unknowable, what_of};
 pub use comparison::{
-    Adopted, Comparison, DecidingBits, Divergence, Exactness, Own, Symptom, Unasked,
+    Adopted, Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, Unasked,
 };
 pub use follow::{Conversation, Done, Twin};
