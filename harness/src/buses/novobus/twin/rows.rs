@@ -9,7 +9,7 @@ use harness_proto::novobus::role::Role;
 use harness_proto::novobus::sync::SYNCO;
 use harness_proto::time::Instant;
 
-/// The bytes of the longest answer (10.1): so many zeros in a row are no answer.
+/// How many bytes the longest answer has (10.1). A run of that many zeros is not an answer.
 const LONGEST_ANSWER: usize = 6;
 
 /// What a ring sent back, beside what its twin received.
