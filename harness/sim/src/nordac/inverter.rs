@@ -112,7 +112,8 @@ impl Inverter {
     pub fn new(setup: &Setup, at: Instant) -> Self {
         let mut parameters = Parameters::default();
         for (number, index, value) in &setup.parameters {
-            if let Some(parameter) = Parameter::of(*number) {
+            let known = Parameter::of(*number);
+            if let Some(parameter) = known.filter(|own| own.raw_of((*value).into()).is_some()) {
                 parameters.store(parameter, *index, *value);
             }
         }

@@ -20,8 +20,8 @@ impl Inverter {
         }
         let down = |number| Course {
             target: Frequency::ZERO,
-            up: self.size(1202),
-            down: self.size(number),
+            up: self.size(1202).max(1),
+            down: self.size(number).max(1),
             maximum,
         };
         let word = self.words.stw;

@@ -260,3 +260,24 @@ fn no_start_without_the_sequence() {
         }
     });
 }
+
+/// A setup may store values beyond the limits; the model stays within its numbers.
+#[test]
+fn any_stored_values() {
+    let numbers = vec![
+        1202, 1203, 1205, 1301, 1302, 1304, 1309, 1504, 1509, 1517, 1615, 1621, 1625,
+    ];
+    let value = prop_oneof![Just(0), Just(1), Just(0x7FFF), Just(0xFFFF), any::<i32>()];
+    let stored = prop::collection::vec((prop::sample::select(numbers), value), 0..13);
+    property(
+        "any_stored_values",
+        &(open(), stored, steps(30)),
+        |(properties, stored, steps)| {
+            let mut bench = Bench::with(properties, true, &stored);
+            for step in &steps {
+                bench.step(step, 2);
+                let _shown = bench.seen();
+            }
+        },
+    );
+}
