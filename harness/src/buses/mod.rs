@@ -46,6 +46,8 @@ use crate::port::Wire;
 use crate::report::html::Html;
 use crate::rig::Rig;
 use crate::rig::port_file::{Node, Port};
+use crate::rig::segment::{SegmentJudge, SegmentRun};
+use crate::rig::{Options, Rig, SessionError};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::settled::{self, Settled};
@@ -107,12 +109,18 @@ impl PortBus {
     /// All of them.
     pub const ALL: [Self; 1] = [Self::Unitek];
 
+    /// The bus of its scenarios.
+    #[must_use]
+    pub const fn bus(self) -> Bus {
+        match self {
+            Self::Unitek => Bus::Unitek,
+        }
+    }
+
     /// The name in a rig's file.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Unitek => Bus::Unitek.name(),
-        }
+        self.bus().name()
     }
 
     /// The drive at a place of a port's list: its number, and its identifiers to receive and to send.
@@ -146,6 +154,27 @@ impl PortBus {
         match self {
             Self::Unitek => unitek::rig::special_register(text),
         }
+    }
+}
+
+/// Takes a rig with a port, to play scenarios on it.
+///
+/// # Errors
+/// [`SessionError`]; nothing is left locked or open.
+pub(crate) fn run_on(rig: &Rig, options: &Options) -> Result<Box<dyn SegmentRun>, SessionError> {
+    match rig.port().map(|port| port.bus) {
+        Some(PortBus::Unitek) => Ok(Box::new(unitek::rig::DrivesInUse::open(rig, options)?)),
+        None => Err(SessionError::Drives {
+            rig: rig.id().to_owned(),
+            why: "it has no [port.1]".to_owned(),
+        }),
+    }
+}
+
+/// Judges what was played on a rig with a port again, with or without `--allow-motion`; `None` for a bench with rings.
+pub(crate) fn judge_of(rig: &Rig, allow_motion: bool) -> Option<Box<dyn SegmentJudge>> {
+    match rig.port()?.bus {
+        PortBus::Unitek => Some(Box::new(unitek::rig::Judge::new(rig, allow_motion))),
     }
 }
 

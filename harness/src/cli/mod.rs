@@ -25,6 +25,7 @@ pub(crate) mod rig;
 pub(crate) mod rig_failure;
 pub(crate) mod run;
 mod run_rig;
+mod run_segment;
 mod schema;
 pub(crate) mod shrink;
 mod tally;

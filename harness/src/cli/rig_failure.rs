@@ -74,7 +74,18 @@ pub(crate) fn exit_of(error: &SessionError) -> Exit {
 
 /// Gives a rig back in its safe state and reports how. What ended the work early is more serious than its outcome.
 pub(crate) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -> (End, Exit) {
-    let exit = match session.link().trouble() {
+    let exit = exit_of_end(session.link().trouble(), exit, output);
+    let end = match exit {
+        Exit::RigError | Exit::Interlock => session.close_with_error(),
+        _ => session.close(),
+    };
+    let exit = tell_end(&end, exit, output);
+    (end, exit)
+}
+
+/// The exit code of work that this trouble has ended.
+pub(crate) fn exit_of_end(trouble: Option<&Trouble>, exit: Exit, output: &mut Output) -> Exit {
+    match trouble {
         Some(Trouble::Interrupted) => Exit::Interrupted,
         Some(Trouble::Interlock(why)) => {
             output.complain(why);
@@ -83,13 +94,7 @@ pub(crate) fn give_back(mut session: Session, exit: Exit, output: &mut Output) -
         // It may have come behind the last scenario, which has judged everything by then; the bench has failed all the same.
         Some(Trouble::Lost(_) | Trouble::Garbled(_)) => Exit::RigError,
         Some(Trouble::Denied(_)) | None => exit,
-    };
-    let end = match exit {
-        Exit::RigError | Exit::Interlock => session.close_with_error(),
-        _ => session.close(),
-    };
-    let exit = tell_end(&end, exit, output);
-    (end, exit)
+    }
 }
 
 /// Reports how a rig was given back. A safe state that is not confirmed is more serious than anything else.

@@ -5,8 +5,9 @@ use super::exit::Exit;
 use super::junit::Cases;
 use super::output::Output;
 use super::page::Page;
-use super::rig_failure::find_rig;
+use super::rig_failure::find_any_rig;
 use super::run_rig::{PlayOrder, reports, work};
+use super::run_segment;
 use super::tally::Tally;
 use crate::evidence::{About, EvidenceError, Folder, too_large};
 use crate::library::{Entry, LibraryError, sources};
@@ -48,12 +49,16 @@ pub(crate) fn select(
 
 /// Plays scenarios, one line each.
 pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let rig = match arguments.rig.as_deref().map(|name| find_rig(name, output)) {
+    let rig = match arguments
+        .rig
+        .as_deref()
+        .map(|name| find_any_rig(name, output))
+    {
         None => None,
         Some(Some(rig)) => Some(rig),
         Some(None) => return Ok(Exit::Usage),
     };
-    let own = rig.as_ref().map(|rig| rig.ring_size());
+    let own = rig.as_ref().map(Rig::ring_size).filter(|own| *own > 0);
     let size = own.or(arguments.ring);
     let entries = match select(&arguments.selection, size) {
         Ok(entries) => entries,
@@ -83,7 +88,10 @@ pub(crate) fn run(arguments: &RunArguments, output: &mut Output) -> std::io::Res
             thorough: false,
             sign: arguments.sign.clone(),
         };
-        return work(rig, &entries, &job, page, output);
+        return match rig.port() {
+            Some(_) => run_segment::work(rig, &entries, &job, page, output),
+            None => work(rig, &entries, &job, page, output),
+        };
     }
     on_simulated(arguments, &entries, rig.as_ref(), page, output)
 }

@@ -15,7 +15,7 @@ use crate::link::{Line, Octets, Trouble};
 use crate::qualify::Qualification;
 use crate::report::html::Head;
 use crate::report::plot::plot;
-use crate::rig::{Options, Played, Rig, Run, Session, SessionError};
+use crate::rig::{Keeper, Options, Played, Rig, Run, Session, SessionError};
 use crate::scenario::run::{Outcome, Skip, Why};
 use crate::signals::interrupt_flag;
 use harness_proto::line::Rate;
@@ -155,7 +155,7 @@ fn all(
     session: &mut Session,
     entries: &[Entry],
     job: &PlayOrder,
-    (folder, mut page): (&mut Option<Folder>, Option<&mut Page>),
+    (folder, page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
 ) -> Result<Exit, Stop> {
     let mut run = match Run::new(session) {
@@ -171,20 +171,104 @@ fn all(
     if let Some(path) = &job.evidence {
         *folder = Some(Folder::create(path, &about(&mut run, job, entries))?);
     }
-    let bar = progress_bar(entries.len(), output.progress);
-    let mut course = job.qualify.then(|| {
+    let course = job.qualify.then(|| {
         let began = folder
             .as_ref()
             .map_or_else(String::new, |own| own.began().to_owned());
         Qualification::new(facts(&mut run, began, job.thorough))
     });
-    let name = run.session().rig().id().to_owned();
+    let mut course = OnRings { run, course };
+    let mut exit = course_of(&mut course, entries, job, (folder.as_mut(), page), output)?;
+    let OnRings { mut run, course } = course;
+    if let Some(course) = course {
+        let live = Live {
+            run: &mut run,
+            folder: folder.as_mut(),
+            output,
+        };
+        match settle(course, live)? {
+            // What a drive does wrong is the drive's fault, whatever the outcome.
+            Exit::Failed => exit = Exit::Failed,
+            // What is not settled takes no failure back.
+            Exit::Incomplete if exit == Exit::Failed => {}
+            other => exit = exit.max(other),
+        }
+    }
+    for gap in measured(&mut run) {
+        output.say(&gap);
+    }
+    Ok(exit)
+}
+
+/// A rig on which scenarios are played one after another.
+pub(super) trait Course {
+    /// The name of the rig.
+    fn name(&mut self) -> String;
+
+    /// Plays a scenario, into the folder where there is one, and returns its name there.
+    ///
+    /// # Errors
+    /// Why nothing more is played.
+    fn play(
+        &mut self,
+        entry: &Entry,
+        folder: Option<&mut Folder>,
+    ) -> Result<(String, Played), Stop>;
+
+    /// Notes what came of it.
+    fn note(&mut self, entry: &Entry, name: &str, played: &Played, output: &mut Output);
+
+    /// Whether nothing more can or may be played; says why.
+    fn over(&mut self, output: &mut Output) -> bool;
+}
+
+/// The rings of a rig, and what a qualification has found out so far.
+struct OnRings<'s> {
+    run: Run<'s>,
+    course: Option<Qualification>,
+}
+
+impl Course for OnRings<'_> {
+    fn name(&mut self) -> String {
+        self.run.session().rig().id().to_owned()
+    }
+
+    fn play(
+        &mut self,
+        entry: &Entry,
+        folder: Option<&mut Folder>,
+    ) -> Result<(String, Played), Stop> {
+        play(&mut self.run, entry, folder)
+    }
+
+    fn note(&mut self, entry: &Entry, name: &str, played: &Played, _: &mut Output) {
+        // Those for another bus are no part of a qualification of this one.
+        if let Some(course) = self.course.as_mut().filter(|_| entry.plan.is_some()) {
+            course.note(name, played);
+        }
+    }
+
+    fn over(&mut self, output: &mut Output) -> bool {
+        over(&mut self.run, output)
+    }
+}
+
+/// Plays scenarios one after another and reports each. Returns the exit code of their verdicts.
+pub(super) fn course_of(
+    course: &mut dyn Course,
+    entries: &[Entry],
+    job: &PlayOrder,
+    (mut folder, mut page): (Option<&mut Folder>, Option<&mut Page>),
+    output: &mut Output,
+) -> Result<Exit, Stop> {
+    let bar = progress_bar(entries.len(), output.progress);
+    let name = course.name();
     let mut cases = Cases::new(&name, job.junit.as_deref());
     let mut tally = Tally::default();
     let mut left = entries.iter();
     for entry in left.by_ref() {
         bar.set_message(entry.short_name().to_owned());
-        let (name, played) = match play(&mut run, entry, folder.as_mut()) {
+        let (name, played) = match course.play(entry, folder.as_deref_mut()) {
             Err(Stop::Session(error)) => {
                 cases.note(entry, &Outcome::rig_error(error.to_string()), &[]);
                 cases.write(Exit::RigError, output);
@@ -207,11 +291,8 @@ fn all(
             page.add(entry, outcome, traces);
         }
         bar.inc(1);
-        // Those for another bus are no part of a qualification of this one.
-        if let Some(course) = course.as_mut().filter(|_| entry.plan.is_some()) {
-            course.note(&name, &played);
-        }
-        if played.shows_an_ill_rig() || over(&mut run, output) {
+        course.note(entry, &name, &played, output);
+        if played.shows_an_ill_rig() || course.over(output) {
             break;
         }
     }
@@ -222,25 +303,7 @@ fn all(
         cases.note(entry, &outcome, &[]);
     }
     output.result(&tally.summary())?;
-    let mut exit = cases.write(tally.exit(job.require_all), output);
-    if let Some(course) = course {
-        let live = Live {
-            run: &mut run,
-            folder: folder.as_mut(),
-            output,
-        };
-        match settle(course, live)? {
-            // What a drive does wrong is the drive's fault, whatever the outcome.
-            Exit::Failed => exit = Exit::Failed,
-            // What is not settled takes no failure back.
-            Exit::Incomplete if exit == Exit::Failed => {}
-            other => exit = exit.max(other),
-        }
-    }
-    for gap in measured(&mut run) {
-        output.say(&gap);
-    }
-    Ok(exit)
+    Ok(cases.write(tally.exit(job.require_all), output))
 }
 
 /// Plays a scenario, into the folder where there is one, and returns its name there.
@@ -258,8 +321,17 @@ pub(super) fn play(
     let Some(folder) = folder else {
         return Ok((own(), run.play(plan, None)?));
     };
+    keep(entry, folder, |keeper| run.play(plan, Some(keeper)))
+}
+
+/// Plays a scenario into a folder, and returns its name there.
+pub(super) fn keep(
+    entry: &Entry,
+    folder: &mut Folder,
+    play: impl FnOnce(&mut dyn Keeper) -> Result<Played, SessionError>,
+) -> Result<(String, Played), Stop> {
     let mut kept = folder.keep(entry.short_name(), &entry.source.text);
-    let played = run.play(plan, Some(&mut kept));
+    let played = play(&mut kept);
     let name = kept.finish()?;
     let lost;
     let outcome = match &played {
@@ -291,12 +363,11 @@ fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> 
     let way = run.way();
     let byte_time = run.session().link().byte_time();
     let capabilities = run.capabilities();
+    let mut rates = Rate::ALL.into_iter();
+    let rate = rates.find(|rate| rate.byte_time() == byte_time);
     About {
-        rate: Rate::ALL
-            .into_iter()
-            .find(|rate| rate.byte_time() == byte_time)
-            .unwrap_or_default(),
-        exactness,
+        rate: rate.unwrap_or_default().bits_per_second(),
+        tolerance: exactness.tolerance,
         capabilities,
         anew: way.anew,
         own_rings: false,

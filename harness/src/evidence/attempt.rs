@@ -12,6 +12,7 @@ use crate::link::{
 use crate::rig::judge::known;
 use crate::rig::judge::{Heard, judge};
 use crate::rig::run::{Way, opening, twin};
+use crate::rig::segment::SegmentJudge;
 use crate::rig::{Attempt, Driven, Rig, SessionError, play_one};
 use crate::scenario::run::{AtMismatch, Outcome};
 use crate::scenario::settled::Settled;
@@ -181,21 +182,48 @@ pub(super) fn again(
     }
 }
 
+/// Judges an attempt on a rig with a port again.
+///
+/// # Errors
+/// Its text is no scenario of the rig's bus, in a sentence.
+pub(super) fn again_on_segment(
+    recorded: &Recorded,
+    text: &str,
+    judge: &mut dyn SegmentJudge,
+) -> Result<Again, String> {
+    let source = Source {
+        name: recorded.name.clone(),
+        text: text.to_owned().into(),
+    };
+    let judged = judge.judge(&source, &recorded.events)?;
+    let (other, made) = match &judged.played {
+        Some((events, traces)) => (
+            first_difference(&recorded.events, events),
+            Some(capture(traces, &judged.outcome)),
+        ),
+        None => (None, None),
+    };
+    Ok(Again {
+        attempt: Attempt {
+            opening: judged.before,
+            ..Attempt::on_own_rings(judged.outcome, Vec::new())
+        },
+        stale: false,
+        left: judged.left,
+        other,
+        capture: made,
+        exact: true,
+        trouble: judged.trouble,
+        ended: Ended::of(&recorded.events),
+    })
+}
+
 /// Plays an attempt again on simulated rings of its own: everything that was recorded must come again.
 fn simulated_again(recorded: &Recorded, plan: &dyn Settled) -> Again {
     let mut link = plan.simulate();
     let mut events: Vec<LinkEvent> = Vec::new();
     let mut recording = Recording::whole(&mut *link, &mut events);
     let outcome = plan.play(&mut recording, AtMismatch::Stop);
-    let written = |events: &[LinkEvent]| -> Vec<RecordLine> {
-        events.iter().filter_map(RecordLine::of).collect()
-    };
-    let (theirs, own) = (written(&recorded.events), written(&events));
-    let differs = (0..theirs.len().max(own.len())).find(|at| theirs.get(*at) != own.get(*at));
-    let show = |line: Option<&RecordLine>| match line.map(serde_json::to_string) {
-        Some(Ok(text)) => text,
-        _ => "nothing more".to_owned(),
-    };
     let traces: Vec<_> = (0..plan.ports()).map(|port| link.trace(port)).collect();
     Again {
         capture: Some(capture(&traces, &outcome)),
@@ -204,16 +232,28 @@ fn simulated_again(recorded: &Recorded, plan: &dyn Settled) -> Again {
         attempt: Attempt::on_own_rings(outcome, traces),
         stale: false,
         left: None,
-        other: differs.map(|at| {
-            format!(
-                "event {}: the record has {}, the simulated rings give {}",
-                at + 1,
-                show(theirs.get(at)),
-                show(own.get(at))
-            )
-        }),
+        other: first_difference(&recorded.events, &events),
         ended: Ended::of(&recorded.events),
     }
+}
+
+/// The first event of a record that is not what simulated drives give when it is played again.
+fn first_difference(recorded: &[LinkEvent], played: &[LinkEvent]) -> Option<String> {
+    let written = |events: &[LinkEvent]| -> Vec<RecordLine> {
+        events.iter().filter_map(RecordLine::of).collect()
+    };
+    let (theirs, own) = (written(recorded), written(played));
+    let at = (0..theirs.len().max(own.len())).find(|at| theirs.get(*at) != own.get(*at))?;
+    let show = |line: Option<&RecordLine>| match line.map(serde_json::to_string) {
+        Some(Ok(text)) => text,
+        _ => "nothing more".to_owned(),
+    };
+    Some(format!(
+        "event {}: the record has {}, the simulated rings give {}",
+        at + 1,
+        show(theirs.get(at)),
+        show(own.get(at))
+    ))
 }
 
 impl Again {

@@ -6,7 +6,7 @@ use super::verify::{Judged, Opened};
 use crate::library::Entry;
 use crate::link::{LinkEvent, Replay};
 use crate::rig::run::not_played;
-use crate::rig::{Again as Retries, Attempt, Played, Rig};
+use crate::rig::{Again as Retries, Attempt, Played, Rig, attempts_of};
 use crate::scenario::run::{DENIED, Outcome, Skip, Why};
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
@@ -132,8 +132,7 @@ impl Settling<'_> {
             return;
         }
         let real = header.exactness.tolerance > Span::ZERO;
-        let least = if header.qualified && real { 2 } else { 1 };
-        let most = usize::from(self.opened.rig.file.retry.attempts.max(least));
+        let most = attempts_of(&self.opened.rig, real, header.qualified);
         let all = settled(attempts);
         let too_many = (1..all.len()).any(|n| !self.retries.after(&all[..n], most));
         let trouble = attempts.iter().any(|own| match &own.again {
@@ -224,8 +223,11 @@ impl Opened {
     /// Why a scenario is not played on this rig; `None` where it is.
     fn skipped(&self, entry: &Entry, remarks: &[String]) -> Option<Outcome> {
         let header = &self.header;
+        if let Some(judge) = self.segment_judge() {
+            return judge.not_begun(&entry.source);
+        }
         let why = match (&entry.plan, header.own_rings) {
-            (None, true) if entry.settled().is_some() => return None,
+            (None, true) if entry.settled().is_some() => too_large(entry, &self.rig)?,
             (None, true) => Skip::no_bus(entry.scenario.bus),
             (None, false) => Skip::not_on_rig(entry.scenario.bus),
             (Some(_), true) => too_large(entry, &self.rig)?,
@@ -254,6 +256,18 @@ impl Opened {
 /// Why a scenario does not fit the rings of a rig on which each scenario has rings of its own; `None` where it does.
 #[must_use]
 pub fn too_large(entry: &Entry, rig: &Rig) -> Option<Skip> {
+    if let Some(port) = rig.port() {
+        let settled = entry.settled()?;
+        let drives = port.drives.len();
+        if entry.scenario.bus != port.bus.bus() {
+            return Some(Skip::not_on_rig(entry.scenario.bus));
+        }
+        let why = format!(
+            "it is for {} drives, and the rig has {drives}",
+            settled.size()
+        );
+        return (settled.size() != drives.to_string()).then(|| Why::OtherDrives(why).into());
+    }
     let plan = entry.plan.as_ref()?;
     let own: Vec<_> = plan.rings.iter().map(|ring| ring.drives()).collect();
     let sizes: Vec<_> = rig.rings().map(|(_, ring)| ring.drives).collect();

@@ -7,7 +7,6 @@ use super::files::{
 use super::record::{RecordLine, SCHEMA, Writer};
 use super::signature;
 use crate::buses::SimulatedLink;
-use crate::buses::twin::Exactness;
 use crate::buses::{SharedForm, share_a_line, write_shared};
 use crate::link::{Capability, LinkEvent, Sink};
 use crate::report::json;
@@ -52,10 +51,10 @@ pub enum EvidenceError {
 pub struct About<'r> {
     /// The rig.
     pub rig: &'r Rig,
-    /// The rate of its line.
-    pub rate: Rate,
-    /// How exactly the twin is compared.
-    pub exactness: Exactness,
+    /// Bits a second on its line.
+    pub rate: u32,
+    /// How exact its times are; zero where time is virtual.
+    pub tolerance: Span,
     /// What the link can do.
     pub capabilities: Vec<Capability>,
     /// Whether drives are reset before each scenario.
@@ -76,13 +75,8 @@ impl<'r> About<'r> {
     pub fn own_rings(rig: &'r Rig) -> Self {
         Self {
             rig,
-            rate: Rate::default(),
-            exactness: Exactness {
-                tolerance: Span::ZERO,
-                line_errors: true,
-                knows_cells: true,
-                looks: None,
-            },
+            rate: Rate::default().bits_per_second(),
+            tolerance: Span::ZERO,
             capabilities: SimulatedLink::CAPABILITIES.to_vec(),
             anew: false,
             own_rings: true,
@@ -144,7 +138,6 @@ impl Folder {
             folder.write(KNOWN_PROFILE, &profile.text)?;
         }
         folder.write(VERSIONS, &versions(&started))?;
-        let rings: Vec<u8> = about.rig.rings().map(|(_, ring)| ring.drives).collect();
         let selected = about.selected.iter().map(|text| sum(text.as_bytes()));
         let names = about.capabilities.iter().map(|own| own.name().to_owned());
         folder.writer.line(&RecordLine::Run {
@@ -153,9 +146,9 @@ impl Folder {
             rig: about.rig.id().to_owned(),
             rig_sha256: sum(about.rig.text.as_bytes()),
             started,
-            rate: about.rate.bits_per_second(),
-            rings,
-            tolerance: about.exactness.tolerance.units(),
+            rate: about.rate,
+            rings: about.rig.sizes(),
+            tolerance: about.tolerance.units(),
             simulated: about.rig.is_simulated(),
             capabilities: names.collect(),
             anew: about.anew,

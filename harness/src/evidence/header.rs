@@ -2,10 +2,11 @@
 
 use super::files::{RIG, sum};
 use super::record::{RecordLine, capabilities};
-use crate::buses::SimulatedLink;
 use crate::buses::twin::Exactness;
+use crate::buses::{SimulatedLink, judge_of};
 use crate::guard::Limits;
 use crate::link::Capability;
+use crate::rig::segment::OnSegment;
 use crate::rig::{Rig, Way, limits, line_rate};
 use harness_proto::line::Rate;
 use harness_proto::novobus::address::RingSize;
@@ -33,6 +34,8 @@ pub(super) struct Header {
     pub(super) selected: Option<Vec<String>>,
     pub(super) limits: Limits,
     pub(super) way: Way,
+    /// Of a rig with a port: whether motors could turn.
+    pub(super) on_segment: Option<bool>,
 }
 
 /// Reads the first line. What the rig's file contradicts is added to `wrong`, and the file's value is used.
@@ -69,19 +72,29 @@ pub(super) fn header(
     let sizes = drives.iter().map(|n| RingSize::new((*n).into()).ok());
     let rings = sizes.collect::<Option<Vec<_>>>();
     let rings = rings.ok_or("a ring has 1 to 250 drives (ND21 8.4)")?;
-    let own: Vec<u8> = rig.rings().map(|(_, ring)| ring.drives).collect();
+    let own = rig.sizes();
     if own != *drives {
         return Err(format!(
             "the record is of rings of {drives:?} drives, {RIG} has {own:?}"
         ));
     }
-    let (capabilities, limits) = match own_rings {
-        true => (SimulatedLink::CAPABILITIES.to_vec(), limits(rig, true)),
-        false => possible(names, rig),
+    let segment = match own_rings {
+        true => None,
+        false => segment(names, rig),
     };
-    let expected_rate = match own_rings {
+    let on_segment = segment.as_ref().map(|(_, motion)| *motion);
+    let (capabilities, limits) = match (&segment, own_rings) {
+        (Some((segment, _)), _) => (segment.capabilities.clone(), Limits::default()),
+        (None, true) => (SimulatedLink::CAPABILITIES.to_vec(), limits(rig, true)),
+        (None, false) => possible(names, rig),
+    };
+    let expected_rate = match *own_rings || segment.is_some() {
         true => Rate::default(),
         false => line_rate(rig),
+    };
+    let expected_bits = match &segment {
+        Some((segment, _)) => segment.rate,
+        None => expected_rate.bits_per_second(),
     };
     let expected_anew = !own_rings && limits.reset && limits.motion;
     let mut must = |what: &str, stated: String, expected: String| {
@@ -91,12 +104,15 @@ pub(super) fn header(
             ));
         }
     };
-    let expected_tolerance = tolerance_of(rig);
+    let expected_tolerance = match &segment {
+        Some((segment, _)) => segment.tolerance,
+        None => tolerance_of(rig),
+    };
     must("the rig", id.clone(), rig.id().to_owned());
     must(
         "the rate",
         stated_rate.to_string(),
-        expected_rate.bits_per_second().to_string(),
+        expected_bits.to_string(),
     );
     must(
         "the tolerance",
@@ -115,7 +131,7 @@ pub(super) fn header(
         listed.join(", "),
     );
     must("`anew`", anew.to_string(), expected_anew.to_string());
-    let purposes = match own_rings {
+    let purposes = match *own_rings || segment.is_some() {
         true => &["run"][..],
         false => &["run", "qualify"],
     };
@@ -151,11 +167,25 @@ pub(super) fn header(
         limits,
         way: Way {
             rings: rings.clone(),
-            attempts: rig.examinations(),
+            attempts: rig.examinations().filter(|_| on_segment.is_none()),
             anew: expected_anew,
         },
+        on_segment,
         rings,
     })
+}
+
+/// What the first line must say of a rig with a port that has these capabilities, and whether motors could turn; `None` for rings.
+fn segment(names: &[String], rig: &Rig) -> Option<(OnSegment, bool)> {
+    let [moving, still] = judge_of(rig, true)?.segments();
+    let listed = |own: &OnSegment| {
+        let own = own.capabilities.iter().map(|own| own.name());
+        own.eq(names.iter().map(String::as_str))
+    };
+    match listed(&still) {
+        true => Some((still, false)),
+        false => Some((moving, true)),
+    }
 }
 
 /// How exact the times of a rig are.

@@ -33,7 +33,7 @@ pub enum RecordLine {
         /// When the run began, in UTC.
         started: String,
         /// Bits a second.
-        #[schemars(extend("enum" = [38_400, 19_200, 9_600]))]
+        #[schemars(range(min = 9_600, max = 1_000_000))]
         rate: u32,
         /// How many drives each ring has.
         #[schemars(length(min = 1, max = 2), inner(range(min = 1, max = 250)))]
@@ -218,7 +218,8 @@ pub enum RecordLine {
         /// Line errors that the transport told of without their bytes.
         #[serde(default)]
         unplaced: u64,
-        /// How the bytes received before the drives were reset compare with a ring at rest; none where they are judged with the rest.
+        /// How the bytes received before the drives were reset compare with a ring at rest; none where they are judged with the rest. On a
+        /// bus of frames, how many came before the scenario, with their checksum.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         opening: Option<String>,
     },

@@ -19,7 +19,7 @@ pub(super) fn rerun(
     texts: &dyn Fn(&str) -> Result<String, String>,
 ) -> Vec<String> {
     let header = &opened.header;
-    if !header.simulated || header.own_rings || header.schema < 2 {
+    if !header.simulated || header.own_rings || header.schema < 2 || header.on_segment.is_some() {
         return Vec::new();
     }
     let mut rig = opened.rig.clone();

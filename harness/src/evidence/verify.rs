@@ -1,6 +1,6 @@
 //! Every verdict of a folder, judged again from its record, and everything that follows from the record compared.
 
-use super::attempt::{Again, Recalled, Recorded, UNUSED, again};
+use super::attempt::{Again, Recalled, Recorded, UNUSED, again, again_on_segment};
 use super::cases;
 use super::derive::derived;
 use super::files::{
@@ -16,8 +16,10 @@ use super::reports;
 use super::rerun::rerun;
 use super::selection;
 use super::signature::{self, Signer};
+use crate::buses::judge_of;
 use crate::rig::judge::known;
 use crate::rig::run::twin;
+use crate::rig::segment::SegmentJudge;
 use crate::rig::{Rig, parse_beside};
 use crate::scenario::source::Source;
 use harness_proto::line::Rate;
@@ -200,6 +202,9 @@ impl Opened {
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Vec<Judged>, EvidenceError> {
+        if let Some(mut judge) = self.segment_judge() {
+            return Ok(self.judged_on_segment(judge.as_mut(), scenario));
+        }
         let fresh = || {
             twin(&self.rig, &known(&self.rig))
                 .map_err(|problems| EvidenceError::Foreign(RIG.to_owned(), problems.to_string()))
@@ -234,6 +239,38 @@ impl Opened {
             });
         }
         Ok(all)
+    }
+
+    /// What judges attempts on a rig with a port; `None` for rings, and where each scenario had a bench of its own.
+    pub(super) fn segment_judge(&self) -> Option<Box<dyn SegmentJudge>> {
+        judge_of(&self.rig, self.header.on_segment?)
+    }
+
+    /// Judges every attempt on a rig with a port again.
+    fn judged_on_segment(
+        &self,
+        judge: &mut dyn SegmentJudge,
+        scenario: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Vec<Judged> {
+        let attempts = group(&self.lines[1..]).into_iter();
+        attempts
+            .map(|recorded| {
+                let text = text_of(&recorded.name, &recorded.sha256, scenario);
+                let again = text.and_then(|text| {
+                    let again = again_on_segment(&recorded, &text, judge)?;
+                    Ok((text, again))
+                });
+                let differs = match &again {
+                    Err(why) => Some(why.clone()),
+                    Ok((_, again)) => recorded.differs(again, &self.header),
+                };
+                Judged {
+                    recorded,
+                    again,
+                    differs,
+                }
+            })
+            .collect()
     }
 
     /// Whether the record has its last line and the verdict of every attempt.

@@ -222,6 +222,8 @@ impl<L: Line> Line for Guarded<L> {
         let (admitted, denied) = gate.admit(guard_time, what);
         self.refused = what.len() - admitted;
         let end = self.inner.send(port, what.first(admitted));
+        // An adapter may have no words for a frame.
+        self.refused += self.inner.refused();
         denied.into_iter().for_each(|denied| self.deny(denied));
         end
     }

@@ -59,6 +59,15 @@ impl Rig {
         self.file.rings().next().map_or(0, |ring| ring.drives)
     }
 
+    /// How many drives each of its rings has; of a bench with a port, how many are there.
+    #[must_use]
+    pub fn sizes(&self) -> Vec<u8> {
+        match self.port() {
+            Some(port) => vec![u8::try_from(port.drives.len()).unwrap_or(u8::MAX)],
+            None => self.rings().map(|(_, ring)| ring.drives).collect(),
+        }
+    }
+
     /// Refuses a bench without rings.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
+use super::Rig;
 use super::driven::Driven;
 use crate::buses::syntax::Header;
 use crate::buses::twin::{Comparison, Conversation, Divergence};
@@ -12,6 +13,20 @@ use std::collections::BTreeSet;
 
 /// How often a scenario is played whose bytes are right and come at other times than the model says.
 const MOST_UNTIMELY: usize = 3;
+
+/// How often a scenario that does not pass is played on a bus of frames in real time: a busy computer moves frames against each other.
+const ON_A_SEGMENT: u8 = 3;
+
+/// How often a scenario that does not pass is played, at most: as often as the rig's file says, and in real time often enough to tell a drive
+/// from a busy computer.
+pub(crate) fn attempts_of(rig: &Rig, real_time: bool, qualifies: bool) -> usize {
+    let least = match (real_time, rig.port().is_some()) {
+        (true, true) => ON_A_SEGMENT,
+        (true, false) if qualifies => 2,
+        _ => 1,
+    };
+    usize::from(rig.file.retry.attempts.max(least))
+}
 
 /// How often drives are made ready before one that gives no answer has failed.
 const MOST_UNREADY: usize = 3;
@@ -221,7 +236,7 @@ impl Again {
         };
         let played = attempts.len();
         match last.outcome.verdict {
-            Verdict::Passed | Verdict::RigError => false,
+            Verdict::Passed | Verdict::RigError | Verdict::Skipped => false,
             // What disturbed a drive that gave no answer may have been the computer.
             _ if played < self.unready && last.unanswered().is_some() => {
                 let hopeless = |why| self.hopeless.contains(why);

@@ -50,6 +50,12 @@ pub struct Port {
 }
 
 impl Port {
+    /// Whether its adapter carries remote frames: socketcand has no words for them.
+    #[must_use]
+    pub const fn carries_remote_frames(&self) -> bool {
+        self.socketcand.is_none()
+    }
+
     /// The keys of the adapters that are given: one, or none where the drives are simulated.
     #[must_use]
     pub fn adapters(&self) -> Vec<&'static str> {

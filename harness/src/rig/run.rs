@@ -3,7 +3,7 @@
 
 use super::Rig;
 use super::driven::Driven;
-use super::played::{Again, Attempt, Played};
+use super::played::{Again, Attempt, Played, attempts_of};
 use super::session::Session;
 use super::session_error::SessionError;
 use crate::buses::syntax::Header;
@@ -54,8 +54,8 @@ pub struct Run<'s> {
     as_they_are: bool,
     /// A scenario that the rig's limits do not permit to its end is skipped, and nothing of it is sent.
     rehearses: bool,
-    /// How often a scenario that does not pass is played where the rig's file asks for less.
-    least: u8,
+    /// Whether what does not pass is played once more at least.
+    repeats: bool,
     /// How the bench's own master breaks the manual on this rig, on purpose.
     master: Option<&'static MasterDeviation>,
 }
@@ -86,7 +86,7 @@ impl<'s> Run<'s> {
             twin,
             byte_time,
             again: Again::new(tolerance > Span::ZERO),
-            least: 1,
+            repeats: false,
             as_they_are: false,
             rehearses: true,
         })
@@ -144,7 +144,8 @@ impl<'s> Run<'s> {
             return Ok(Played::skipped(skip));
         }
         let mut attempts = Vec::new();
-        let most = usize::from(self.session.rig().file.retry.attempts.max(self.least));
+        let real = self.exactness.tolerance > Span::ZERO;
+        let most = attempts_of(self.session.rig(), real, self.repeats);
         loop {
             let number = attempts.len() + 1;
             if let Some(keeper) = &mut keeper {
@@ -264,9 +265,7 @@ impl<'s> Run<'s> {
     /// Plays from now on what does not pass once more at least, where time is real: what a busy computer has caused does not come
     /// again.
     pub fn repeat(&mut self) {
-        if self.exactness.tolerance > Span::ZERO {
-            self.least = 2;
-        }
+        self.repeats = true;
     }
 
     /// Why a plan is skipped that `lacks` something, or that the guard denies on the model; with all that would let it be played.

@@ -12,7 +12,7 @@ use crate::rig::line_test::Cause;
 pub enum SessionError {
     /// Its drives are on another bus.
     #[error(
-        "rig {rig} has drives on the bus {bus}, and this command serves rings only; read, write, watch, info, params, position, go, stop, block and rig check serve it, and scenarios of that bus are played on simulated drives, without --rig"
+        "rig {rig} has drives on the bus {bus}, and this command serves rings only; read, write, watch, info, params, position, go, stop, block, run and rig check serve it"
     )]
     OtherBus {
         /// Which.

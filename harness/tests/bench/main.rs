@@ -8,6 +8,7 @@ mod embedded;
 mod evidence;
 mod explore;
 mod named;
+mod on_can;
 #[path = "../common/program.rs"]
 mod program;
 mod simulated;

@@ -98,6 +98,11 @@ pub(crate) fn kept(desk: Desk, command: &str, ports: bool) -> Kept {
         "{}",
         said(&played)
     );
+    of(desk, ports)
+}
+
+/// The folder `kept` of a desk.
+pub(crate) fn of(desk: Desk, ports: bool) -> Kept {
     let kept = Kept { desk, ports };
     ended(&kept.desk.run(&["verify", "kept"]), 0, "0 things wrong");
     fit(&kept.folder());

@@ -25,6 +25,13 @@ impl Desk {
         Self { folder }
     }
 
+    /// A rig with a port, given by the whole text of its file.
+    pub(crate) fn of_file(text: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("desk.toml"), text).expect("room");
+        Self { folder }
+    }
+
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }

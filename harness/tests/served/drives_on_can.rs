@@ -135,6 +135,30 @@ fn every_command_over_every_way_in() {
     }
 }
 
+/// All that needs no permission is played over each way in, no correct drive is accused, and a changed frame of the record is found.
+#[test]
+fn scenarios_over_every_way_in() {
+    for way in ["slcan", "pty", "socketcand"] {
+        let desk = Desk::new(way, "");
+        let played = desk.run("run --filter unitek --evidence kept");
+        let code = played.status.code();
+        assert!(matches!(code, Some(0 | 5)), "{way}: {}", said(&played));
+        assert!(said(&played).contains(SAFE), "{way}: {}", said(&played));
+        let passed = String::from_utf8_lossy(&played.stdout).into_owned();
+        let passed = passed.lines().filter(|own| own.starts_with("passed "));
+        assert!(passed.count() >= 4, "{way}: {}", said(&played));
+        let verify = || desk.command("verify kept").output().expect("the program");
+        ended(&verify(), 0, " 0 things wrong");
+        let record = desk.path("kept/run.jsonl");
+        let text = std::fs::read_to_string(&record).expect("a record");
+        let edited = text.replacen("181#1BD80100", "181#1BD90100", 1);
+        assert_ne!(text, edited);
+        std::fs::write(&record, edited).expect("room");
+        crate::edits::fit(&desk.path("kept"));
+        assert_ne!(verify().status.code(), Some(0), "{way}");
+    }
+}
+
 /// What the rig's file does not permit is refused before the first frame of the command, and a speed above the highest too.
 #[test]
 fn limits_are_kept_before_anything_is_sent() {

@@ -4,6 +4,7 @@
 //! [`fw472`](Properties::fw472) is the drive of the dump.
 
 use crate::time::Span;
+use core::fmt;
 
 /// One row an open point with words for values: the enum with its values (the default first) and their words.
 macro_rules! words {
@@ -289,9 +290,40 @@ pub struct Description {
     /// What it decides.
     pub about: &'static str,
     set: fn(&mut Properties, Setting<'_>) -> bool,
+    get: fn(&Properties) -> Value,
+}
+
+/// What a property is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Value {
+    /// One of the property's words.
+    Word(&'static str),
+    /// A byte.
+    Byte(u8),
+    /// A time.
+    Time(Span),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Word(word) => f.write_str(word),
+            Self::Byte(byte) => write!(f, "{byte:02X}"),
+            Self::Time(span) => match span.as_nanos() {
+                whole if whole % 1_000_000 == 0 => write!(f, "{}ms", whole / 1_000_000),
+                other => write!(f, "{}us", other / 1_000),
+            },
+        }
+    }
 }
 
 impl Description {
+    /// What the property is of a drive.
+    #[must_use]
+    pub fn of_drive(&self, properties: &Properties) -> Value {
+        (self.get)(properties)
+    }
+
     /// The property with this name.
     #[must_use]
     pub fn of(name: &str) -> Option<&'static Self> {
@@ -318,12 +350,16 @@ macro_rules! properties {
                     let value = properties!(@value $type setting);
                     value.map(|value| properties.$field = value).is_some()
                 },
+                get: |properties| properties!(@get $type properties.$field),
             },)+
         ]
     };
     (@accepts Byte) => { Accepts::Byte };
     (@accepts Time) => { Accepts::TimeUpTo(LONGEST) };
     (@accepts $type:ident) => { Accepts::Words($type::WORDS) };
+    (@get Byte $value:expr) => { Value::Byte($value) };
+    (@get Time $value:expr) => { Value::Time($value) };
+    (@get $type:ident $value:expr) => { Value::Word($value.word()) };
     (@value Byte $setting:ident) => { byte($setting) };
     (@value Time $setting:ident) => { time($setting) };
     (@value $type:ident $setting:ident) => {

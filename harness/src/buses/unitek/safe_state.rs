@@ -16,6 +16,9 @@ use std::fmt::Write as _;
 /// The registers of a speed and of a torque command.
 const COMMANDS: [u8; 2] = [0x31, 0x90];
 
+/// MODE (ex 2).
+const MODE: u8 = 0x51;
+
 /// How often the speed of a drive is looked at that does not stand yet.
 const AGAIN: Span = Span::from_millis(20);
 
@@ -65,8 +68,12 @@ pub fn safe_state<L: Line>(
     let now: Vec<_> = axes.iter().map(latest).collect();
     let mut reports = String::new();
     let mut confirmed = true;
-    let mut driver = Driver::new(Box::new(&mut *line), &now, patience);
-    for axis in &now {
+    let known: Vec<_> = now.iter().chain(axes).copied().collect();
+    let mut driver = Driver::new(Box::new(&mut *line), &known, patience);
+    for (axis, first) in now.iter().zip(axes) {
+        // A drive may change its identifiers at the next power-up only, or not take them (3.1, ex 1).
+        let moved = axis != first && driver.read(*axis, MODE).is_ok();
+        let axis = if moved { axis } else { first };
         let made = make_safe(&mut driver, *axis, &cycles, standing);
         // Writing to a String cannot fail.
         let _infallible = match made {

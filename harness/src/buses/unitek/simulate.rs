@@ -116,7 +116,7 @@ pub struct Bench {
 
 impl Bench {
     /// What a simulated bench can do.
-    const CAPABILITIES: [Capability; 8] = [
+    pub(super) const CAPABILITIES: [Capability; 8] = [
         Capability::Interposer,
         Capability::Tap,
         Capability::Memory,

@@ -17,7 +17,7 @@ mod transport;
 pub use open::{AdapterError, AdapterPlace, AdapterSettings, DEFAULT_BAUD};
 
 use super::port_end::MOST_RECORDED;
-use super::{Capability, InnerLink, Line, Link, Moment, PlacedFault, PortLink, Trouble};
+use super::{Capability, InnerLink, Lead, Line, Link, Moment, PlacedFault, PortLink, Trouble};
 use crate::medium::{Heard, Medium, Out, Pieces};
 use crate::port::{LastWords, wake_on_time};
 use adapter::Event;
@@ -38,7 +38,7 @@ use transport::Transport;
 const AHEAD: Span = Span::from_millis(2);
 
 /// How long behind the bench's last frame an answer to it may come through an adapter and a busy computer.
-const SLACK: Span = Span::from_millis(30);
+pub(crate) const SLACK: Span = Span::from_millis(30);
 
 /// The longest sleep: a request to end is looked for at least this often.
 const NAP: Span = Span::from_millis(50);
@@ -297,7 +297,10 @@ impl Line for FrameLink {
     }
 
     fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
-        let (at, heard) = self.received.pop_front().filter(|_| port == 0)?;
+        if port > 0 {
+            return None;
+        }
+        let (at, heard) = self.received.pop_front()?;
         self.lying = false;
         Some((at, Heard::Frame(heard)))
     }
@@ -315,11 +318,19 @@ impl Line for FrameLink {
     fn trouble(&self) -> Option<&Trouble> {
         self.trouble.as_ref()
     }
+
+    fn lead(&self) -> Lead {
+        Lead {
+            far: AHEAD,
+            near: Span::ZERO,
+        }
+    }
 }
 
 impl Link for FrameLink {
+    /// What the limits of a rig can permit, and what can be set over the bus.
     fn capabilities(&self) -> &[Capability] {
-        &[]
+        &[Capability::Memory, Capability::Motion, Capability::Eeprom]
     }
 
     fn begin(&mut self) {

@@ -30,6 +30,8 @@ pub enum Why {
     OtherSize(Vec<u8>, Vec<u8>),
     /// The rig's limits deny a byte or a fault of it, in the guard's words.
     Denied(String),
+    /// The rig's drives are not those that it is for: what differs, in a sentence.
+    OtherDrives(String),
     /// The bench knows no such bus.
     NoBus(Bus),
     /// The rig has no such bus.
@@ -111,6 +113,7 @@ impl Why {
             Self::NoTap(_) => "the rig has no tap".to_owned(),
             Self::OtherSize(..) => "it is for rings of another size".to_owned(),
             Self::Denied(_) => DENIED.trim_end_matches(": ").to_owned(),
+            Self::OtherDrives(_) => "it is for drives in another state than the rig's".to_owned(),
             // Whatever else is missing, a simulated rig has it.
             Self::Lacks(missing) if missing.iter().any(|own| simulated(*own)) => {
                 "the rig has no simulator".to_owned()
@@ -143,6 +146,7 @@ impl fmt::Display for Why {
                 sizes(rig)
             ),
             Self::Denied(words) => write!(f, "{DENIED}{words}"),
+            Self::OtherDrives(words) => f.write_str(words),
             Self::NoBus(bus) => write!(f, "the bench has no bus `{}` yet", name(*bus)),
             Self::NotOnRig => f.write_str("the rig has no such bus"),
             Self::RunEnded => f.write_str("the run ended before it"),

@@ -195,6 +195,13 @@ impl Gate {
         }
     }
 
+    /// Takes notice that new bus settings have been written earlier to the drive that receives on `rx`.
+    pub fn note_moved(&mut self, rx: u16) {
+        for drive in self.drives.iter_mut().filter(|own| own.rx.contains(&rx)) {
+            drive.moved = true;
+        }
+    }
+
     /// What the rig's file permits.
     #[must_use]
     pub const fn limits(&self) -> &Limits {
@@ -324,7 +331,11 @@ impl Guarded {
     fn written(&mut self, register: u8, data: Data, sure: bool) {
         let value = low(data.bits());
         self.speed.written(register, value, sure);
+        // With a number that is none of 11 bits no drive can be reached.
         let remember = |list: &mut Vec<u16>| {
+            if !(1..=0x7FF).contains(&value) {
+                return;
+            }
             list.retain(|id| *id != value);
             list.push(value);
         };

@@ -18,6 +18,10 @@ impl Rig {
     #[must_use]
     pub fn is_bare(&self) -> bool {
         let file = &self.file;
+        if self.port().is_some() {
+            // Of a file of its own the drives are set up, or the limits are to be tried.
+            return self.origin.starts_with("sim:");
+        }
         let is_input = |own: &Setup| match &own.what {
             SetupKind::Influence(Influence::Stimuli(all)) => {
                 all.iter().all(|own| matches!(own, Stimulus::Input(..)))

@@ -19,7 +19,7 @@ use harness_proto::time;
 use harness_proto::unitek::master;
 use harness_proto::unitek::properties::{Properties, Setting};
 use harness_proto::unitek::units::{Scaling, to_raw};
-use harness_proto::unitek::{Data, Register, Request};
+use harness_proto::unitek::{Access, Data, Register, Request};
 use harness_sim::unitek::Stimulus;
 use harness_sim::unitek::deviation::MasterDeviation;
 
@@ -189,11 +189,12 @@ fn apply(line: &DriveLine, drives: &mut Vec<DriveSetup>, rate: BitRate) -> Resul
 }
 
 /// Eight bits: what `bytes` means as a unit of time.
-fn octet_time(rate: BitRate) -> time::Span {
+pub(crate) fn octet_time(rate: BitRate) -> time::Span {
     rate.time_of(8)
 }
 
-fn node(drive: &Located, scope: Scope) -> Result<u8, Problem> {
+/// The number of a drive.
+pub(crate) fn node(drive: &Located, scope: Scope) -> Result<u8, Problem> {
     let number = drive.value(scope)?;
     let fits = (1..=MOST_NODES).contains(&number);
     let node = u8::try_from(number).ok().filter(|_| fits);
@@ -266,6 +267,16 @@ fn setting(register: u8, raw: u32) -> Option<Stimulus> {
         0x20 | 0x27 | 0x5F | 0x32 | 0xA8 | 0x40 | 0x70 | 0x91 | 0xCE | 0xD8 | 0xE2 | 0xE3
         | 0xEF | 0xF2 | 0xF5 => None,
         register => Some(Stimulus::Register(register, raw)),
+    }
+}
+
+/// What setting the contents of a register needs: one that can be written is written over the bus.
+fn of_register(register: &Register) -> Capability {
+    let written = matches!(register.access, Access::RW | Access::SP);
+    let held = matches!(setting(register.number, 0), Some(Stimulus::Register(..)));
+    match written && held {
+        true => Capability::Memory,
+        false => Capability::Simulator,
     }
 }
 
@@ -568,7 +579,7 @@ impl Settle<Unitek> for Planner {
             Step::Outside(drive, outside) => {
                 needs.push(match outside {
                     Outside::Restart => Capability::Power,
-                    Outside::Register(..) => Capability::Memory,
+                    Outside::Register(name, _) => of_register(register(name, self.scope)?),
                     Outside::Input(..) | Outside::Force(..) => Capability::Simulator,
                 });
                 self.outside(drive, outside)?
@@ -595,11 +606,16 @@ impl Settle<Unitek> for Planner {
     fn needs(&self, scenario: &Scenario<Unitek>) -> Vec<Capability> {
         let lines = scenario.header.drives.iter();
         let needs = lines.filter_map(|line| match &line.what {
-            Setup::There { .. } => None,
-            Setup::Outside(Outside::Register(..)) => Some(Capability::Memory),
+            // A rig has drives with properties of their own, which are found out.
+            Setup::There { .. } | Setup::Profile(_) | Setup::Property(..) => None,
+            Setup::Outside(Outside::Register(RegisterName::Known { register, .. }, _)) => {
+                Some(of_register(register))
+            }
             _ => Some(Capability::Simulator),
         });
-        needs.collect()
+        let master = scenario.header.master.as_ref();
+        let wrong = master.map(|_| Capability::Simulator);
+        needs.chain(wrong).collect()
     }
 
     fn finish(self) -> Bench {

@@ -16,7 +16,7 @@ use harness_proto::can::{BusError, Frame, Heard};
 use harness_proto::time::{self, Instant};
 use harness_proto::unitek::master::{Event, Job, JobId, Options, Outcome};
 use harness_proto::unitek::units::{Scaling, shown, usual};
-use harness_proto::unitek::{Register, Reply};
+use harness_proto::unitek::{Data, Register, Reply, Request};
 use harness_sim::unitek;
 use harness_sim::unitek::deviation::{DeviantMaster, MasterDeviation};
 use std::collections::BTreeMap;
@@ -224,6 +224,13 @@ pub(super) fn act(
             };
             happen(runner, now, &[fault]);
         }
+        Act::Outside(node, unitek::Stimulus::Register(register, raw))
+            if runner.link.beside().is_none() =>
+        {
+            if let Some(frame) = over_bus(runner, *node, *register, *raw) {
+                runner.transmit(0, &[frame]);
+            }
+        }
         Act::Outside(node, stimulus) => happen(runner, now, &[from_outside(*node, *stimulus)]),
         Act::Restart(node) => {
             let faults = [DriveFault::Off, DriveFault::On];
@@ -264,6 +271,15 @@ pub(super) fn from_outside(node: u8, stimulus: unitek::Stimulus) -> PlacedFault 
     PlacedFault::Stimulus(node, Stimulus::Unitek(stimulus))
 }
 
+/// The write that sets a register of a drive which is not simulated beside the bus.
+fn over_bus(runner: &Runner<'_, Unitek>, node: u8, register: u8, raw: u32) -> Option<Frame> {
+    let drives = &runner.plan.setup.setup.drives;
+    let own = drives.iter().find(|own| own.node == node)?;
+    let data = Data::of(Register::of(register), raw);
+    let request = Request::Write { register, data };
+    request.encode(own.identifiers.0).ok()
+}
+
 /// What happens to a drive. Without a time in front of the line it happens when everything that was sent has left and is answered.
 fn happen(runner: &mut Runner<'_, Unitek>, settles: bool, faults: &[PlacedFault]) {
     if settles {
@@ -291,7 +307,7 @@ fn look(
     let drives = &runner.plan.setup.setup.drives;
     let own = drives.iter().find(|own| own.node == node);
     let request = own.and_then(|own| {
-        let request = harness_proto::unitek::Request::Read {
+        let request = Request::Read {
             register: wanted.register,
         };
         Some((request.encode(own.identifiers.0).ok()?, own.identifiers.1))

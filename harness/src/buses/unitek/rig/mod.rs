@@ -1,10 +1,16 @@
 //! Rig files of UNITEK drives: identifiers, limits, and the simulated bench.
 
+mod known;
+mod observed;
 mod permitted;
+mod player;
+mod probe;
+mod run;
 mod session;
 
 pub use permitted::limits;
 pub(crate) use permitted::special_register;
+pub(crate) use run::{DrivesInUse, Judge};
 pub use session::Session;
 
 use super::serve;

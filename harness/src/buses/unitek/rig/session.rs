@@ -5,11 +5,11 @@ use crate::buses::unitek::driver::Driver;
 use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::safe_state::{last_words, safe_state};
 use crate::buses::unitek::simulate::Bench;
-use crate::guard::Guarded;
+use crate::guard::{Guarded, Safe, SafeStep, Standstill};
 use crate::link::frames::{AdapterPlace, AdapterSettings, FrameLink};
 use crate::link::{Line, Trouble};
 use crate::medium::{Heard, Pieces};
-use crate::rig::file::SafeStep;
+use crate::rig::file;
 use crate::rig::lock::PortLock;
 use crate::rig::taken::{Taken, take};
 use crate::rig::watchdog::{Watchdog, watch_over};
@@ -17,6 +17,8 @@ use crate::rig::{Alarm, End, Ends, Options, Rig, SessionError, standing};
 use crate::scenario::source::Source;
 use harness_proto::can::{self, Id};
 use harness_proto::time::Span;
+use harness_proto::unitek::guard::Limits;
+use std::time::Instant;
 
 /// How long a bus is listened to before anything is sent.
 const LISTEN: Span = Span::from_millis(150);
@@ -34,6 +36,7 @@ pub struct Session {
     link: Guarded<Ends>,
     axes: Vec<Axis>,
     patience: Span,
+    started: Instant,
     listen_only: bool,
     /// The drives are as they are to be left.
     ended: bool,
@@ -73,6 +76,7 @@ impl Session {
             link: guarded(ends, limits, &identifiers, port.listen_only),
             axes,
             patience: span(port.patience.0),
+            started: Instant::now(),
             listen_only: port.listen_only,
             // Nothing has been sent: there is nothing to make safe.
             ended: true,
@@ -115,6 +119,36 @@ impl Session {
     /// Its guarded link.
     pub const fn link(&mut self) -> &mut Guarded<Ends> {
         &mut self.link
+    }
+
+    /// Its guarded link, to look at.
+    #[must_use]
+    pub const fn guarded(&self) -> &Guarded<Ends> {
+        &self.link
+    }
+
+    /// What the rig's file and the command line allow together.
+    #[must_use]
+    pub fn limits(&self) -> Limits {
+        let gate = self.link.segment();
+        gate.map(|own| own.limits().clone()).unwrap_or_default()
+    }
+
+    /// Whether it has been used for longer than its file allows.
+    #[must_use]
+    pub fn overdue(&self) -> bool {
+        let longest = self.rig.file.limits.max_run.as_ref();
+        longest.is_some_and(|longest| self.started.elapsed() > longest.0)
+    }
+
+    /// Takes every drive to its safe state, whatever the file wants at the end, and reads it back.
+    pub fn make_safe(&mut self) -> Safe {
+        self.link.reset_after_denial();
+        let wanted = Standstill {
+            order: vec![SafeStep::Stop, SafeStep::Block],
+            ..standing(&self.rig.file.safe_state)
+        };
+        safe_state(&mut self.link, &self.axes, self.patience, &wanted)
     }
 
     /// A driver of its drives.
@@ -250,7 +284,7 @@ impl Session {
                 end.safe = Some(safe_state(&mut self.link, &axes, self.patience, &standing));
             }
             self.watchdog = None;
-            if wanted.order.contains(&SafeStep::PowerOff) {
+            if wanted.order.contains(&file::SafeStep::PowerOff) {
                 end.power = self.taken.around.power_off();
             }
         }

@@ -1,0 +1,631 @@
+//! Attempts at scenarios on the drives of a rig, whose registers and properties are found out first.
+//!
+//! A scenario describes the drive of the manual; a rig has a drive of its own. So every scenario is played on a model of that drive first,
+//! behind the same limits. It is skipped if a right drive with these registers would not meet its lines, or if the limits deny a frame of
+//! it. A line that the rig does not meet then accuses the drive, unless a right drive with another value of a property that is not settled
+//! would not meet it either, the drive and its model read differently at rest, or the computer was late.
+
+use super::known::Known;
+use super::observed::{Observed, Slow};
+use super::{Axis, probe};
+use crate::buses::LimitSetting;
+use crate::buses::unitek::driver::{Driver, Error};
+use crate::buses::unitek::gate::guarded;
+use crate::buses::unitek::language::Unitek;
+use crate::buses::unitek::language::plan::{Act, WantedFrame, node, octet_time};
+use crate::buses::unitek::language::syntax::{PropertyValue, Setup};
+use crate::buses::unitek::simulate::{self, Bench};
+use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
+use crate::medium::Medium;
+use crate::scenario::expression::Scope;
+use crate::scenario::parse::parse;
+use crate::scenario::pattern::Expected;
+use crate::scenario::plan::{Plan, PlannedAction, plan};
+use crate::scenario::problem::Problems;
+use crate::scenario::run::outcome::Unready;
+use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Scenario;
+use crate::scenario::verdict::Verdict;
+use harness_proto::can::{BitRate, Frame};
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::frame::{Data, Request};
+use harness_proto::unitek::guard::Limits;
+use harness_proto::unitek::properties::{Dlc4, PROFILES, PROPERTIES, Properties, Setting};
+use harness_proto::unitek::words::MODE_LOCK;
+use harness_proto::unitek::{Register, guard};
+use std::collections::BTreeSet;
+
+const MODE: u8 = 0x51;
+/// The commands of torque and of speed. The last one decides what the drive controls.
+const COMMANDS: [u8; 2] = [0x90, 0x31];
+
+/// Identifiers and bit rate: a drive that stores new ones may be lost.
+const BUS_SETTINGS: [u8; 3] = [0x68, 0x69, 0x73];
+
+/// Registers that show what a drive makes of its inputs: a model that explains the drive reads the same at rest.
+const AT_REST: [u8; 9] = [0x40, 0x8F, 0xCE, 0xD8, 0xE2, 0xE3, 0xEF, 0xF2, 0xF5];
+
+/// A scenario of this bus.
+pub(super) struct Own {
+    scenario: Scenario<Unitek>,
+    pub(super) plan: Plan<Unitek>,
+}
+
+impl Own {
+    /// Reads a scenario.
+    pub(super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
+        let scenario: Scenario<Unitek> = parse(source)?;
+        let plan = plan(&scenario, source, None)?;
+        Ok(Self { scenario, plan })
+    }
+
+    /// The frames that its lines send.
+    pub(super) fn frames(&self) -> impl Iterator<Item = &Frame> {
+        self.plan.steps.iter().flat_map(|step| match &step.action {
+            PlannedAction::Send(_, frames) => frames.as_slice(),
+            PlannedAction::Own(Act::Send(frame) | Act::Read { request: frame, .. }) => {
+                std::slice::from_ref(frame)
+            }
+            _ => &[],
+        })
+    }
+
+    /// The registers whose contents its lines ask for.
+    fn asks_for(&self) -> BTreeSet<u8> {
+        let first = |wanted: &WantedFrame| match wanted.data.first() {
+            Some(Expected::Byte(register)) => Some(*register),
+            _ => None,
+        };
+        let steps = self.plan.steps.iter();
+        let all = steps.flat_map(|step| match &step.action {
+            PlannedAction::Receive(_, wanted) => wanted.iter().filter_map(first).collect(),
+            PlannedAction::Own(Act::Read { register, .. }) => vec![*register],
+            PlannedAction::Own(Act::Register(_, wanted)) => vec![wanted.register],
+            PlannedAction::Own(Act::Driver(..)) => AT_REST.to_vec(),
+            _ => Vec::new(),
+        });
+        all.collect()
+    }
+}
+
+/// What drives read at rest, by number and register.
+type AtRest = Vec<(u8, u8, u32)>;
+
+/// Where the clock of a drive can stand when a scenario begins, in parts of 32 of a millisecond: cycles, ramps and events go by it.
+const PHASES: std::ops::Range<u64> = 1..32;
+
+/// What a model is beside what is known of the drives.
+#[derive(Clone, Copy, Default)]
+struct Other<'o> {
+    /// How far the clocks of the drives are ahead.
+    phase: Span,
+    /// The properties of all drives, in place of those that are known.
+    properties: Option<&'o [Properties]>,
+    /// What adapter and computer do to frames.
+    slow: Option<Slow>,
+}
+
+/// How late frames may leave through an adapter and a busy computer, in us, beside what was measured.
+const LATE: [u64; 3] = [1_000, 3_000, 15_000];
+
+/// The way to the drives and back, as it was in an attempt.
+#[derive(Clone, Copy)]
+struct Way {
+    /// By how much a wait has ended late, at most.
+    late: Span,
+    /// The longest time from a request until its reply was read.
+    longest: Span,
+    /// How exact times are; zero where time is virtual.
+    tolerance: Span,
+}
+
+/// A scenario played on the model.
+struct Rehearsal {
+    outcome: Outcome,
+    at_rest: AtRest,
+    denied: Option<(String, Vec<LimitSetting>)>,
+}
+
+/// Plays attempts, on a rig or on a record, and judges them.
+#[derive(Debug)]
+pub(super) struct Player {
+    axes: Vec<Axis>,
+    rate: BitRate,
+    patience: Span,
+    limits: Limits,
+    /// What a record of the rig shows that it can do.
+    capabilities: Vec<Capability>,
+    /// Whether its adapter carries remote frames.
+    remote: bool,
+    /// Known from the first attempt on.
+    known: Option<Vec<Known>>,
+    /// What has been written since the registers were read.
+    written: BTreeSet<(u16, u8)>,
+    /// The drives to which bus settings were written, by identifier: the guard does not let them be stored.
+    moved: BTreeSet<u16>,
+    /// What was received before the scenario of the last attempt; `None` where it was not begun.
+    before: Option<String>,
+}
+
+impl Player {
+    pub(super) fn new(
+        axes: Vec<Axis>,
+        rate: BitRate,
+        patience: Span,
+        limits: Limits,
+        (capabilities, remote): (Vec<Capability>, bool),
+    ) -> Self {
+        Self {
+            axes,
+            rate,
+            patience,
+            limits,
+            capabilities,
+            remote,
+            known: None,
+            written: BTreeSet::new(),
+            moved: BTreeSet::new(),
+            before: None,
+        }
+    }
+
+    /// What is known of the drives; nothing before the first attempt.
+    pub(super) fn known(&self) -> &[Known] {
+        self.known.as_deref().unwrap_or_default()
+    }
+
+    /// The registers that may differ from what is known.
+    pub(super) const fn written(&self) -> &BTreeSet<(u16, u8)> {
+        &self.written
+    }
+
+    /// Why a scenario is not begun, whatever the drives are; `None` if it is.
+    pub(super) fn not_begun(&self, own: &Own) -> Option<Skip> {
+        let bench = &own.plan.setup.setup;
+        let axis = |node: u8| self.axes.iter().find(|axis| axis.node == node);
+        for drive in &bench.drives {
+            let wanted = drive.identifiers;
+            let why = match axis(drive.node) {
+                None => format!("the rig has no drive {}", drive.node),
+                Some(axis) if (axis.rx, axis.tx) != wanted => format!(
+                    "drive {} of the rig has the identifiers {:03X} and {:03X}, that of the scenario {:03X} and {:03X}",
+                    drive.node, axis.rx, axis.tx, wanted.0, wanted.1
+                ),
+                Some(_) => continue,
+            };
+            return Some(Why::OtherDrives(why).into());
+        }
+        let stated = own.scenario.header.rate.is_some();
+        if stated && bench.rate != self.rate {
+            let why = format!(
+                "the rig's bus has {} kbit/s, that of the scenario {}",
+                self.rate.bits_per_second() / 1000,
+                bench.rate.bits_per_second() / 1000
+            );
+            return Some(Why::OtherDrives(why).into());
+        }
+        if !self.remote && own.frames().any(Frame::is_remote) {
+            let why = "the adapter's language has no remote frames; use SLCAN".to_owned();
+            return Some(Why::OtherDrives(why).into());
+        }
+        lacks(&own.plan, &self.replay(&[], Span::ZERO))
+    }
+
+    /// What was recorded of the rig, as a link.
+    pub(super) fn replay(&self, events: &[LinkEvent], tolerance: Span) -> Replay {
+        let drives = u8::try_from(self.axes.len()).unwrap_or(u8::MAX);
+        let medium = Medium::Frames(self.rate);
+        let capabilities = self.capabilities.clone();
+        Replay::new(
+            events.to_vec(),
+            medium,
+            tolerance,
+            vec![drives],
+            capabilities,
+        )
+    }
+
+    /// One attempt over a link: finds out about the drives, rehearses, makes them ready, plays and judges. With what was received
+    /// before the scenario, in words.
+    pub(super) fn attempt(&mut self, own: &Own, link: &mut dyn Link) -> (Outcome, String) {
+        link.begin();
+        let mut link = Observed::new(link);
+        let outcome = self.attempt_over(own, &mut link);
+        let before = match &self.before {
+            Some(before) => before.clone(),
+            None => link.received(),
+        };
+        (outcome, before)
+    }
+
+    fn attempt_over(&mut self, own: &Own, link: &mut Observed<'_>) -> Outcome {
+        self.before = None;
+        if let Err(error) = self.learn(link) {
+            return self.unanswered(&error);
+        }
+        let rehearsal = match self.rehearsed(own) {
+            Ok(rehearsal) => rehearsal,
+            Err(skip) => return Outcome::skipped(skip),
+        };
+        let at_rest = self.prepare(own, self.limits.motion, link);
+        self.before = Some(link.received());
+        self.written.extend(link.written());
+        let at_rest = match at_rest {
+            Ok(at_rest) => at_rest,
+            Err(error) => return self.unanswered(&error),
+        };
+        link.begin();
+        link.take_late();
+        let outcome = play(&own.plan, link, AtMismatch::Stop);
+        self.written.extend(link.written());
+        let settings = link
+            .written()
+            .filter(|(_, register)| BUS_SETTINGS.contains(register));
+        self.moved.extend(settings.map(|(rx, _)| rx));
+        let unlike = unlike(&at_rest, &rehearsal.at_rest);
+        let way = Way {
+            late: link.take_late(),
+            longest: link.longest(),
+            tolerance: link.time_tolerance(),
+        };
+        self.judged(own, outcome, way, &unlike)
+    }
+
+    /// Reads the drives; the first time everything, and what the manual leaves open is settled.
+    fn learn(&mut self, link: &mut Observed<'_>) -> Result<(), Error> {
+        let mut drives = match self.known.take() {
+            Some(drives) => drives,
+            None => self.axes.iter().copied().map(Known::new).collect(),
+        };
+        for known in &mut drives {
+            let axes = [known.axis];
+            let mut driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+            if known.cells.is_empty() {
+                known.read_all(&mut driver)?;
+                drop(driver);
+                probe::settle(known, link, self.patience)?;
+                driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+            }
+            known.read_again(&mut driver, &self.written)?;
+        }
+        self.written.clear();
+        self.known = Some(drives);
+        Ok(())
+    }
+
+    /// The outcome where the drives could not be made ready.
+    fn unanswered(&self, error: &Error) -> Outcome {
+        let remark = error.to_string();
+        match error {
+            Error::Link(trouble) => Outcome::trouble(trouble),
+            // Nothing was ever heard of it.
+            Error::NoReply { .. } if self.known.is_none() => Outcome::rig_error(remark),
+            Error::NoReply { .. } => Outcome::not_ready(Verdict::Failed, Unready::NoAnswer, remark),
+            // A drive may have reasons of its own to refuse a parameter.
+            _ => Outcome::not_ready(Verdict::Inconclusive, Unready::Differs, remark),
+        }
+    }
+
+    /// Plays a scenario on the model.
+    ///
+    /// # Errors
+    /// Why the rig does not play it.
+    fn rehearsed(&self, own: &Own) -> Result<Rehearsal, Skip> {
+        if let Some(why) = self.other_properties(&own.scenario) {
+            return Err(Why::OtherDrives(why).into());
+        }
+        let first = self.rehearse(own, &self.limits, Other::default());
+        if first.denied.is_none() && first.outcome.verdict == Verdict::Passed {
+            return Ok(first);
+        }
+        let mut limits = self.limits.clone();
+        let mut unlocks = BTreeSet::new();
+        let mut last = self.rehearse(own, &limits, Other::default());
+        for _ in 0..4 {
+            let wanted = match &last.denied {
+                Some((_, settings)) => settings.clone(),
+                // The drives stay locked without it.
+                None if !limits.motion => vec![LimitSetting::Motion],
+                None => break,
+            };
+            let before = limits.clone();
+            for setting in wanted {
+                permit(&mut limits, setting);
+                unlocks.insert(Unlock::Limit(setting));
+            }
+            if limits == before {
+                break;
+            }
+            last = self.rehearse(own, &limits, Other::default());
+        }
+        let found = |outcome: &Outcome| {
+            let finding = outcome.finding.as_ref().map(|own| own.message.clone());
+            let remark = outcome.remarks.first().cloned();
+            finding.or(remark).unwrap_or_default()
+        };
+        let denied = first.denied.as_ref();
+        let plays = last.denied.is_none() && last.outcome.verdict == Verdict::Passed;
+        Err(match (denied, plays) {
+            (None, true) => {
+                let why = "the drives stay locked without `allow_motion` and --allow-motion";
+                Skip::from(Why::Denied(why.to_owned())).and(unlocks)
+            }
+            (Some((why, _)), true) => Skip::from(Why::Denied(why.clone())).and(unlocks),
+            // Nothing that can be permitted is enough.
+            (Some((why, settings)), false) if settings.is_empty() => {
+                Why::Denied(why.clone()).into()
+            }
+            (_, false) => Why::OtherDrives(format!(
+                "a correct drive with the same registers does not meet it: {}",
+                found(&last.outcome)
+            ))
+            .into(),
+        })
+    }
+
+    /// The first property of the header that the rig's drives have another value of, or that is not settled.
+    fn other_properties(&self, scenario: &Scenario<Unitek>) -> Option<String> {
+        scenario.header.drives.iter().find_map(|line| {
+            let node = node(&line.drive, Scope::default()).ok()?;
+            let known = self.known().iter().find(|own| own.axis.node == node)?;
+            let mut wanted = known.properties;
+            let named: Vec<_> = match &line.what {
+                Setup::Property(property, value) => {
+                    let setting = match value {
+                        PropertyValue::Word(word) => Setting::Word(word),
+                        PropertyValue::Time(time) => Setting::Time(time.on(octet_time(self.rate))),
+                    };
+                    let _fits = property.set(&mut wanted, setting);
+                    vec![*property]
+                }
+                Setup::Profile(name) => {
+                    wanted = Properties::profile(name)?;
+                    let differs = |own: &&_| differs_between_profiles(own);
+                    PROPERTIES.iter().filter(differs).collect()
+                }
+                _ => return None,
+            };
+            named.into_iter().find_map(|property| {
+                let (value, own) = (
+                    property.of_drive(&wanted),
+                    property.of_drive(&known.properties),
+                );
+                let name = property.name;
+                match known.settled.contains(name) {
+                    false => Some(format!(
+                        "it is for a drive with {name} = {value}; that of drive {node} is not settled"
+                    )),
+                    true => (value != own).then(|| {
+                        format!("it is for a drive with {name} = {value}; drive {node} has {own}")
+                    }),
+                }
+            })
+        })
+    }
+
+    /// Plays a scenario on the model within limits.
+    fn rehearse(&self, own: &Own, limits: &Limits, other: Other<'_>) -> Rehearsal {
+        let known = self.known().iter().enumerate();
+        let drives = known.map(|(place, known)| {
+            let other = other.properties.and_then(|all| all.get(place)).copied();
+            known.model(other.unwrap_or(known.properties))
+        });
+        let setup = simulate::Setup {
+            rate: self.rate,
+            drives: drives.collect(),
+        };
+        let identifiers: Vec<_> = self.axes.iter().map(|axis| (axis.rx, axis.tx)).collect();
+        let mut bench = Bench::new(&setup);
+        bench.wait(Instant::START + other.phase);
+        let mut link = guarded(bench, limits.clone(), &identifiers, false);
+        if let Some(gate) = link.segment_mut() {
+            for known in self.known() {
+                let [full, limit] = [0xC8, 0x34].map(|own| (known.cell(own) & 0xFFFF) as u16);
+                gate.learn(known.axis.rx, full, limit);
+            }
+            self.moved.iter().for_each(|rx| gate.note_moved(*rx));
+        }
+        let mut forgotten: Vec<LinkEvent> = Vec::new();
+        let mut recording = Recording::new(&mut link, &mut forgotten);
+        let at_rest = self.prepare(own, limits.motion, &mut recording);
+        recording.begin();
+        let (outcome, at_rest) = match at_rest {
+            Ok(at_rest) => {
+                let mut link = Observed::new(&mut recording).slowed(other.slow);
+                (play(&own.plan, &mut link, AtMismatch::Stop), at_rest)
+            }
+            Err(error) => (self.unanswered(&error), Vec::new()),
+        };
+        let denied = match link.trouble() {
+            Some(Trouble::Denied(why)) => Some((why.clone(), link.denying().to_vec())),
+            _ => None,
+        };
+        Rehearsal {
+            outcome,
+            at_rest,
+            denied,
+        }
+    }
+
+    /// Makes the drives ready: locked, without commands, with the registers of the header, and released where motors may turn.
+    fn prepare(&self, own: &Own, release: bool, link: &mut dyn Link) -> Result<AtRest, Error> {
+        let mut driver = Driver::new(Box::new(&mut *link), &self.axes, self.patience);
+        for axis in &self.axes {
+            driver.write(*axis, MODE, Data::Short(MODE_LOCK))?;
+            for register in COMMANDS {
+                driver.write(*axis, register, Data::Short(0))?;
+            }
+        }
+        let mut at_rest = Vec::new();
+        for drive in &own.plan.setup.setup.drives {
+            let known = self.known().iter().find(|own| own.axis.node == drive.node);
+            let Some(known) = known else { continue };
+            for (register, raw) in &drive.registers {
+                if known.cells.get(register) != Some(raw) {
+                    let data = Data::of(Register::of(*register), *raw);
+                    driver.write(known.axis, *register, data)?;
+                }
+            }
+            if release {
+                driver.write(known.axis, MODE, Data::Short(0))?;
+            }
+            for register in AT_REST {
+                let bits = match driver.read(known.axis, register) {
+                    Ok(reply) => reply.data.bits(),
+                    Err(Error::NoReply { .. }) => continue,
+                    Err(error) => return Err(error),
+                };
+                at_rest.push((drive.node, register, bits));
+            }
+        }
+        Ok(at_rest)
+    }
+
+    /// Whether a line that was not met accuses the drive.
+    fn judged(&self, own: &Own, outcome: Outcome, way: Way, unlike: &[(u8, u8)]) -> Outcome {
+        if outcome.verdict != Verdict::Failed {
+            return outcome;
+        }
+        let asks_for = own.asks_for();
+        let unlike = unlike
+            .iter()
+            .find(|(_, register)| asks_for.contains(register));
+        let real = way.tolerance > Span::ZERO;
+        let why = if real && way.late > way.tolerance {
+            Some(format!(
+                "the computer was late by {}: this may not be the drive's fault",
+                way.late
+            ))
+        } else if real && way.longest > way.tolerance {
+            Some(format!(
+                "a request and its reply took {} over the adapter: this may not be the drive's fault",
+                way.longest
+            ))
+        } else if let Some((node, register)) = unlike {
+            Some(format!(
+                "register {register:02X} ({}) of drive {node} differs at rest from that of the model of the drive: the scenario may be for \
+                 another firmware",
+                Register::of(*register).name
+            ))
+        } else {
+            self.left_open(own, way).map(|property| {
+                format!(
+                    "a correct drive with {property} does not meet it either, and this is not known"
+                )
+            })
+        };
+        match why {
+            None => outcome,
+            Some(why) => Outcome {
+                verdict: Verdict::Inconclusive,
+                remarks: std::iter::once(why).chain(outcome.remarks).collect(),
+                ..outcome
+            },
+        }
+    }
+
+    /// A difference from the model with which a correct drive does not meet the scenario either: the first property that is not
+    /// settled, the place of its clock, or times in which frames leave.
+    fn left_open(&self, own: &Own, way: Way) -> Option<String> {
+        let fails = |other: Other<'_>| {
+            let played = self.rehearse(own, &self.limits, other);
+            played.denied.is_some() || played.outcome.verdict != Verdict::Passed
+        };
+        for phase in PHASES.map(|own| Span::from_micros(own * 1_000 / 32)) {
+            let other = Other {
+                phase,
+                ..Other::default()
+            };
+            if fails(other) {
+                return Some(format!("its clock of 1 ms ahead by {phase}"));
+            }
+        }
+        let measured = [way.longest, way.longest * 2];
+        let late = LATE.map(Span::from_micros).into_iter().chain(measured);
+        let late = late.flat_map(|by| [0, 1, 2].map(|which| (by, which)));
+        for (by, which) in late.filter(|_| way.tolerance > Span::ZERO) {
+            let slow = Slow {
+                by,
+                which,
+                tolerance: way.tolerance,
+            };
+            let other = Other {
+                slow: Some(slow),
+                ..Other::default()
+            };
+            if fails(other) {
+                return Some(format!("an adapter through which frames leave {by} late"));
+            }
+        }
+        for (place, known) in self.known().iter().enumerate() {
+            for (words, other) in known.candidates() {
+                let drives = self.known().iter().enumerate();
+                let all: Vec<_> = drives
+                    .map(|(at, own)| if at == place { other } else { own.properties })
+                    .collect();
+                let other = Other {
+                    properties: Some(&all),
+                    ..Other::default()
+                };
+                if fails(other) {
+                    return Some(words);
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The registers in which drives and their models read differently at rest, by number and register.
+fn unlike(drives: &AtRest, models: &AtRest) -> Vec<(u8, u8)> {
+    let mask = |(node, register, bits): &(u8, u8, u32)| {
+        (*node, *register, bits & Register::of(*register).mask())
+    };
+    let models: BTreeSet<_> = models.iter().map(mask).collect();
+    let drives: BTreeSet<_> = drives.iter().map(mask).collect();
+    let differing = drives.symmetric_difference(&models);
+    let places: BTreeSet<_> = differing
+        .map(|(node, register, _)| (*node, *register))
+        .collect();
+    places.into_iter().collect()
+}
+
+/// Whether the profiles have different values of a property.
+fn differs_between_profiles(property: &harness_proto::unitek::properties::Description) -> bool {
+    let profiles = PROFILES.iter().filter_map(|name| Properties::profile(name));
+    let values: Vec<_> = profiles.map(|own| property.of_drive(&own)).collect();
+    values.windows(2).any(|pair| pair[0] != pair[1])
+}
+
+/// Permits what a setting denies.
+const fn permit(limits: &mut Limits, setting: LimitSetting) {
+    match setting {
+        LimitSetting::Motion => limits.motion = true,
+        LimitSetting::Eeprom => limits.eeprom = true,
+        LimitSetting::MaxSpeed => limits.max_speed = None,
+        _ => {}
+    }
+}
+
+/// Whether a frame may store parameters in the EEPROM.
+pub(super) fn stores(frame: &Frame) -> bool {
+    let rx = u16::try_from(frame.id().number()).unwrap_or(0);
+    let request = Request::decode(frame, rx, Dlc4::As3);
+    matches!(request, Ok(Request::Write { register: 0x84, .. }))
+}
+
+/// What a rig's capabilities are within limits, beside what no record shows.
+pub(super) fn capabilities(limits: &guard::Limits, simulated: bool) -> Vec<Capability> {
+    let all = match simulated {
+        true => Bench::CAPABILITIES.as_slice(),
+        false => &[Capability::Memory, Capability::Motion, Capability::Eeprom],
+    };
+    let has = |own: &&Capability| match own {
+        Capability::Motion => limits.motion,
+        Capability::Eeprom => limits.eeprom,
+        Capability::Tap | Capability::Simulator | Capability::Power => false,
+        _ => true,
+    };
+    all.iter().filter(has).copied().collect()
+}

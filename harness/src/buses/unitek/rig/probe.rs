@@ -1,0 +1,276 @@
+//! Probes that settle what the manual leaves open, before a scenario may accuse a drive.
+//!
+//! They need no permission: reads, cycles, STATUS_MASK (52) and the lock. What they do not settle stays open, and a scenario that depends
+//! on it accuses no drive.
+
+use super::known::Known;
+use super::observed::Observed;
+use crate::buses::unitek::driver::{Driver, Error};
+use crate::link::Line;
+use crate::medium::{Heard, Out};
+use harness_proto::can::{self, Frame};
+use harness_proto::time::{Instant, Span};
+use harness_proto::unitek::frame::{Data, Reply};
+use harness_proto::unitek::properties::MapReply;
+use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK, status};
+
+/// A register to which nothing is assigned (dump).
+const UNASSIGNED: u8 = 0x81;
+const STATUS: u8 = 0x40;
+const MODE: u8 = 0x51;
+const MASK: u8 = 0x52;
+
+/// The interval of a probe's cycle, in ms.
+const EVERY: u8 = 100;
+const CYCLE: Span = Span::from_millis(100);
+const HALF: Span = Span::from_millis(50);
+
+/// By how much a frame may be off its time.
+const SLACK: Span = Span::from_millis(30);
+
+/// Nine registers, one more than there are cycles (App 8).
+const NINE: [u8; 9] = [0x1B, 0x30, 0x31, 0x90, 0x51, 0x52, 0x6D, 0x6E, 0x11];
+
+/// How often a probe is made that a busy computer has disturbed.
+const TRIES: usize = 3;
+
+/// Settles what can be settled of a drive. It is locked afterwards.
+///
+/// # Errors
+/// The link is in trouble, or the drive does not answer.
+pub(super) fn settle(
+    known: &mut Known,
+    link: &mut Observed<'_>,
+    patience: Span,
+) -> Result<(), Error> {
+    let mut probe = Probe {
+        known,
+        link,
+        patience,
+    };
+    probe.by_replies()?;
+    probe.event()?;
+    let lock = Data::Short(MODE_LOCK);
+    probe.write(MODE, lock)?;
+    probe.widths()?;
+    probe.cycles()?;
+    probe.table()?;
+    let counted = probe.read(0x95)?;
+    let counts = probe.known.cell(0x95) != counted.data.bits();
+    let word = if counts { "live" } else { "frozen" };
+    probe.known.settle("can-counters", word);
+    // A reply on an idle bus takes less.
+    let delay = probe.link.shortest();
+    probe.known.reply_delay = delay.filter(|own| *own > Span::from_micros(500));
+    Ok(())
+}
+
+struct Probe<'p, 'l> {
+    known: &'p mut Known,
+    link: &'p mut Observed<'l>,
+    patience: Span,
+}
+
+impl Probe<'_, '_> {
+    fn driver(&mut self) -> Driver<'_> {
+        Driver::new(Box::new(&mut *self.link), &[self.known.axis], self.patience)
+    }
+
+    fn read(&mut self, register: u8) -> Result<Reply, Error> {
+        let axis = self.known.axis;
+        self.driver().read(axis, register)
+    }
+
+    /// Writes a register. What it reads afterwards is not judged here.
+    fn write(&mut self, register: u8, data: Data) -> Result<(), Error> {
+        let axis = self.known.axis;
+        match self.driver().write(axis, register, data) {
+            Ok(_) | Err(Error::Differs { .. }) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Sends data bytes as they are. Returns when the frame has left.
+    fn send(&mut self, data: &[u8]) -> Result<Instant, Error> {
+        let Ok(frame) = Frame::base(self.known.axis.rx, data) else {
+            return Ok(self.link.now());
+        };
+        let end = self.link.send(0, Out::Frames(&[frame]));
+        self.sound().map(|()| end)
+    }
+
+    fn sound(&self) -> Result<(), Error> {
+        self.link
+            .trouble()
+            .map_or(Ok(()), |trouble| Err(Error::Link(trouble.clone())))
+    }
+
+    /// The frames of the drive that come up to a time.
+    fn listen(&mut self, until: Instant) -> Result<Vec<(Instant, Reply)>, Error> {
+        let mut heard = Vec::new();
+        loop {
+            while let Some((at, piece)) = self.link.receive(0) {
+                if let Heard::Frame(can::Heard::Frame(frame)) = piece
+                    && let Ok(reply) = Reply::decode(&frame, self.known.axis.tx)
+                {
+                    heard.push((at, reply));
+                }
+            }
+            self.sound()?;
+            if self.link.now() >= until {
+                return Ok(heard);
+            }
+            let _more = self.link.wait(until);
+        }
+    }
+
+    /// What the replies to plain reads show: widths, stuff bytes, and bits of STATUS.
+    fn by_replies(&mut self) -> Result<(), Error> {
+        let mut stuffs = self.known.replies.values().map(|reply| reply.stuff);
+        if let Some(first) = stuffs.next()
+            && stuffs.all(|own| own == first)
+        {
+            let word = format!("{first:02X}");
+            self.known.settle("stuff", &word);
+        }
+        let status_reply = self.known.replies.get(&STATUS).copied();
+        if let Some(reply) = status_reply {
+            if !self.known.is_wide() {
+                let long = matches!(reply.data, Data::Long(_));
+                let word = if long { "native" } else { "short" };
+                self.known.settle("map-reply", word);
+            }
+            let bits = reply.data.bits();
+            let stands = self.known.cell(0xF5) == 1;
+            if bits & (status::STANDING | status::READY) != 0 {
+                self.known.settle("status-bits", "full");
+            } else if stands {
+                self.known.settle("status-bits", "printed");
+            }
+        }
+        let word = match self.read(UNASSIGNED) {
+            Ok(_) => "face",
+            Err(Error::NoReply { .. }) => "silent",
+            Err(error) => return Err(error),
+        };
+        self.known.settle("unknown-register", word);
+        Ok(())
+    }
+
+    /// The width of STATUS in an event: locking an enabled drive is one (5.2).
+    fn event(&mut self) -> Result<(), Error> {
+        let enabled = self.known.cell(STATUS) & status::ENABLED != 0;
+        if !enabled || self.known.is_wide() {
+            return Ok(());
+        }
+        let mask = self.known.cell(MASK);
+        self.write(MASK, Data::Long(status::ENABLED))?;
+        let both = MODE_LOCK | MODE_EVENT;
+        let [low, high] = both.to_le_bytes();
+        let sent = self.send(&[MODE, low, high])?;
+        let heard = self.listen(sent + self.patience.max(SLACK))?;
+        let width = heard
+            .iter()
+            .find(|(_, reply)| reply.register == STATUS)
+            .map(|(_, reply)| matches!(reply.data, Data::Long(_)));
+        self.write(MODE, Data::Short(MODE_LOCK))?;
+        self.write(MASK, Data::Long(mask))?;
+        let narrow = self.known.settled.contains("map-reply")
+            && self.known.properties.map_reply == MapReply::Short;
+        match width {
+            Some(false) => self.known.settle("event-reply", "as-map-reply"),
+            // With 32 bits in replies, both values give the same frame.
+            Some(true) if narrow => self.known.settle("event-reply", "native"),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Frames of 4 bytes, and 16 bits to a register of 32. STATUS_MASK decides nothing while the drive sends no events.
+    fn widths(&mut self) -> Result<(), Error> {
+        const WHOLE: u32 = 0x1122_3344;
+        let mask = self.known.cell(MASK);
+        self.write(MASK, Data::Long(WHOLE))?;
+        self.send(&[MASK, 0x66, 0x55])?;
+        let short = self.read(MASK)?.data.bits();
+        self.write(MASK, Data::Long(WHOLE))?;
+        self.send(&[MASK, 0x66, 0x55, 0x77])?;
+        let four = self.read(MASK)?.data.bits();
+        self.write(MASK, Data::Long(mask))?;
+        match short {
+            0x0000_5566 => self.known.settle("short-write", "extend"),
+            0x1122_5566 => self.known.settle("short-write", "keep-high"),
+            _ => {}
+        }
+        match four {
+            WHOLE => self.known.settle("dlc4", "ignore"),
+            other if other == short => self.known.settle("dlc4", "as3"),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// When the first frame of a cycle comes, and what a single request does to the cycle.
+    fn cycles(&mut self) -> Result<(), Error> {
+        let register = NINE[0];
+        for _ in 0..TRIES {
+            self.link.take_late();
+            let sent = self.send(&[0x3D, register, EVERY])?;
+            let first = self.listen(sent + CYCLE * 2 + HALF)?;
+            self.send(&[0x3D, register, 0])?;
+            let now = self.link.now();
+            let then = self.listen(now + CYCLE * 2)?;
+            self.send(&[0x3D, register, 0xFF])?;
+            let now = self.link.now();
+            self.listen(now + SLACK)?;
+            if self.link.take_late() > SLACK {
+                continue;
+            }
+            let own = |all: &[(Instant, Reply)]| -> Vec<Instant> {
+                let own = all.iter().filter(|(_, reply)| reply.register == register);
+                own.map(|(at, _)| *at).collect()
+            };
+            if let [one, two, ..] = own(&first)[..] {
+                let (wait, gap) = (one.since(sent), two.since(one));
+                let regular = gap + SLACK > CYCLE && gap < CYCLE + SLACK;
+                if regular && wait < HALF {
+                    self.known.settle("cyclic-first", "at-once");
+                } else if regular && wait + SLACK > CYCLE {
+                    self.known.settle("cyclic-first", "after");
+                }
+            }
+            match own(&then).len() {
+                0 => {}
+                1 => self.known.settle("oneshot-stops", "yes"),
+                _ => self.known.settle("oneshot-stops", "no"),
+            }
+            return Ok(());
+        }
+        Ok(())
+    }
+
+    /// What becomes of a ninth cycle.
+    fn table(&mut self) -> Result<(), Error> {
+        for register in NINE {
+            self.send(&[0x3D, register, EVERY])?;
+        }
+        let now = self.link.now();
+        // Behind the first frames, which may come at once.
+        self.listen(now + HALF)?;
+        let heard = self.listen(now + CYCLE * 2 + HALF)?;
+        for register in NINE {
+            self.send(&[0x3D, register, 0xFF])?;
+        }
+        let now = self.link.now();
+        self.listen(now + SLACK)?;
+        let there = |register| heard.iter().any(|(_, reply)| reply.register == register);
+        let [first, .., ninth] = NINE;
+        let others = NINE[1..8].iter().all(|own| there(*own));
+        match (there(first), there(ninth)) {
+            (true, false) if others => self.known.settle("table-full", "refuse"),
+            (false, true) if others => self.known.settle("table-full", "oldest"),
+            _ => {}
+        }
+        Ok(())
+    }
+}

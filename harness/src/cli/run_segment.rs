@@ -1,0 +1,149 @@
+//! `run --rig` on a rig with a port, whose stations share one segment.
+
+use super::exit::Exit;
+use super::output::Output;
+use super::page::Page;
+use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
+use super::run_rig::{Course, PlayOrder, Stop, course_of, keep, reports};
+use crate::buses::run_on;
+use crate::evidence::{About, Folder};
+use crate::library::Entry;
+use crate::rig::segment::SegmentRun;
+use crate::rig::{Options, Played, Rig};
+use crate::scenario::run::Skip;
+use crate::signals::interrupt_flag;
+
+/// Plays scenarios on a rig with a port, and gives the rig back in its safe state.
+pub(crate) fn work(
+    rig: &Rig,
+    entries: &[Entry],
+    job: &PlayOrder,
+    mut page: Option<Page>,
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    let options = Options {
+        purpose: job.purpose.to_owned(),
+        wait: job.wait,
+        allow_motion: job.allow_motion,
+        interrupt: interrupt_flag(),
+        alarm: alarm(),
+        ..Options::default()
+    };
+    let run = match run_on(rig, &options) {
+        Ok(run) => run,
+        Err(error) => {
+            output.complain(&error.to_string());
+            return Ok(exit_of(&error));
+        }
+    };
+    let mut course = SegmentCourse { rig, run };
+    let mut folder = None;
+    let exit = match all(
+        &mut course,
+        entries,
+        job,
+        (&mut folder, page.as_mut()),
+        output,
+    ) {
+        Ok(exit) => exit,
+        Err(Stop::Session(error)) => {
+            output.complain(&error.to_string());
+            exit_of(&error)
+        }
+        Err(Stop::Evidence(error)) => {
+            output.complain(&error.to_string());
+            folder = None;
+            Exit::of_evidence(&error)
+        }
+        Err(Stop::Output(error)) => output.unwritable(&error),
+    };
+    let exit = exit_of_end(course.run.trouble().as_ref(), exit, output);
+    let end = course
+        .run
+        .close(matches!(exit, Exit::RigError | Exit::Interlock));
+    let exit = tell_end(&end, exit, output);
+    let safe = end.safe.as_ref().map(|_| exit != Exit::NotSafe);
+    Ok(match reports(rig, folder, page, safe, output) {
+        true => exit,
+        false => exit.with_rig_error(),
+    })
+}
+
+fn all(
+    course: &mut SegmentCourse<'_>,
+    entries: &[Entry],
+    job: &PlayOrder,
+    (folder, page): (&mut Option<Folder>, Option<&mut Page>),
+    output: &mut Output,
+) -> Result<Exit, Stop> {
+    if let Some(path) = &job.evidence {
+        let segment = course.run.segment();
+        let selected = entries.iter().filter(|entry| course.is_for(entry));
+        let about = About {
+            rig: course.rig,
+            rate: segment.rate,
+            tolerance: segment.tolerance,
+            capabilities: segment.capabilities,
+            anew: false,
+            own_rings: false,
+            purpose: job.purpose,
+            selected: selected.map(|entry| &*entry.source.text).collect(),
+            sign: job.sign.as_deref(),
+        };
+        *folder = Some(Folder::create(path, &about)?);
+    }
+    course_of(course, entries, job, (folder.as_mut(), page), output)
+}
+
+/// A rig with a port in use.
+struct SegmentCourse<'r> {
+    rig: &'r Rig,
+    run: Box<dyn SegmentRun>,
+}
+
+impl SegmentCourse<'_> {
+    /// Whether a scenario is for the bus of the rig.
+    fn is_for(&self, entry: &Entry) -> bool {
+        let bus = self.rig.port().map(|port| port.bus.bus());
+        bus == Some(entry.scenario.bus)
+    }
+}
+
+impl Course for SegmentCourse<'_> {
+    fn name(&mut self) -> String {
+        self.rig.id().to_owned()
+    }
+
+    fn play(
+        &mut self,
+        entry: &Entry,
+        folder: Option<&mut Folder>,
+    ) -> Result<(String, Played), Stop> {
+        let name = entry.short_name().to_owned();
+        if !self.is_for(entry) {
+            let skip = Skip::not_on_rig(entry.scenario.bus);
+            return Ok((name, Played::skipped(skip)));
+        }
+        match folder {
+            None => Ok((name, self.run.play(&entry.source, None)?)),
+            Some(folder) => keep(entry, folder, |keeper| {
+                self.run.play(&entry.source, Some(keeper))
+            }),
+        }
+    }
+
+    fn note(&mut self, _: &Entry, _: &str, _: &Played, output: &mut Output) {
+        for note in self.run.notes() {
+            output.say(&format!("  note: {note}\n"));
+        }
+    }
+
+    fn over(&mut self, output: &mut Output) -> bool {
+        if let Some(why) = self.run.over() {
+            output.complain(&why);
+            return true;
+        }
+        let trouble = self.run.trouble();
+        trouble.is_some_and(|trouble| trouble.ends_a_run())
+    }
+}

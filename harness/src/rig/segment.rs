@@ -1,0 +1,80 @@
+//! Scenarios on a rig whose stations share one segment: what running, recording and verifying ask of its bus.
+
+use super::{End, Keeper, Played, SessionError};
+use crate::link::{Capability, LinkEvent, Trouble};
+use crate::scenario::run::Outcome;
+use crate::scenario::source::Source;
+use harness_proto::time::Span;
+use harness_sim::record::Trace;
+
+/// What the first line of a record says of such a rig.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct OnSegment {
+    /// Bits a second.
+    pub(crate) rate: u32,
+    /// How many drives the rig has.
+    pub(crate) drives: u8,
+    /// How exact its times are; zero where time is virtual.
+    pub(crate) tolerance: Span,
+    /// What its link can do.
+    pub(crate) capabilities: Vec<Capability>,
+}
+
+/// A rig in use, on which scenarios of its bus are played.
+pub(crate) trait SegmentRun {
+    /// What a record begins with.
+    fn segment(&self) -> OnSegment;
+
+    /// Plays a scenario, and again if it did not pass, as often as the rig's file says. Afterwards the drives are in their safe state, with
+    /// the registers that the scenario changed set back.
+    ///
+    /// # Errors
+    /// The scenario cannot be read; it could be when it was selected.
+    fn play(
+        &mut self,
+        source: &Source,
+        keeper: Option<&mut dyn Keeper>,
+    ) -> Result<Played, SessionError>;
+
+    /// Notes about the drives since the last call, in sentences.
+    fn notes(&mut self) -> Vec<String>;
+
+    /// Why nothing more is played, in a sentence; `None` if the next scenario can be.
+    fn over(&self) -> Option<String>;
+
+    /// Why the link carries nothing more.
+    fn trouble(&self) -> Option<Trouble>;
+
+    /// Takes the rig to its safe state and gives it back; `error` after a rig error or an interlock.
+    fn close(self: Box<Self>, error: bool) -> End;
+}
+
+/// An attempt judged again from its record.
+#[derive(Clone, Debug)]
+pub(crate) struct JudgedAgain {
+    /// Its outcome.
+    pub(crate) outcome: Outcome,
+    /// What was received before the scenario, in words.
+    pub(crate) before: Option<String>,
+    /// What the record holds behind the end of the attempt.
+    pub(crate) left: Option<String>,
+    /// Of simulated drives, for which the attempt was played again: what happened, and what the bus carried.
+    pub(crate) played: Option<(Vec<LinkEvent>, Vec<Trace>)>,
+    /// Whether it ends in trouble.
+    pub(crate) trouble: bool,
+}
+
+/// Judges the attempts of a record again, in their order: what one of them found out about the drives counts for those behind it.
+pub(crate) trait SegmentJudge {
+    /// What the first line of the record must say. It names the capabilities of the rig with and without `--allow-motion`.
+    fn segments(&self) -> [OnSegment; 2];
+
+    /// Why a scenario is not begun on this rig; `None` if it is.
+    fn not_begun(&self, source: &Source) -> Option<Outcome>;
+
+    /// Judges an attempt again.
+    ///
+    /// # Errors
+    /// The text is no scenario of this bus, in a sentence.
+    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<JudgedAgain, String>;
+}
