@@ -44,7 +44,6 @@ use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
 use crate::report::html::Html;
-use crate::rig::Rig;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{Options, Rig, SessionError};

@@ -32,8 +32,10 @@ pub enum RecordLine {
         rig_sha256: String,
         /// When the run began, in UTC.
         started: String,
-        /// Bits a second.
-        #[schemars(range(min = 9_600, max = 1_000_000))]
+        /// Bits a second: of a ring, or of a CAN bus.
+        #[schemars(extend("enum" = [
+            38_400, 19_200, 9_600, 10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 625_000, 800_000, 1_000_000
+        ]))]
         rate: u32,
         /// How many drives each ring has.
         #[schemars(length(min = 1, max = 2), inner(range(min = 1, max = 250)))]

@@ -131,7 +131,13 @@ fn drives_are_moved() {
         "drive 1: locked, with commands 0; ready\n"
     );
     refused("recover --rig sim:unitek", 2, &["for rings of ND21"]);
-    refused("run --rig sim:unitek", 2, &["serves rings only"]);
+    refused(
+        "qualify --rig sim:unitek unitek-ex-8-status",
+        2,
+        &["serves rings only"],
+    );
+    let played = shown("run unitek-ex-3-speed unitek-inputs --rig sim:unitek");
+    assert!(played.contains("2 passed, 0 failed"), "{played}");
 }
 
 #[test]
