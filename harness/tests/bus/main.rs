@@ -12,6 +12,7 @@ mod frames;
 mod guard;
 mod language;
 mod naming;
+mod nordac;
 mod twin;
 mod unitek;
 mod vectors;
