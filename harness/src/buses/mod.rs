@@ -26,6 +26,7 @@ pub(crate) use novobus::language::parse::header;
 /// The bus of a scenario without a `bus` line.
 pub use novobus::language::Novobus as DefaultBus;
 
+pub(crate) use nordac::GSD;
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
@@ -54,7 +55,7 @@ use crate::scenario::source::{Source, line_number};
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
 use crate::serve::frames::FrameJob;
-use crate::serve::{End, Host, ServeError};
+use crate::serve::{End, Host, Job, Marks, ServeError, serve};
 use commands::rig_check::CheckRigArguments;
 use commands::{DriveCommand, RigName};
 use harness_proto::can::Frame;
@@ -479,23 +480,48 @@ impl Bus {
     }
 }
 
-/// Serves simulated drives of a bus of frames: as many, with what a header says of them. `None` if the bus carries no frames, or is not
-/// built.
+/// Serves simulated drives of a bus of frames: as many, with what a header says of them.
 ///
 /// # Errors
-/// The header has mistakes.
+/// The header has mistakes, or the bus carries no frames.
 pub(crate) fn serve_frames(
     bus: Bus,
     (drives, header): (Option<u8>, Option<&Source>),
     job: &FrameJob,
     host: &mut dyn Host,
-) -> Result<Option<Result<End, ServeError>>, Problems> {
+) -> Result<Result<End, ServeError>, Problems> {
     match bus {
         Bus::Unitek => {
             let plan = unitek::serve::bench(drives, header)?;
-            Ok(Some(unitek::serve::serve(plan, job, host)))
+            Ok(unitek::serve::serve(plan, job, host))
         }
-        Bus::Novobus | Bus::Nordac => Ok(None),
+        Bus::Novobus | Bus::Nordac => Ok(Err(ServeError::Medium)),
+    }
+}
+
+/// Whether the stations of a bus share a line of octets.
+pub(crate) const fn shares_octets(bus: Bus) -> bool {
+    matches!(bus, Bus::Nordac)
+}
+
+/// Serves simulated drives of a shared line of octets, those with these addresses and those of a header, to a master at each place of the job.
+///
+/// # Errors
+/// The header has mistakes, or the bus has no such line.
+pub(crate) fn serve_octets(
+    bus: Bus,
+    (slaves, header): (Option<&[u8]>, Option<&Source>),
+    marks: Marks,
+    job: &Job,
+    host: &mut dyn Host,
+) -> Result<Result<End, ServeError>, Problems> {
+    match bus {
+        Bus::Nordac => {
+            let plan = nordac::serve::bench(slaves, header)?;
+            let server = nordac::serve::SegmentServer::new(plan, job.places.len(), marks);
+            Ok(serve(server, job, host))
+        }
+        Bus::Novobus | Bus::Unitek => Ok(Err(ServeError::Medium)),
     }
 }
 

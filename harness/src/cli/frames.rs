@@ -1,4 +1,4 @@
-//! Where `sim` serves drives on a bus of frames.
+//! Where `sim` serves drives on a bus of frames, and the drives of a shared line.
 
 use crate::buses::Bus;
 use crate::serve::ServedAt;
@@ -15,6 +15,10 @@ pub struct FrameArguments {
     /// How many drives are on the CAN bus: nodes 1 to N, beside those of --setup. By default node 1, if --setup has none.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(1..=127))]
     pub drives: Option<u8>,
+    /// Addresses of slaves on a PROFIBUS segment, such as 8 or 8,9,20. They have factory settings but for their address and their interface: the
+    /// bus controls them (1621 = 2). By default 8, if there is no --setup.
+    #[arg(long, value_name = "ADDRESS", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=126))]
+    pub slaves: Option<Vec<u8>>,
     /// Serve a CAN bus as a serial CAN adapter (SLCAN) behind a socket: HOST:PORT, port 0 for a free one. Several clients share the bus.
     #[arg(long, value_name = "ADDRESS", group = "place")]
     pub slcan: Vec<String>,

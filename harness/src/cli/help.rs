@@ -37,7 +37,15 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("Find", &["fuzz", "shrink", "promote", "campaign"]),
     (
         "Exchange",
-        &["import", "diff", "report", "dissector", "dbc", "schema"],
+        &[
+            "import",
+            "diff",
+            "report",
+            "dissector",
+            "dbc",
+            "gsd",
+            "schema",
+        ],
     ),
     ("More", &["completions", "man", "help"]),
 ];

@@ -1,4 +1,4 @@
-//! `drivebench import`, `diff`, `dissector` and `dbc`: captures that are read, and what helps to read them elsewhere.
+//! `drivebench import`, `diff`, `dissector`, `dbc` and `gsd`: captures that are read, and what helps to read them elsewhere.
 
 use super::args::{DiffArguments, ImportArguments};
 use super::exit::Exit;
@@ -40,6 +40,12 @@ pub(crate) fn dissector(bus: Bus, output: &mut Output) -> std::io::Result<Exit> 
 /// Prints a DBC file of this number of drives on CAN.
 pub(crate) fn dbc(drives: u16, output: &mut Output) -> std::io::Result<Exit> {
     output.result(&crate::buses::dbc(drives))?;
+    Ok(Exit::Passed)
+}
+
+/// Prints the GSD file of slaves on PROFIBUS DP.
+pub(crate) fn gsd(output: &mut Output) -> std::io::Result<Exit> {
+    output.result(crate::buses::GSD)?;
     Ok(Exit::Passed)
 }
 

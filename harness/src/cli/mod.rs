@@ -76,6 +76,7 @@ fn dispatch(command: Command, output: &mut Output) -> std::io::Result<Exit> {
         Command::Diff(arguments) => import::diff(&arguments, output),
         Command::Dissector { bus } => import::dissector(bus, output),
         Command::Dbc { drives } => import::dbc(drives, output),
+        Command::Gsd => import::gsd(output),
         Command::Manual(arguments) => manual::manual(&arguments, output),
         Command::Cells(arguments) => crate::buses::cells(&arguments, output),
         Command::Qualify(arguments) => qualify::qualify(&arguments, output),

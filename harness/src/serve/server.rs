@@ -1,7 +1,10 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
+use super::control::Answer;
 use super::place::{ClientRole, Inner};
+use super::served::ServedBus;
 use crate::buses::SimulatedLink;
+use crate::counted::counted;
 use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
 use crate::scenario::plan::Plan;
 use harness_proto::line::{LineError, Received};
@@ -167,30 +170,6 @@ impl Server {
         self.plan.rings.len()
     }
 
-    /// How many seats there are: a ring each, and those added.
-    #[must_use]
-    pub fn seats(&self) -> usize {
-        self.seats.len()
-    }
-
-    /// What a seat is called: `ring 1`, `tap 2->1`, `cut 2->1`.
-    #[must_use]
-    pub fn name(&self, seat: usize) -> String {
-        match self.seats.get(seat).map(|seat| seat.at) {
-            None => String::new(),
-            Some(At::Master(ring)) => format!("ring {}", ring + 1),
-            Some(At::Inner(Inner { ring, link, role })) => {
-                let link = link_name(ring, self.drives(ring), link);
-                match role {
-                    ClientRole::Tap => format!("tap {link}"),
-                    ClientRole::Cut => format!("cut {link}"),
-                    ClientRole::Upstream => format!("cut {link} upstream"),
-                    ClientRole::Downstream => format!("cut {link} downstream"),
-                }
-            }
-        }
-    }
-
     /// How many drives ring `ring` has, rings counted from 0.
     #[must_use]
     pub fn drives(&self, ring: usize) -> u8 {
@@ -201,88 +180,6 @@ impl Server {
     #[must_use]
     pub fn time(&self) -> Instant {
         self.link.now()
-    }
-
-    /// A client takes a seat.
-    pub fn come(&mut self, seat: usize) {
-        if let Some(seat) = self.seats.get_mut(seat) {
-            seat.taken = true;
-            seat.unmark = Unmark::default();
-        }
-    }
-
-    /// The client has gone: what it has not fetched is dropped, and half a mark is forgotten. The ring lives on, and what is
-    /// under way there goes its way.
-    pub fn go(&mut self, seat: usize) {
-        if let Some(seat) = self.seats.get_mut(seat) {
-            seat.taken = false;
-            seat.outbox.clear();
-            seat.lost = 0;
-        }
-    }
-
-    /// How many bytes of its client's stream a seat takes now: none while half a second of them waits for the line.
-    #[must_use]
-    pub fn room(&self, seat: usize) -> usize {
-        let Some(seat) = self.seats.get(seat) else {
-            return 0;
-        };
-        if matches!(seat.at, At::Inner(inner) if !inner.role.feeds()) {
-            return DROPPED;
-        }
-        let byte = self.link.byte_time().units().max(1);
-        let waiting = seat.sent_by.since(self.link.now());
-        let room = WAITING.saturating_sub(waiting).units() / byte;
-        usize::try_from(room).unwrap_or(usize::MAX)
-    }
-
-    /// Takes bytes of a client's stream, which leave one after another behind those still to be sent. Of a client that
-    /// only listens they are dropped.
-    ///
-    /// # Errors
-    /// The first byte that is no mark where one must stand; it is dropped, and the others are taken.
-    pub fn receive(&mut self, seat: usize, bytes: &[u8]) -> Result<(), BadMark> {
-        let Some(seat) = self.seats.get_mut(seat) else {
-            return Ok(());
-        };
-        let mut read = Vec::with_capacity(bytes.len());
-        let mut wrong = Ok(());
-        for &byte in bytes {
-            match self.marks {
-                Marks::None => read.push(Received::good(byte)),
-                Marks::InBand => match seat.unmark.push(byte) {
-                    None => {}
-                    Some(Err(bad)) => wrong = wrong.and(Err(bad)),
-                    Some(Ok(byte)) => read.push(byte),
-                },
-            }
-        }
-        match seat.at {
-            At::Master(ring) => send(&mut self.link, seat, ring, &read),
-            At::Inner(Inner { ring, link, role }) if role.feeds() => {
-                for byte in read {
-                    seat.sent_by = self.link.feed(ring, link, byte);
-                }
-            }
-            At::Inner(_) => {}
-        }
-        wrong
-    }
-
-    /// Lets time pass up to the clock's time `clock`, in the rings as their pace is.
-    pub fn advance(&mut self, clock: Instant) {
-        self.clock = self.clock.max(clock);
-        let (from, to) = self.base;
-        let due = to + self.clock.since(from);
-        let most = self.link.now() + CATCH_UP;
-        self.link.run_until(due.min(most));
-        if due > most {
-            self.base = (self.clock, self.link.now());
-        }
-        if self.pace == Pace::Free {
-            self.leap();
-        }
-        self.fetch();
     }
 
     /// Lets the rings go on until nothing of the masters' is under way.
@@ -316,16 +213,133 @@ impl Server {
             }
         }
     }
+}
+
+impl ServedBus for Server {
+    /// How many seats there are: a ring each, and those added.
+    fn seats(&self) -> usize {
+        self.seats.len()
+    }
+
+    fn masters(&self) -> usize {
+        self.plan.rings.len()
+    }
+
+    /// What a seat is called: `ring 1`, `tap 2->1`, `cut 2->1`.
+    fn name(&self, seat: usize) -> String {
+        match self.seats.get(seat).map(|seat| seat.at) {
+            None => String::new(),
+            Some(At::Master(ring)) => format!("ring {}", ring + 1),
+            Some(At::Inner(Inner { ring, link, role })) => {
+                let link = link_name(ring, self.drives(ring), link);
+                match role {
+                    ClientRole::Tap => format!("tap {link}"),
+                    ClientRole::Cut => format!("cut {link}"),
+                    ClientRole::Upstream => format!("cut {link} upstream"),
+                    ClientRole::Downstream => format!("cut {link} downstream"),
+                }
+            }
+        }
+    }
+
+    fn title(&self, seat: usize) -> String {
+        let name = self.name(seat);
+        match self.seats.get(seat).map(|seat| seat.at) {
+            Some(At::Master(ring)) => format!("{name}: {}", counted(self.drives(ring), "drive")),
+            _ => name,
+        }
+    }
+
+    /// A client takes a seat.
+    fn come(&mut self, seat: usize) {
+        if let Some(seat) = self.seats.get_mut(seat) {
+            seat.taken = true;
+            seat.unmark = Unmark::default();
+        }
+    }
+
+    /// The client has gone: what it has not fetched is dropped, and half a mark is forgotten. The ring lives on, and what is
+    /// under way there goes its way.
+    fn go(&mut self, seat: usize) {
+        if let Some(seat) = self.seats.get_mut(seat) {
+            seat.taken = false;
+            seat.outbox.clear();
+            seat.lost = 0;
+        }
+    }
+
+    /// How many bytes of its client's stream a seat takes now: none while half a second of them waits for the line.
+    fn room(&self, seat: usize) -> usize {
+        let Some(seat) = self.seats.get(seat) else {
+            return 0;
+        };
+        if matches!(seat.at, At::Inner(inner) if !inner.role.feeds()) {
+            return DROPPED;
+        }
+        let byte = self.link.byte_time().units().max(1);
+        let waiting = seat.sent_by.since(self.link.now());
+        let room = WAITING.saturating_sub(waiting).units() / byte;
+        usize::try_from(room).unwrap_or(usize::MAX)
+    }
+
+    /// Takes bytes of a client's stream, which leave one after another behind those still to be sent. Of a client that
+    /// only listens they are dropped.
+    ///
+    /// # Errors
+    /// The first byte that is no mark where one must stand; it is dropped, and the others are taken.
+    fn receive(&mut self, seat: usize, bytes: &[u8]) -> Result<(), BadMark> {
+        let Some(seat) = self.seats.get_mut(seat) else {
+            return Ok(());
+        };
+        let mut read = Vec::with_capacity(bytes.len());
+        let mut wrong = Ok(());
+        for &byte in bytes {
+            match self.marks {
+                Marks::None => read.push(Received::good(byte)),
+                Marks::InBand => match seat.unmark.push(byte) {
+                    None => {}
+                    Some(Err(bad)) => wrong = wrong.and(Err(bad)),
+                    Some(Ok(byte)) => read.push(byte),
+                },
+            }
+        }
+        match seat.at {
+            At::Master(ring) => send(&mut self.link, seat, ring, &read),
+            At::Inner(Inner { ring, link, role }) if role.feeds() => {
+                for byte in read {
+                    seat.sent_by = self.link.feed(ring, link, byte);
+                }
+            }
+            At::Inner(_) => {}
+        }
+        wrong
+    }
+
+    /// Lets time pass up to the clock's time `clock`, in the rings as their pace is.
+    fn advance(&mut self, clock: Instant) {
+        self.clock = self.clock.max(clock);
+        let (from, to) = self.base;
+        let due = to + self.clock.since(from);
+        let most = self.link.now() + CATCH_UP;
+        self.link.run_until(due.min(most));
+        if due > most {
+            self.base = (self.clock, self.link.now());
+        }
+        if self.pace == Pace::Free {
+            self.leap();
+        }
+        self.fetch();
+    }
 
     /// What a seat has for its client.
-    pub fn transmit(&mut self, seat: usize) -> &[u8] {
+    fn transmit(&mut self, seat: usize) -> &[u8] {
         self.seats
             .get_mut(seat)
             .map_or(&[], |seat| seat.outbox.make_contiguous())
     }
 
     /// The first `count` bytes of that have been passed on.
-    pub fn transmitted(&mut self, seat: usize, count: usize) {
+    fn transmitted(&mut self, seat: usize, count: usize) {
         if let Some(seat) = self.seats.get_mut(seat) {
             let count = count.min(seat.outbox.len());
             seat.outbox.drain(..count);
@@ -333,15 +347,13 @@ impl Server {
     }
 
     /// How many bytes the client has lost because it did not read.
-    #[must_use]
-    pub fn lost(&self, seat: usize) -> u64 {
+    fn lost(&self, seat: usize) -> u64 {
         self.seats.get(seat).map_or(0, |seat| seat.lost)
     }
 
     /// When, by the clock, the next byte arrives at a master that may be waiting for it. The client cannot know what to send before it has
     /// this byte, so any delay in handing it over leaves the line idle.
-    #[must_use]
-    pub fn awaited(&self) -> Option<Instant> {
+    fn awaited(&self) -> Option<Instant> {
         let (from, to) = self.base;
         let soon = self.link.now() + AHEAD;
         let homes = self.seats.iter().filter_map(|seat| match seat.at {
@@ -352,8 +364,7 @@ impl Server {
     }
 
     /// When, by the clock, [`Self::advance`] is to be called again if nothing comes before.
-    #[must_use]
-    pub fn deadline(&self) -> Instant {
+    fn deadline(&self) -> Instant {
         if self.pace == Pace::Free && self.link.busy() {
             return self.clock;
         }
@@ -382,6 +393,10 @@ impl Server {
         }
         let next = next.map_or(idle, |next| on_clock(next).clamp(self.clock + batch, idle));
         next.min(exact).max(self.clock)
+    }
+
+    fn control(&mut self, line: &str) -> Option<Answer> {
+        Self::control(self, line)
     }
 }
 

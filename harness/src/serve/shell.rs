@@ -1,10 +1,10 @@
-//! The shell around a [`Server`]: one thread that waits for sockets, pseudo terminals, signals and the next deadline.
+//! The shell around a [`ServedBus`]: one thread that waits for sockets, pseudo terminals, signals and the next deadline.
 
 use super::clock::Clock;
 use super::control_stream::ControlStream;
 use super::place::{ControlPlace, ServedAt};
 use super::pty::{Change, Pty};
-use super::server::Server;
+use super::served::ServedBus;
 use super::tcp::{Tcp, Visitor};
 use crate::counted::counted;
 use crate::port::wake_on_time;
@@ -59,6 +59,9 @@ pub enum ServeError {
         /// How many rings there are.
         rings: usize,
     },
+    /// The bus has another medium than this way of serving.
+    #[error("this bus is not served in this way; see the help of sim")]
+    Medium,
     /// Other machines could reach it.
     #[error(
         "{address} can be reached from other machines, and whoever connects is the master: a loopback address such as 127.0.0.1 \
@@ -119,7 +122,7 @@ pub trait Host {
 ///
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
-pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, ServeError> {
+pub fn serve(server: impl ServedBus, job: &Job, host: &mut dyn Host) -> Result<End, ServeError> {
     let ending = Ending::by_signals().map_err(ServeError::Wait)?;
     serve_until(ending, server, job, host)
 }
@@ -130,15 +133,15 @@ pub fn serve(server: Server, job: &Job, host: &mut dyn Host) -> Result<End, Serv
 /// As [`serve`].
 pub(crate) fn serve_until(
     ending: Ending,
-    server: Server,
+    mut server: impl ServedBus,
     job: &Job,
     host: &mut dyn Host,
 ) -> Result<End, ServeError> {
     if job.places.len() != server.seats() {
-        let inner = server.seats() - server.rings();
+        let inner = server.seats() - server.masters();
         return Err(ServeError::Places {
             given: job.places.len().saturating_sub(inner),
-            rings: server.rings(),
+            rings: server.masters(),
         });
     }
     let mut ends = Vec::new();
@@ -155,7 +158,7 @@ pub(crate) fn serve_until(
     let mut shell = Shell {
         garbled: vec![false; ends.len()],
         losing: vec![false; ends.len()],
-        server,
+        server: &mut server,
         ends,
         control,
         host,
@@ -225,7 +228,7 @@ enum Seat {
 }
 
 struct Shell<'a> {
-    server: Server,
+    server: &'a mut dyn ServedBus,
     ends: Vec<Seat>,
     control: Option<ControlStream>,
     host: &'a mut dyn Host,
@@ -253,11 +256,7 @@ impl Shell<'_> {
                 }
                 Seat::Pty(pty) => pty.link().display().to_string(),
             };
-            let name = self.server.name(seat);
-            lines.push(match self.server.drives(seat) {
-                _ if seat >= self.server.rings() => format!("{name} at {place}"),
-                drives => format!("{name}: {} at {place}", counted(drives, "drive")),
-            });
+            lines.push(format!("{} at {place}", self.server.title(seat)));
         }
         let control = self.control.as_ref().and_then(ControlStream::address);
         lines.extend(control.map(|address| format!("control at {address}")));
@@ -290,7 +289,7 @@ impl Shell<'_> {
                 }
             }
             if ready && let Some(control) = &mut self.control {
-                let server = &mut self.server;
+                let server = &mut *self.server;
                 let obeyed = control.obey(self.host, &mut |line| server.control(line));
                 obeyed.map_err(ServeError::Output)?;
             }

@@ -34,7 +34,7 @@ fn until(stream: &mut impl Read, end: &str) -> String {
 /// Python-can, as a vehicle's controller would use it, over every way in.
 #[test]
 fn python_can_talks_to_a_drive() {
-    let Some(python) = crate::python::python_can("SLCAN and socketcand as it speaks them") else {
+    let Some(python) = crate::python::with("can", "SLCAN and socketcand as it speaks them") else {
         return;
     };
     let terminal = path("slcan-python");

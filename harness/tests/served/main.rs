@@ -3,6 +3,7 @@
 mod bench;
 #[path = "../common/debian.rs"]
 mod debian;
+mod dp;
 mod drives_on_can;
 #[path = "../common/edits.rs"]
 mod edits;

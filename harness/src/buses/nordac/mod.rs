@@ -4,4 +4,10 @@ pub(crate) mod deviations;
 pub mod language;
 pub(crate) mod manual;
 pub mod report;
+pub(crate) mod serve;
+#[cfg(test)]
+mod serve_tests;
 pub mod simulate;
+
+/// The GSD file: the unit master file of the manual.
+pub(crate) const GSD: &str = include_str!("nordac.gsd");

@@ -9,7 +9,9 @@ use harness_proto::profibus::BusRate;
 use harness_proto::time::Instant;
 use harness_sim::nordac::deviation::{Deviant, Deviation, MasterDeviation, MasterLine};
 use harness_sim::nordac::{self, Drive, Member};
-use harness_sim::octet_segment::{LineFaultAt, LineHost, LineStation, OctetSegment, Wish};
+use harness_sim::octet_segment::{
+    LineFault, LineFaultAt, LineHost, LineStation, OctetSegment, Wish,
+};
 use harness_sim::record::{Channel, Trace};
 use std::any::Any;
 use std::collections::VecDeque;
@@ -146,11 +148,19 @@ impl Bench {
     /// A bench with the slaves of a setup, all just switched on.
     #[must_use]
     pub fn new(setup: &Setup) -> Self {
+        Self::with_guests(setup, 0)
+    }
+
+    /// The same with this number of hosts more, behind the slaves.
+    #[must_use]
+    pub(super) fn with_guests(setup: &Setup, guests: usize) -> Self {
         let bench = Member::Host(LineHost::default());
+        let guests = (0..guests).map(|_| Member::Host(LineHost::default()));
         let slaves = setup.slaves.iter();
         let slave =
             |own: &SlaveSetup| Member::Drive(Box::new(own.drive(setup.rate, Instant::START)));
-        let stations = std::iter::once(bench).chain(slaves.map(slave)).collect();
+        let stations = std::iter::once(bench).chain(slaves.map(slave));
+        let stations = stations.chain(guests).collect();
         Self {
             line: OctetSegment::new(setup.rate.format(), stations),
             rate: setup.rate,
@@ -161,6 +171,44 @@ impl Bench {
             scheduled: VecDeque::new(),
             master: setup.master,
         }
+    }
+
+    /// The line, for what shares it.
+    pub(super) const fn line(&mut self) -> &mut OctetSegment<SegmentStation> {
+        &mut self.line
+    }
+
+    /// A client's host: the first client has the bench's own place, the others are behind the slaves.
+    pub(super) fn client(&mut self, client: usize) -> Option<&mut LineHost> {
+        let place = match client {
+            0 => BENCH,
+            _ => self.addresses.len() + client,
+        };
+        self.line.station_mut(place).host_mut()
+    }
+
+    /// A fault of the next octet or telegram, if its own has passed.
+    pub(super) fn not_passed(&self, placed: LineFaultAt) -> LineFaultAt {
+        let so_far = match placed.fault {
+            LineFault::Octet(_) => self.line.octets(),
+            LineFault::Telegram(_) => self.line.telegrams(),
+        };
+        if placed.station.is_some() || placed.number > so_far {
+            return placed;
+        }
+        let number = so_far + 1;
+        LineFaultAt { number, ..placed }
+    }
+
+    /// When something happens next.
+    pub(super) fn next_event(&self) -> Option<Instant> {
+        let scheduled = self.scheduled.front().map(|(at, _)| *at);
+        self.line.next_event().into_iter().chain(scheduled).min()
+    }
+
+    /// The time of the segment.
+    pub(super) const fn time(&self) -> Instant {
+        self.now
     }
 
     /// A parameter of a slave beside its bus; `None` if the slave does not have it.
@@ -209,7 +257,7 @@ impl Bench {
         self.origin + at.since_start()
     }
 
-    fn run_to(&mut self, at: Instant) {
+    pub(super) fn run_to(&mut self, at: Instant) {
         self.line.run_until(at);
         self.now = self.now.max(at);
         while let Some(&(at, fault)) = self.scheduled.front()
@@ -397,7 +445,6 @@ impl Link for Bench {
 impl Bench {
     /// A fault on the line, as a scenario writes it.
     fn words(&self, placed: &LineFaultAt) -> String {
-        use harness_sim::octet_segment::LineFault;
         let sender = match placed.station {
             None => String::new(),
             Some(BENCH) => "master ".to_owned(),

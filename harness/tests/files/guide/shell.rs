@@ -31,7 +31,7 @@ pub(super) fn differences(steps: &[Step], page: &str) -> String {
     let python = Mode::Needs(PYTHON_CAN.to_owned());
     let python = (steps.iter())
         .any(|step| matches!(step, Step::Command(mode, _) if *mode == python))
-        .then(|| crate::python::python_can(page))
+        .then(|| crate::python::with("can", page))
         .flatten();
     for (number, step) in steps.iter().enumerate() {
         match step {
@@ -68,7 +68,7 @@ fn wanted(mode: &Mode, page: &str) -> bool {
         return *mode == Mode::Run;
     };
     match tool.as_str() {
-        PYTHON_CAN => crate::python::python_can(page).is_some(),
+        PYTHON_CAN => crate::python::with("can", page).is_some(),
         tool => debian::has(tool, page),
     }
 }

@@ -4,6 +4,7 @@ mod against_reference;
 mod common;
 mod deviations;
 mod exchange;
+mod gsd;
 mod line;
 mod profirust;
 mod slave;

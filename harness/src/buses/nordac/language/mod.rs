@@ -1,6 +1,7 @@
 //! The words of the scenario language that belong to NORDAC inverters on PROFIBUS DP: slaves, telegrams, parameters, jobs.
 
 mod jobs;
+pub(crate) mod now;
 mod parse;
 pub mod plan;
 mod play;

@@ -30,6 +30,11 @@ bus: each frame goes through the arbitration and reaches the other clients. With
 the rate of the bus (S6 is 500 kbit/s) or none; with socketcand any name of a bus is taken. The header lines of --setup
 describe the drives: `rate 250`, `drive 1 profile fw472`, `drive 3 rx 210 tx 190`, `drive 1 input run low`.
 
+Slaves on PROFIBUS: `sim --bus nordac --slaves 8,9 --tcp 127.0.0.1:4200`, or --pty /tmp/master. Each --tcp or --pty is the
+place of a master; all share the segment and hear each other. A telegram of a client leaves behind 33 idle bits and
+without a gap, however the stream cuts it; octets that are no telegram leave as they are. The header lines of --setup
+describe the slaves: `rate 1500`, `slave 8 ppo 2`, `slave 8 parameter 1205 = 70.0Hz`, `slave 8 property ext-diag = always`.
+
 A control line is a line of the scenario language that sends no byte of the master. It takes effect at once:
   ! 1->0: flip 0                  a fault; `byte n` and times count from the start; if that byte has passed, the
                                   next byte is meant
@@ -41,6 +46,11 @@ On CAN:
   drive 1 input limit1 high       an event outside the bus
   ? drive 1 register 6E = 0       a check of a register
   state 1                         what the drive shows; `state 1 SPEED_ACTUAL 6E`: these registers
+On PROFIBUS:
+  ! slave 8 telegram 3: lost      a fault; bytes and telegrams count from the start
+  slave 8 fault on                an event outside the bus
+  ? slave 8 parameter 1202 = 100  a check of a parameter
+  state 8                         states of slave and inverter, and its frequency in 0.1 Hz
 The answer to each is one line: `ok` (and the state), `no: ` and what was found, or `error: ` and the reason.
 
 --tap and --cut take a link, `=`, and a place: a path (with a `/` in it) for a pseudo terminal, HOST:PORT for a socket.
@@ -56,10 +66,11 @@ Ends on SIGINT, SIGTERM, SIGHUP or SIGQUIT (exit code 130), after --for, or with
 #[command(group(ArgGroup::new("place").required(true).multiple(true)))]
 pub struct SimArguments {
     /// Serve a ring on a socket: HOST:PORT, port 0 for a free one. Only one client at a time. Give it twice for two rings, in their
-    /// order.
+    /// order. On PROFIBUS it is the place of a master.
     #[arg(long, value_name = "ADDRESS", group = "place")]
     pub tcp: Vec<String>,
-    /// Serve a ring on a pseudo terminal; this path is a symbolic link to it. Give it twice for two rings.
+    /// Serve a ring on a pseudo terminal; this path is a symbolic link to it. Give it twice for two rings. On PROFIBUS it is
+    /// the place of a master.
     #[arg(long, value_name = "PATH", group = "place", conflicts_with = "tcp")]
     pub pty: Vec<PathBuf>,
     /// Let a client listen on a link: `2->1=ADDRESS` or `2->1=PATH`. Bytes from the client are dropped.
@@ -200,6 +211,7 @@ fn inner(arguments: &SimArguments, sizes: &[u8]) -> Result<Vec<(Inner, ServedAt)
 pub(crate) fn sim(arguments: &SimArguments, output: &mut Output) -> Result<Exit, Failure> {
     let end = match arguments.frames.bus {
         Bus::Novobus => rings(arguments, output)?,
+        bus if buses::shares_octets(bus) => octets(bus, arguments, output)?,
         bus => frames(bus, arguments, output)?,
     };
     let end = end.map_err(|error| match error {
@@ -221,6 +233,72 @@ fn control(arguments: &SimArguments) -> Option<ControlPlace> {
     })
 }
 
+/// Options that a bus does not have, and what it has instead.
+fn refuse(bus: Bus, given: &[(&str, bool)], expected: &str) -> Result<(), Failure> {
+    match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) => Err(Failure::refused(format!(
+            "{option} is not for the bus {}; {expected} expected",
+            bus.name()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The header of `--setup`.
+fn header(arguments: &SimArguments) -> Result<Option<Source>, Failure> {
+    let header = arguments.rig.setup.as_deref().map(Source::read).transpose();
+    header.map_err(|error| Failure::File(error.into()))
+}
+
+/// How streams carry line errors.
+fn marks(arguments: &SimArguments) -> Marks {
+    match arguments.marks {
+        MarksForm::None => Marks::None,
+        MarksForm::InBand => Marks::InBand,
+    }
+}
+
+/// Where masters are served.
+fn places(arguments: &SimArguments) -> impl Iterator<Item = ServedAt> {
+    let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
+    let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
+    tcp.chain(pty)
+}
+
+/// Serves the drives of a shared line of octets: every place is a master's.
+fn octets(
+    bus: Bus,
+    arguments: &SimArguments,
+    output: &mut Output,
+) -> Result<Result<End, ServeError>, Failure> {
+    let others = [
+        ("--tap", !arguments.tap.is_empty()),
+        ("--cut", !arguments.cut.is_empty()),
+        ("--pace", arguments.pace != SimSpeed::Line),
+        ("--drives", arguments.frames.drives.is_some()),
+        (
+            "--slcan and --socketcand",
+            !arguments.frames.places().is_empty(),
+        ),
+        ("--rig", arguments.rig.rig.is_some()),
+    ];
+    refuse(
+        bus,
+        &others,
+        "--tcp or --pty, a place for each master, and --slaves",
+    )?;
+    let job = Job {
+        places: places(arguments).collect(),
+        control: control(arguments),
+        allow_remote: arguments.allow_remote,
+        once: arguments.once,
+        length: arguments.length,
+    };
+    let header = header(arguments)?;
+    let slaves = (arguments.frames.slaves.as_deref(), header.as_ref());
+    buses::serve_octets(bus, slaves, marks(arguments), &job, output).map_err(Failure::from)
+}
+
 /// Serves the drives of a bus of frames.
 fn frames(
     bus: Bus,
@@ -234,14 +312,14 @@ fn frames(
         ("--cut", !arguments.cut.is_empty()),
         ("--pace", arguments.pace != SimSpeed::Line),
         ("--marks", arguments.marks != MarksForm::None),
+        ("--slaves", arguments.frames.slaves.is_some()),
         ("--rig", arguments.rig.rig.is_some()),
     ];
-    if let Some((option, _)) = rings.iter().find(|(_, given)| *given) {
-        return Err(Failure::refused(format!(
-            "{option} is for a ring; with --bus {}, --slcan, --slcan-pty or --socketcand, and --drives expected",
-            bus.name()
-        )));
-    }
+    refuse(
+        bus,
+        &rings,
+        "--slcan, --slcan-pty or --socketcand, and --drives",
+    )?;
     let job = FrameJob {
         places: arguments.frames.places(),
         control: control(arguments),
@@ -249,15 +327,9 @@ fn frames(
         once: arguments.once,
         length: arguments.length,
     };
-    let header = arguments.rig.setup.as_deref().map(Source::read).transpose();
-    let header = header.map_err(|error| Failure::File(error.into()))?;
+    let header = header(arguments)?;
     let drives = (arguments.frames.drives, header.as_ref());
-    buses::serve_frames(bus, drives, &job, output)?.ok_or_else(|| {
-        Failure::refused(format!(
-            "the bus {} is not built yet; novobus or unitek expected",
-            bus.name()
-        ))
-    })
+    Ok(buses::serve_frames(bus, drives, &job, output)?)
 }
 
 /// Serves the rings of a simulated bench.
@@ -270,24 +342,23 @@ fn rings(
             "--slcan, --slcan-pty and --socketcand serve a CAN bus; --bus unitek expected with them",
         ));
     }
+    if arguments.frames.slaves.is_some() {
+        return Err(Failure::refused(
+            "--slaves are those of a PROFIBUS segment; --bus nordac expected with it",
+        ));
+    }
     let (plan, link) = rig::link(&arguments.rig, output)?;
     let pace = match arguments.pace {
         SimSpeed::Line => Pace::Line,
         SimSpeed::Free => Pace::Free,
     };
-    let marks = match arguments.marks {
-        MarksForm::None => Marks::None,
-        MarksForm::InBand => Marks::InBand,
-    };
-    let tcp = arguments.tcp.iter().cloned().map(ServedAt::Tcp);
-    let pty = arguments.pty.iter().cloned().map(ServedAt::Pty);
     let sizes: Vec<u8> = plan.rings.iter().map(|ring| ring.drives()).collect();
     let inner = inner(arguments, &sizes)?;
-    let mut server = Server::new(plan, link, pace, marks);
+    let mut server = Server::new(plan, link, pace, marks(arguments));
     inner.iter().for_each(|(inner, _)| server.add(*inner));
     let places = inner.into_iter().map(|(_, place)| place);
     let job = Job {
-        places: tcp.chain(pty).chain(places).collect(),
+        places: self::places(arguments).chain(places).collect(),
         control: control(arguments),
         allow_remote: arguments.allow_remote,
         once: arguments.once,

@@ -1,0 +1,186 @@
+//! The segment behind streams of clients, without I/O: how telegrams are known, line errors, several masters.
+
+use super::serve::{SegmentServer, bench};
+use crate::serve::{Marks, ServedBus};
+use harness_proto::time::{Instant, Span};
+
+const STATUS: [u8; 6] = [0x10, 0x08, 0x02, 0x49, 0x53, 0x16];
+const PRESENT: [u8; 6] = [0x10, 0x02, 0x08, 0x00, 0x0A, 0x16];
+const DIAGNOSIS: [u8; 11] = [0x68, 5, 5, 0x68, 0x88, 0x82, 0x6C, 0x3C, 0x3E, 0xF0, 0x16];
+
+struct Clients {
+    server: SegmentServer,
+    now: Instant,
+}
+
+impl Clients {
+    fn new(clients: usize, marks: Marks) -> Self {
+        let plan = bench(Some(&[8]), None).expect("a bench");
+        let mut server = SegmentServer::new(plan, clients, marks);
+        (0..clients).for_each(|seat| server.come(seat));
+        let now = Instant::START;
+        Self { server, now }
+    }
+
+    fn pass(&mut self, time: Span) {
+        self.now += time;
+        self.server.advance(self.now);
+    }
+
+    fn send(&mut self, seat: usize, octets: &[u8]) {
+        self.server.receive(seat, octets).expect("no wrong mark");
+    }
+
+    /// Nothing comes within 10 ms.
+    fn hears_nothing(&mut self, seat: usize) -> bool {
+        self.heard(seat).is_empty()
+    }
+
+    /// What comes within 10 ms.
+    fn heard(&mut self, seat: usize) -> Vec<u8> {
+        self.pass(Span::from_millis(10));
+        let octets = self.server.transmit(seat).to_vec();
+        self.server.transmitted(seat, octets.len());
+        octets
+    }
+}
+
+/// A telegram is whole however it is cut, and two in one piece are two.
+#[test]
+fn telegrams_are_known_by_their_octets() {
+    let mut clients = Clients::new(1, Marks::None);
+    for cut in 0..STATUS.len() {
+        clients.send(0, &STATUS[..cut]);
+        assert!(clients.hears_nothing(0), "{cut}");
+        clients.send(0, &STATUS[cut..]);
+        assert_eq!(clients.heard(0), PRESENT, "{cut}");
+    }
+    clients.send(0, &[STATUS, STATUS].concat());
+    assert_eq!(clients.heard(0), [PRESENT, PRESENT].concat());
+}
+
+/// What is no telegram is on the line as it came and is not answered; a telegram behind it is.
+#[test]
+fn what_is_no_telegram_is_not_answered() {
+    for garbage in [
+        &[0x00][..],
+        &[0xFF, 0x16, 0xE5],
+        &[0x10, 0x08, 0x02, 0x49, 0x54, 0x16],
+        &[0x68, 0x05, 0x06, 0x68],
+        &[0x68, 0xFF],
+        &[
+            0x68, 0x05, 0x05, 0x68, 0x88, 0x82, 0x6C, 0x3C, 0x3E, 0xF1, 0x16,
+        ],
+        &[0xDC, 0x03, 0x02],
+    ] {
+        let mut clients = Clients::new(2, Marks::None);
+        clients.send(0, garbage);
+        assert!(clients.hears_nothing(0), "{garbage:X?}");
+        clients.send(0, &STATUS);
+        assert_eq!(clients.heard(0), PRESENT, "{garbage:X?}");
+        assert_eq!(
+            clients.heard(1),
+            [garbage, &STATUS[..], &PRESENT[..]].concat()
+        );
+        // In one piece too.
+        clients.send(0, &[garbage, &STATUS[..]].concat());
+        assert_eq!(clients.heard(0), PRESENT, "{garbage:X?}");
+    }
+}
+
+/// The begin of a telegram that does not go on leaves after 20 ms, and nothing waits for ever.
+#[test]
+fn a_telegram_that_does_not_go_on() {
+    let mut clients = Clients::new(2, Marks::None);
+    clients.send(0, &STATUS[..4]);
+    assert!(clients.hears_nothing(1));
+    assert!(clients.server.deadline() <= clients.now + Span::from_millis(10));
+    clients.pass(Span::from_millis(10));
+    assert_eq!(clients.heard(1), STATUS[..4]);
+    clients.send(0, &STATUS[4..]);
+    assert!(clients.hears_nothing(0));
+    clients.pass(Span::from_millis(30));
+    clients.send(0, &STATUS);
+    assert_eq!(clients.heard(0), PRESENT);
+}
+
+/// With marks an octet goes out with wrong parity, and the slave does not answer (EN 1).
+#[test]
+fn marks_carry_parity_errors() {
+    let mut clients = Clients::new(2, Marks::InBand);
+    let [a, b, c, d, e, f] = STATUS;
+    clients.send(0, &[a, b, 0xFF, 0x00, c, d, e, f]);
+    assert!(clients.hears_nothing(0));
+    let heard = clients.heard(1);
+    assert_eq!(heard, [a, b, 0xFF, 0x00, c, d, e, f]);
+    clients.send(0, &STATUS);
+    assert_eq!(clients.heard(0), PRESENT);
+}
+
+/// At 500 kbit/s a reply begins 11 bits behind its request, and 33 idle bits stand in front of the request.
+#[test]
+fn times_are_those_of_the_line() {
+    let mut clients = Clients::new(1, Marks::None);
+    clients.send(0, &DIAGNOSIS);
+    // 33 + 11 x 11 + 11 bits, and the first octet of the reply, at 2 us a bit.
+    let first = Span::from_micros(2 * (33 + 121 + 11 + 11));
+    clients.pass(first.saturating_sub(Span::from_micros(1)));
+    assert!(clients.server.transmit(0).is_empty());
+    clients.pass(Span::from_micros(1));
+    assert_eq!(clients.server.transmit(0), [0x68]);
+}
+
+/// A client that sends more than the line carries is held back, and one that does not read loses octets that are counted.
+#[test]
+fn memory_is_bounded() {
+    let mut clients = Clients::new(1, Marks::None);
+    let mut taken = 0;
+    while clients.server.room(0) >= STATUS.len() && taken < 1_000_000 {
+        clients.send(0, &STATUS);
+        taken += STATUS.len();
+    }
+    assert!(taken < 30_000, "{taken}");
+    for _ in 0..1000 {
+        clients.send(0, &STATUS);
+        clients.pass(Span::from_millis(50));
+    }
+    assert!(clients.server.transmit(0).len() <= 64 << 10);
+    for _ in 0..12_000 {
+        clients.send(0, &STATUS);
+        clients.pass(Span::from_millis(1));
+    }
+    assert!(clients.server.lost(0) > 0);
+    assert!(clients.server.transmit(0).len() <= 64 << 10);
+}
+
+/// The header's slaves are there beside those of the command line; without either there is slave 8.
+#[test]
+fn slaves_of_header_and_command_line() {
+    use crate::scenario::source::Source;
+    let header = Source {
+        name: "setup".to_owned(),
+        text: "slave 9 ppo 2\nslave 20 parameter 1621 = 3\nrate 1500\n".into(),
+    };
+    let addresses = |plan: &crate::scenario::plan::Plan<super::language::Nordac>| {
+        let slaves = plan.setup.slaves.iter();
+        slaves.map(|own| own.address).collect::<Vec<_>>()
+    };
+    let plan = bench(Some(&[8, 20]), Some(&header)).expect("a bench");
+    assert_eq!(addresses(&plan), [8, 20, 9]);
+    assert_eq!(plan.setup.rate.name(), "1500");
+    assert_eq!(addresses(&bench(None, None).expect("a bench")), [8]);
+    assert_eq!(
+        addresses(&bench(None, Some(&header)).expect("a bench")),
+        [9, 20]
+    );
+    let mut server = SegmentServer::new(plan, 1, Marks::None);
+    for (line, answer) in [
+        ("? slave 8 parameter 1621 = 2", "ok"),
+        ("? slave 20 parameter 1621 = 3", "ok"),
+        ("? slave 9 parameter 1621 = 0", "ok"),
+    ] {
+        let found = server.control(line).expect("an answer").to_string();
+        assert_eq!(found, answer, "{line}");
+    }
+    assert_eq!(server.control("  # nothing"), None);
+}
