@@ -273,12 +273,12 @@ pub(crate) fn judge_frames(
     unitek::capture::judged(traces, setup)
 }
 
-/// The dissector of a bus for Wireshark; `None` if it is not built.
-pub(crate) fn dissector(bus: Bus) -> Option<String> {
+/// The dissector of a bus for Wireshark.
+pub(crate) fn dissector(bus: Bus) -> String {
     match bus {
-        Bus::Novobus => Some(novobus::report::DISSECTOR.to_owned()),
-        Bus::Unitek => Some(unitek::dissector::dissector()),
-        Bus::Nordac => None,
+        Bus::Novobus => novobus::report::DISSECTOR.to_owned(),
+        Bus::Unitek => unitek::dissector::dissector(),
+        Bus::Nordac => nordac::dissector::dissector(),
     }
 }
 
@@ -305,7 +305,7 @@ pub(crate) enum SharedForm {
     Pcapng,
 }
 
-/// Writes traces of a shared line. Only frames have a log of candump and a capture for Wireshark.
+/// Writes traces of a shared line. Only frames have a log of candump.
 ///
 /// # Errors
 /// Those of `out`.
@@ -319,11 +319,24 @@ pub(crate) fn write_shared(
             nordac::report::json::write(Bus::Nordac, traces, out)
         }
         (SharedForm::Csv, Some(Bus::Nordac)) => nordac::report::csv::write(traces, out),
+        (SharedForm::Pcapng, Some(Bus::Nordac)) => nordac::report::pcapng::write(traces, out),
         (SharedForm::Json, _) => unitek::report::json::write(Bus::Unitek, traces, out),
         (SharedForm::Candump, _) => unitek::report::json::candump(traces, out),
         (SharedForm::Csv, _) => unitek::report::csv::write(traces, out),
         (SharedForm::Pcapng, _) => crate::report::pcapng_frames::write(traces, out),
     }
+}
+
+/// Compares the telegrams of two runs, and says whether they are the same, and how they differ; `None` unless both are octets of a shared
+/// line. Times may differ by `tolerance`.
+pub(crate) fn telegram_difference(
+    [left, right]: [&[Trace]; 2],
+    tolerance: Span,
+    names: [&str; 2],
+) -> Option<(bool, String)> {
+    let telegrams = [left, right].map(|own| shared(own) == Some(Bus::Nordac));
+    let found = nordac::report::diff::difference(left, right, tolerance);
+    (telegrams == [true; 2]).then(|| (found.is_none(), found.show(names)))
 }
 
 /// Runs a command on drives, in the words of the bus of its bench.

@@ -193,8 +193,8 @@ pub(crate) fn fits_bus(format: TraceFormat, traces: &[Trace], output: &mut Outpu
         (true, _, format) if OF_RINGS.contains(&format) => {
             format!("`--format {name}` shows bytes of a ring, and this bus carries frames; use table, json, csv, candump or pcapng")
         }
-        (false, true, format) if OF_RINGS.contains(&format) || format == TraceFormat::Pcapng => {
-            format!("`--format {name}` shows bytes of a ring, and the stations of this bus share one line; use table, json or csv")
+        (false, true, format) if OF_RINGS.contains(&format) => {
+            format!("`--format {name}` shows bytes of a ring, and the stations of this bus share one line; use table, json, csv or pcapng")
         }
         (false, _, TraceFormat::Candump) => {
             "`--format candump` shows frames of CAN, and this bus carries bytes; use table, json or csv".to_owned()

@@ -72,13 +72,63 @@ fn traces_for_spreadsheets() {
 /// What is no form of a bus is refused, and says which forms are.
 #[test]
 fn forms_of_another_bus_are_refused() {
-    for form in ["svg", "vcd", "candump"] {
+    for form in ["svg", "vcd"] {
         let (code, _, complaint) = run(&["trace", "nordac-3.3-start-up", "--format", form]);
         assert!(
-            code == 2 && complaint.contains("use table, json or csv"),
+            code == 2 && complaint.contains("use table, json, csv"),
             "{complaint}"
         );
     }
+}
+
+/// Link type 250: an interface a station, a packet a telegram, with its line error in the header and in a comment.
+#[test]
+fn traces_for_wireshark() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nordac.pcapng");
+    let name = path.to_str().expect("a name");
+    let trace = [
+        "trace",
+        "nordac-en-1-parity-3",
+        "--format",
+        "pcapng",
+        "-o",
+        name,
+    ];
+    assert_eq!(run(&trace).0, 0);
+    let bytes = std::fs::read(&path).expect("a capture");
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("a word"));
+    let (mut at, mut blocks) = (0, Vec::new());
+    while at < bytes.len() {
+        let length = word(at + 4) as usize;
+        assert_eq!(
+            word(at + length - 4) as usize,
+            length,
+            "both lengths of a block"
+        );
+        blocks.push((word(at), bytes[at..at + length].to_vec()));
+        at += length;
+    }
+    let kinds: Vec<_> = blocks.iter().map(|(kind, _)| *kind).collect();
+    assert_eq!(kinds, [0x0A0D_0D0A, 1, 1, 6, 6, 6]);
+    let has =
+        |block: usize, text: &[u8]| blocks[block].1.windows(text.len()).any(|own| own == text);
+    assert!(has(1, b"master") && has(2, b"slave 8"));
+    // Behind 28 bytes of the block and 8 of time: the event, and behind three zeros the octets.
+    let event = |block: usize| blocks[block].1[36];
+    assert_eq!([event(3), event(4), event(5)], [0x08, 0x02, 0x02]);
+    assert!(has(3, b"byte 3: parity") && has(4, &[0x10, 8, 2, 0x49, 0x53, 0x16]));
+}
+
+/// Two runs are compared telegram by telegram.
+#[test]
+fn runs_are_compared() {
+    let same = "nordac-en-2-services-wait-prm";
+    assert_eq!(run(&["diff", same, same]).0, 0);
+    let (code, text, _) = run(&["diff", same, "nordac-en-2-services-wait-cfg"]);
+    assert!(
+        code == 1 && text.contains("first difference: telegram 1 of"),
+        "{text}"
+    );
 }
 
 /// A line that is not met is shown with the whole telegram and those in front of it.
@@ -122,4 +172,77 @@ fn the_manual_of_this_bus() {
         !own.contains("nd21") && !own.contains("unitek App"),
         "{own}"
     );
+}
+
+/// The fields of each telegram of a start-up, as tshark shows them: service, PPO type, state, process words, parameter.
+#[test]
+fn tshark_reads_telegrams() {
+    if !crate::debian::has("tshark", "telegrams of NORDAC inverters") {
+        return;
+    }
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let [capture, script, scenario] =
+        ["nordac-seen.pcapng", "nordac.lua", "nordac-seen.scn"].map(|name| {
+            let path = folder.join(name);
+            path.to_str().expect("a name").to_owned()
+        });
+    let text = "title a\nbus nordac\nslave 8\nslave 8 parameter 1621 = 2\nstart 8\nexchange 8 STW=047E\n\
+                exchange 8 PKW=14B2000000000000 STW=047F HSW=50%\nexchange 8 PKW=14B2000000000000\n\
+                exchange 8 PKW=14B2000000000000\n> 10 08 02 49 53 16 bad 2\n";
+    std::fs::write(&scenario, text).expect("a file");
+    let trace = ["trace", &scenario, "--format", "pcapng", "-o", &capture];
+    assert_eq!(run(&trace).0, 0);
+    let (code, dissector, _) = run(&["dissector", "--bus", "nordac"]);
+    assert_eq!(code, 0);
+    std::fs::write(&script, dissector).expect("a file");
+    let mut command = Command::new("tshark");
+    command.args(["-X", &format!("lua_script:{script}"), "-r", &capture]);
+    command.args([
+        "-d",
+        "rtacser.data,nordac",
+        "-T",
+        "fields",
+        "-E",
+        "separator=|",
+    ]);
+    let fields = [
+        "frame.interface_name",
+        "nordac.service",
+        "nordac.kind",
+        "nordac.ppo",
+        "nordac.state",
+        "nordac.percent",
+        "nordac.name",
+        "nordac.value",
+        "nordac.status",
+    ];
+    command.args(fields.iter().flat_map(|field| ["-e", field]));
+    let output = command.output().expect("it is there");
+    let rows = String::from_utf8(output.stdout).expect("text");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        !rows.contains("Lua Error") && !errors.contains("Lua:"),
+        "{rows}{errors}"
+    );
+    let rows: Vec<_> = rows.lines().collect();
+    let expected = [
+        "master|Slave_Diag|SRD low||||||ok",
+        "slave 8|Slave_Diag|DL||||||ok",
+        "master|Set_Prm|SRD low||||||ok",
+        "slave 8|Set_Prm|||||||ok",
+        "master|Chk_Cfg|SRD low||||||ok",
+        "slave 8|Chk_Cfg|||||||ok",
+        "master|Slave_Diag|SRD low||||||ok",
+        "slave 8|Slave_Diag|DL||||||ok",
+        "master|Data_Exchange|SRD high|1||0.0 %|||ok",
+        "slave 8|Data_Exchange|DL|1|SD|0.0 %|||ok",
+        "master|Data_Exchange|SRD high|1||50.0 %|Accel. time||ok",
+        "slave 8|Data_Exchange|DL|1|RDY|0.0 %|||ok",
+        "master|Data_Exchange|SRD high|1||50.0 %|Accel. time||ok",
+        "slave 8|Data_Exchange|DL|1|OE|0.0 %|||ok",
+        "master|Data_Exchange|SRD high|1||50.0 %|Accel. time||ok",
+        "slave 8|Data_Exchange|DL|1|OE|0.0 %|Accel. time|5.00 s|ok",
+        "master||||||||parity",
+    ];
+    assert_eq!(rows, expected, "{errors}");
 }

@@ -1,6 +1,7 @@
 //! NORDAC *vector* inverters on PROFIBUS DP: their words in a scenario, simulated slaves, tables and pictures.
 
 pub(crate) mod deviations;
+pub(crate) mod dissector;
 pub mod language;
 pub(crate) mod manual;
 pub mod report;

@@ -156,6 +156,18 @@ fn damaged_telegrams_are_not_answered() {
     }
 }
 
+/// Words of the reply may stand without the arrow; the writer puts it there.
+#[test]
+fn an_exchange_without_an_arrow() {
+    let lines = "slave 8\nstart 8\nexchange 8 STW=047E ZSW=0970 HSW=0% HIW=0000\n";
+    passes(lines);
+    let scenario: Scenario<Nordac> =
+        parse(&source(&format!("{HEADER}{lines}"))).expect("a scenario");
+    let written = write(&scenario);
+    let expected = "exchange 8 STW=047E HSW=0% -> ZSW=0970 HIW=0000\n";
+    assert!(written.ends_with(expected), "{written}");
+}
+
 /// Faults of octets and telegrams are counted over all stations, or those of one.
 #[test]
 fn faults_on_the_line() {

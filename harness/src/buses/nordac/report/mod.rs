@@ -2,7 +2,9 @@
 
 pub mod csv;
 pub(crate) mod curves;
+pub mod diff;
 pub mod json;
+pub mod pcapng;
 pub(crate) mod sequence;
 pub mod table;
 mod telegrams;

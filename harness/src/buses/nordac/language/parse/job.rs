@@ -101,11 +101,17 @@ fn start(scanner: &mut Scanner<'_>) -> Result<JobKind, Problem> {
 
 /// `STW=047F HSW=50% -> ZSW=0F37 HIW=50%`
 fn exchange(scanner: &mut Scanner<'_>) -> Result<JobKind, Problem> {
-    let mut send = Vec::new();
+    let (mut send, mut expect) = (Vec::new(), Vec::new());
     while !scanner.at_end() && !scanner.eat("->") {
-        send.push(word(scanner, &SENT)?);
+        // ZSW and HIW stand in replies only, so they need no arrow in front.
+        let reply = ["ZSW", "HIW"]
+            .iter()
+            .any(|name| scanner.rest().starts_with(name));
+        match reply {
+            true => expect.push(word(scanner, &RECEIVED)?),
+            false => send.push(word(scanner, &SENT)?),
+        }
     }
-    let mut expect = Vec::new();
     while !scanner.at_end() {
         expect.push(word(scanner, &RECEIVED)?);
     }
