@@ -34,25 +34,29 @@ fn colour(class: CaseClass) -> String {
 /// How many cases there are of each class.
 type Counts = BTreeMap<CaseClass, u64>;
 
-/// The page of campaigns that were played.
+/// The page of campaigns that were played; those of frames as sections, which stand behind the others.
 #[must_use]
-pub fn campaigns(all: &[PlayedCampaign]) -> String {
+pub fn campaigns(all: &[PlayedCampaign], of_frames: Vec<Section>) -> String {
     let mut front = Html::new();
     front.element("section", &[("aria-labelledby", &"summary")], |html| {
         html.line("h2", &[("id", &"summary")], "Summary");
-        summary(html, all);
+        if !all.is_empty() {
+            summary(html, all);
+        }
         html.line(
             "p",
             &[],
             "A case is a conversation played with one fault, or two. A map shows the gravest class of all cases at a place.",
         );
-        letters(html);
+        if !all.is_empty() {
+            letters(html);
+        }
     });
-    let sections: Vec<_> = all
+    let of_rings = all
         .iter()
         .enumerate()
-        .map(|(number, one)| section(number + 1, one))
-        .collect();
+        .map(|(number, one)| section(number + 1, one));
+    let sections: Vec<_> = of_rings.chain(of_frames).collect();
     page("drivebench: campaigns of faults", &front, &sections)
 }
 

@@ -383,7 +383,7 @@ pub struct CampaignArguments {
     /// Show the cases of this class, one per line.
     #[arg(long, value_name = "CLASS", value_enum)]
     pub only: Option<ClassName>,
-    /// Print a scenario that replays this case, LINK:BYTE:WHAT, such as 98->97:10:0.
+    /// Print a scenario that replays this case of a campaign on a ring, LINK:BYTE:WHAT, such as 98->97:10:0.
     #[arg(long, value_name = "CASE", conflicts_with_all = ["only", "format"])]
     pub case: Option<String>,
     /// Write the report into this file, as one HTML page.

@@ -6,7 +6,7 @@ use super::output::Output;
 use super::page::{writable, write};
 use super::run::progress_bar;
 use crate::campaign::find::{FindCampaignError, find, names};
-use crate::campaign::frames::{self, FrameCampaign};
+use crate::campaign::frames::{self, FrameCampaign, FrameClass, PlayedFrames};
 use crate::campaign::replay::scenario;
 use crate::campaign::report::{json, line, table};
 use crate::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign};
@@ -50,19 +50,8 @@ pub(crate) fn campaign(
             }
         }
     }
-    let rings_only =
-        arguments.only.is_some() || arguments.html.is_some() || arguments.case.is_some();
-    if rings_only && campaigns.is_empty() && !of_frames.is_empty() {
-        output.complain("--only, --case and --html show campaigns of rings; for one of frames use --format json, which lists every case");
-        return Ok(Exit::Usage);
-    }
-    if rings_only && !of_frames.is_empty() {
-        output.say(
-            "campaigns of frames are left out: --only, --case and --html show those of rings\n",
-        );
-    }
     if let Some(name) = &arguments.case {
-        return replay(name, &campaigns, output);
+        return replay(name, &campaigns, &of_frames, output);
     }
     if let Some(path) = &arguments.html
         && writable(path, output).is_err()
@@ -89,43 +78,58 @@ pub(crate) fn campaign(
             }
         }
     }
-    let mut listed = json(&all, arguments.only.map(CaseClass::from));
+    let mut listed = json(&all, arguments.only.and_then(ClassName::of_rings));
     let mut differs = all.iter().any(|finished| !finished.differs().is_empty());
-    if !rings_only {
-        differs |= play_frames(&of_frames, arguments.format, &mut listed, output)?;
-    }
+    let played = play_frames(&of_frames, arguments, &mut listed, output)?;
+    differs |= played.iter().any(|own| !own.differs().is_empty());
     if arguments.format == TableFormat::Json {
         output.result(&format!("{listed}\n"))?;
     }
     if let Some(path) = &arguments.html
-        && !write(path, &crate::campaign::campaigns(&all), output)
+        && !write(path, &campaigns_page(&all, &played), output)
     {
         return Ok(Exit::RigError);
     }
     Ok(if differs { Exit::Failed } else { Exit::Passed })
 }
 
-/// Plays campaigns of frames; gives whether a pinned figure is not met.
-fn play_frames(
-    campaigns: &[FrameCampaign],
-    format: TableFormat,
+fn campaigns_page(all: &[PlayedCampaign], of_frames: &[PlayedFrames<'_>]) -> String {
+    let sections = (all.len() + 1..).zip(of_frames);
+    let sections = sections.map(|(number, own)| frames::section(number, own));
+    crate::campaign::campaigns(all, sections.collect())
+}
+
+/// Plays campaigns of frames, and shows them.
+fn play_frames<'c>(
+    campaigns: &'c [FrameCampaign],
+    arguments: &CampaignArguments,
     listed: &mut serde_json::Value,
     output: &mut Output,
-) -> std::io::Result<bool> {
-    let mut differs = false;
+) -> std::io::Result<Vec<PlayedFrames<'c>>> {
+    let mut all = Vec::new();
+    let only = arguments.only.map(ClassName::of_frames);
     for campaign in campaigns {
         let bar = progress_bar(campaign.cases.len(), output.progress);
         bar.set_message(campaign.name.clone());
         let played = campaign.run(&|done| bar.inc(done));
         bar.finish_and_clear();
-        differs |= !played.differs().is_empty();
-        if format == TableFormat::Table {
-            output.result(&(frames::table(&played) + "\n"))?;
-        } else if let Some(all) = listed["campaigns"].as_array_mut() {
-            all.push(frames::json(&played));
+        match (arguments.format, only) {
+            (TableFormat::Table, None) => output.result(&(frames::table(&played) + "\n"))?,
+            (TableFormat::Table, Some(class)) => {
+                let shown = class.map(|class| frames::only(&played, class));
+                output.result(&shown.unwrap_or_default())?;
+            }
+            (_, class) => {
+                // A class of rings leaves out the campaigns of frames.
+                let wanted = class != Some(None);
+                if let Some(list) = listed["campaigns"].as_array_mut().filter(|_| wanted) {
+                    list.push(frames::json(&played, class.flatten()));
+                }
+            }
         }
+        all.push(played);
     }
-    Ok(differs)
+    Ok(all)
 }
 
 /// How many threads there is room for.
@@ -134,11 +138,12 @@ fn cores() -> usize {
 }
 
 fn shown(finished: &PlayedCampaign, only: Option<ClassName>) -> String {
-    let Some(only) = only.map(CaseClass::from) else {
-        return table(finished) + "\n";
+    let only = match only.map(ClassName::of_rings) {
+        None => return table(finished) + "\n",
+        Some(only) => only,
     };
     let outcomes = finished.outcomes.iter();
-    let wanted = outcomes.filter(|outcome| outcome.class == only);
+    let wanted = outcomes.filter(|outcome| Some(outcome.class) == only);
     wanted
         .map(|outcome| line(outcome, finished.drives))
         .collect()
@@ -152,8 +157,19 @@ fn complain(error: &FindCampaignError, output: &mut Output) {
 }
 
 /// Prints the scenario of one case.
-fn replay(name: &str, campaigns: &[Campaign], output: &mut Output) -> std::io::Result<Exit> {
-    let [campaign] = campaigns else {
+fn replay(
+    name: &str,
+    campaigns: &[Campaign],
+    of_frames: &[FrameCampaign],
+    output: &mut Output,
+) -> std::io::Result<Exit> {
+    if campaigns.is_empty() && !of_frames.is_empty() {
+        output.complain(
+            "--case is for campaigns on rings; for one of frames --format json lists every case",
+        );
+        return Ok(Exit::Usage);
+    }
+    let ([campaign], []) = (campaigns, of_frames) else {
         output.complain("--case needs exactly one campaign; name the one that the case belongs to");
         return Ok(Exit::Usage);
     };
@@ -193,18 +209,39 @@ pub enum ClassName {
     Corrupted,
     /// Not noticed, and a value is wrong.
     SilentCorruption,
+    /// On a bus of frames: nothing is different.
+    Answered,
+    /// On a bus of frames: a request was repeated, and nothing else is different.
+    Retried,
+    /// On a bus of frames: the master reported the fault.
+    Noticed,
+    /// On a bus of frames: the master reported nothing, and something is wrong.
+    Unnoticed,
 }
 
-impl From<ClassName> for CaseClass {
-    fn from(name: ClassName) -> Self {
-        match name {
-            ClassName::Harmless => Self::Harmless,
-            ClassName::Located => Self::Located,
-            ClassName::Recovered => Self::Recovered,
-            ClassName::Mislocated => Self::Mislocated,
-            ClassName::NotRecovered => Self::NotRecovered,
-            ClassName::Corrupted => Self::Corrupted,
-            ClassName::SilentCorruption => Self::SilentCorruption,
-        }
+impl ClassName {
+    /// The class of campaigns on rings; `None` for one of frames.
+    const fn of_rings(self) -> Option<CaseClass> {
+        Some(match self {
+            Self::Harmless => CaseClass::Harmless,
+            Self::Located => CaseClass::Located,
+            Self::Recovered => CaseClass::Recovered,
+            Self::Mislocated => CaseClass::Mislocated,
+            Self::NotRecovered => CaseClass::NotRecovered,
+            Self::Corrupted => CaseClass::Corrupted,
+            Self::SilentCorruption => CaseClass::SilentCorruption,
+            Self::Answered | Self::Retried | Self::Noticed | Self::Unnoticed => return None,
+        })
+    }
+
+    /// The class of campaigns of frames; `None` for one on rings.
+    const fn of_frames(self) -> Option<FrameClass> {
+        Some(match self {
+            Self::Answered => FrameClass::Answered,
+            Self::Retried => FrameClass::Retried,
+            Self::Noticed => FrameClass::Noticed,
+            Self::Unnoticed => FrameClass::Unnoticed,
+            _ => return None,
+        })
     }
 }

@@ -120,7 +120,7 @@ fn wrong_usage_says_what_to_do() {
     }
 }
 
-/// Campaigns over frames stand beside those of rings; what shows rings only says so.
+/// Campaigns over frames stand beside those of rings, and can be shown in the same ways.
 #[test]
 fn campaigns_over_frames() {
     let frames = "unitek/5.3-no-read-back";
@@ -131,14 +131,27 @@ fn campaigns_over_frames() {
     let listed: Value = serde_json::from_str(&stdout(&listed)).expect("JSON");
     let cases = listed["campaigns"][0]["cases"].as_array();
     assert_eq!(cases.map(Vec::len), Some(248));
-    let alone = drivebench(&["campaign", frames, "--only", "located"]);
-    assert_eq!(alone.status.code(), Some(2));
+    let wrong = drivebench(&["campaign", frames, "--only", "unnoticed"]);
+    let lines = stdout(&wrong);
+    assert_eq!(
+        (wrong.status.code(), lines.lines().count()),
+        (Some(0), 5),
+        "{lines}"
+    );
     assert!(
-        stderr(&alone).contains("--format json"),
-        "{}",
-        stderr(&alone)
+        lines.lines().all(|line| line.starts_with("unnoticed ")),
+        "{lines}"
     );
     let both = drivebench(&["campaign", "9.6-single-bits", frames, "--only", "recovered"]);
     assert_eq!(both.status.code(), Some(0), "{}", stderr(&both));
-    assert!(stderr(&both).contains("are left out"), "{}", stderr(&both));
+    assert!(!stdout(&both).contains("unnoticed"), "{}", stdout(&both));
+    let case = drivebench(&["campaign", frames, "--case", "3:lost"]);
+    assert_eq!(case.status.code(), Some(2));
+    assert!(stderr(&case).contains("--format json"), "{}", stderr(&case));
+    let page = file("frames", "").with_file_name("frames.html");
+    let path = page.to_str().expect("plain");
+    let shown = drivebench(&["campaign", frames, "--html", path]);
+    assert_eq!(shown.status.code(), Some(0), "{}", stderr(&shown));
+    let page = std::fs::read_to_string(&page).expect("a page");
+    assert!(page.contains("Where: faults across, frames down"));
 }

@@ -5,11 +5,13 @@
 
 mod converse;
 pub mod file;
+mod html;
 mod report;
 
 pub use converse::{Conversation, JobEnd};
 pub use file::{FrameCampaignFile, Step};
-pub use report::{json, table};
+pub(crate) use html::section;
+pub use report::{json, only, table};
 
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};

@@ -32,9 +32,7 @@ pub fn table(played: &PlayedFrames<'_>) -> String {
             "  differs: {name} is {found}, the file pins {expected}"
         );
     }
-    let serious = |outcome: &&FrameOutcome| outcome.class >= FrameClass::Noticed;
-    let mut worst: Vec<_> = played.outcomes.iter().filter(serious).collect();
-    worst.sort_by_key(|outcome| std::cmp::Reverse(outcome.class));
+    let worst = serious(played);
     if !worst.is_empty() {
         text.push_str("\n  the worst\n");
     }
@@ -50,8 +48,32 @@ pub fn table(played: &PlayedFrames<'_>) -> String {
     text
 }
 
+/// The serious cases, the worst class first.
+pub(super) fn serious<'p>(played: &'p PlayedFrames<'_>) -> Vec<&'p FrameOutcome> {
+    let serious = |outcome: &&FrameOutcome| outcome.class >= FrameClass::Noticed;
+    let mut worst: Vec<_> = played.outcomes.iter().filter(serious).collect();
+    worst.sort_by_key(|outcome| std::cmp::Reverse(outcome.class));
+    worst
+}
+
+/// The cases of a class, one a line.
+#[must_use]
+pub fn only(played: &PlayedFrames<'_>, class: FrameClass) -> String {
+    let own = played.outcomes.iter().filter(|own| own.class == class);
+    let line = |own: &FrameOutcome| {
+        let name = own.case.to_string();
+        format!(
+            "{:10} {name:20} {:22} {}\n",
+            class.name(),
+            own.disturbed,
+            happened(own)
+        )
+    };
+    own.map(line).collect()
+}
+
 /// What happened in a case.
-fn happened(outcome: &FrameOutcome) -> String {
+pub(super) fn happened(outcome: &FrameOutcome) -> String {
     let played = &outcome.conversation;
     let jobs = played
         .ends
@@ -72,7 +94,7 @@ fn happened(outcome: &FrameOutcome) -> String {
 
 /// A campaign for tools.
 #[must_use]
-pub fn json(played: &PlayedFrames<'_>) -> Value {
+pub fn json(played: &PlayedFrames<'_>, only: Option<FrameClass>) -> Value {
     let campaign = played.campaign;
     let case = |outcome: &FrameOutcome| {
         let ends: Vec<_> = outcome
@@ -90,6 +112,8 @@ pub fn json(played: &PlayedFrames<'_>) -> Value {
         })
     };
     let count = |class: FrameClass| json!({ "class": class.name(), "cases": played.count(class) });
+    let wanted = |own: &&FrameOutcome| only.is_none_or(|only| own.class == only);
+    let shown = played.outcomes.iter().filter(wanted);
     let differs = played.differs().into_iter();
     let differs = differs.map(
         |(name, expected, found)| json!({ "class": name, "expected": expected, "found": found }),
@@ -101,6 +125,6 @@ pub fn json(played: &PlayedFrames<'_>) -> Value {
         "frames": campaign.frames(),
         "classes": FrameClass::ALL.map(count),
         "differs": differs.collect::<Vec<_>>(),
-        "cases": played.outcomes.iter().map(case).collect::<Vec<_>>(),
+        "cases": shown.map(case).collect::<Vec<_>>(),
     })
 }
