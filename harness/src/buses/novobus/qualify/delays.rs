@@ -1,7 +1,7 @@
 //! Bytes that a drive sends late each time, within the tolerance of the rig's file (ND21 8.2: every drive takes a byte time).
 //!
-//! A computer is late at any byte, and not at the same byte of every telegram. So the least lateness at a place of many equal telegrams is
-//! the drives' own. Where it rises by much from one byte to the next in the telegrams to one drive alone, that drive holds the byte back.
+//! A computer is late at any byte, and not at the same byte of most telegrams. Where the lateness rises by much from one byte to the next, at
+//! the same place of most telegrams to one drive and of hardly any to the others, that drive holds the byte back.
 
 use crate::buses::novobus::twin::Conversation;
 use harness_proto::novobus::address::RingSize;
@@ -19,9 +19,11 @@ const TELEGRAM: usize = 12;
 /// How many telegrams each drive must have had.
 const ENOUGH: usize = 16;
 
-/// From which delay on a drive is late, and below which the others are not.
+/// From which rise of the lateness on a byte is late.
 const LATE: Span = Span::from_millis(2);
-const IN_TIME: Span = Span::from_millis(1);
+
+/// How many quarters of the telegrams to a drive must have a late byte at the same place, and those to other drives none.
+const MOST_OF_THEM: usize = 3;
 
 /// A drive that holds a byte back each time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +61,7 @@ pub(super) fn held_back(drives: u8, byte_time: Span, conversation: &Conversation
         .map(|(sent, (came, _))| came.since(sent + way))
         .collect();
     let roles = roles(size, &sent);
-    let mut least: BTreeMap<u8, (usize, [Span; TELEGRAM])> = BTreeMap::new();
+    let mut telegrams: BTreeMap<u8, Vec<&[Span]>> = BTreeMap::new();
     for (telegram, late) in roles
         .chunks_exact(TELEGRAM)
         .zip(late.chunks_exact(TELEGRAM))
@@ -67,28 +69,29 @@ pub(super) fn held_back(drives: u8, byte_time: Span, conversation: &Conversation
         let Some(drive) = telegram.iter().find_map(|role| role.drive()) else {
             return Vec::new();
         };
-        let (count, least) = least.entry(drive).or_insert((0, [Span::MAX; TELEGRAM]));
-        *count += 1;
-        for (least, late) in least.iter_mut().zip(late) {
-            *least = (*least).min(*late);
-        }
+        telegrams.entry(drive).or_default().push(late);
     }
-    if least.values().any(|(count, _)| *count < ENOUGH) {
+    if telegrams.values().any(|own| own.len() < ENOUGH) {
         return Vec::new();
     }
-    let rise = |drive: u8, place: usize| {
-        let (_, least) = least[&drive];
-        least[place].saturating_sub(least[place - 1])
+    let rises = |drive: u8, place: usize| -> Vec<Span> {
+        let rises = telegrams[&drive]
+            .iter()
+            .map(|own| own[place].saturating_sub(own[place - 1]));
+        rises.filter(|rise| *rise >= LATE).collect()
     };
-    let places = (1..TELEGRAM).flat_map(|place| least.keys().map(move |drive| (place, *drive)));
+    let quarters =
+        |drive: u8, place: usize| rises(drive, place).len() * 4 / telegrams[&drive].len();
+    let places = (1..TELEGRAM).flat_map(|place| telegrams.keys().map(move |drive| (place, *drive)));
     let alone = |(place, drive): &(usize, u8)| {
-        let mut others = least.keys().filter(|other| *other != drive);
-        rise(*drive, *place) >= LATE && others.all(|other| rise(*other, *place) < IN_TIME)
+        let mut others = telegrams.keys().filter(|other| *other != drive);
+        quarters(*drive, *place) >= MOST_OF_THEM
+            && others.all(|other| quarters(*other, *place) == 0)
     };
     let held = places.filter(alone).map(|(place, drive)| HeldBack {
         drive,
         role: roles[place],
-        by: rise(drive, place),
+        by: rises(drive, place).into_iter().min().unwrap_or_default(),
     });
     held.filter(|own| own.role.drive().is_some()).collect()
 }
