@@ -51,7 +51,7 @@ pub(crate) trait SegmentRun {
 
 /// An attempt judged again from its record.
 #[derive(Clone, Debug)]
-pub(crate) struct JudgedAgain {
+pub(crate) struct RepeatedVerdict {
     /// Its outcome.
     pub(crate) outcome: Outcome,
     /// What was received before the scenario, in words.
@@ -76,5 +76,5 @@ pub(crate) trait SegmentJudge {
     ///
     /// # Errors
     /// The text is no scenario of this bus, in a sentence.
-    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<JudgedAgain, String>;
+    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String>;
 }

@@ -6,7 +6,7 @@ use crate::buses::Bus;
 use crate::buses::unitek::driver::{Driver, Error};
 use crate::link::{Line, Link, LinkEvent, Recording, Sink, Trouble};
 use crate::rig::port_file::Port;
-use crate::rig::segment::{JudgedAgain, OnSegment, SegmentJudge, SegmentRun};
+use crate::rig::segment::{OnSegment, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::rig::{Again, Attempt, End, Keeper, Options, Played, Rig, SessionError, attempts_of};
 use crate::scenario::parse;
 use crate::scenario::run::{Outcome, Skip};
@@ -242,7 +242,7 @@ impl Judge {
 
 impl Judge {
     /// Plays an attempt on the simulated rig again, behind those before it.
-    fn again(&mut self, own: &Own) -> Result<JudgedAgain, String> {
+    fn again(&mut self, own: &Own) -> Result<RepeatedVerdict, String> {
         let mut run = match self.run.take() {
             Some(run) => run,
             None => {
@@ -262,7 +262,7 @@ impl Judge {
         let attempt = run.attempt(own, &mut events);
         let trouble = run.trouble().is_some();
         self.run = Some(run);
-        Ok(JudgedAgain {
+        Ok(RepeatedVerdict {
             outcome: attempt.outcome,
             before: attempt.opening,
             left: None,
@@ -285,14 +285,14 @@ impl SegmentJudge for Judge {
         skip.map(Outcome::skipped)
     }
 
-    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<JudgedAgain, String> {
+    fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String> {
         let own = Own::read(source).map_err(|problems| problems.to_string())?;
         if self.rig.is_simulated() {
             return self.again(&own);
         }
         let mut replay = self.player.replay(events, self.tolerance);
         let (outcome, before) = self.player.attempt(&own, &mut replay);
-        Ok(JudgedAgain {
+        Ok(RepeatedVerdict {
             outcome,
             before: Some(before),
             left: replay.left(),
