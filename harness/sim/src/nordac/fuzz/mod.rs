@@ -4,12 +4,16 @@
 //! `corpora/fuzz/<target>/` keeps.
 
 mod cells;
+mod dp;
+mod fdl;
 mod heard;
 mod pkw;
 mod slave;
 mod telegrams;
 
 pub use cells::CELLS;
+pub use dp::dp;
+pub use fdl::fdl;
 pub use pkw::pkw;
 pub use slave::{slave, slave_counted};
 
@@ -17,10 +21,15 @@ use crate::fuzz::{FuzzTarget, InputPieces, Noting};
 use cells::Cell;
 
 /// Every target whose body is here.
-pub const TARGETS: [FuzzTarget; 2] = [("nordac-slave", slave), ("nordac-pkw", pkw)];
+pub const TARGETS: [FuzzTarget; 4] = [
+    ("nordac-slave", slave),
+    ("nordac-pkw", pkw),
+    ("nordac-fdl", fdl),
+    ("nordac-dp", dp),
+];
 
 /// The same, with what their inputs reach.
-pub const NOTING: [Noting; 2] = [
+pub const NOTING: [Noting; 4] = [
     Noting {
         name: "nordac-slave",
         body: slave::noted,
@@ -34,6 +43,18 @@ pub const NOTING: [Noting; 2] = [
         name: "nordac-pkw",
         body: pkw::noted,
         pieces: InputPieces::Bytes { head: 1, record: 9 },
+        of: None,
+    },
+    Noting {
+        name: "nordac-fdl",
+        body: fdl::noted,
+        pieces: InputPieces::Bytes { head: 0, record: 2 },
+        of: None,
+    },
+    Noting {
+        name: "nordac-dp",
+        body: dp::noted,
+        pieces: InputPieces::Bytes { head: 0, record: 1 },
         of: None,
     },
 ];

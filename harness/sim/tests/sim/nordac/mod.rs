@@ -1,6 +1,7 @@
 //! The NORDAC inverter and its PROFIBUS module on a shared line: printed telegrams, tables, and properties.
 
 mod against_reference;
+mod bodies;
 mod common;
 mod deviations;
 mod exchange;

@@ -1,0 +1,2 @@
+#![no_main]
+drivebench_fuzz::noting!("nordac-fdl");
