@@ -8,7 +8,7 @@ use harness_proto::profibus::dp::{CfgByte, Diagnosis, GlobalControl, SetPrm};
 /// The input as the data of every service: Set_Prm, Chk_Cfg, Slave_Diag, Global_Control, and Data_Exchange in each PPO type.
 ///
 /// # Panics
-/// What was read is written otherwise, or is read although it has no such length.
+/// What was read is not written as it was, or was read although it has no such length.
 pub fn dp(data: &[u8]) {
     noted(data, &mut Notebook::none());
 }
