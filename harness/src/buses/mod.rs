@@ -237,16 +237,20 @@ pub(crate) fn sender_of(frame: &Frame) -> Option<u8> {
     unitek::report::sender_of(frame)
 }
 
-/// A scenario that replays a capture of frames; `setup` describes the drives.
+/// A scenario that replays a capture of a shared line; `setup` describes the drives. `None` for a ring.
 ///
 /// # Errors
 /// It does not say enough of the drives, in a sentence.
-pub(crate) fn frame_scenario(
+pub(crate) fn shared_scenario(
     traces: &[Trace],
     title: &str,
     setup: Option<&Source>,
-) -> Result<String, String> {
-    unitek::capture::scenario(traces, title, setup)
+) -> Option<Result<String, String>> {
+    match shared(traces)? {
+        Bus::Unitek => Some(unitek::capture::scenario(traces, title, setup)),
+        Bus::Nordac => Some(nordac::capture::scenario(traces, title, setup)),
+        Bus::Novobus => None,
+    }
 }
 
 /// What came of judging a capture of frames.

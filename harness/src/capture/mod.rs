@@ -14,6 +14,7 @@ pub mod frame_diff;
 mod frames;
 pub mod fuzz;
 mod pcapng;
+mod telegrams;
 
 pub use crate::buses::novobus::capture::judge::{JudgeError, Judged, judge};
 pub use crate::buses::novobus::capture::scenario::{Options, SketchError, scenario};

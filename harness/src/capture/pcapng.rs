@@ -1,18 +1,24 @@
-//! Captures in pcapng, link types 250 and 227: those of [`crate::report::pcapng`], and those of others with one interface a link.
+//! Captures in pcapng, link types 250 and 227: those of [`crate::report::pcapng`], [`crate::report::pcapng_telegrams`] and
+//! [`crate::report::pcapng_frames`], and those of others with one interface a link or a station.
 //!
 //! Both orders of bytes, every resolution of time, several sections; blocks and options of other kinds are passed over. A
 //! packet may hold several bytes: the time is that of the first, the others follow without a gap. Where the first
 //! packet is later than a day, times count from a byte time before it.
 
 use super::frames::{FrameRead, Sender, assemble, packet};
+use super::telegrams::{self, DAY};
 use super::{Assembly, Capture, CaptureError, ends, line_byte};
 use crate::report::pcapng::{
     COMMENT, END, ERRORS, HEADER, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST, MAGIC,
     NANOSECONDS, PACKET, SECTION,
 };
 use crate::report::pcapng_frames;
+use crate::report::pcapng_telegrams::{PacketOctet, octet_time, octets, station};
 use harness_proto::can::BitRate;
 use harness_proto::line::{LineError, Rate};
+use harness_proto::profibus::BusRate;
+use harness_proto::profibus::rate::OCTET_BITS;
+use harness_proto::time::Span;
 
 /// Option of an interface: seconds to be added to its times.
 const IF_TSOFFSET: u16 = 14;
@@ -20,8 +26,8 @@ const IF_TSOFFSET: u16 = 14;
 const NO_BYTE: [u8; 2] = [0x00, 0x06];
 /// Events of a good byte: sent or received, begun or ended.
 const GOOD: std::ops::RangeInclusive<u8> = 0x01..=0x04;
-/// The longest time, in nanoseconds, that is one since the start, and not one since 1970: a day.
-const DAY: u64 = 86_400_000_000_000;
+/// The time of an octet on a line that all stations share, where no interface says its rate.
+const OCTET: Span = Span::from_units(BusRate::K500.bit_time().units() * OCTET_BITS);
 /// The most interfaces: two rings of 250 drives, and as many for each of some sections.
 const MAX_INTERFACES: usize = 65_536;
 
@@ -29,6 +35,8 @@ struct Interface {
     carries: Carries,
     resolution: u8,
     offset: i64,
+    /// The time of an octet at its rate.
+    octet: Option<Span>,
 }
 
 /// What an interface stands for.
@@ -36,6 +44,8 @@ struct Interface {
 enum Carries {
     /// A link of a ring: the ring, and the ends of the link.
     Link(usize, Option<u8>, Option<u8>),
+    /// What a station sends on a line that all stations share; `None` is the master.
+    Station(Option<u8>),
     /// Frames of a bus.
     Frames(Sender),
 }
@@ -59,6 +69,7 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
         speed: None,
         bit_rate: None,
         found: Vec::new(),
+        octets: Vec::new(),
         frames: Vec::new(),
     };
     let mut offset = 0;
@@ -70,20 +81,41 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
             what: "no interface is of link type 250 (RTAC serial) or 227 (CAN): captures of a ring have one of the former for each \
-                   link, named as in `98->97`"
+                   link, named as in `98->97`, and captures of PROFIBUS one for each station, named `master` or `slave 8`"
                 .to_owned(),
         });
     }
     let is_link = |own: &Interface| matches!(own.carries, Carries::Link(..));
-    let links = known.iter().flatten().filter(|own| is_link(own)).count();
-    if links == 0 {
-        return Ok(assemble(reader.frames, reader.bit_rate));
-    }
-    if !reader.frames.is_empty() {
+    let is_station = |own: &Interface| matches!(own.carries, Carries::Station(_));
+    let links = known.iter().flatten().any(is_link);
+    let stations = known.iter().flatten().any(is_station);
+    let kinds = [
+        (links, "bytes of a ring"),
+        (stations, "telegrams of PROFIBUS"),
+        (!reader.frames.is_empty(), "frames of CAN"),
+    ];
+    let mixed: Vec<_> = kinds.iter().filter(|own| own.0).map(|own| own.1).collect();
+    if let [one, other, ..] = mixed.as_slice() {
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
-            what: "it has frames of CAN and bytes of a ring: write them into two files".to_owned(),
+            what: format!("it has {one} and {other}: write them into two files"),
         });
+    }
+    if stations {
+        let own = known.iter().flatten();
+        let senders = own.clone().filter_map(|own| match own.carries {
+            Carries::Station(station) => Some(station),
+            Carries::Link(..) | Carries::Frames(_) => None,
+        });
+        let octet = own.clone().find_map(|own| own.octet);
+        return Ok(telegrams::assemble(
+            senders,
+            reader.octets,
+            octet.unwrap_or(OCTET),
+        ));
+    }
+    if !links {
+        return Ok(assemble(reader.frames, reader.bit_rate));
     }
     let byte_time = rate.or(reader.speed).unwrap_or_default().byte_time();
     let first = reader.found.iter().map(|byte| byte.nanos).min();
@@ -93,7 +125,7 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
     let mut assembly = Assembly::default();
     let link = |interface: &Option<Interface>| match interface.as_ref()?.carries {
         Carries::Link(ring, from, to) => Some((ring, from, to)),
-        Carries::Frames(_) => None,
+        Carries::Frames(_) | Carries::Station(_) => None,
     };
     for (ring, from, to) in known.iter().filter_map(link) {
         assembly.link(ring, from, to);
@@ -128,6 +160,7 @@ struct Reader<'b> {
     speed: Option<Rate>,
     bit_rate: Option<BitRate>,
     found: Vec<Byte>,
+    octets: Vec<(Option<u8>, PacketOctet)>,
     frames: Vec<FrameRead>,
 }
 
@@ -299,6 +332,7 @@ impl Reader<'_> {
                 carries,
                 resolution,
                 offset,
+                octet: None,
             }));
             return Ok(());
         }
@@ -309,21 +343,25 @@ impl Reader<'_> {
             );
         };
         let text = String::from_utf8_lossy(&self.bytes[from..to]);
-        let Some((ring, link_from, link_to)) = ends(text.trim_end_matches('\0')) else {
+        let text = text.trim_end_matches('\0');
+        let link = ends(text).map(|(ring, from, to)| Carries::Link(ring, from, to));
+        let alone = || station(text).map(Carries::Station);
+        let Some(carries) = link.or_else(alone) else {
             let text: String = text.chars().take(40).collect();
             return self.wrong(
                 from,
                 format!(
-                    "{text:?} is not a link of a ring: master->K, K->K-1 or 0->master is expected"
+                    "{text:?} is neither a link of a ring nor a station: master->K, K->K-1, 0->master, master or slave N is expected"
                 ),
             );
         };
         let known = speed.and_then(|speed| u32::try_from(speed).ok());
         self.speed = self.speed.or(known.and_then(Rate::from_bits_per_second));
         self.interfaces.push(Some(Interface {
-            carries: Carries::Link(ring, link_from, link_to),
+            carries,
             resolution,
             offset,
+            octet: speed.and_then(octet_time),
         }));
         Ok(())
     }
@@ -353,6 +391,10 @@ impl Reader<'_> {
         }
         let event = self.bytes[data + 8];
         let payload = data + HEADER..data + captured;
+        if let Carries::Station(from) = known.carries {
+            let octet = known.octet.unwrap_or(OCTET);
+            return self.telegram((data, captured, end), (from, nanos), octet);
+        }
         let mut comment = None;
         let options = data + captured.next_multiple_of(4);
         self.options((options, end), |code, from, to| {
@@ -362,6 +404,38 @@ impl Reader<'_> {
             Ok(())
         })?;
         self.bytes_of(data + 8, event, payload, (interface, nanos), comment)
+    }
+
+    /// The octets of a packet that holds a telegram.
+    fn telegram(
+        &mut self,
+        (data, captured, end): (usize, usize, usize),
+        (from, nanos): (Option<u8>, u64),
+        octet: Span,
+    ) -> Result<(), CaptureError> {
+        let event = self.bytes[data + 8];
+        if NO_BYTE.contains(&event) {
+            return Ok(());
+        }
+        let mut comment = String::new();
+        let options = data + captured.next_multiple_of(4);
+        self.options((options, end), |code, from, to| {
+            if code == COMMENT {
+                comment = format!(
+                    "{comment}, {}",
+                    String::from_utf8_lossy(&self.bytes[from..to])
+                );
+            }
+            Ok(())
+        })?;
+        let arrived = &self.bytes[data + HEADER..data + captured];
+        match octets((event, nanos), arrived, &comment, octet) {
+            Ok(octets) => self
+                .octets
+                .extend(octets.into_iter().map(|own| (from, own))),
+            Err(what) => return self.wrong(data + 8, what),
+        }
+        Ok(())
     }
 
     /// The frame of a packet.

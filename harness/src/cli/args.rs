@@ -307,7 +307,7 @@ pub struct TraceOutput {
 /// For `import`.
 #[derive(Clone, Debug, Args)]
 pub struct ImportArguments {
-    /// The capture: pcapng with one interface per link, named as in 98->97, or of CAN; the JSON of `trace`; the log of candump.
+    /// The capture: pcapng with one interface per link, named as in 98->97, of CAN, or of PROFIBUS; the JSON of `trace`; the log of candump.
     pub file: PathBuf,
     /// Show the capture in this format instead of comparing it.
     #[arg(long, value_enum, conflicts_with = "scenario")]

@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::buses::{self, Bus, JudgedFrames, carry_frames, telegram_difference};
+use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
     Capture, ComparedRun, Judged, Options, diff as compare, is_capture, judge, read_file, scenario,
@@ -19,6 +19,7 @@ use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use harness_sim::record::Trace;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -75,8 +76,8 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
             return Ok(Exit::Usage);
         }
     };
-    if carry_frames(&capture.traces) {
-        return frames(&capture, &title, setup.as_ref(), arguments, output);
+    if share_a_line(&capture.traces) {
+        return of_shared_line(&capture, &title, setup.as_ref(), arguments, output);
     }
     let options = Options {
         title: &title,
@@ -137,8 +138,8 @@ fn told(
     Ok(Exit::of(&[judged.verdict], false))
 }
 
-/// Judges frames, or makes a scenario of them.
-fn frames(
+/// Judges what a shared line carried, or makes a scenario of it.
+fn of_shared_line(
     capture: &Capture,
     title: &str,
     setup: Option<&Source>,
@@ -147,20 +148,28 @@ fn frames(
 ) -> std::io::Result<Exit> {
     let path = arguments.file.display();
     if !arguments.scenario {
-        return match buses::judge_frames(&capture.traces, setup) {
-            Ok(judged) => told(&judged, capture, title, output),
-            Err(error) => {
-                output.complain(&format!("{path}: {error}"));
-                Ok(Exit::Usage)
-            }
-        };
+        if carry_frames(&capture.traces) {
+            return match buses::judge_frames(&capture.traces, setup) {
+                Ok(judged) => told(&judged, capture, title, output),
+                Err(error) => {
+                    output.complain(&format!("{path}: {error}"));
+                    Ok(Exit::Usage)
+                }
+            };
+        }
+        output.complain(&format!(
+            "{path}: nothing compared: telegrams of PROFIBUS are not compared with a model; `--format table` shows them, `--scenario` makes \
+             a scenario of them that `drivebench run` plays, and `drivebench diff` compares them with another capture"
+        ));
+        return Ok(Exit::Usage);
     }
-    match buses::frame_scenario(&capture.traces, title, setup) {
-        Ok(text) => write_scenario(&text, arguments, output),
-        Err(error) => {
+    match buses::shared_scenario(&capture.traces, title, setup) {
+        Some(Ok(text)) => write_scenario(&text, arguments, output),
+        Some(Err(error)) => {
             output.complain(&format!("{path}: {error}"));
             Ok(Exit::Usage)
         }
+        None => Ok(Exit::Usage),
     }
 }
 
@@ -272,8 +281,8 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
         output.result(&text)?;
         return Ok(if same { Exit::Passed } else { Exit::Failed });
     }
-    match [&left, &right].map(|side| carry_frames(&side.traces)) {
-        [true, true] => {
+    match [&left, &right].map(|side| kind(&side.traces)) {
+        [FRAMES, FRAMES] => {
             let summary = frame_diff(&left, &right, span(arguments.tolerance));
             output.result(&summary.show([&names[0], &names[1]]))?;
             return Ok(match summary.same() {
@@ -281,9 +290,11 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
                 false => Exit::Failed,
             });
         }
-        [false, false] => {}
-        _ => {
-            output.complain("one side has frames of CAN and the other bytes of a ring; two of one kind expected");
+        [one, other] if one == other => {}
+        [one, other] => {
+            output.complain(&format!(
+                "one side has {one} and the other {other}; two of one kind expected"
+            ));
             return Ok(Exit::Usage);
         }
     }
@@ -304,6 +315,18 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
     } else {
         Exit::Failed
     })
+}
+
+/// What a capture of CAN is of.
+const FRAMES: &str = "frames of CAN";
+
+/// What a capture is of.
+fn kind(traces: &[Trace]) -> &'static str {
+    match (carry_frames(traces), share_a_line(traces)) {
+        (true, _) => FRAMES,
+        (false, true) => "telegrams of PROFIBUS",
+        (false, false) => "bytes of a ring",
+    }
 }
 
 /// A capture, or a scenario that is played.

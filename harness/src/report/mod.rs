@@ -6,6 +6,7 @@ pub mod mismatch;
 pub mod page;
 pub mod pcapng;
 pub mod pcapng_frames;
+pub(crate) mod pcapng_telegrams;
 pub mod vcd;
 
 /// How the one bus that is shown today reads its bytes, and its own tables and pictures.

@@ -16,6 +16,7 @@
 
 use crate::report::walk::in_time;
 use harness_proto::line::{LineError, Rate};
+use harness_proto::time::Instant;
 use harness_sim::record::LineByte;
 use harness_sim::record::{Channel, Trace};
 use std::io::Write;
@@ -88,24 +89,14 @@ pub fn write(traces: &[Trace], rate: Rate, mut out: impl Write) -> std::io::Resu
 }
 
 fn packet(block: &mut Block, link: usize, byte: &LineByte) {
-    let nanos = byte.at.since_start().as_nanos();
     let error = |(own, event): &(LineError, u8)| (byte.error == Some(*own)).then_some(*event);
     let event = match byte.received {
         None => LOST,
         Some(_) => ERRORS.iter().find_map(error).unwrap_or(RECEIVED),
     };
-    let seconds = u32::try_from(nanos / 1_000_000_000).unwrap_or(u32::MAX);
-    let micros = u32::try_from(nanos % 1_000_000_000 / 1_000).unwrap_or(0);
-    let length = u32::try_from(HEADER).unwrap_or(0) + u32::from(byte.received.is_some());
-    let [h0, h1, h2, h3, l0, l1, l2, l3] = nanos.to_be_bytes();
     block.begin(PACKET);
     block.put(&u32::try_from(link).unwrap_or(u32::MAX).to_le_bytes());
-    block.put(&[h3, h2, h1, h0, l3, l2, l1, l0]);
-    block.put(&length.to_le_bytes());
-    block.put(&length.to_le_bytes());
-    block.put(&seconds.to_be_bytes());
-    block.put(&micros.to_be_bytes());
-    block.put(&[event, 0, 0, 0]);
+    header(block, byte.at, event, usize::from(byte.received.is_some()));
     if let Some(byte) = byte.received {
         block.put(&[byte]);
         block.pad();
@@ -118,6 +109,21 @@ fn packet(block: &mut Block, link: usize, byte: &LineByte) {
         block.option(COMMENT, comment.as_bytes());
         block.option(END, &[]);
     }
+}
+
+/// The time and the lengths of a packet with this many bytes behind its header, and the header of the link type.
+pub(crate) fn header(block: &mut Block, at: Instant, event: u8, bytes: usize) {
+    let nanos = at.since_start().as_nanos();
+    let seconds = u32::try_from(nanos / 1_000_000_000).unwrap_or(u32::MAX);
+    let micros = u32::try_from(nanos % 1_000_000_000 / 1_000).unwrap_or(0);
+    let length = u32::try_from(HEADER + bytes).unwrap_or(0);
+    let [h0, h1, h2, h3, l0, l1, l2, l3] = nanos.to_be_bytes();
+    block.put(&[h3, h2, h1, h0, l3, l2, l1, l0]);
+    block.put(&length.to_le_bytes());
+    block.put(&length.to_le_bytes());
+    block.put(&seconds.to_be_bytes());
+    block.put(&micros.to_be_bytes());
+    block.put(&[event, 0, 0, 0]);
 }
 
 /// A link's name, as a scenario writes it.

@@ -115,8 +115,8 @@ fn traces_for_wireshark() {
     assert!(has(1, b"master") && has(2, b"slave 8"));
     // Behind 28 bytes of the block and 8 of time: the event, and behind three zeros the octets.
     let event = |block: usize| blocks[block].1[36];
-    assert_eq!([event(3), event(4), event(5)], [0x08, 0x02, 0x02]);
-    assert!(has(3, b"byte 3: parity") && has(4, &[0x10, 8, 2, 0x49, 0x53, 0x16]));
+    assert_eq!([event(3), event(4), event(5)], [0x08, 0x03, 0x04]);
+    assert!(has(3, b"byte 3 parity") && has(4, &[0x10, 8, 2, 0x49, 0x53, 0x16]));
 }
 
 /// Two runs are compared telegram by telegram.
@@ -172,77 +172,4 @@ fn the_manual_of_this_bus() {
         !own.contains("nd21") && !own.contains("unitek App"),
         "{own}"
     );
-}
-
-/// The fields of each telegram of a start-up, as tshark shows them: service, PPO type, state, process words, parameter.
-#[test]
-fn tshark_reads_telegrams() {
-    if !crate::debian::has("tshark", "telegrams of NORDAC inverters") {
-        return;
-    }
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let [capture, script, scenario] =
-        ["nordac-seen.pcapng", "nordac.lua", "nordac-seen.scn"].map(|name| {
-            let path = folder.join(name);
-            path.to_str().expect("a name").to_owned()
-        });
-    let text = "title a\nbus nordac\nslave 8\nslave 8 parameter 1621 = 2\nstart 8\nexchange 8 STW=047E\n\
-                exchange 8 PKW=14B2000000000000 STW=047F HSW=50%\nexchange 8 PKW=14B2000000000000\n\
-                exchange 8 PKW=14B2000000000000\n> 10 08 02 49 53 16 bad 2\n";
-    std::fs::write(&scenario, text).expect("a file");
-    let trace = ["trace", &scenario, "--format", "pcapng", "-o", &capture];
-    assert_eq!(run(&trace).0, 0);
-    let (code, dissector, _) = run(&["dissector", "--bus", "nordac"]);
-    assert_eq!(code, 0);
-    std::fs::write(&script, dissector).expect("a file");
-    let mut command = Command::new("tshark");
-    command.args(["-X", &format!("lua_script:{script}"), "-r", &capture]);
-    command.args([
-        "-d",
-        "rtacser.data,nordac",
-        "-T",
-        "fields",
-        "-E",
-        "separator=|",
-    ]);
-    let fields = [
-        "frame.interface_name",
-        "nordac.service",
-        "nordac.kind",
-        "nordac.ppo",
-        "nordac.state",
-        "nordac.percent",
-        "nordac.name",
-        "nordac.value",
-        "nordac.status",
-    ];
-    command.args(fields.iter().flat_map(|field| ["-e", field]));
-    let output = command.output().expect("it is there");
-    let rows = String::from_utf8(output.stdout).expect("text");
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        !rows.contains("Lua Error") && !errors.contains("Lua:"),
-        "{rows}{errors}"
-    );
-    let rows: Vec<_> = rows.lines().collect();
-    let expected = [
-        "master|Slave_Diag|SRD low||||||ok",
-        "slave 8|Slave_Diag|DL||||||ok",
-        "master|Set_Prm|SRD low||||||ok",
-        "slave 8|Set_Prm|||||||ok",
-        "master|Chk_Cfg|SRD low||||||ok",
-        "slave 8|Chk_Cfg|||||||ok",
-        "master|Slave_Diag|SRD low||||||ok",
-        "slave 8|Slave_Diag|DL||||||ok",
-        "master|Data_Exchange|SRD high|1||0.0 %|||ok",
-        "slave 8|Data_Exchange|DL|1|SD|0.0 %|||ok",
-        "master|Data_Exchange|SRD high|1||50.0 %|Accel. time||ok",
-        "slave 8|Data_Exchange|DL|1|RDY|0.0 %|||ok",
-        "master|Data_Exchange|SRD high|1||50.0 %|Accel. time||ok",
-        "slave 8|Data_Exchange|DL|1|OE|0.0 %|||ok",
-        "master|Data_Exchange|SRD high|1||50.0 %|Accel. time||ok",
-        "slave 8|Data_Exchange|DL|1|OE|0.0 %|Accel. time|5.00 s|ok",
-        "master||||||||parity",
-    ];
-    assert_eq!(rows, expected, "{errors}");
 }

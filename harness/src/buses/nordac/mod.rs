@@ -1,5 +1,6 @@
 //! NORDAC *vector* inverters on PROFIBUS DP: their words in a scenario, simulated slaves, tables and pictures.
 
+pub(crate) mod capture;
 pub(crate) mod deviations;
 pub(crate) mod dissector;
 pub mod language;

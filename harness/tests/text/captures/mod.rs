@@ -6,6 +6,7 @@ mod hostile;
 mod judged;
 mod program;
 mod round_trip;
+mod telegrams;
 mod tools;
 
 use harness::capture::Capture;

@@ -1,4 +1,4 @@
-//! How telegrams of PROFIBUS read: a row a telegram, JSON, CSV, a picture.
+//! How telegrams of PROFIBUS read: a row a telegram, JSON, CSV, a capture, a picture.
 
 pub mod csv;
 pub(crate) mod curves;
@@ -11,4 +11,6 @@ mod telegrams;
 mod words;
 
 pub use telegrams::{Said, said};
+pub(super) use telegrams::{TelegramRun, octets, runs};
+pub(super) use words::{CONTROL, PRM};
 pub use words::{ProcessImage, Reader};

@@ -3,6 +3,7 @@
 use harness_proto::decode::Decoded;
 use harness_proto::line::LineError;
 use harness_proto::profibus::Telegram;
+use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{LineByte, Trace};
 
@@ -33,7 +34,7 @@ impl Said {
 }
 
 /// The octets of all stations with their senders, in order of time.
-pub(super) fn octets(trace: &Trace) -> Vec<(Option<u8>, LineByte)> {
+pub(in crate::buses::nordac) fn octets(trace: &Trace) -> Vec<(Option<u8>, LineByte)> {
     let channels = trace.channels.iter();
     let all = channels.flat_map(|own| own.octets().iter().map(|octet| (own.from, *octet)));
     let mut all: Vec<_> = all.collect();
@@ -41,49 +42,85 @@ pub(super) fn octets(trace: &Trace) -> Vec<(Option<u8>, LineByte)> {
     all
 }
 
-/// The telegrams of a trace. An octet belongs to the one before it of its sender where no other station has sent between them, unless the line
-/// was idle: for one octet behind a complete telegram, and for T_SYN, three octets, behind any other.
-#[must_use]
-pub fn said(trace: &Trace) -> Vec<Said> {
+/// What a station sent without a pause: the octets that arrived, and those that did not.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::buses::nordac) struct TelegramRun {
+    /// The slave that sent them; `None` for the master.
+    pub(in crate::buses::nordac) from: Option<u8>,
+    /// One or more octets.
+    pub(in crate::buses::nordac) octets: Vec<LineByte>,
+}
+
+impl TelegramRun {
+    /// When the stop bit of its last octet had passed.
+    pub(in crate::buses::nordac) fn at(&self) -> Instant {
+        self.octets.last().map_or(Instant::START, |own| own.at)
+    }
+
+    /// What the other stations read; `None` where nothing arrived.
+    pub(in crate::buses::nordac) fn said(&self) -> Option<Said> {
+        let arrived = self
+            .octets
+            .iter()
+            .filter_map(|own| own.received.map(|byte| (byte, own)));
+        let arrived: Vec<_> = arrived.collect();
+        let (_, last) = arrived.last()?;
+        let mut errors = arrived.iter().zip(1..);
+        Some(Said {
+            from: self.from,
+            at: last.at,
+            octets: arrived.iter().map(|(byte, _)| *byte).collect(),
+            error: errors.find_map(|((_, own), place)| own.error.map(|error| (place, error))),
+        })
+    }
+}
+
+/// The time between the ends of two octets that follow each other without a gap: the shortest distance of octets of one station. `None`
+/// where no two of them follow each other.
+pub(in crate::buses::nordac) fn octet_time<'t>(
+    octets: impl Iterator<Item = (Option<u8>, &'t LineByte)>,
+) -> Option<Span> {
+    let mut last: Option<(Option<u8>, Instant)> = None;
+    let distances = octets.filter_map(|(from, own)| {
+        let before = last.replace((from, own.at));
+        before.and_then(|(sender, at)| (sender == from).then(|| own.at.since(at)))
+    });
+    distances.min()
+}
+
+/// Idle octets behind which a telegram begins in any case: 33 bits (T_SYN).
+const SYN_OCTETS: u64 = SYN_BITS.div_ceil(OCTET_BITS);
+/// What times of captures, which are cut off to nanoseconds, may fall short of.
+const CUT: Span = Span::from_nanos(SYN_OCTETS + 1);
+
+/// The octets of a trace, cut into runs. An octet begins a run where another station has sent before it, where the line was idle for 33 bits,
+/// and where it was idle for at least one octet behind a complete telegram.
+pub(in crate::buses::nordac) fn runs(trace: &Trace) -> Vec<TelegramRun> {
     let octets = octets(trace);
-    let own = |one: &[(Option<u8>, LineByte)]| {
-        (one[0].0 == one[1].0).then(|| one[1].1.at.since(one[0].1.at))
-    };
-    // Octets of one telegram follow each other without a gap, so the shortest distance is the time of an octet.
-    let octet = octets
-        .windows(2)
-        .filter_map(own)
-        .min()
-        .unwrap_or(Span::ZERO);
-    let mut all: Vec<Said> = Vec::new();
-    for (from, octet_on_line) in octets {
-        let Some(byte) = octet_on_line.received else {
-            continue;
+    let one = octet_time(octets.iter().map(|(from, own)| (*from, own))).unwrap_or(Span::ZERO);
+    let mut all: Vec<TelegramRun> = Vec::new();
+    for (from, octet) in octets {
+        let complete = |last: &TelegramRun| last.said().is_some_and(|own| own.telegram().is_some());
+        let parted = |last: &TelegramRun| {
+            let distance = octet.at.since(last.at());
+            distance + CUT >= one * (SYN_OCTETS + 1) && distance > CUT
+                || distance >= one * 2 && complete(last)
         };
-        let at = octet_on_line.at;
-        let goes_on = all.last().is_some_and(|last| {
-            let since = at.since(last.at);
-            let ended = since >= octet * 4 || since >= octet * 2 && last.telegram().is_some();
-            last.from == from && !ended
-        });
-        if !goes_on {
-            all.push(Said {
+        match all.last_mut() {
+            Some(last) if last.from == from && !parted(last) => last.octets.push(octet),
+            _ => all.push(TelegramRun {
                 from,
-                at,
-                octets: Vec::new(),
-                error: None,
-            });
-        }
-        if let Some(last) = all.last_mut() {
-            last.octets.push(byte);
-            last.at = at;
-            let place = last.octets.len();
-            last.error = last
-                .error
-                .or(octet_on_line.error.map(|error| (place, error)));
+                octets: vec![octet],
+            }),
         }
     }
     all
+}
+
+/// The telegrams of a trace: its [`runs`] of which something arrived.
+#[must_use]
+pub fn said(trace: &Trace) -> Vec<Said> {
+    runs(trace).iter().filter_map(TelegramRun::said).collect()
 }
 
 #[cfg(test)]

@@ -9,6 +9,23 @@ use harness_proto::profibus::fdl::Status;
 use harness_proto::profibus::{Buffer, Pdu, Telegram};
 use std::collections::BTreeMap;
 
+/// Bits of the status of Set_Prm by name; the watchdog is shown with its time.
+pub(in crate::buses::nordac) const PRM: [(u8, &str); 4] = [
+    (SetPrm::LOCK, "lock"),
+    (SetPrm::UNLOCK, "unlock"),
+    (SetPrm::SYNC, "sync"),
+    (SetPrm::FREEZE, "freeze"),
+];
+
+/// Bits of the command of Global_Control by name.
+pub(in crate::buses::nordac) const CONTROL: [(u8, &str); 5] = [
+    (GlobalControl::CLEAR_DATA, "clear data"),
+    (GlobalControl::UNFREEZE, "unfreeze"),
+    (GlobalControl::FREEZE, "freeze"),
+    (GlobalControl::UNSYNC, "unsync"),
+    (GlobalControl::SYNC, "sync"),
+];
+
 /// Reads telegrams one after another: a reply has the service of its request, and the PPO type is that of the last Chk_Cfg.
 #[derive(Clone, Debug, Default)]
 pub struct Reader {
@@ -323,13 +340,7 @@ fn value(pkw: Pkw, raw: u32) -> String {
 }
 
 fn parameters(own: &SetPrm<'_>) -> String {
-    let bits = [
-        (SetPrm::LOCK, "lock"),
-        (SetPrm::UNLOCK, "unlock"),
-        (SetPrm::SYNC, "sync"),
-        (SetPrm::FREEZE, "freeze"),
-    ];
-    let set = bits.into_iter().filter(|(bit, _)| own.has(*bit));
+    let set = PRM.into_iter().filter(|(bit, _)| own.has(*bit));
     let mut words: Vec<_> = set.map(|(_, name)| name.to_owned()).collect();
     if let Some(tens) = own.watchdog_tens_of_ms() {
         words.push(format!("watchdog {} ms", u32::from(tens) * 10));
@@ -348,14 +359,7 @@ fn parameters(own: &SetPrm<'_>) -> String {
 }
 
 fn commands(own: &GlobalControl) -> String {
-    let bits = [
-        (GlobalControl::CLEAR_DATA, "clear data"),
-        (GlobalControl::UNFREEZE, "unfreeze"),
-        (GlobalControl::FREEZE, "freeze"),
-        (GlobalControl::UNSYNC, "unsync"),
-        (GlobalControl::SYNC, "sync"),
-    ];
-    let set = bits.into_iter().filter(|(bit, _)| own.has(*bit));
+    let set = CONTROL.into_iter().filter(|(bit, _)| own.has(*bit));
     let names: Vec<_> = set.map(|(_, name)| name).collect();
     let names = if names.is_empty() {
         "operate".to_owned()

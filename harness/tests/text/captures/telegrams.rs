@@ -1,0 +1,242 @@
+//! Captures of PROFIBUS: written, read back, compared, made into a scenario, and read by tshark with the dissector.
+
+use super::file;
+use crate::debian::has;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn drivebench(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+    command.args(arguments).output().expect("the program")
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[track_caller]
+fn ended(output: &Output, code: i32) -> String {
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{errors}{}", text(output));
+    format!("{}{errors}", text(output))
+}
+
+fn plain(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+/// FDL status, every service of a start, PPO1 and PPO4, tasks and refusals, Global_Control, a token, a repetition, and telegrams that are none:
+/// a lost byte, a wrong FCS, a wrong parity bit, lengths that differ, an end that is missing.
+const EVERY_KIND: &str = "\
+title   Every kind of telegram
+source  nordac 3.3
+bus     nordac
+slave 8
+slave 9 ppo 4
+slave 8 parameter 1621 = 3
+! slave 8 byte 8: drop
+
+> 10 08 02 49 53 16
+< 10 02 08 00 0A 16
+> 10 08 02 49 53 16
+< 10 08 00 0A 16
+> 10 08 02 49 54 16
+> 10 08 02 49 53 16 bad 3
+> DC 02 02
+> 68 04 05 68 08 02 49 53 16
+> 68 05 05 68 88 82 5C
+> 68 07 07 68 FF 82 46 3A 3E 02 00 41 16
+> 68 07 07 68 88 82 6C 3E 3E F3 F1 D6 16
+< 10 02 08 03 0D 16
+> 68 05 05 68 88 82 5C 3B 3E DF 16
+< 68 07 07 68 82 88 08 3E 3B F3 F1 6F 16
+> 68 05 05 68 88 82 5C 3B 3E DF 16
+< 68 07 07 68 82 88 08 3E 3B F3 F1 6F 16
+start 8 ppo 1 watchdog 300ms
+exchange 8 STW=047E
+exchange 8 STW=047F HSW=50%
+read 8 1202
+write 8 1205.3 = 50.0Hz
+read 8 1001 error 0
+write 8 1202 = 0 error 2
+read 8 1605
+read 8 1813.2
+start 9 ppo 4
+exchange 9 STW=047E HSW=-12.5%
+";
+
+/// A scenario as a file, and its capture.
+fn captured(name: &str, scenario: &str) -> [PathBuf; 2] {
+    let [path, capture] = ["scn", "pcapng"].map(|ending| file(&format!("{name}.{ending}")));
+    std::fs::write(&path, scenario).expect("room");
+    let written = drivebench(&[
+        "trace",
+        plain(&path),
+        "--format",
+        "pcapng",
+        "-o",
+        plain(&capture),
+    ]);
+    ended(&written, 0);
+    [path, capture]
+}
+
+/// A capture that is read back shows the same bytes, times and errors, and what differs is named.
+#[test]
+fn telegrams_are_written_read_and_compared() {
+    for (name, rate) in [("telegrams", ""), ("telegrams-fast", "rate 1500\n")] {
+        let scenario = EVERY_KIND.replace("slave 8\n", &format!("{rate}slave 8\n"));
+        let [path, capture] = captured(name, &scenario);
+        let same = ended(&drivebench(&["diff", plain(&path), plain(&capture)]), 0);
+        assert!(same.contains("telegrams are the same"), "{same}");
+        for form in ["table", "csv"] {
+            let of_run = ended(&drivebench(&["trace", plain(&path), "--format", form]), 0);
+            let read = ended(
+                &drivebench(&["import", plain(&capture), "--format", form]),
+                0,
+            );
+            assert_eq!(of_run, read);
+        }
+        let again = file(&format!("{name}-again.pcapng"));
+        let arguments = ["import", plain(&capture), "--format", "pcapng", "-o"];
+        let written = drivebench(&[arguments.as_slice(), &[plain(&again)]].concat());
+        ended(&written, 0);
+        let read = |path: &Path| std::fs::read(path).expect("a capture");
+        assert!(read(&capture) == read(&again), "{name}");
+    }
+    let [path, capture] = captured("telegrams-other", EVERY_KIND);
+    let other = EVERY_KIND.replace("HSW=-12.5%", "HSW=-25%");
+    let changed = file("telegrams-changed.scn");
+    std::fs::write(&changed, other).expect("room");
+    let said = ended(&drivebench(&["diff", plain(&capture), plain(&changed)]), 1);
+    assert!(said.contains("first difference: telegram "), "{said}");
+    let said = ended(&drivebench(&["import", plain(&capture)]), 2);
+    assert!(
+        said.contains("nothing compared: telegrams of PROFIBUS are not compared with a model"),
+        "{said}"
+    );
+    let said = ended(&drivebench(&["diff", plain(&path), "10.1-read-byte"]), 2);
+    assert!(
+        said.contains("telegrams of PROFIBUS and the other bytes of a ring"),
+        "{said}"
+    );
+}
+
+/// A scenario made of a capture plays as the run that was captured, faults of the line included.
+#[test]
+fn a_scenario_is_made_of_a_capture() {
+    let [path, capture] = captured("telegrams-replayed", EVERY_KIND);
+    let again = file("telegrams-again.scn");
+    let made = drivebench(&[
+        "import",
+        "--scenario",
+        plain(&capture),
+        "--setup",
+        plain(&path),
+        "-o",
+        plain(&again),
+    ]);
+    ended(&made, 0);
+    ended(&drivebench(&["run", plain(&again)]), 0);
+    let same = drivebench(&["diff", plain(&capture), plain(&again)]);
+    assert!(ended(&same, 0).contains("telegrams are the same"));
+    // Without --setup the slaves are those that sent; the inverter is not controlled by the bus then.
+    let alone = ended(&drivebench(&["import", "--scenario", plain(&capture)]), 0);
+    assert!(
+        alone.contains("slave 8 ppo 1\nslave 9 ppo 4\n")
+            && alone.contains("! slave 8 byte 8: drop\n! master byte 21: flip p\n"),
+        "{alone}"
+    );
+}
+
+/// The rows that tshark prints of a capture, with these fields.
+fn dissected(capture: &Path, options: &[&str], fields: &[&str]) -> Vec<String> {
+    let script = file("nordac.lua");
+    let dissector = ended(&drivebench(&["dissector", "--bus", "nordac"]), 0);
+    std::fs::write(&script, dissector).expect("room");
+    let mut command = Command::new("tshark");
+    let script = format!("lua_script:{}", plain(&script));
+    command.args(["-X", &script, "-d", "rtacser.data,nordac"]);
+    command.args(["-r", plain(capture), "-T", "fields", "-E", "separator=|"]);
+    command.args(options);
+    command.args(fields.iter().flat_map(|field| ["-e", field]));
+    let output = command.output().expect("it is there");
+    let rows = text(&output);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && !rows.contains("Lua Error") && !errors.contains("Lua:"),
+        "{rows}{errors}"
+    );
+    rows.lines().map(str::to_owned).collect()
+}
+
+/// The dissector says of every telegram what the table says, and its fields have the values.
+#[test]
+fn tshark_reads_telegrams() {
+    if !has("tshark", "telegrams of NORDAC inverters") {
+        return;
+    }
+    let [path, capture] = captured("telegrams-dissected", EVERY_KIND);
+    let rows = dissected(&capture, &[], &["nordac.service", "nordac.meaning"]);
+    let csv = ended(&drivebench(&["trace", plain(&path), "--format", "csv"]), 0);
+    let said = csv.lines().skip(1).map(|line| {
+        let (_, words) = line.split_once('"').expect("a service");
+        let words = words.strip_suffix('"').expect("a meaning");
+        words.replace("\",\"", "|")
+    });
+    let said: Vec<String> = said.collect();
+    for (row, said) in rows.iter().zip(&said) {
+        assert_eq!(row, said);
+    }
+    assert_eq!(rows.len(), said.len());
+    let shown = [
+        "nordac.stw.on",
+        "nordac.zsw.start_disable",
+        "nordac.hsw",
+        "nordac.ppo",
+        "nordac.pkw.parameter",
+        "nordac.pkw.value",
+        "nordac.pkw.error",
+    ];
+    let find = |filter: &str| dissected(&capture, &["-Y", filter], &shown);
+    assert_eq!(
+        find("nordac.stw && nordac.da == 8")[..2],
+        ["0||0|1|||", "1||50|1|||"]
+    );
+    assert_eq!(find("nordac.stw && nordac.da == 9"), ["0||-12.5|4|||"]);
+    assert_eq!(find("nordac.zsw && nordac.sa == 9"), ["|1||4|||"]);
+    assert_eq!(find("nordac.pkw.error == 2")[0], "|0||1|1202||2");
+    let value = find("nordac.pkw.parameter == 1205 && nordac.pkw.answer");
+    assert_eq!(value[0], "|0||1|1205|500 (50.0 Hz)|");
+    let marked = |expert: &str| dissected(&capture, &["-Y", expert], &["_ws.col.Info"]).len();
+    let counts = [
+        ("nordac.bad_fcs", 2),
+        ("nordac.bad_status", 1),
+        ("nordac.no_telegram", 2),
+        ("nordac.repeated", 1),
+        ("nordac.refused", 7),
+    ];
+    for (expert, count) in counts {
+        assert_eq!(marked(expert), count, "{expert}");
+    }
+}
+
+/// Without a Chk_Cfg 12 bytes are PPO1 where they begin with a parameter channel that can be one, and else PPO4; a preference decides too.
+#[test]
+fn tshark_tells_ppo_types_of_one_length_apart() {
+    if !has("tshark", "PPO types of NORDAC inverters") {
+        return;
+    }
+    let refused = "< 10 02 08 03 0D 16\n";
+    let one = "> 68 0F 0F 68 08 02 5D 14 B2 00 00 00 00 00 00 04 7F 20 00 D0 16\n";
+    let four = "> 68 0F 0F 68 08 02 7D 04 7F 20 00 00 00 00 00 00 00 00 00 2A 16\n";
+    let scenario = format!(
+        "title   Early\nsource  nordac 3.1\nbus     nordac\nslave 8\n\n{one}{refused}{four}{refused}"
+    );
+    let [_, capture] = captured("telegrams-early", &scenario);
+    let fields = ["nordac.ppo", "nordac.hsw", "nordac.pkw.parameter"];
+    let only = ["-Y", "nordac.stw"];
+    assert_eq!(dissected(&capture, &only, &fields), ["1|50|1202", "4|50|"]);
+    let four = [only.as_slice(), &["-o", "nordac.ppo:4"]].concat();
+    assert_eq!(dissected(&capture, &four, &fields), ["4|0|", "4|50|"]);
+}
