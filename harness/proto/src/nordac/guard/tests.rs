@@ -480,7 +480,7 @@ proptest! {
         let mut sent = Vec::new();
         let mut now = Instant::START;
         for (octets, pause) in pieces {
-            now = now + Span::from_micros(pause);
+            now += Span::from_micros(pause);
             for octet in octets {
                 if gate.admit(now, octet).is_ok() {
                     sent.push(octet);

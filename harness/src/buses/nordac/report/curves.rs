@@ -120,10 +120,10 @@ mod tests {
         let (mut master, mut slave) = (Vec::new(), Vec::new());
         let mut at = Instant::START;
         for (from, text) in telegrams {
-            at = at + Span::from_micros(66);
+            at += Span::from_micros(66);
             let digits: String = text.split(' ').collect();
             for pair in digits.as_bytes().chunks(2) {
-                at = at + Span::from_micros(22);
+                at += Span::from_micros(22);
                 let pair = std::str::from_utf8(pair).expect("digits");
                 let byte = Some(u8::from_str_radix(pair, 16).expect("a byte"));
                 let octet = LineByte::seen(at, byte, byte, None);

@@ -132,7 +132,7 @@ mod tests {
     fn channel(from: Option<u8>, start: u64, octets: &[(u64, u8)]) -> Channel {
         let mut at = Instant::START + Span::from_micros(start);
         let octets = octets.iter().map(|&(distance, byte)| {
-            at = at + Span::from_micros(22) * distance;
+            at += Span::from_micros(22) * distance;
             LineByte::seen(at, Some(byte), Some(byte), None)
         });
         Channel::of_octets(from, None, octets.collect())

@@ -61,8 +61,8 @@ fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Vec<(u8,
             ended: FrameEnd::Good,
         };
         for own in &mut frames {
-            own.start = own.start + IDLE;
-            own.at = own.at + IDLE;
+            own.start += IDLE;
+            own.at += IDLE;
         }
         frames.insert(0, other);
     }

@@ -29,10 +29,11 @@ fn a_setpoint_that_waits_shows_in_every_state() {
 /// Each rule of the state machine by the words that cause it: state, words, state, status word at once.
 #[test]
 fn every_transition() {
+    type Row = (u8, fn(&mut Bench), u16, State, u16);
     let at_half: fn(&mut Bench) = |bench| {
         bench.run(0x2000);
     };
-    let cases: [(u8, fn(&mut Bench), u16, State, u16); 14] = [
+    let cases: [Row; 14] = [
         (1, |_| (), 0x047F, State::StartDisable, 0x0B70),
         (2, |_| (), 0x047E, State::ReadyToStart, 0x0B31),
         (
@@ -286,7 +287,8 @@ fn second_setpoint() {
 /// Actual value 2 by 1517; the three printed examples, and the others from the motor's data (3.2.6).
 #[test]
 fn second_actual_value() {
-    let cases: [(i32, &[(u16, i32)], u16, u16); 13] = [
+    type Row<'a> = (i32, &'a [(u16, i32)], u16, u16);
+    let cases: [Row<'_>; 13] = [
         (3, &[(1309, 1_255)], 0x2000, 0x04E7),
         (1, &[(1205, 675)], 0x4000, 0x02A3),
         (0, &[], 0x4000, 0),
