@@ -105,6 +105,8 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
         frames::candump(bytes)
     } else if text == Some(&b'{') && frames::is_json(bytes) {
         frames::json(bytes)
+    } else if text == Some(&b'{') && telegrams::is_json(bytes) {
+        telegrams::json(bytes)
     } else if text == Some(&b'{') {
         crate::buses::novobus::capture::json::read(bytes, rate)
     } else {

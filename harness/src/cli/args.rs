@@ -89,7 +89,7 @@ pub enum Command {
         #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=127))]
         drives: u16,
     },
-    /// Print the GSD file of NORDAC vector inverters on PROFIBUS DP, for masters that read one.
+    /// Print the GSD file of NORDAC inverters, which PROFIBUS masters read.
     Gsd,
     /// List the manual's tables with the scenarios that test them, and the errata.
     Manual(ManualArguments),

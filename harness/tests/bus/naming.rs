@@ -208,7 +208,7 @@ fn verdict(lines: &[String]) -> Verdict {
         exactness: THROUGH_A_PORT,
     };
     let culprit = culprit(DRIVES, &seen, &trials.expect("no errors"), &pinned);
-    let (_, named) = agreed(culprit, &name(&seen_all, &twin_of));
+    let (culprit, named) = agreed(culprit, &name(&seen_all, &twin_of));
     Verdict {
         differs: !play.differing.is_empty(),
         named,

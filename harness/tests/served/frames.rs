@@ -161,7 +161,7 @@ fn options_that_do_not_fit_are_refused() {
         (&["--bus", "unitek", "--slcan", "nowhere"][..], "HOST:PORT"),
         (
             &["--bus", "nordac", "--slcan", "127.0.0.1:0"][..],
-            "not built",
+            "--tcp or --pty",
         ),
     ] {
         let mut sim = Sim::start(arguments);

@@ -202,7 +202,9 @@ impl Comparer<'_> {
         };
         let equal = wanted.byte == found.byte;
         let same = match right {
-            Some(right) => right || equal && rows.is_refused(index),
+            Some(right) => {
+                right || equal && (rows.is_refused(index) || rows.is_last_of_long(index))
+            }
             None => equal,
         };
         self.note_write(ring, rows, index);

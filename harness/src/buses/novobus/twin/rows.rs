@@ -42,6 +42,21 @@ impl Rows<'_> {
         calm(self.size, &sent).last() == Some(&false)
     }
 
+    /// Whether a byte is the third or fourth of the data of ReadLong. The manual leaves open which cells they show (ND21 10.1).
+    pub(super) fn is_last_of_long(&self, index: usize) -> bool {
+        let before = index.checked_sub(2).map(|before| self.role(before));
+        match (before, self.role(index)) {
+            (
+                Some(Role::Data {
+                    drive: own,
+                    address: first,
+                }),
+                Role::Data { drive, address },
+            ) => own == drive && first.wrapping_add(2) == address,
+            _ => false,
+        }
+    }
+
     /// Whether a byte is the low byte of process data (ND21 9.4).
     pub(super) fn is_second_of_process_data(&self, index: usize) -> bool {
         let sync_before = |back: usize| index.checked_sub(back).map(|before| self.role(before));
