@@ -19,6 +19,10 @@ pub struct Drive {
     inverter: Inverter,
     /// The reply that waits, and when it begins.
     reply: Option<(Instant, Buffer)>,
+    /// Module and inverter as they were before the last telegram: an octet right behind it makes it too long (EN 1).
+    before: Option<(Slave, Inverter)>,
+    /// Whether the last octet was such a one.
+    torn: bool,
     powered: bool,
 }
 
@@ -34,6 +38,8 @@ impl Drive {
             properties: setup.properties,
             rate,
             reply: None,
+            before: None,
+            torn: false,
             powered: true,
         }
     }
@@ -51,7 +57,8 @@ impl Drive {
     }
 
     /// The inverter, to be changed by its inputs.
-    pub const fn inverter_mut(&mut self) -> &mut Inverter {
+    pub fn inverter_mut(&mut self) -> &mut Inverter {
+        self.before = None;
         &mut self.inverter
     }
 
@@ -69,6 +76,7 @@ impl Drive {
         }
         self.powered = on;
         self.reply = None;
+        self.before = None;
         if on {
             self.inverter.power_up(at);
             self.slave = Slave::new(self.properties, self.inverter.settings());
@@ -78,6 +86,7 @@ impl Drive {
     /// Module and inverter lose each other, or find each other again (NORDAC 2.6).
     pub fn set_link(&mut self, at: Instant, lost: bool) {
         LineStation::advance(self, at);
+        self.before = None;
         self.slave.link(at, lost, &mut self.inverter);
     }
 }
@@ -85,7 +94,14 @@ impl Drive {
 impl Drive {
     /// Takes an octet; gives the telegram that it completes, to be answered by [`Drive::answer`]. A drive without power hears nothing.
     pub fn receive(&mut self, at: Instant, octet: Received) -> Option<Telegram> {
+        self.torn = self.powered && self.receiver.tears(at);
         if self.powered {
+            if self.torn
+                && let Some((slave, inverter)) = self.before.take()
+            {
+                (self.slave, self.inverter) = (slave, inverter);
+                self.reply = None;
+            }
             return self.receiver.hear(at, octet);
         }
         self.receiver.skip(at);
@@ -95,11 +111,18 @@ impl Drive {
     /// Takes a telegram that has ended at `at`. The reply, if there is one, waits from now on.
     pub fn answer(&mut self, at: Instant, telegram: &Telegram) {
         LineStation::advance(self, at);
+        self.before = Some((self.slave.clone(), self.inverter.clone()));
         // Set_Prm changes the delay of the replies behind its own.
         let delay = self.rate.bit_time() * self.slave.reply_delay_bits();
         if let Some(octets) = self.slave.hear(at, telegram, &mut self.inverter) {
             self.reply = Some((at + delay, octets));
         }
+    }
+
+    /// Whether the last octet followed a telegram without a gap: then that one was too long, and nothing was done.
+    #[must_use]
+    pub const fn torn(&self) -> bool {
+        self.torn
     }
 
     /// The reply that waits, and when it begins.

@@ -2,6 +2,7 @@
 
 use harness_proto::nordac::pkw::Index;
 use harness_proto::nordac::{PARAMETERS, Parameter, Pkw};
+use std::sync::Arc;
 use std::sync::LazyLock;
 
 /// Where the values of each number begin.
@@ -40,9 +41,9 @@ impl Places {
     }
 }
 
-/// All values.
+/// All values. A copy shares them until one of the two is changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parameters(Vec<i32>);
+pub struct Parameters(Arc<Vec<i32>>);
 
 impl Default for Parameters {
     /// The factory settings.
@@ -52,7 +53,7 @@ impl Default for Parameters {
             let count = usize::from(parameter.sets()) * usize::from(parameter.count);
             values.extend(std::iter::repeat_n(parameter.default, count));
         }
-        Self(values)
+        Self(Arc::new(values))
     }
 }
 
@@ -77,7 +78,7 @@ impl Parameters {
     /// Stores a value; nothing happens for an index that the parameter does not have.
     pub fn store(&mut self, parameter: &Parameter, index: Index, value: i32) {
         if let Some(place) = PLACES.of(parameter, index) {
-            self.0[place] = value;
+            Arc::make_mut(&mut self.0)[place] = value;
         }
     }
 }

@@ -209,6 +209,9 @@ impl LineStation for Deviant {
             }
             (telegram, ..) => telegram,
         };
+        if self.drive.torn() {
+            self.replies.clear();
+        }
         if let Some(telegram) = telegram {
             self.answer(at, &telegram);
         }

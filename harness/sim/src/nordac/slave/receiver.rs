@@ -1,6 +1,5 @@
 //! The receiver of a slave: from octets to telegrams (EN 1).
 
-use harness_proto::decode::Decoded;
 use harness_proto::line::Received;
 use harness_proto::profibus::fdl::{SC, SD1, SD2, SD3, SD4};
 use harness_proto::profibus::rate::SYN_BITS;
@@ -19,6 +18,8 @@ pub(in crate::nordac) struct Receiver {
     octets: Buffer,
     /// Whether the octets up to the next idle time are not read.
     skips: bool,
+    /// Whether the last octet was the last one of a telegram.
+    complete: bool,
 }
 
 impl Receiver {
@@ -30,6 +31,7 @@ impl Receiver {
             idle_since: at,
             octets: Buffer::new(),
             skips: true,
+            complete: false,
         }
     }
 
@@ -37,6 +39,12 @@ impl Receiver {
     pub(in crate::nordac) fn skip(&mut self, at: Instant) {
         self.idle_since = self.idle_since.max(at);
         self.skips = true;
+        self.complete = false;
+    }
+
+    /// Whether an octet that ends at `at` follows a telegram without a gap: then that was no telegram, but one of another length than it announced.
+    pub(in crate::nordac) fn tears(&self, at: Instant) -> bool {
+        self.complete && (at - self.octet).since(self.idle_since) < self.bit
     }
 
     /// Takes an octet whose last stop bit has passed at `at`; gives the telegram that it completes.
@@ -44,6 +52,7 @@ impl Receiver {
         let start = at - self.octet;
         let idle = start.since(self.idle_since);
         self.idle_since = at;
+        self.complete = false;
         if idle >= self.bit * SYN_BITS {
             self.octets.clear();
             self.skips = false;
@@ -58,10 +67,9 @@ impl Receiver {
             None => self.skips = true,
             Some(length) if length == self.octets.len() => {
                 self.skips = true;
-                return match Telegram::decode(&self.octets) {
-                    Decoded::Value { value, .. } => Some(value),
-                    Decoded::NeedMore | Decoded::Bad { .. } => None,
-                };
+                let telegram = Telegram::decode(&self.octets).value();
+                self.complete = telegram.is_some();
+                return telegram;
             }
             Some(_) => {}
         }
