@@ -19,13 +19,12 @@ impl Desk {
 
     /// The same with these limits.
     pub(crate) fn limited(ring: &str, limits: &str) -> Self {
-        let folder = tempfile::tempdir().expect("a folder");
-        let text = format!("schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\n{ring}{limits}");
-        std::fs::write(folder.path().join("desk.toml"), text).expect("room");
-        Self { folder }
+        Self::of_file(&format!(
+            "schema = 1\n[rig]\nid = \"desk\"\n[ring.1]\n{ring}{limits}"
+        ))
     }
 
-    /// A rig with a port, given by the whole text of its file.
+    /// A rig given by the whole text of its file.
     pub(crate) fn of_file(text: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("desk.toml"), text).expect("room");

@@ -1,4 +1,4 @@
-//! A trace as a capture for Wireshark: a packet a telegram, see [`crate::report::pcapng_telegrams`].
+//! A trace as a capture for Wireshark: a packet a telegram, see `report/pcapng_telegrams.rs`.
 
 use super::telegrams::{octet_time, octets, runs};
 use crate::report::pcapng_telegrams;

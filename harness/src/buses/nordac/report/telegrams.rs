@@ -117,7 +117,7 @@ pub(in crate::buses::nordac) fn runs(trace: &Trace) -> Vec<TelegramRun> {
     all
 }
 
-/// The telegrams of a trace: its [`runs`] of which something arrived.
+/// The telegrams of a trace: its runs of octets of which something arrived.
 #[must_use]
 pub fn said(trace: &Trace) -> Vec<Said> {
     runs(trace).iter().filter_map(TelegramRun::said).collect()

@@ -42,8 +42,11 @@ fn scenarios() -> Vec<Source> {
 /// How long the bus may be idle before a scenario.
 const IDLE: Span = Span::from_millis(400);
 
+/// Drives: their numbers and identifiers.
+type Drives = Vec<(u8, (u16, u16))>;
+
 /// The frames of a scenario with these lines in its header, and its drives.
-fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Vec<(u8, (u16, u16))>) {
+fn frames(source: &Source, lines: &str, idle: bool) -> (Vec<LineFrame>, Drives) {
     let text = source.text.replace(BUS, &format!("{BUS}{lines}"));
     let source = Source::from_bytes(source.name.clone(), text.into_bytes()).expect("a text");
     let entry = Entry::new(source.clone(), None).unwrap_or_else(|p| panic!("{:#?}", p.all()));
