@@ -4,10 +4,14 @@ pub mod nordac;
 pub mod novobus;
 pub mod unitek;
 
+/// The bus whose drives stand in rings: what rooms take of it by type.
+pub use novobus as rings;
 pub use novobus::language::{argument, plan, syntax};
 pub use novobus::link::SimulatedLink;
 pub use novobus::simulate;
 pub use novobus::stream::StreamLink;
+/// Campaigns of the bus whose conversations are frames.
+pub use unitek::campaign as frame_campaign;
 
 /// What of playing belongs to the one bus whose drives are played on over their bus today.
 pub mod run {
@@ -20,6 +24,7 @@ pub mod run {
     pub use super::novobus::language::run::record::{CellRecord, MAX_SAMPLES, Sample};
 }
 
+pub(crate) use harness_proto::novobus::address::MAX_DRIVES as MOST_IN_A_RING;
 pub(crate) use harness_proto::novobus::guard::LimitSetting;
 pub(crate) use novobus::language::parse::header;
 
@@ -29,7 +34,8 @@ pub use novobus::language::Novobus as DefaultBus;
 pub(crate) use nordac::GSD;
 pub(crate) use unitek::dbc::dbc;
 
-pub(crate) use novobus::{cli as commands, driver, drives, qualify, serve::state_of, twin};
+pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
+pub(crate) use novobus::{cli as commands, driver, drives, qualify, twin};
 
 use crate::cli::args::CellsArguments;
 use crate::cli::deviations::DeviationRow;
@@ -61,6 +67,7 @@ use commands::{DriveCommand, RigName};
 use harness_proto::can::Frame;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
+use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::{Carried, Trace};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -79,6 +86,22 @@ pub(crate) const MANUALS: [Manual; 3] = [
 
 /// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
 type Found = Result<(Scenario, Arc<dyn Settled>), Problems>;
+
+/// The fuzz targets of the buses.
+pub(crate) fn fuzz_targets() -> impl Iterator<Item = FuzzTarget> {
+    let rings = harness_sim::novobus::fuzz::TARGETS.into_iter();
+    rings
+        .chain(harness_sim::unitek::fuzz::TARGETS)
+        .chain(harness_sim::nordac::fuzz::TARGETS)
+}
+
+/// What the inputs of those reach.
+pub(crate) fn fuzz_noting() -> impl Iterator<Item = Noting> {
+    let rings = harness_sim::novobus::fuzz::NOTING.into_iter();
+    rings
+        .chain(harness_sim::unitek::fuzz::NOTING)
+        .chain(harness_sim::nordac::fuzz::NOTING)
+}
 
 /// A link to the drives that a plan simulates, warmed up: their self-tests are over.
 pub(crate) fn simulated(plan: &Plan) -> Box<dyn Link> {
@@ -182,6 +205,22 @@ pub(crate) fn judge_of(rig: &Rig, allow_motion: bool) -> Option<Box<dyn SegmentJ
 pub(crate) fn carry_frames(traces: &[Trace]) -> bool {
     let mut channels = traces.iter().flat_map(|trace| &trace.channels);
     channels.any(|channel| matches!(channel.carried, Carried::Frames(_)))
+}
+
+/// What rings carry.
+pub(crate) const RING_BYTES: &str = "bytes of a ring";
+/// What a bus of frames carries.
+pub(crate) const FRAMES: &str = "frames of CAN";
+/// What a line of octets carries that all stations share.
+pub(crate) const TELEGRAMS: &str = "telegrams of PROFIBUS";
+
+/// What these are traces of.
+pub(crate) fn carried(traces: &[Trace]) -> &'static str {
+    match shared(traces) {
+        Some(Bus::Unitek) => FRAMES,
+        Some(Bus::Nordac) => TELEGRAMS,
+        Some(Bus::Novobus) | None => RING_BYTES,
+    }
 }
 
 /// The bus whose stations share one line, by what the channels carried: frames, or octets for all stations. `None` for a ring.

@@ -13,14 +13,12 @@ pub mod plan;
 pub mod replay;
 pub(crate) mod run;
 
-pub use crate::buses::novobus::campaign::class::{CaseClass, CaseEvidence, Wrong};
+pub use crate::buses::rings::campaign::class::{CaseClass, CaseEvidence, Wrong};
 pub use fault::CaseFaults;
 pub use html::campaigns;
 pub use run::{Campaign, CaseOutcome, Contradiction, PlayedCampaign};
 
-/// The classes of the one bus whose conversations are disturbed today, and how a case is played there.
-pub use crate::buses::novobus::campaign::{
-    by_driver, by_manual, class, conversation, report, sound,
-};
 /// Campaigns of the bus whose conversations are frames.
-pub use crate::buses::unitek::campaign as frames;
+pub use crate::buses::frame_campaign as frames;
+/// The classes of the one bus whose conversations are disturbed today, and how a case is played there.
+pub use crate::buses::rings::campaign::{by_driver, by_manual, class, conversation, report, sound};

@@ -16,13 +16,13 @@ pub mod fuzz;
 mod pcapng;
 mod telegrams;
 
-pub use crate::buses::novobus::capture::judge::{JudgeError, Judged, judge};
-pub use crate::buses::novobus::capture::scenario::{Options, SketchError, scenario};
+pub use crate::buses::rings::capture::judge::{JudgeError, Judged, judge};
+pub use crate::buses::rings::capture::scenario::{Options, SketchError, scenario};
 pub use diff::{ComparedRun, LinkDifference, Summary, diff};
 
+use crate::buses::MOST_IN_A_RING;
 use crate::regular::{self, Links};
 use harness_proto::line::Rate;
-use harness_proto::novobus::address::MAX_DRIVES;
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use harness_sim::record::{Carried, Channel, Remark, Trace};
@@ -108,7 +108,7 @@ pub fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureError> {
     } else if text == Some(&b'{') && telegrams::is_json(bytes) {
         telegrams::json(bytes)
     } else if text == Some(&b'{') {
-        crate::buses::novobus::capture::json::read(bytes, rate)
+        crate::buses::rings::capture::json::read(bytes, rate)
     } else {
         let begins = bytes.iter().take(8).map(|byte| format!("{byte:02X}"));
         let begins: Vec<_> = begins.collect();
@@ -145,7 +145,7 @@ pub(crate) fn end(text: &str) -> Option<Option<u8>> {
     }
     let number: u16 = text.parse().ok()?;
     let drive = u8::try_from(number).ok()?;
-    (number < MAX_DRIVES).then_some(Some(drive))
+    (number < MOST_IN_A_RING).then_some(Some(drive))
 }
 
 /// Whether a link can have these ends (ND21 8.5).

@@ -8,6 +8,7 @@
 use super::frames::{FrameRead, Sender, assemble, packet};
 use super::telegrams::{self, DAY};
 use super::{Assembly, Capture, CaptureError, ends, line_byte};
+use crate::buses::{FRAMES, RING_BYTES, TELEGRAMS};
 use crate::report::pcapng::{
     COMMENT, END, ERRORS, HEADER, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST, MAGIC,
     NANOSECONDS, PACKET, SECTION,
@@ -15,9 +16,7 @@ use crate::report::pcapng::{
 use crate::report::pcapng_frames;
 use crate::report::pcapng_telegrams::{PacketOctet, octet_time, octets, station};
 use harness_proto::can::BitRate;
-use harness_proto::line::{LineError, Rate};
-use harness_proto::profibus::BusRate;
-use harness_proto::profibus::rate::OCTET_BITS;
+use harness_proto::line::{BITS_PER_BYTE, LineError, Rate};
 use harness_proto::time::Span;
 
 /// Option of an interface: seconds to be added to its times.
@@ -26,8 +25,8 @@ const IF_TSOFFSET: u16 = 14;
 const NO_BYTE: [u8; 2] = [0x00, 0x06];
 /// Events of a good byte: sent or received, begun or ended.
 const GOOD: std::ops::RangeInclusive<u8> = 0x01..=0x04;
-/// The time of an octet on a line that all stations share, where no interface says its rate.
-const OCTET: Span = Span::from_units(BusRate::K500.bit_time().units() * OCTET_BITS);
+/// The time of an octet on a line that all stations share, where no interface says its rate: that of 500 kbit/s.
+const OCTET: Span = Span::from_nanos(2_000 * BITS_PER_BYTE);
 /// The most interfaces: two rings of 250 drives, and as many for each of some sections.
 const MAX_INTERFACES: usize = 65_536;
 
@@ -81,7 +80,7 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
         return Err(CaptureError::Link {
             place: "the capture".to_owned(),
             what: "no interface is of link type 250 (RTAC serial) or 227 (CAN): captures of a ring have one of the former for each \
-                   link, named as in `98->97`, and captures of PROFIBUS one for each station, named `master` or `slave 8`"
+                   link, named as in `98->97`, captures of a line that all stations share one for each station, named `master` or `slave 8`"
                 .to_owned(),
         });
     }
@@ -90,9 +89,9 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
     let links = known.iter().flatten().any(is_link);
     let stations = known.iter().flatten().any(is_station);
     let kinds = [
-        (links, "bytes of a ring"),
-        (stations, "telegrams of PROFIBUS"),
-        (!reader.frames.is_empty(), "frames of CAN"),
+        (links, RING_BYTES),
+        (stations, TELEGRAMS),
+        (!reader.frames.is_empty(), FRAMES),
     ];
     let mixed: Vec<_> = kinds.iter().filter(|own| own.0).map(|own| own.1).collect();
     if let [one, other, ..] = mixed.as_slice() {

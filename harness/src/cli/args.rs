@@ -8,6 +8,7 @@ use super::rig::RigCommand;
 use super::shrink::ShrinkArguments;
 use crate::buses::Bus;
 use crate::buses::commands::DriveCommand;
+use crate::buses::rings::rig::named::ring_size;
 use crate::file::values::{Time, ValueError};
 use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use harness_proto::line::Rate;
@@ -36,7 +37,7 @@ Examples:
   drivebench                                 play all built-in scenarios
   drivebench run --filter 9.7                play those of section 9.7 of the manual
   drivebench run my.scn tests/               play a file and all files of a folder
-  drivebench trace 9.7-parity-error          every byte of the 100-axis example of ND21 9.7
+  drivebench trace 9.7-parity-error          every byte of the manual's example of 100 drives
   drivebench trace my.scn --format svg -o my.svg
                                              a picture of the ring
   drivebench info --rig sim:5                the drives of a simulated ring of five
@@ -367,8 +368,8 @@ pub struct CellsArguments {
     #[arg(long)]
     pub eeprom: bool,
     /// The bus: novobus for the cells of an ND21, unitek for the registers of a UNITEK drive.
-    #[arg(long, value_enum, default_value_t = crate::buses::Bus::Novobus)]
-    pub bus: crate::buses::Bus,
+    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
+    pub bus: Bus,
 }
 
 /// For `campaign`.
@@ -400,8 +401,8 @@ pub struct DeviationsArguments {
     /// Only deviations with this text in their name, section or description.
     pub filter: Option<String>,
     /// The bus: novobus for ND21 drives, unitek for UNITEK drives.
-    #[arg(long, value_enum, default_value_t = crate::buses::Bus::Novobus)]
-    pub bus: crate::buses::Bus,
+    #[arg(long, value_enum, default_value_t = Bus::DEFAULT)]
+    pub bus: Bus,
     /// Output format.
     #[arg(long, value_enum, default_value_t = TableFormat::Table)]
     pub format: TableFormat,
@@ -505,19 +506,10 @@ fn threads(text: &str) -> Result<usize, String> {
     number.ok_or_else(|| "1 to 256 expected".to_owned())
 }
 
-fn ring_size(text: &str) -> Result<u8, String> {
-    let number: u64 = text
-        .parse()
-        .map_err(|_| "a number of drives is expected, 1 to 250 (ND21 8.4)".to_owned())?;
-    harness_proto::novobus::address::RingSize::new(number)
-        .map(harness_proto::novobus::address::RingSize::drives)
-        .map_err(|error| error.to_string())
-}
-
 fn rate(text: &str) -> Result<Rate, String> {
     let bits = text.parse().ok();
     bits.and_then(Rate::from_bits_per_second)
-        .ok_or_else(|| "38400, 19200 or 9600 is expected (ND21 8.3)".to_owned())
+        .ok_or_else(|| "38400, 19200 or 9600 is expected".to_owned())
 }
 /// What `--wire-time` of the commands of `fuzz` says of itself.
 pub(crate) const WIRE_TIME_HELP: &str =

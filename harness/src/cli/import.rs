@@ -19,7 +19,6 @@ use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::line::Rate;
 use harness_proto::time::Span;
-use harness_sim::record::Trace;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -158,8 +157,9 @@ fn of_shared_line(
             };
         }
         output.complain(&format!(
-            "{path}: nothing compared: telegrams of PROFIBUS are not compared with a model; `--format table` shows them, `--scenario` makes \
-             a scenario of them that `drivebench run` plays, and `drivebench diff` compares them with another capture"
+            "{path}: nothing compared: {} are not compared with a model; `--format table` shows them, `--scenario` makes \
+             a scenario of them that `drivebench run` plays, and `drivebench diff` compares them with another capture",
+            buses::carried(&capture.traces)
         ));
         return Ok(Exit::Usage);
     }
@@ -257,7 +257,7 @@ fn details(judged: &Judged, capture: &Capture) -> String {
         let ring = if ring == 0 { "" } else { " of ring 2" };
         let _infallible = writeln!(
             text,
-            "  note: the ring spells out drive {drive}{ring}: it saw a fault first (ND21 9.7)"
+            "  note: the ring spells out drive {drive}{ring}: it saw a fault first"
         );
     }
     if judged.verdict != Verdict::Passed || judged.links.differ > 0 {
@@ -281,8 +281,8 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
         output.result(&text)?;
         return Ok(if same { Exit::Passed } else { Exit::Failed });
     }
-    match [&left, &right].map(|side| kind(&side.traces)) {
-        [FRAMES, FRAMES] => {
+    match [&left, &right].map(|side| buses::carried(&side.traces)) {
+        [buses::FRAMES, buses::FRAMES] => {
             let summary = frame_diff(&left, &right, span(arguments.tolerance));
             output.result(&summary.show([&names[0], &names[1]]))?;
             return Ok(match summary.same() {
@@ -315,18 +315,6 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
     } else {
         Exit::Failed
     })
-}
-
-/// What a capture of CAN is of.
-const FRAMES: &str = "frames of CAN";
-
-/// What a capture is of.
-fn kind(traces: &[Trace]) -> &'static str {
-    match (carry_frames(traces), share_a_line(traces)) {
-        (true, _) => FRAMES,
-        (false, true) => "telegrams of PROFIBUS",
-        (false, false) => "bytes of a ring",
-    }
 }
 
 /// A capture, or a scenario that is played.

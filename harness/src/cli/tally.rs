@@ -112,15 +112,17 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::buses::LimitSetting;
     use crate::link::Capability;
+    use crate::manual::Manual;
     use crate::scenario::run::{Skip, Why};
     use crate::scenario::source::Source;
-    use harness_proto::novobus::guard::LimitSetting;
 
     fn of(outcomes: &[Outcome]) -> Tally {
         let mut tally = Tally::default();
         let source = |n: usize| {
-            let text = format!("title t\nsource nd21 9.{n}\nring 1\n> 80\n");
+            let document = Manual::all()[0].document;
+            let text = format!("title t\nsource {document} 9.{n}\nring 1\n> 80\n");
             Source::from_bytes("t.scn".to_owned(), text.into_bytes()).expect("a text")
         };
         for (outcome, n) in outcomes.iter().zip(1..) {

@@ -86,7 +86,7 @@ pub(super) fn again(
         name: recorded.name.clone(),
         text: text.to_owned().into(),
     };
-    let size = header.rings.first().map(|ring| ring.drives());
+    let size = header.way.rings.first().map(|ring| ring.drives());
     let entry = Entry::fitting(source, size).map_err(|problems| problems.to_string());
     if header.own_rings
         && let Ok(Entry {
@@ -97,7 +97,7 @@ pub(super) fn again(
     }
     let plan = entry.and_then(|entry| entry.plan.ok_or("no scenario of this bus".to_owned()));
     let mut plan = match plan {
-        Ok(plan) if plan.rings == header.rings => plan,
+        Ok(plan) if plan.rings == header.way.rings => plan,
         Ok(_) => return Again::impossible("it is for other rings than the rig has".to_owned()),
         Err(why) => return Again::impossible(why),
     };

@@ -216,7 +216,7 @@ impl Opened {
             name: name.to_owned(),
             text: text.to_owned().into(),
         };
-        let drives = self.header.rings.first().map(|ring| ring.drives());
+        let drives = self.header.way.rings.first().map(|ring| ring.drives());
         Entry::fitting(source, drives).map_err(|problems| problems.to_string())
     }
 
@@ -246,7 +246,7 @@ impl Opened {
                 let words = remarks.first().and_then(|own| own.strip_prefix(DENIED));
                 let denied = words.filter(|_| limited);
                 let denied = denied.map(|words| Why::Denied(words.to_owned()).into());
-                not_played(plan, &link, &header.rings).or(denied)?
+                not_played(plan, &link, &header.way.rings).or(denied)?
             }
         };
         Some(Outcome::skipped(why))

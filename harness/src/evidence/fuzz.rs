@@ -4,6 +4,8 @@
 use super::read::{RecordError, read};
 use super::record::RecordLine;
 use super::verify::{Beside, judge_record};
+/// The scenario of every attempt, whatever its name.
+pub use crate::buses::rings::fuzz::RECORDED as SCENARIO;
 use crate::rig::{Rig, parse};
 use crate::scenario::source::Source;
 use harness_proto::time::Span;
@@ -18,9 +20,6 @@ const SHORT: Span = Span::from_millis(2_000);
 /// The bench of every record.
 pub const RIG: &str = "schema = 1\n[rig]\nid = \"fuzz\"\n[ring.1]\ndrives = 2\ntransport = \"sim\"\n[limits]\nallow_motion = true\n\
                        allow_eeprom = true\nallow_reset = false\nallow_outputs = true\n";
-
-/// The scenario of every attempt, whatever its name.
-pub const SCENARIO: &str = "title A read\nsource nd21 10.1\nring 2\n> 88 FE C0 13 FE D1\n";
 
 fn rig() -> &'static Rig {
     static RIG_READ: OnceLock<Rig> = OnceLock::new();

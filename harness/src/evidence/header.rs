@@ -2,6 +2,7 @@
 
 use super::files::{RIG, sum};
 use super::record::{RecordLine, capabilities};
+use crate::buses::rings::rig::named::rings;
 use crate::buses::twin::Exactness;
 use crate::buses::{SimulatedLink, judge_of};
 use crate::guard::Limits;
@@ -9,7 +10,6 @@ use crate::link::Capability;
 use crate::rig::segment::OnSegment;
 use crate::rig::{Rig, Way, limits, line_rate};
 use harness_proto::line::Rate;
-use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 
 /// What a record is judged by.
@@ -22,7 +22,6 @@ pub(super) struct Header {
     pub(super) started: String,
     pub(super) rate: Rate,
     pub(super) drives: Vec<u8>,
-    pub(super) rings: Vec<RingSize>,
     pub(super) exactness: Exactness,
     pub(super) capabilities: Vec<Capability>,
     pub(super) simulated: bool,
@@ -69,9 +68,7 @@ pub(super) fn header(
     if *rig_sha256 != sum(rig.text.as_bytes()) {
         wrong.push(format!("{RIG} is not the file that was used"));
     }
-    let sizes = drives.iter().map(|n| RingSize::new((*n).into()).ok());
-    let rings = sizes.collect::<Option<Vec<_>>>();
-    let rings = rings.ok_or("a ring has 1 to 250 drives (ND21 8.4)")?;
+    let rings = rings(drives)?;
     let own = rig.sizes();
     if own != *drives {
         return Err(format!(
@@ -166,12 +163,11 @@ pub(super) fn header(
         selected: selected.clone(),
         limits,
         way: Way {
-            rings: rings.clone(),
+            rings,
             attempts: rig.examinations().filter(|_| on_segment.is_none()),
             anew: expected_anew,
         },
         on_segment,
-        rings,
     })
 }
 

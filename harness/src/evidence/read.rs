@@ -2,9 +2,9 @@
 //! place.
 
 use super::record::{RecordLine, SCHEMA};
+use crate::buses::rings::rig::named::rings;
 use crate::link::{Lead, LinkEvent, LinkFault, Moment, PlacedFault};
 use crate::scenario::verdict::Verdict;
-use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
 
 /// The largest record, in bytes.
@@ -158,12 +158,7 @@ impl Order {
                 "a record of schema {schema}; this program knows 1 to {SCHEMA}"
             ));
         }
-        if !(1..=2).contains(&rings.len()) {
-            return Err("a bench has one ring or two (ND21 8.4)".to_owned());
-        }
-        for drives in rings {
-            RingSize::new(u64::from(*drives)).map_err(|error| error.to_string())?;
-        }
+        self::rings(rings)?;
         self.begun = true;
         self.drives = rings.to_vec();
         Ok(())

@@ -32,7 +32,7 @@ pub use swarm::Swarm;
 pub use target::{Rehearsal, Target, Tried};
 
 /// The ring's cases and targets, the default of every parameter of this module.
-pub use crate::buses::novobus::explore::{
+pub use crate::buses::rings::explore::{
     Act, ActKind, AttemptRecord, Case, CaseScope, Command, CommandSent, Damage, Difference,
     Generator, Harm, MOST_ACTS, MOST_BYTES, MOST_NET, MasterView, OnRig, OnSim, OtherRing, Planted,
     RingScope, RingSetup, Spice, Spoil, Talk, To, against_model, against_reference,

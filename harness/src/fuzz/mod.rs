@@ -11,11 +11,11 @@ mod text;
 
 pub use text::{rig, scenario, written};
 
+use crate::buses;
 /// The matrix of protocol transitions is that of the ring.
-pub use crate::buses::novobus::fuzz::coverage;
-use crate::buses::novobus::fuzz::noted;
+pub use crate::buses::rings::fuzz::coverage;
+use crate::buses::rings::fuzz::noted;
 use harness_sim::fuzz::{Body, FuzzTarget, InputPieces, Noting};
-use harness_sim::{nordac, novobus, unitek};
 
 /// The targets whose bodies need the whole bench.
 pub const BENCH_TARGETS: [FuzzTarget; 4] = [
@@ -27,11 +27,7 @@ pub const BENCH_TARGETS: [FuzzTarget; 4] = [
 
 /// Every target.
 pub fn targets() -> impl Iterator<Item = FuzzTarget> {
-    let of_buses = novobus::fuzz::TARGETS
-        .into_iter()
-        .chain(unitek::fuzz::TARGETS)
-        .chain(nordac::fuzz::TARGETS);
-    of_buses.chain(BENCH_TARGETS)
+    buses::fuzz_targets().chain(BENCH_TARGETS)
 }
 
 /// What the inputs of those reach.
@@ -54,9 +50,5 @@ const fn text(name: &'static str, body: Body, ending: &'static str) -> Noting {
 
 /// Every target with what its inputs reach.
 pub fn noting() -> impl Iterator<Item = Noting> {
-    let of_buses = novobus::fuzz::NOTING
-        .into_iter()
-        .chain(unitek::fuzz::NOTING)
-        .chain(nordac::fuzz::NOTING);
-    of_buses.chain(BENCH_NOTING)
+    buses::fuzz_noting().chain(BENCH_NOTING)
 }

@@ -12,11 +12,11 @@ mod guarded;
 mod safe;
 mod watch;
 
-pub use crate::buses::novobus::guard::safe_state::{
-    NotSafe, SafeState, SafeStep, Standstill, blind_stop, safe_state,
+pub use crate::buses::rings::guard::{
+    Denial, Found, Guard, Limits, Need, NotSafe, SafeState, SafeStep, Standstill, blind_stop,
+    safe_state,
 };
 pub use gate::{Denied, Gate, Restore};
 pub use guarded::Guarded;
-pub use harness_proto::novobus::guard::{Denial, Found, Guard, Limits, Need};
 pub use safe::Safe;
 pub use watch::Watch;

@@ -3,10 +3,10 @@
 //! One idea does both: a hypothesis is a model with one thing changed, and it holds where its twin gives every byte
 //! that the real ring gave.
 
-pub use crate::buses::novobus::qualify::{
+pub use crate::buses::rings::qualify::{
     Answer, Asked, Culprit, Fit, Hypothesis, Meant, Named, Pinned, Probe, Question, RingSeen,
     Sighting, Trial, Whose, agreed, answer, conversations, culprit, deviating_masters, dumps,
     exchange, explaining, hypotheses, marches, name, probes, questions, thorough,
 };
-pub(crate) use crate::buses::novobus::qualify::{Bench, Qualification, QualificationFacts};
+pub(crate) use crate::buses::rings::qualify::{Bench, Qualification, QualificationFacts};
 pub use crate::rig::{Profile, ProfileError, SettledProperty};

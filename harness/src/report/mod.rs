@@ -10,5 +10,5 @@ pub(crate) mod pcapng_telegrams;
 pub mod vcd;
 
 /// How the one bus that is shown today reads its bytes, and its own tables and pictures.
-pub use crate::buses::novobus::report::{csv, json, meaning, plot, svg, table, walk};
-pub(crate) use crate::buses::novobus::report::{diagram, lines, sequence};
+pub use crate::buses::rings::report::{csv, json, meaning, plot, svg, table, walk};
+pub(crate) use crate::buses::rings::report::{diagram, lines, sequence};

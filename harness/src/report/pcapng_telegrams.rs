@@ -16,8 +16,7 @@ use super::pcapng::{
     Block, COMMENT, END, ERRORS, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST,
     NANOSECONDS, PACKET, header,
 };
-use harness_proto::line::LineError;
-use harness_proto::profibus::rate::OCTET_BITS;
+use harness_proto::line::{BITS_PER_BYTE, LineError};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::LineByte;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,7 +42,7 @@ pub(crate) type Sent<'t> = (Option<u8>, &'t [LineByte]);
 /// The time of an octet at a rate.
 pub(crate) fn octet_time(bits_per_second: u64) -> Option<Span> {
     let bit = 3_000_000_000_u64.checked_div(bits_per_second)?;
-    Some(Span::from_units(bit.saturating_mul(OCTET_BITS)))
+    Some(Span::from_units(bit.saturating_mul(BITS_PER_BYTE)))
 }
 
 /// Writes what stations sent; `bits_per_second` is the rate, where it is known.

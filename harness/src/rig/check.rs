@@ -1,18 +1,15 @@
 //! From the text of a rig file to a [`Rig`]: every mistake is found here, before a port is opened.
 
 use super::file::schema;
-use super::file::{Endpoint, Interlock, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
+use super::file::{Endpoint, Marks, RigFile, Ring, SCHEMA, SafeStep, Transport};
 use super::port_file::Port;
 use super::profile::KnownProfile;
 use super::session_error::SessionError;
 use crate::buses::syntax::Header;
 use crate::file::schema::{Step, compare, place, syntax};
-use crate::file::values::{ValueError, Wire};
+use crate::file::values::Wire;
 use crate::scenario::problem::{Problem, Problems, Span};
-use crate::scenario::quantity::{Dimension, parse as quantity};
 use crate::scenario::source::Source;
-use harness_proto::nd21::cells::{Cell, RAM, cell};
-use harness_proto::nd21::io::Input;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -158,31 +155,6 @@ pub(crate) fn is_address(text: &str) -> bool {
     text.rsplit_once(':').is_some_and(|(host, number)| {
         !host.is_empty() && number.parse::<u16>().is_ok_and(|number| number > 0)
     })
-}
-
-/// A bound of an interlock, in the unit of its cell's scale.
-pub(crate) fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
-    let wrong = |message: String, expected: &str| ValueError {
-        message,
-        expected: expected.to_owned(),
-    };
-    let Some(dimension) = cell.scale.and_then(Dimension::of) else {
-        return text.trim().parse::<i32>().map(f64::from).map_err(|_| {
-            wrong(
-                format!("`{text}` is not a whole number"),
-                "the cell has no unit: a whole number in quotes expected here",
-            )
-        });
-    };
-    let unit = cell.scale.map_or("", |scale| scale.unit());
-    let expected = format!("a number in {unit} expected here");
-    let value = quantity(text).map_err(|problem| wrong(problem.message, &expected))?;
-    if value.unit.dimension() == dimension {
-        Ok(value.value.to_f64())
-    } else {
-        let message = format!("`{}` is not a unit of {}", value.unit.name, cell.printed);
-        Err(wrong(message, &expected))
-    }
 }
 
 pub(crate) struct Check<'a> {
@@ -467,7 +439,8 @@ impl Check<'_> {
         }
     }
 
-    fn drive(&mut self, path: &[Step<'_>], ring: u8, address: u8) {
+    /// The drive is one of the ring.
+    pub(crate) fn drive(&mut self, path: &[Step<'_>], ring: u8, address: u8) {
         let at = path.split_last().map_or(path, |(_, before)| before);
         let Some(drives) = self.ring(at, ring) else {
             return;
@@ -501,88 +474,6 @@ impl Check<'_> {
                 let path = ["deviation".into(), index.into(), "drives".into()];
                 self.drive(&path, deviation.ring, *drive);
             }
-        }
-    }
-
-    fn interlock(&mut self, path: &[Step<'_>], interlock: &Interlock) {
-        let at = |key| [path, &[Step::Key(key)]].concat();
-        self.drive(&at("drive"), interlock.ring, interlock.drive);
-        let bounds = [("min", &interlock.min), ("max", &interlock.max)];
-        match (&interlock.cell, &interlock.input) {
-            (Some(name), None) => {
-                let Some(cell) = cell(name) else {
-                    let known: Vec<_> = RAM.iter().map(|cell| cell.printed).collect();
-                    let place = place(self.table, &at("cell"));
-                    let problem = Problem::new(
-                        place,
-                        format!("there is no cell `{name}`"),
-                        "the name of a RAM cell expected here (`drivebench cells`)",
-                    );
-                    self.problems.push(problem.did_you_mean(name, &known));
-                    return;
-                };
-                if interlock.min.is_none() && interlock.max.is_none() {
-                    self.wrong(
-                        &at("cell"),
-                        "nothing bounds this cell",
-                        "`min`, `max` or both expected beside it",
-                    );
-                }
-                if interlock.level.is_some() {
-                    self.wrong(
-                        &at("level"),
-                        "`level` is for inputs",
-                        "`min` or `max` expected in its place",
-                    );
-                }
-                let mut values = Vec::new();
-                for (key, text) in bounds {
-                    let Some(text) = text else { continue };
-                    match bound(cell, text) {
-                        Ok(value) => values.push(value),
-                        Err(error) => self.wrong(&at(key), error.message, error.expected),
-                    }
-                }
-                if values.len() == 2 && values[0] > values[1] {
-                    self.wrong(
-                        &at("min"),
-                        "`min` is above `max`",
-                        "a smaller value expected here",
-                    );
-                }
-            }
-            (None, Some(name)) => {
-                if Input::from_name(name).is_none() {
-                    let known = Input::ALL.map(Input::name);
-                    let problem = Problem::new(
-                        place(self.table, &at("input")),
-                        format!("there is no input `{name}`"),
-                        format!("one of {} expected here", known.join(", ")),
-                    );
-                    self.problems.push(problem.did_you_mean(name, &known));
-                }
-                if interlock.level.is_none() {
-                    self.wrong(
-                        &at("input"),
-                        "the level that the input must hold is missing",
-                        "`level` expected beside it",
-                    );
-                }
-                for (key, text) in bounds {
-                    if text.is_some() {
-                        self.wrong(
-                            &at(key),
-                            format!("`{key}` is for cells"),
-                            "`level` expected in its place",
-                        );
-                    }
-                }
-            }
-            _ => self.wrong(
-                path,
-                "an interlock looks at one thing",
-                "either `cell` or `input` expected in here",
-            ),
         }
     }
 

@@ -3,8 +3,6 @@
 
 use super::port_file::{PortBus, PortLimits, Ports};
 use crate::file::values::{MaxSpeed, Speed, Time, Wire};
-use harness_proto::nd21::cells::{Cell, cell};
-use harness_proto::nd21::io::Input;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -355,50 +353,6 @@ pub struct Interlock {
     /// What is said when it trips.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub message: Option<String>,
-}
-
-impl Interlock {
-    /// What must hold; `None` only where the file was not checked.
-    #[must_use]
-    pub fn condition(&self) -> Option<Condition> {
-        if let Some(name) = &self.input {
-            return Some(Condition::Input {
-                input: Input::from_name(name)?,
-                level: self.level?,
-            });
-        }
-        let cell = cell(self.cell.as_deref()?)?;
-        let bound = |text: &Option<String>| {
-            text.as_deref()
-                .and_then(|text| super::check::bound(cell, text).ok())
-        };
-        Some(Condition::Cell {
-            cell,
-            min: bound(&self.min),
-            max: bound(&self.max),
-        })
-    }
-}
-
-/// What an interlock looks at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Condition {
-    /// The value of a cell stays within bounds, in the unit of its scale.
-    Cell {
-        /// The cell.
-        cell: &'static Cell,
-        /// The least.
-        min: Option<f64>,
-        /// The most.
-        max: Option<f64>,
-    },
-    /// An input stays at a level.
-    Input {
-        /// The input.
-        input: Input,
-        /// Its level.
-        level: Level,
-    },
 }
 
 /// The level of an input: high is 5 to 24 V (ND21 5.3).

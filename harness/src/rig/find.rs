@@ -2,9 +2,9 @@
 
 use super::check::{Rig, parse};
 use super::port_file::{CONFIRMATION, PortBus};
+use crate::buses::rings::rig::named::{simulated_rings, sizes_of_rings};
 use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::source::{Source, SourceError};
-use harness_proto::novobus::address::RingSize;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
 
@@ -61,7 +61,7 @@ pub fn find(name: &str, folder: &Path) -> Result<Rig, FindError> {
     if let Some(sizes) = name.strip_prefix("sim:") {
         let text = match simulated_port(sizes) {
             Some((bus, drives)) => drives.map(|drives| simulated_bus(bus, drives)),
-            None => simulated(sizes),
+            None => simulated_rings(sizes),
         };
         let text = text.map_err(|reason| FindError::Simulated {
             name: name.to_owned(),
@@ -102,7 +102,7 @@ fn simulated_name(name: &str) -> Option<String> {
     let (word, sizes) = name.split_at(digit);
     let word = word.trim_end_matches(|c: char| !c.is_alphanumeric());
     nearest(word, &["sim"])?;
-    self::sizes(sizes).ok()?;
+    sizes_of_rings(sizes).ok()?;
     Some(format!("sim:{sizes}"))
 }
 
@@ -193,48 +193,4 @@ fn simulated_bus(bus: PortBus, drives: u8) -> String {
          bit_rate_way_back = \"it is simulated\"\nstore_bus_settings = \"{CONFIRMATION}\"\n",
         nodes.join(", ")
     )
-}
-
-/// The sizes of the rings of `sim:N` and `sim:N,M`, given what stands behind the colon.
-///
-/// # Errors
-/// What is wrong, in a sentence.
-pub fn sizes(text: &str) -> Result<Vec<u8>, String> {
-    let size = |text: &str| {
-        let number: u64 = text.parse().map_err(|_| {
-            format!("`{text}` is not a number of drives: 1 to 250 expected (ND21 8.4)")
-        })?;
-        RingSize::new(number)
-            .map(RingSize::drives)
-            .map_err(|error| error.to_string())
-    };
-    let sizes = text.split(',').map(size).collect::<Result<Vec<_>, _>>()?;
-    match sizes.len() {
-        1 | 2 => Ok(sizes),
-        _ => Err("a bench has one ring or two (ND21 12.2)".to_owned()),
-    }
-}
-
-/// The file of a simulated bench, made from the sizes of its rings.
-fn simulated(sizes: &str) -> Result<String, String> {
-    let sizes = self::sizes(sizes)?;
-    let ring = |number: usize| {
-        let drives = sizes[number];
-        let prefix = ["", "2:"][number];
-        (
-            format!(
-                "[ring.{}]\ndrives = {drives}\ntransport = \"sim\"\n",
-                number + 1
-            ),
-            format!("\"drive {prefix}0..last input GPIN3 GPIN5 high\""),
-        )
-    };
-    let (rings, setups): (Vec<_>, Vec<_>) = (0..sizes.len()).map(ring).unzip();
-    let id: Vec<_> = sizes.iter().map(u8::to_string).collect();
-    Ok(format!(
-        "schema = 1\n[rig]\nid = \"sim-{}\"\n{}[sim]\nsetup = [{}]\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\nallow_outputs = true\nallow_monitoring = true\n",
-        id.join("-"),
-        rings.concat(),
-        setups.join(", ")
-    ))
 }

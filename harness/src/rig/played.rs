@@ -1,7 +1,7 @@
 //! Attempts at a scenario: what they come to together, and whether there is another one.
 
+use super::Driven;
 use super::Rig;
-use super::driven::Driven;
 use crate::buses::syntax::Header;
 use crate::buses::twin::{Comparison, Conversation, Divergence};
 use crate::rig::left_open::Explanation;
@@ -257,10 +257,10 @@ impl Again {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::buses::twin::Symptom;
+    use crate::buses::twin::{Role, Symptom};
     use Verdict::{Failed, Flaky, Inconclusive, Marginal, Passed};
     use harness_proto::line::Received;
-    use harness_proto::novobus::role::Role;
+
     use harness_proto::time::Instant;
 
     const SILENT: &str = "cell FF00 of drive 1: it does not answer ResetH8";

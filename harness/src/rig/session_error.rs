@@ -1,11 +1,10 @@
 //! Why a rig cannot be used.
 
 use super::hook::HookError;
+use super::in_use::End;
 use super::lock::LockError;
 use super::open::OpenRigError;
-use super::session::End;
-use crate::rig::health::Unhealthy;
-use crate::rig::line_test::Cause;
+use crate::rig::{Cause, Unhealthy};
 
 /// Why a rig cannot be used.
 #[derive(Debug, thiserror::Error)]

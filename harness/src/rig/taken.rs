@@ -2,8 +2,8 @@
 
 use super::Rig;
 use super::around::Around;
+use super::in_use::Options;
 use super::lock::RigLock;
-use super::session::Options;
 use super::session_error::SessionError;
 use super::state;
 

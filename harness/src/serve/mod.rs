@@ -1,7 +1,7 @@
 //! Simulated rings served to anyone's master, over a pseudo terminal or a socket, in real time.
 //!
-//! [`Server`] is the whole of it without I/O: bytes of a client in, bytes of the ring out, the time an argument. [`serve`] is
-//! the shell around it: one thread that waits for pseudo terminals, sockets, signals and lines of control.
+//! [`Server`] is the whole of it without I/O: bytes of a client in, bytes of the ring out, the time an argument. Each bus has its own
+//! [`ServedBus`]. [`serve`] is the shell around it: one thread that waits for pseudo terminals, sockets, signals and lines of control.
 
 mod arrival;
 mod clock;
@@ -12,14 +12,13 @@ mod lines;
 mod place;
 mod pty;
 mod served;
-mod server;
 mod shell;
 mod tcp;
 
+pub use crate::buses::rings::serve::Server;
 pub use control::Answer;
 pub(crate) use control::first;
-pub use place::{ClientRole, ControlPlace, Inner, ServedAt};
+pub use place::{ClientRole, ControlPlace, Inner, Marks, Pace, ServedAt};
 pub use served::ServedBus;
-pub use server::{Marks, Pace, Server};
 pub use shell::{End, Host, Job, ServeError, serve};
 pub(crate) use shell::{Ending, serve_until};

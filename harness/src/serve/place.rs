@@ -45,11 +45,34 @@ pub enum ClientRole {
 }
 
 impl ClientRole {
-    pub(super) fn hears(self) -> bool {
+    pub(crate) fn hears(self) -> bool {
         self != Self::Downstream
     }
 
-    pub(super) fn feeds(self) -> bool {
+    pub(crate) fn feeds(self) -> bool {
         matches!(self, Self::Cut | Self::Downstream)
     }
+}
+
+/// How fast time passes on a served bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// As on the line: a byte takes its byte time.
+    #[default]
+    Line,
+    /// As fast as possible while bytes of the master's are under way; as on the line while none are, so that time-outs (ND21
+    /// 9.9) happen and motors turn.
+    Free,
+}
+
+/// How the stream of a client carries line errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Marks {
+    /// Not at all. Every byte of the client's is a good one; a byte that comes back damaged is given as it was read (a break as
+    /// 00), and that it was damaged is lost.
+    #[default]
+    None,
+    /// In-band, as of [`harness_proto::marks`]. A byte with an error of the client's reaches the first drive with a parity error, a
+    /// 00 with an error as a break; a byte that comes back damaged is marked.
+    InBand,
 }

@@ -8,9 +8,9 @@ pub mod keys;
 pub mod screen;
 pub mod view;
 
-pub use crate::buses::novobus::top::{
+pub use crate::buses::rings::top::{
     Disturbance, DriveReading, Heading, RingReading, Snapshot, Top,
 };
-pub(crate) use crate::buses::novobus::top::{KeyTarget, TopRow};
+pub(crate) use crate::buses::rings::top::{KeyTarget, TopRow};
 pub use keys::{Key, Press};
 pub use screen::Screen;

@@ -17,7 +17,7 @@ pub(crate) mod manual;
 pub mod qualify;
 pub mod report;
 pub mod rig;
-pub(crate) mod serve;
+pub mod serve;
 pub mod simulate;
 pub mod stream;
 pub mod top;

@@ -1,7 +1,8 @@
 //! Rig files, locks, quarantine, hooks and the commands for them.
 
+use harness::buses::novobus::rig::Condition;
 use harness::file::values::{MaxSpeed, Speed};
-use harness::rig::file::{Condition, Level, LineFormat, Transport};
+use harness::rig::file::{Level, LineFormat, Transport};
 use harness::rig::hook::{self, HookError};
 use harness::rig::lock::{self, RigLock};
 use harness::rig::{Rig, find, parse, scan, schema};

@@ -17,6 +17,7 @@ mod recover;
 mod rig;
 pub(crate) mod rig_check;
 mod scope;
+pub(crate) mod shrink;
 mod signal;
 mod sim;
 mod top;

@@ -52,7 +52,9 @@ impl FromStr for RigName {
             return drives.map(|_| Self::Named(text.to_owned()));
         }
         match text.strip_prefix("sim:") {
-            Some(sizes) => crate::rig::find::sizes(sizes).map(Self::Simulated),
+            Some(sizes) => {
+                crate::buses::novobus::rig::named::sizes_of_rings(sizes).map(Self::Simulated)
+            }
             None => Ok(Self::Named(text.to_owned())),
         }
     }

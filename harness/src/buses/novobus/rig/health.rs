@@ -170,6 +170,7 @@ fn shown(bytes: &[Received]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::line_test;
     use super::*;
     use crate::buses::SimulatedLink;
     use crate::buses::novobus::driver::{OpenRings, Options};
@@ -177,7 +178,6 @@ mod tests {
     use crate::guard::{Guarded, Limits};
     use crate::library::Entry;
     use crate::link::{Line as _, LinkFault, Moment, PlacedFault};
-    use crate::rig::line_test;
     use crate::scenario::simulate;
     use crate::scenario::source::Source;
     use harness_proto::line::Rate;

@@ -1,9 +1,10 @@
 //! Interlocks: what must hold of drives throughout a run, asked over the bus while nothing else is under way.
 
+use super::condition::Condition;
 use crate::buses::novobus::language::scale::shown;
 use crate::guard::Watch;
 use crate::link::Line;
-use crate::rig::file::{Condition, Level};
+use crate::rig::file::Level;
 use crate::rig::{Rig, file};
 use crate::scenario::run::read_byte;
 use harness_proto::nd21::cells::Cell;

@@ -1,9 +1,21 @@
-//! A ring with ports: whether it is sound, what its line is like, and its figures.
+//! A ring with ports: in use, its scenarios, whether it is sound, what its line is like, and its figures.
 
+mod condition;
+mod driven;
 pub mod figures;
 pub(crate) mod health;
 pub(crate) mod interlock;
 pub(crate) mod judge;
 pub(crate) mod left_open;
 pub(crate) mod line_test;
+pub mod named;
+pub(crate) mod run;
+pub(crate) mod session;
 pub(crate) mod sim;
+
+pub use condition::Condition;
+pub use driven::Driven;
+pub use health::{Health, Unhealthy, examine};
+pub use line_test::Cause;
+pub use run::{Keeper, Run, Way, play_one};
+pub use session::Session;

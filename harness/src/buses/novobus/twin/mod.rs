@@ -18,3 +18,4 @@ pub use comparison::{
     Adopted, Comparison, DecidingBits, Divergence, Exactness, OwnByte, Symptom, Unasked,
 };
 pub use follow::{Conversation, Done, Twin};
+pub use harness_proto::novobus::role::Role;

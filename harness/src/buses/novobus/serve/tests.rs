@@ -1,12 +1,10 @@
 //! Served rings in virtual time: the clock is a number.
 
 use super::*;
-use crate::link::Octets;
 use crate::scenario::parse::parse_setup;
 use crate::scenario::plan::plan;
 use crate::scenario::simulate;
 use crate::scenario::source::Source;
-use crate::serve::Answer;
 use proptest::prelude::*;
 
 /// A read of the byte FE13 of drive 0 in a ring of three, and its answer (ND21 10.1): 00 with its negated sum.

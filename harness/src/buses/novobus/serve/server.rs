@@ -1,12 +1,10 @@
 //! Simulated rings behind streams of bytes, without I/O: bytes and the time are arguments, the deadline is a return value.
 
-use super::control::Answer;
-use super::place::{ClientRole, Inner};
-use super::served::ServedBus;
-use crate::buses::SimulatedLink;
+use crate::buses::novobus::link::SimulatedLink;
 use crate::counted::counted;
 use crate::link::{Line, Link, LinkFault, Moment, Octets, PlacedFault, link_name};
 use crate::scenario::plan::Plan;
+use crate::serve::{Answer, ClientRole, Inner, Marks, Pace, ServedBus};
 use harness_proto::line::{LineError, Received};
 use harness_proto::marks::{BadMark, Unmark, mark};
 use harness_proto::time::{Instant, Span};
@@ -42,29 +40,6 @@ const DROPPED: usize = 4096;
 
 /// Maximum number of bytes that wait for a client. Further bytes are lost, as in a serial port that is not read.
 const UNREAD: usize = 64 << 10;
-
-/// How fast time passes in the rings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pace {
-    /// As on the line: a byte takes its byte time.
-    #[default]
-    Line,
-    /// As fast as possible while bytes of the master's are under way; as on the line while none are, so that time-outs (ND21
-    /// 9.9) happen and motors turn.
-    Free,
-}
-
-/// How the stream of a client carries line errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Marks {
-    /// Not at all. Every byte of the client's is a good one; a byte that comes back damaged is given as it was read (a break as
-    /// 00), and that it was damaged is lost.
-    #[default]
-    None,
-    /// In-band, as of [`harness_proto::marks`]. A byte with an error of the client's reaches the first drive with a parity error, a
-    /// 00 with an error as a break; a byte that comes back damaged is marked.
-    InBand,
-}
 
 /// Simulated rings with seats for clients: first the master's place of each ring, then the inner links.
 #[derive(Clone, Debug)]

@@ -1,96 +1,32 @@
 //! A rig in use: locked, opened, found healthy, guarded, and taken to its safe state on every way out.
 
-use super::Rig;
-use super::around::Around;
-use super::ends::Ends;
-use super::file;
-use super::lock::{PortLock, RigLock};
-use super::open::{open, stated_rate};
-use super::permitted::{limits, standing};
-use super::session_error::SessionError;
-use super::state;
-use super::taken::take;
-use super::watchdog::{Alarm, Watchdog, watch_over};
+use super::health::{self, Health, Unhealthy, examine};
+use super::interlock::Interlocks;
+use super::line_test::{self, Cause};
 use crate::buses::novobus::driver::{Axis, count_behind};
 use crate::guard::Limits;
-use crate::guard::{Guarded, Safe, Watch, blind_stop, safe_state};
+use crate::guard::{Guarded, Watch, blind_stop, safe_state};
 use crate::link::{Line, Link, Octets, PortLink, Trouble};
 use crate::medium::Pieces;
-use crate::rig::health::{self, Health, Unhealthy, examine};
-use crate::rig::interlock::Interlocks;
-use crate::rig::line_test::{self, Cause};
+use crate::rig::around::Around;
+use crate::rig::lock::{PortLock, RigLock};
+use crate::rig::open::open;
+use crate::rig::taken::take;
+use crate::rig::watchdog::{Watchdog, watch_over};
+use crate::rig::{
+    Alarm, End, Ends, Options, Rig, SessionError, file, limits, standing, state, stated_rate,
+};
 use harness_proto::line::{Rate, Received};
 use harness_proto::novobus::address::RingSize;
 use harness_proto::time::Span;
-use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 /// How long a rig must be silent before anything is sent.
 const LISTEN: Span = Span::from_millis(40);
 
 /// How long what was sent may be on its way round a ring of 250 drives, adapters counted (ND21 8.2).
 const LONGEST_ROUND: Span = Span::from_millis(1_000);
-
-/// How a rig is used.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// The purpose, shown to others who want the rig.
-    pub purpose: String,
-    /// How long to wait for a rig that is in use.
-    pub wait: Duration,
-    /// Whether motors may turn, if the rig's file allows it too.
-    pub allow_motion: bool,
-    /// Whether to open a ring that fails its health check, to find out what is wrong with it.
-    pub ill_as_well: bool,
-    /// Whether the lines of a ring that has timed out are [kept](Line::keep) until the caller's own master sends.
-    pub keeps_lines: bool,
-    /// Set to end the program.
-    pub interrupt: Arc<AtomicBool>,
-    /// Called when the program shows no sign of life, after the watchdog has stopped the drives.
-    pub alarm: Alarm,
-}
-
-impl Options {
-    /// Returns an error once the program has been interrupted.
-    pub(crate) fn unless_interrupted(&self, rig: &Rig) -> Result<(), SessionError> {
-        match self.interrupt.load(Ordering::Relaxed) {
-            false => Ok(()),
-            true => Err(SessionError::Interrupted {
-                rig: rig.id().to_owned(),
-                end: None,
-            }),
-        }
-    }
-}
-
-/// How a session ended.
-#[derive(Debug)]
-pub struct End {
-    /// Whether every drive stands and is blocked; `None` for rings that are simulated in the program.
-    pub safe: Option<Safe>,
-    /// Power that was to be switched off and is not known to be, in sentences.
-    pub power: Vec<String>,
-    /// What else went wrong on the way out, in sentences.
-    pub remarks: Vec<String>,
-}
-
-impl End {
-    /// Whether the drives or their power may not be in the safe state.
-    #[must_use]
-    pub fn is_unsafe(&self) -> bool {
-        !self.power.is_empty() || self.safe.as_ref().is_some_and(|safe| !safe.confirmed)
-    }
-}
-
-impl fmt::Display for End {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let safe = self.safe.iter().map(Safe::to_string);
-        let others = self.power.iter().chain(&self.remarks).cloned();
-        f.write_str(&safe.chain(others).collect::<Vec<_>>().join("; "))
-    }
-}
 
 /// A rig in use.
 #[derive(Debug)]

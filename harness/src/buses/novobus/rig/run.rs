@@ -1,19 +1,17 @@
 //! Scenarios on a rig: healthy before, beside the twin while they run, again where they did not pass, and every attempt
 //! kept.
 
-use super::Rig;
 use super::driven::Driven;
-use super::played::{Again, Attempt, Played, attempts_of};
+use super::health::{Unhealthy, examine};
+use super::judge::{Heard, judge, known};
 use super::session::Session;
-use super::session_error::SessionError;
-use crate::buses::syntax::Header;
-use crate::buses::twin::{Comparison, Conversation, Exactness, Twin};
+use crate::buses::novobus::language::syntax::Header;
+use crate::buses::novobus::twin::{Comparison, Conversation, Exactness, Twin};
 use crate::guard::Guarded;
 use crate::link::{
     Capability, Line, Link, LinkEvent, Octets, Recording, Sink, Trouble, wait_keeping,
 };
-use crate::rig::health::{Unhealthy, examine};
-use crate::rig::judge::{Heard, judge, known};
+use crate::rig::{Again, Attempt, Played, Rig, SessionError, attempts_of};
 use crate::scenario::plan::Plan;
 use crate::scenario::problem::Problems;
 use crate::scenario::run::{

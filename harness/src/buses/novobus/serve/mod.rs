@@ -1,0 +1,7 @@
+//! Simulated rings behind streams of bytes.
+
+mod control;
+mod server;
+mod state;
+
+pub use server::Server;
