@@ -3,6 +3,7 @@
 pub(crate) mod capture;
 pub(crate) mod deviations;
 pub(crate) mod dissector;
+pub mod driver;
 pub mod language;
 pub(crate) mod manual;
 pub mod report;

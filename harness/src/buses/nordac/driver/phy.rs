@@ -1,0 +1,284 @@
+//! The physical layer of the master: a [`Line`] as profirust sees it.
+//!
+//! The bench is the only master of its segment. So requests for other masters (FDL status of unused addresses, EN 1) stay off the line, and
+//! their slot time passes at once. A telegram reaches the master only if it is whole and replies to the last
+//! request; the standard's own checks are done here, by the codec of this bench.
+
+use super::error::Error;
+use crate::link::Line;
+use crate::medium::{Heard, Out};
+use harness_proto::decode::Decoded;
+use harness_proto::line::Received;
+use harness_proto::profibus::dp::{Diagnosis, Service};
+use harness_proto::profibus::fdl::{Function, MAX_TELEGRAM, Status};
+use harness_proto::profibus::rate::{OCTET_BITS, SYN_BITS};
+use harness_proto::profibus::{BusRate, Pdu, Telegram};
+use harness_proto::time::{Instant, Span};
+use profirust::phy::ProfibusPhy;
+use profirust::time;
+
+/// What a driver needs to know of its line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// The rate of the segment.
+    pub rate: BusRate,
+    /// How long a reply may take until it is whole, from the end of its request: what the line and the bench need, the adapter among it. At
+    /// most [`Timing::MOST_BITS`] bits of the rate.
+    pub patience: Span,
+    /// How often the master looks at the line while nothing arrives; a line in virtual time needs no more than the default.
+    pub step: Span,
+}
+
+impl Timing {
+    /// The longest slot time that the master counts.
+    pub const MOST_BITS: u16 = u16::MAX;
+
+    /// That of a line in virtual time: the slave's longest delay and its longest reply.
+    #[must_use]
+    pub fn simulated(rate: BusRate) -> Self {
+        let longest = rate.max_tsdr_bits() + SYN_BITS + OCTET_BITS * LONGEST_REPLY;
+        Self {
+            rate,
+            patience: rate.bit_time() * longest,
+            step: Span::ZERO,
+        }
+    }
+
+    /// The slot time in bits.
+    pub(super) fn slot_bits(self) -> u16 {
+        let bits = self.patience.units() / self.rate.bit_time().units().max(1);
+        // The master takes no shorter slot at the highest rate.
+        u16::try_from(bits).unwrap_or(Self::MOST_BITS).max(400)
+    }
+
+    pub(super) fn slot_time(self) -> Span {
+        self.rate.bit_time() * u64::from(self.slot_bits())
+    }
+
+    /// The time between two looks: a little more than the idle time in front of a request.
+    fn grain(self) -> Span {
+        let idle = self.rate.bit_time() * (SYN_BITS + 2);
+        idle.max(self.step).max(Span::from_micros(1))
+    }
+}
+
+/// Octets of the longest reply: 20 octets of data in an SD2 telegram with SAPs.
+const LONGEST_REPLY: u64 = 32;
+
+/// A line, and what the master has under way on it.
+pub(super) struct Wire<'l> {
+    line: Box<dyn Line + 'l>,
+    timing: Timing,
+    master: u8,
+    /// When the last octet that was sent will have left.
+    left: Instant,
+    /// The request that waits for a reply.
+    asked: Option<Pdu>,
+    /// Octets received that are no whole telegram yet.
+    begun: Vec<u8>,
+    /// The reply, for the master.
+    reply: Vec<u8>,
+    /// How far the master's clock is ahead of the line's.
+    ahead: Span,
+    /// What cannot go on: the line does not carry a telegram, or belongs to another master.
+    failed: Option<Error>,
+    /// The last diagnosis, and the last service that its slave has answered with RS.
+    pub(super) diagnosis: Option<Diagnosis>,
+    pub(super) not_activated: Option<Service>,
+}
+
+impl<'l> Wire<'l> {
+    pub(super) fn new(line: Box<dyn Line + 'l>, timing: Timing, master: u8) -> Self {
+        let left = line.now();
+        Self {
+            line,
+            timing,
+            master,
+            left,
+            asked: None,
+            begun: Vec::new(),
+            reply: Vec::new(),
+            ahead: Span::ZERO,
+            failed: None,
+            diagnosis: None,
+            not_activated: None,
+        }
+    }
+
+    pub(super) fn line(&self) -> &dyn Line {
+        &*self.line
+    }
+
+    /// The master's time.
+    pub(super) fn clock(&self) -> time::Instant {
+        let micros = (self.line.now().since_start() + self.ahead).as_nanos() / 1000;
+        time::Instant::from_micros(i64::try_from(micros).unwrap_or(i64::MAX))
+    }
+
+    /// The station whose reply is awaited.
+    pub(super) fn awaits(&self) -> Option<u8> {
+        self.asked.map(|asked| asked.da())
+    }
+
+    /// Forgets the request that waits.
+    pub(super) fn forget(&mut self) {
+        self.asked = None;
+        self.begun.clear();
+        self.reply.clear();
+    }
+
+    /// Why nothing more can be done on this line.
+    pub(super) fn check(&mut self) -> Result<(), Error> {
+        match (self.failed.take(), self.line.trouble()) {
+            (_, Some(trouble)) => Err(Error::Link(trouble.clone())),
+            (Some(error), None) => Err(error),
+            (None, None) => Ok(()),
+        }
+    }
+
+    /// Lets time pass until something is received, the master is to look again, or `end`.
+    pub(super) fn wait(&mut self, end: Instant) {
+        let now = self.line.now();
+        let next = if now < self.left {
+            self.left
+        } else if self.reply.is_empty() {
+            now + self.timing.grain()
+        } else {
+            // The master takes the reply, at the latest one of its microseconds later.
+            now + Span::from_micros(1)
+        };
+        let _nothing_comes = self.line.wait(next.min(end));
+        self.receive();
+    }
+
+    /// Asks a slave once beside the master, and returns its reply; `None` if there is none. The master has nothing under way.
+    pub(super) fn ask(&mut self, request: Pdu) -> Result<Option<Telegram>, Error> {
+        let idle = self.timing.rate.bit_time() * SYN_BITS;
+        let ready = self.left.max(self.line.now()) + idle;
+        while self.line.now() < ready && self.line.trouble().is_none() {
+            let _nothing_comes = self.line.wait(ready);
+            self.receive();
+        }
+        self.send(&Telegram::Pdu(request).encode());
+        let end = self.left + self.timing.slot_time();
+        while self.reply.is_empty() && self.line.now() < end {
+            self.check()?;
+            let _nothing_comes = self.line.wait(end);
+            self.receive();
+        }
+        self.check()?;
+        self.asked = None;
+        let reply = std::mem::take(&mut self.reply);
+        Ok(Telegram::decode(&reply).value())
+    }
+
+    fn send(&mut self, octets: &[u8]) {
+        // What was received before a request is no reply to it.
+        self.receive();
+        self.begun.clear();
+        self.reply.clear();
+        let request = Telegram::decode(octets).value();
+        let pdu = request.as_ref().and_then(Telegram::pdu).copied();
+        let function = pdu.and_then(|pdu| pdu.fc().function());
+        if function == Some(Function::FdlStatus) {
+            let sent = self.timing.rate.octet_time() * octets.len() as u64;
+            // A microsecond more for each time that the master rounds.
+            self.ahead = self.ahead + sent + self.timing.slot_time() + Span::from_micros(4);
+            return;
+        }
+        self.asked = pdu.filter(|_| function.is_some_and(Function::is_srd));
+        self.left = self.line.send(0, Out::Octets(octets));
+        if self.line.refused() > 0 && self.line.trouble().is_none() {
+            self.failed = Some(Error::NotSent);
+        }
+    }
+
+    pub(super) fn receive(&mut self) {
+        while let Some((_, heard)) = self.line.receive(0) {
+            if let Heard::Octet(octet) = heard {
+                self.hear(octet);
+            }
+        }
+    }
+
+    fn hear(&mut self, octet: Received) {
+        if octet.error.is_some() {
+            self.begun.clear();
+            return;
+        }
+        self.begun.push(octet.byte);
+        match Telegram::decode(&self.begun) {
+            Decoded::NeedMore if self.begun.len() <= MAX_TELEGRAM => {}
+            Decoded::NeedMore | Decoded::Bad { .. } => self.begun.clear(),
+            Decoded::Value { value, .. } => {
+                let octets = std::mem::take(&mut self.begun);
+                self.take(&value, octets);
+            }
+        }
+    }
+
+    fn take(&mut self, telegram: &Telegram, octets: Vec<u8>) {
+        let other = match telegram {
+            Telegram::Token { sa, .. } => Some(*sa),
+            Telegram::Pdu(pdu) if pdu.fc().is_request() => Some(pdu.sa()),
+            Telegram::Pdu(_) | Telegram::Confirmation => None,
+        };
+        if let Some(station) = other {
+            self.failed = Some(Error::OtherMaster { station });
+        } else if let Some(asked) = self.asked.filter(|asked| self.replies(asked, telegram)) {
+            self.note(&asked, telegram);
+            self.asked = None;
+            self.reply = octets;
+        }
+    }
+
+    /// Keeps what a failed start is explained by.
+    fn note(&mut self, asked: &Pdu, telegram: &Telegram) {
+        let Some(pdu) = telegram.pdu() else {
+            return;
+        };
+        let service = Service::of(asked.dsap());
+        if pdu.fc().status() == Some(Status::Rs) {
+            self.not_activated = service;
+        } else if service == Some(Service::SlaveDiag) {
+            self.diagnosis = Diagnosis::decode(pdu.data());
+        }
+    }
+
+    /// Whether a telegram replies to a request.
+    fn replies(&self, asked: &Pdu, telegram: &Telegram) -> bool {
+        let Some(pdu) = telegram.pdu() else {
+            return true;
+        };
+        let saps = pdu.dsap() == asked.ssap() && pdu.ssap() == asked.dsap();
+        let bare = pdu.dsap().is_none() && pdu.ssap().is_none();
+        pdu.sa() == asked.da() && pdu.da() == self.master && (saps || bare)
+    }
+}
+
+impl ProfibusPhy for Wire<'_> {
+    fn poll_transmission(&mut self, _now: time::Instant) -> bool {
+        self.line.now() < self.left
+    }
+
+    fn transmit_data<F, R>(&mut self, _now: time::Instant, f: F) -> R
+    where
+        F: FnOnce(&mut [u8]) -> (usize, R),
+    {
+        let mut buffer = [0; 256];
+        let (length, result) = f(&mut buffer);
+        if length > 0 {
+            self.send(&buffer[..length]);
+        }
+        result
+    }
+
+    fn receive_data<F, R>(&mut self, _now: time::Instant, f: F) -> R
+    where
+        F: FnOnce(&[u8]) -> (usize, R),
+    {
+        let (used, result) = f(&self.reply);
+        self.reply.drain(..used);
+        result
+    }
+}
