@@ -324,7 +324,7 @@ impl<S: LineStation> OctetSegment<S> {
         while let Some((at, event, place)) = self.next().filter(|(at, ..)| *at <= to) {
             self.now = self.now.max(at);
             match event {
-                Event::End => self.end(place),
+                Event::End => self.stream(place, to),
                 Event::Act => self.stations[place].advance(at),
                 Event::Octet => self.begin_octet(place, at),
                 Event::Telegram => self.begin_telegrams(at),
@@ -334,6 +334,35 @@ impl<S: LineStation> OctetSegment<S> {
         for station in &mut self.stations {
             station.advance(to);
         }
+    }
+
+    /// Ends the octet of a station. As long as the octets of its telegram follow each other up to `to`, and nothing else happens before
+    /// one of them ends, the search for the next event is left out.
+    fn stream(&mut self, place: usize, to: Instant) {
+        loop {
+            self.end(place);
+            let acts = self.stations.iter().filter_map(S::next_action).min();
+            let member = &self.members[place];
+            let follows = member.next < member.telegram.len() && member.begins == self.now;
+            if !follows || acts.is_some_and(|at| at <= self.now) || self.others_send(place) {
+                return;
+            }
+            self.begin_octet(place, self.now);
+            let Some(end) = self.members[place].flying.as_ref().map(|own| own.end) else {
+                return;
+            };
+            let begins = |other: usize| self.start_of(other).is_some_and(|at| at < end);
+            let disturbed = (0..self.stations.len()).any(|other| other != place && begins(other));
+            if end > to || disturbed || acts.is_some_and(|at| at < end) {
+                return;
+            }
+            self.now = end;
+        }
+    }
+
+    fn others_send(&self, place: usize) -> bool {
+        let mut others = self.members.iter().enumerate();
+        others.any(|(other, member)| other != place && member.is_sending())
     }
 
     /// What happens next, when, and to which station.
