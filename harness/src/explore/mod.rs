@@ -14,6 +14,8 @@ mod finding;
 mod fuzz_case;
 mod pool;
 mod record;
+pub(crate) mod search;
+pub(crate) mod smaller;
 mod swarm;
 mod target;
 

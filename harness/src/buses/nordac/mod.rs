@@ -4,6 +4,8 @@ pub(crate) mod capture;
 pub(crate) mod deviations;
 pub(crate) mod dissector;
 pub mod driver;
+pub mod explore;
+pub mod judge;
 pub mod language;
 pub(crate) mod manual;
 pub mod report;

@@ -1,6 +1,5 @@
 //! `drivebench fuzz run` and `shrink` on UNITEK drives.
 
-use crate::buses::unitek::explore::shrink::smaller;
 use crate::buses::unitek::explore::{
     FrameScope, FrameSetup, FrameSpice, FrameTalk, OnAdapter, OnBench, PlantedDrive,
 };
@@ -12,6 +11,7 @@ use crate::cli::output::Output;
 use crate::cli::rig_failure::{alarm, exit_of, tell_end};
 use crate::cli::shrink::write_smaller;
 use crate::counted::counted;
+use crate::explore::smaller::smaller;
 use crate::explore::{ExploreError, Finding, FuzzSettings, KeptRun, Spiced as _, read_as};
 use crate::link::{Line as _, Trouble};
 use crate::rig::{Options, Rig};
@@ -170,7 +170,8 @@ pub(crate) fn shrink(path: &Path, most: u32, output: &mut Output) -> std::io::Re
     let read = Finding::<FrameTalk>::read_as(path);
     let small = read.and_then(|(finding, file)| {
         let most = if finding.ports { 0 } else { most };
-        Ok((smaller(&finding, most)?, finding, file))
+        let mut target = OnBench::new(finding.setup.under_test()?);
+        Ok((smaller(&finding, &mut target, most)?, finding, file))
     });
     let (small, finding, file) = match small {
         Ok(small) => small,

@@ -8,10 +8,12 @@ use super::play::FramesSeen;
 use super::setup::FrameSetup;
 use super::text::text;
 use crate::buses::Bus;
+use crate::explore::smaller::Acts;
 use crate::explore::{
     Confirmation, Dice, Differing, ExploreError, Finding, FuzzCase, FuzzSettings, JudgedAgain,
     Pool, Rehearsal, Swarm, Target,
 };
+use harness_proto::can::Frame;
 use harness_proto::unitek::Register;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -130,6 +132,47 @@ impl FuzzCase for FrameTalk {
             confirmation.by_others(finding);
         }
         Ok(())
+    }
+}
+
+impl Acts for FrameTalk {
+    fn acts(&mut self) -> &mut Vec<FrameAct> {
+        &mut self.acts
+    }
+
+    fn wait(act: &mut FrameAct) -> &mut u64 {
+        &mut act.wait_us
+    }
+
+    /// Shorter frames, and lower bytes behind the register.
+    fn simpler(act: &FrameAct) -> Vec<FrameAct> {
+        let FrameActKind::Send(frame) = act.what else {
+            return Vec::new();
+        };
+        if frame.is_remote() {
+            return Vec::new();
+        }
+        let data = frame.data();
+        let mut all: Vec<_> = (0..data.len())
+            .map(|length| data[..length].to_vec())
+            .collect();
+        for (index, own) in data.iter().enumerate().skip(1) {
+            let lower = [0, 1, own & 0x0F, own / 2].into_iter();
+            for byte in lower.filter(|byte| byte < own) {
+                let mut other = data.to_vec();
+                other[index] = byte;
+                all.push(other);
+            }
+        }
+        let frames = all
+            .iter()
+            .filter_map(|data| Frame::new(frame.id(), data).ok());
+        let with = |frame| FrameAct::new(FrameActKind::Send(frame), act.wait_us);
+        frames.map(with).collect()
+    }
+
+    fn measure(&self) -> (usize, u64, u64) {
+        Self::measure(self)
     }
 }
 

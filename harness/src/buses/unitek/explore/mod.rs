@@ -12,7 +12,6 @@ mod on_sim;
 pub mod oracle;
 mod play;
 pub mod setup;
-pub mod shrink;
 #[cfg(test)]
 mod tests;
 mod text;

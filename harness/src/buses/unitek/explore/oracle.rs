@@ -1,8 +1,7 @@
 //! Whether drives do what the manual says, with any value of what it leaves open.
 //!
 //! The frames of a case are compared with those of the model. Where they differ, the model is played again with other values of the
-//! points that the manual leaves open (UNITEK 7), one drive and one point after the other, as long as that explains more. Only what no
-//! such model explains is a difference. Times of three points are measured, since they can have any value: `stuff`, `reply-delay` and
+//! points that the manual leaves open (UNITEK 7; [`crate::explore::search`]). Only what no such model explains is a difference. Times of three points are measured, since they can have any value: `stuff`, `reply-delay` and
 //! `homing-time`.
 
 use super::act::{FrameAct, FrameActKind, FrameTalk};
@@ -11,6 +10,7 @@ use super::setup::model;
 use crate::buses::unitek::judge::FrameSymptom;
 use crate::buses::unitek::language::written;
 use crate::buses::unitek::simulate::Setup;
+use crate::explore::search::{Explained, Explains, explain};
 use harness_proto::can::Frame;
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::Reply;
@@ -19,16 +19,6 @@ use harness_proto::unitek::words::{MODE_EVENT, status};
 use harness_proto::unitek::{Data, Register, Request};
 use harness_sim::record::LineFrame;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
-
-/// The models that are played at most to explain a case. Beyond them it is not judged.
-const MOST_PLAYED: usize = 2_000;
-
-/// How many values in a row are changed at most.
-const MOST_CHANGED: usize = 8;
-
-/// Of the changes that explain more, how many are followed.
-const FOLLOWED: usize = 3;
 
 /// Bits of the intermission behind a frame.
 const INTERMISSION_BITS: u32 = 3;
@@ -134,93 +124,62 @@ impl Oracle {
 
     /// Judges what the drives under test have done in a case.
     pub fn judge(&mut self, case: &FrameTalk, seen: &FramesSeen) -> Judgement {
-        let mut search = Search {
+        let played = Played {
             oracle: self,
             case,
             seen,
-            tried: BTreeSet::new(),
-            best: None,
         };
         let begins = [
-            search.oracle.last.clone(),
-            search.oracle.all(Properties::default()),
-            search.oracle.all(Properties::fw472()),
+            self.last.clone(),
+            self.all(Properties::default()),
+            self.all(Properties::fw472()),
         ];
-        for begin in begins {
-            if let Some(found) = search.from(begin, MOST_CHANGED) {
+        match explain(&played, begins) {
+            Explained::By(found) => {
                 self.last.clone_from(&found);
-                return Judgement::Explained(found);
+                Judgement::Explained(found)
             }
-        }
-        let (spent, best) = (search.tried.len() >= MOST_PLAYED, search.best.take());
-        match best {
-            Some((_, assignment)) if !spent => {
-                let expected = self.expected(case, &assignment);
-                let found = difference(&self.under_test, &expected, seen, lines(self, &assignment));
+            Explained::Not(best) => {
+                let expected = self.expected(case, &best);
+                let found = difference(&self.under_test, &expected, seen, lines(self, &best));
                 found.map_or(Judgement::Undecided, |own| {
                     Judgement::Differs(Box::new(own))
                 })
             }
-            _ => Judgement::Undecided,
+            Explained::Undecided => Judgement::Undecided,
         }
     }
 }
 
-/// The search for a model that explains a case.
-struct Search<'o> {
+/// A case that was played on the drives under test.
+struct Played<'o> {
     oracle: &'o Oracle,
     case: &'o FrameTalk,
     seen: &'o FramesSeen,
-    /// What was played, by its words.
-    tried: BTreeSet<String>,
-    best: Option<(Agreement, Assignment)>,
 }
 
-/// How far a model agrees: frames before the first difference, and how like this frame is. More is better.
-type Agreement = (usize, i64);
+impl Explains for Played<'_> {
+    type Assumed = Assignment;
+    /// Frames before the first difference, and how like this frame is.
+    type Agreement = (usize, i64);
 
-impl Search<'_> {
-    /// Follows changes that explain more. `None` if none of them explains all.
-    fn from(&mut self, begin: Assignment, left: usize) -> Option<Assignment> {
-        let Some(own) = self.agreement(&begin) else {
-            return Some(begin);
-        };
-        if left == 0 {
-            return None;
-        }
-        let mut better = Vec::new();
-        for drive in 0..begin.len() {
-            for changed in neighbours(&begin[drive]) {
-                let mut next = begin.clone();
-                next[drive] = changed;
-                let words = format!("{next:?}");
-                if self.tried.len() >= MOST_PLAYED || !self.tried.insert(words) {
-                    continue;
-                }
-                match self.agreement(&next) {
-                    None => return Some(next),
-                    Some(other) if other > own => better.push((other, next)),
-                    Some(_) => {}
-                }
-            }
-        }
-        better.sort_by_key(|(agreement, _)| std::cmp::Reverse(*agreement));
-        better.truncate(FOLLOWED);
-        better
-            .into_iter()
-            .find_map(|(_, next)| self.from(next, left - 1))
-    }
-
-    /// How far a model agrees; `None` if it explains all.
-    fn agreement(&mut self, assignment: &Assignment) -> Option<Agreement> {
-        let expected = self.oracle.expected(self.case, assignment);
+    fn agreement(&self, assumed: &Assignment) -> Option<(usize, i64)> {
+        let expected = self.oracle.expected(self.case, assumed);
         let index = first(&expected.frames, &self.seen.frames)?;
         let pair = (expected.frames.get(index), self.seen.frames.get(index));
-        let agreement = (index, -unlike(pair));
-        if self.best.as_ref().is_none_or(|(best, _)| *best < agreement) {
-            self.best = Some((agreement, assignment.clone()));
+        Some((index, -unlike(pair)))
+    }
+
+    fn neighbours(&self, assumed: &Assignment) -> Vec<Assignment> {
+        let mut all = Vec::new();
+        for (drive, own) in assumed.iter().enumerate() {
+            for changed in neighbours(own) {
+                let mut next = assumed.clone();
+                next[drive] = changed;
+                all.push(next);
+            }
         }
-        Some(agreement)
+        all
     }
 }
 

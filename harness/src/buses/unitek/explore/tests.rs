@@ -1,7 +1,7 @@
 //! Fuzz runs on simulated drives: right ones are never accused, wrong ones are found, shrunk and kept as scenarios.
 
-use super::shrink::smaller;
 use super::{FrameScope, FrameSetup, FrameSpice, FrameTalk, OnBench, PlantedDrive};
+use crate::explore::smaller::smaller;
 use crate::explore::{
     Bounds, Finding, FuzzCase, FuzzRun, FuzzSettings, Pool, Progress, RunEnd, Spiced as _, Swarm,
     Watcher,
@@ -136,7 +136,10 @@ fn missed(some: impl Iterator<Item = &'static Deviation>) -> Vec<&'static str> {
             missed.push(deviation.name);
             continue;
         };
-        let small = smaller(finding, 200).expect("a header").finding;
+        let mut target = OnBench::new(finding.setup.under_test().expect("a header"));
+        let small = smaller(finding, &mut target, 200)
+            .expect("a header")
+            .finding;
         assert!(
             small.case.measure() <= finding.case.measure(),
             "{}",

@@ -1,0 +1,5 @@
+//! How replies of slaves can differ from those of a right one.
+
+mod symptom;
+
+pub use symptom::{Place, Symptom};
