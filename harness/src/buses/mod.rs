@@ -126,18 +126,26 @@ pub(crate) fn over_ports(
 pub enum PortBus {
     /// UNITEK DS/BAMOCAR on CAN.
     Unitek,
+    /// NORDAC *vector* on PROFIBUS DP.
+    Nordac,
 }
 
 impl PortBus {
     /// All of them.
-    pub const ALL: [Self; 1] = [Self::Unitek];
+    pub const ALL: [Self; 2] = [Self::Unitek, Self::Nordac];
+
+    /// What a rig's file says of its drives, and what the commands do with them.
+    const fn row(self) -> &'static PortRow {
+        match self {
+            Self::Unitek => &unitek::rig::PORT,
+            Self::Nordac => &nordac::rig::PORT,
+        }
+    }
 
     /// The bus of its scenarios.
     #[must_use]
     pub const fn bus(self) -> Bus {
-        match self {
-            Self::Unitek => Bus::Unitek,
-        }
+        self.row().bus
     }
 
     /// The name in a rig's file.
@@ -146,12 +154,48 @@ impl PortBus {
         self.bus().name()
     }
 
-    /// The drive at a place of a port's list: its number, and its identifiers to receive and to send.
+    /// The drive at a place of a port's list: its number, and its identifiers.
     #[must_use]
-    pub fn drive(self, index: usize, node: Node) -> (u8, (u16, u16)) {
-        match self {
-            Self::Unitek => unitek::rig::drive(index, node),
-        }
+    pub fn drive(self, index: usize, node: Node) -> (u8, Vec<u16>) {
+        (self.row().drive)(index, node)
+    }
+
+    /// The keys of `[port.1]` that not every bus has.
+    #[must_use]
+    pub const fn keys(self) -> &'static [&'static str] {
+        self.row().keys
+    }
+
+    /// The keys of `[limits]` that not every bus has.
+    #[must_use]
+    pub const fn limits(self) -> &'static [&'static str] {
+        self.row().limits
+    }
+
+    /// The most drives of a simulated bench.
+    #[must_use]
+    pub const fn most_drives(self) -> u8 {
+        self.row().most_drives
+    }
+
+    /// The drives of a simulated bench as its file lists them, and the limits with which all is permitted.
+    #[must_use]
+    pub fn simulated(self, drives: u8) -> (String, String) {
+        (self.row().simulated)(drives)
+    }
+
+    /// Whether a drive is named as on this bus.
+    ///
+    /// # Errors
+    /// What is wrong, and what was expected.
+    pub fn named(self, node: Node) -> Result<(), (&'static str, &'static str)> {
+        (self.row().named)(node)
+    }
+
+    /// Whether the bus has a rate of so many bits a second.
+    #[must_use]
+    pub fn has_rate(self, bits: u32) -> bool {
+        (self.row().has_rate)(bits)
     }
 
     /// The mistakes of `setup` lines of a simulated port, each with the number of its line, counted from 0.
@@ -160,9 +204,7 @@ impl PortBus {
             name: "setup".to_owned(),
             text: lines.join("\n").into(),
         };
-        let read = match self {
-            Self::Unitek => unitek::rig::setup(port, &source).err(),
-        };
+        let read = (self.row().setup_mistakes)(port, &source);
         let line = |own: &Problem| line_number(&source.text, own.span.start) - 1;
         let problems = read.iter().flat_map(Problems::all);
         let placed = problems.map(|own| (line(own), own.clone()));
@@ -174,10 +216,42 @@ impl PortBus {
     /// # Errors
     /// What is wrong, and what was expected.
     pub(crate) fn special_register(self, text: &str) -> Result<u8, (String, String)> {
-        match self {
-            Self::Unitek => unitek::rig::special_register(text),
-        }
+        (self.row().special_register)(text)
     }
+}
+
+/// What a bus knows of `[port.1]` and of the drives there.
+pub(crate) struct PortRow {
+    /// The bus of its scenarios.
+    pub(crate) bus: Bus,
+    /// See [`PortBus::keys`].
+    pub(crate) keys: &'static [&'static str],
+    /// See [`PortBus::limits`].
+    pub(crate) limits: &'static [&'static str],
+    /// See [`PortBus::most_drives`].
+    pub(crate) most_drives: u8,
+    /// See [`PortBus::simulated`].
+    pub(crate) simulated: fn(u8) -> (String, String),
+    /// See [`PortBus::named`].
+    pub(crate) named: fn(Node) -> Result<(), (&'static str, &'static str)>,
+    /// See [`PortBus::has_rate`].
+    pub(crate) has_rate: fn(u32) -> bool,
+    /// See [`PortBus::drive`].
+    pub(crate) drive: fn(usize, Node) -> (u8, Vec<u16>),
+    /// The mistakes of `setup` lines.
+    pub(crate) setup_mistakes: fn(&Port, &Source) -> Option<Problems>,
+    /// See [`PortBus::special_register`].
+    pub(crate) special_register: fn(&str) -> Result<u8, (String, String)>,
+    /// Takes a rig to play scenarios on it.
+    pub(crate) run: fn(&Rig, &Options) -> Result<Box<dyn SegmentRun>, SessionError>,
+    /// Judges what was played again, with or without `--allow-motion`.
+    pub(crate) judge: Option<fn(&Rig, bool) -> Box<dyn SegmentJudge>>,
+    /// Runs a command on its drives.
+    pub(crate) command: fn(&Rig, &DriveCommand, &mut Output) -> Result<Exit, Failure>,
+    /// Runs `rig check`, as text or for tools.
+    pub(crate) check: fn(&Rig, &Options, bool, &mut Output) -> Result<Exit, Failure>,
+    /// Explores its drives.
+    pub(crate) fuzz: fn(&Rig, &FuzzRunArguments, &mut Output) -> std::io::Result<Exit>,
 }
 
 /// Takes a rig with a port, to play scenarios on it.
@@ -185,8 +259,8 @@ impl PortBus {
 /// # Errors
 /// [`SessionError`]; nothing is left locked or open.
 pub(crate) fn run_on(rig: &Rig, options: &Options) -> Result<Box<dyn SegmentRun>, SessionError> {
-    match rig.port().map(|port| port.bus) {
-        Some(PortBus::Unitek) => Ok(Box::new(unitek::rig::DrivesInUse::open(rig, options)?)),
+    match rig.port() {
+        Some(port) => (port.bus.row().run)(rig, options),
         None => Err(SessionError::Drives {
             rig: rig.id().to_owned(),
             why: "it has no [port.1]".to_owned(),
@@ -196,9 +270,8 @@ pub(crate) fn run_on(rig: &Rig, options: &Options) -> Result<Box<dyn SegmentRun>
 
 /// Judges what was played on a rig with a port again, with or without `--allow-motion`; `None` for a bench with rings.
 pub(crate) fn judge_of(rig: &Rig, allow_motion: bool) -> Option<Box<dyn SegmentJudge>> {
-    match rig.port()?.bus {
-        PortBus::Unitek => Some(Box::new(unitek::rig::Judge::new(rig, allow_motion))),
-    }
+    let judge = rig.port()?.bus.row().judge?;
+    Some(judge(rig, allow_motion))
 }
 
 /// Whether these are traces of a bus of frames.
@@ -393,9 +466,7 @@ pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
     let Some(bus) = rig.port().map(|port| port.bus) else {
         return novobus::cli::drive(command, output);
     };
-    let end = match bus {
-        PortBus::Unitek => unitek::cli::drive(&rig, command, output),
-    };
+    let end = (bus.row().command)(&rig, command, output);
     told(end, output)
 }
 
@@ -410,8 +481,8 @@ pub(crate) fn check_rig(
     let for_tools = arguments.format == ListFormat::Json;
     match rig.port().map(|port| port.bus) {
         None => novobus::cli::rig_check::check(&rig, arguments, output),
-        Some(PortBus::Unitek) => {
-            let end = unitek::cli::check(&rig, &arguments.options(), for_tools, output);
+        Some(bus) => {
+            let end = (bus.row().check)(&rig, &arguments.options(), for_tools, output);
             told(end, output)
         }
     }
@@ -423,8 +494,8 @@ pub(crate) fn fuzz_port(
     arguments: &FuzzRunArguments,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    match rig.port().map(|port| port.bus) {
-        Some(PortBus::Unitek) => unitek::cli::fuzz::run(rig, arguments, output),
+    match rig.port() {
+        Some(port) => (port.bus.row().fuzz)(rig, arguments, output),
         None => Ok(Exit::Usage),
     }
 }
@@ -501,6 +572,14 @@ pub enum Stimulus {
     Unitek(harness_sim::unitek::Stimulus),
     /// To a NORDAC inverter, or on its line.
     Nordac(nordac::simulate::Happening),
+}
+
+impl Stimulus {
+    /// Whether it changes what the line carries.
+    #[must_use]
+    pub const fn is_on_line(self) -> bool {
+        matches!(self, Self::Nordac(nordac::simulate::Happening::Line(_)))
+    }
 }
 
 /// The buses of the product.

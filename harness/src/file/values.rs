@@ -155,6 +155,89 @@ impl fmt::Display for MaxSpeed {
     }
 }
 
+/// A share of what is called 100 %, written with its sign: `50%`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Percent(pub f64);
+
+impl FromStr for Percent {
+    type Err = ValueError;
+
+    fn from_str(text: &str) -> Result<Self, ValueError> {
+        let number = text.trim().strip_suffix('%');
+        let percent = number.and_then(|number| number.trim().parse().ok());
+        let fits = |percent: &f64| *percent > 0.0 && *percent < 200.0;
+        percent.filter(fits).map(Self).ok_or_else(|| {
+            wrong(
+                format!("`{text}` is not possible here"),
+                "a share above 0% and below 200% expected here",
+            )
+        })
+    }
+}
+
+impl fmt::Display for Percent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}%", self.0)
+    }
+}
+
+/// A frequency written with its unit: `35Hz`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Frequency(pub f64);
+
+impl FromStr for Frequency {
+    type Err = ValueError;
+
+    fn from_str(text: &str) -> Result<Self, ValueError> {
+        let number = text.trim().strip_suffix("Hz");
+        let hertz = number.and_then(|number| number.trim().parse().ok());
+        let fits = |hertz: &f64| *hertz > 0.0 && *hertz <= 999.0;
+        hertz.filter(fits).map(Self).ok_or_else(|| {
+            wrong(
+                format!("`{text}` is not possible here"),
+                "a frequency above 0Hz and up to 999Hz expected here",
+            )
+        })
+    }
+}
+
+impl fmt::Display for Frequency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}Hz", self.0)
+    }
+}
+
+/// A bit rate in kbit/s.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct KilobitRate(#[schemars(range(min = 1, max = 1500))] pub f64);
+
+impl KilobitRate {
+    /// Bits a second.
+    #[must_use]
+    pub fn bits_per_second(self) -> u32 {
+        (self.0 * 1000.0).round().clamp(0.0, f64::from(u32::MAX)) as u32
+    }
+}
+
+impl fmt::Display for KilobitRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0)
+    }
+}
+
+impl Serialize for KilobitRate {
+    /// A whole number stays one.
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.bits_per_second() {
+            bits if bits % 1000 == 0 => serializer.serialize_u32(bits / 1000),
+            _ => serializer.serialize_f64(self.0),
+        }
+    }
+}
+
 /// One wire of a ring by its ends, as a scenario writes it: `98->97`, `master->99`, `0->master`. An end that
 /// is `None` is the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
@@ -254,5 +337,7 @@ text_values! {
     Time "drivebench-time" "a time above 0 with its unit: 100ms, 5s, 1h";
     Speed "drivebench-speed" "a speed above 0 with its unit: 300rpm";
     MaxSpeed "drivebench-max-speed" "a speed above 0 with its unit: 300rpm, 10%";
+    Percent "drivebench-percent" "a share above 0% and below 200%: 50%";
+    Frequency "drivebench-frequency" "a frequency with its unit: 35Hz";
     Wire "drivebench-link" "a link by its ends: 98->97, master->99, 0->master";
 }

@@ -2,8 +2,7 @@
 
 use crate::buses::LimitSetting;
 use crate::link::{Line, Moment, PlacedFault};
-use crate::medium::Out;
-use harness_proto::can;
+use crate::medium::{Heard, Out};
 use harness_proto::time::Instant;
 use std::any::Any;
 use std::fmt;
@@ -48,8 +47,8 @@ pub trait Gate: Any + Send + fmt::Debug {
     /// [`Denied`]: what drives would read after it cannot be judged.
     fn fault(&mut self, fault: PlacedFault, moment: Moment, settled: bool) -> Result<(), Denied>;
 
-    /// Takes notice of a frame that another station has sent.
-    fn hear(&mut self, heard: &can::Heard) {
+    /// Takes notice of what another station has sent.
+    fn hear(&mut self, heard: &Heard) {
         let _of_no_interest = heard;
     }
 

@@ -250,10 +250,8 @@ impl<L: Line> Line for Guarded<L> {
 
     fn receive(&mut self, port: usize) -> Option<(Instant, Heard)> {
         let (at, heard) = self.inner.receive(port)?;
-        if let Heard::Frame(frame) = &heard
-            && let Some(gate) = self.gates.get_mut(port)
-        {
-            gate.hear(frame);
+        if let Some(gate) = self.gates.get_mut(port) {
+            gate.hear(&heard);
         }
         Some((at, heard))
     }

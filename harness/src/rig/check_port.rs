@@ -5,7 +5,6 @@ use super::file::SCHEMA;
 use super::port_file::{CONFIRMATION, Port};
 use crate::file::schema::Step;
 use crate::file::values::MaxSpeed;
-use harness_proto::can::BitRate;
 
 const PORT: [Step<'static>; 2] = [Step::Key("port"), Step::Key("1")];
 
@@ -25,7 +24,7 @@ impl Check<'_> {
                 return true;
             }
             (None, None) => {
-                let expected = "a table [ring.1], or [port.1] for drives on a CAN bus, expected";
+                let expected = "a table [ring.1], or [port.1] for drives on a shared line or a CAN bus, expected";
                 self.wrong(&[], "the file has no drives", expected);
                 return true;
             }
@@ -35,6 +34,7 @@ impl Check<'_> {
             self.wrong(&["schema".into()], message, "2 expected here");
         }
         self.only_of_rings();
+        self.of_other_buses(port);
         self.adapter(port);
         self.nodes(port);
         self.port_limits(port);
@@ -44,20 +44,7 @@ impl Check<'_> {
     /// What only a port has is no part of a file with rings.
     fn of_rings(&mut self) {
         let limits = &self.file.limits;
-        let own = [
-            ("allow_bus_settings", limits.port.allow_bus_settings),
-            (
-                "allow_other_identifiers",
-                limits.port.allow_other_identifiers,
-            ),
-            ("allow_registers", !limits.port.allow_registers.is_empty()),
-            ("bit_rate_way_back", limits.port.bit_rate_way_back.is_some()),
-            (
-                "store_bus_settings",
-                limits.port.store_bus_settings.is_some(),
-            ),
-        ];
-        for (key, _) in own.into_iter().filter(|(_, given)| *given) {
+        for key in limits.port.given() {
             let message = format!("`{key}` is for benches with [port.1]");
             self.wrong(
                 &["limits".into(), key.into()],
@@ -126,6 +113,28 @@ impl Check<'_> {
         }
     }
 
+    /// What only other buses have is no part of a file for this one.
+    fn of_other_buses(&mut self, port: &Port) {
+        let limits = &self.file.limits;
+        let speed = limits.max_speed.map(|_| "max_speed");
+        let given = limits.port.given().into_iter().chain(speed);
+        let keys = port.adapters().into_iter().chain(port.more());
+        let of_port =
+            keys.map(|key| (vec![PORT[0], PORT[1], Step::Key(key)], key, port.bus.keys()));
+        let of_limits = given.map(|key| {
+            let path = vec![Step::Key("limits"), Step::Key(key)];
+            (path, key, port.bus.limits())
+        });
+        let all: Vec<_> = of_port.chain(of_limits).collect();
+        for (path, key, own) in all {
+            if !own.contains(&key) {
+                let message = format!("the bus {} has no `{key}`", port.bus.name());
+                let expected = format!("one of {} expected here", own.join(", "));
+                self.wrong(&path, message, expected);
+            }
+        }
+    }
+
     /// One adapter, or simulated drives.
     fn adapter(&mut self, port: &Port) {
         let at = |key| [PORT[0], PORT[1], Step::Key(key)];
@@ -135,12 +144,15 @@ impl Check<'_> {
             (Some(_), Some(second), _) => self.wrong(
                 &at(second),
                 "two adapters are given",
-                "one of `slcan`, `socketcand` and `socketcan` expected",
+                "one adapter expected",
             ),
             (None, None, None) => self.wrong(
                 &PORT,
                 "the port has no adapter",
-                "`slcan`, `socketcand`, `socketcan`, or a table [sim] with `bus` for simulated drives, expected",
+                format!(
+                    "one of {}, or a table [sim] with `bus` for simulated drives, expected",
+                    port.bus.keys().join(", ")
+                ),
             ),
             (None, None, Some(sim)) if sim.bus != Some(port.bus) => {
                 let expected = format!("`bus = \"{}\"` expected in [sim]", port.bus.name());
@@ -162,10 +174,21 @@ impl Check<'_> {
             let expected = "a device such as \"/dev/ttyACM0\", or host:port, expected here";
             self.wrong(&at("slcan"), message, expected);
         }
-        if let Some(place) = port.socketcand.as_ref().filter(|place| !is_address(place)) {
-            let message = format!("`{place}` is not an address");
-            let expected = "host:port such as \"127.0.0.1:29536\" expected here";
-            self.wrong(&at("socketcand"), message, expected);
+        let addresses = [
+            ("socketcand", &port.socketcand, "127.0.0.1:29536"),
+            ("tcp", &port.tcp, "127.0.0.1:4200"),
+        ];
+        for (key, place, example) in addresses {
+            if let Some(place) = place.as_ref().filter(|place| !is_address(place)) {
+                let message = format!("`{place}` is not an address");
+                let expected = format!("host:port such as \"{example}\" expected here");
+                self.wrong(&at(key), message, expected);
+            }
+        }
+        if let Some(place) = port.serial.as_ref().filter(|place| !place.contains('/')) {
+            let message = format!("`{place}` is not a device");
+            let expected = "a device such as \"/dev/ttyUSB0\" expected here";
+            self.wrong(&at("serial"), message, expected);
         }
         let name = |name: &&String| {
             let fits = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
@@ -184,7 +207,7 @@ impl Check<'_> {
             let expected = "`channel` only beside `socketcand` expected";
             self.wrong(&at("channel"), "this adapter has one bus", expected);
         }
-        if BitRate::from_bits_per_second(port.rate.saturating_mul(1000)).is_none() {
+        if !port.bus.has_rate(port.rate.bits_per_second()) {
             let message = format!("no bus runs at {} kbit/s", port.rate);
             self.wrong(&at("rate"), message, "such as 500 expected here");
         }
@@ -210,27 +233,17 @@ impl Check<'_> {
         let mut numbers: Vec<u8> = Vec::new();
         for (index, node) in port.drives.iter().enumerate() {
             let path = [PORT[0], PORT[1], Step::Key("drives"), Step::Index(index)];
-            let named = match (node.rx, node.tx) {
-                (Some(_), Some(_)) => true,
-                (None, None) => node.node.is_some(),
-                _ => false,
-            };
-            if !named {
-                let expected = "`node`, or `rx` and `tx`, expected";
-                self.wrong(
-                    &path,
-                    "a drive needs its number or both identifiers",
-                    expected,
-                );
+            if let Err((message, expected)) = port.bus.named(*node) {
+                self.wrong(&path, message, expected);
                 continue;
             }
             let (number, identifiers) = port.bus.drive(index, *node);
             if numbers.contains(&number) {
                 let message = format!("drive {number} is listed twice");
-                self.wrong(&path, message, "another `node` expected here");
+                self.wrong(&path, message, "another drive expected here");
             }
             numbers.push(number);
-            for identifier in [identifiers.0, identifiers.1] {
+            for identifier in identifiers {
                 if let Some((_, other)) = seen.iter().find(|(own, _)| *own == identifier) {
                     let message = format!(
                         "identifier {identifier:03X} is used twice, first by the drive in place {}",
@@ -247,6 +260,14 @@ impl Check<'_> {
     fn port_limits(&mut self, port: &Port) {
         let limits = &self.file.limits.port;
         let at = |key| [Step::Key("limits"), Step::Key(key)];
+        if limits.max_setpoint.is_some() && limits.max_frequency.is_some() {
+            let expected = "`max_setpoint` or `max_frequency` expected";
+            self.wrong(
+                &at("max_frequency"),
+                "two limits of the speed are given",
+                expected,
+            );
+        }
         for (index, name) in limits.allow_registers.iter().enumerate() {
             if let Err((message, expected)) = port.bus.special_register(name) {
                 let path = [at("allow_registers").as_slice(), &[index.into()]].concat();

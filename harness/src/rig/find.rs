@@ -1,7 +1,7 @@
 //! A rig by its name: `sim:3`, a file, a file of a folder of rigs, or one that the program carries.
 
 use super::check::{Rig, parse};
-use super::port_file::{CONFIRMATION, PortBus};
+use super::port_file::PortBus;
 use crate::buses::rings::rig::named::{simulated_rings, sizes_of_rings};
 use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::source::{Source, SourceError};
@@ -176,21 +176,18 @@ fn rig_name(path: &Path) -> Option<String> {
 pub fn simulated_port(text: &str) -> Option<(PortBus, Result<u8, String>)> {
     let (bus, number) = text.split_once(':').unwrap_or((text, "1"));
     let bus = PortBus::ALL.into_iter().find(|own| own.name() == bus)?;
-    let drives = number.parse().ok().filter(|own| (1..=127).contains(own));
-    let wrong = || format!("`{number}` is not a number of drives: 1 to 127 expected");
+    let most = bus.most_drives();
+    let drives = number.parse().ok().filter(|own| (1..=most).contains(own));
+    let wrong = || format!("`{number}` is not a number of drives: 1 to {most} expected");
     Some((bus, drives.ok_or_else(wrong)))
 }
 
 /// The file of a simulated bench with a port. All is permitted.
 fn simulated_bus(bus: PortBus, drives: u8) -> String {
-    let nodes: Vec<_> = (1..=drives)
-        .map(|node| format!("{{ node = {node} }}"))
-        .collect();
+    let (nodes, limits) = bus.simulated(drives);
     let name = bus.name();
     format!(
-        "schema = 2\n[rig]\nid = \"sim-{name}-{drives}\"\n[port.1]\nbus = \"{name}\"\ndrives = [{}]\n[sim]\nbus = \"{name}\"\n\
-         [limits]\nallow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\nallow_other_identifiers = true\n\
-         bit_rate_way_back = \"it is simulated\"\nstore_bus_settings = \"{CONFIRMATION}\"\n",
-        nodes.join(", ")
+        "schema = 2\n[rig]\nid = \"sim-{name}-{drives}\"\n[port.1]\nbus = \"{name}\"\ndrives = [{nodes}]\n[sim]\nbus = \"{name}\"\n\
+         [limits]\nallow_motion = true\nallow_eeprom = true\n{limits}"
     )
 }

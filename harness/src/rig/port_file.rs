@@ -1,6 +1,7 @@
-//! `[port.1]` of a rig file: a port of a CAN bus, on which all stations hear each other.
+//! `[port.1]` of a rig file: a port of a bus on which all stations hear each other, on CAN or on a serial line.
 
-use crate::file::values::Time;
+use super::file::Marks;
+use crate::file::values::{Frequency, KilobitRate, Percent, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ pub struct Ports {
     pub first: Port,
 }
 
-/// The bench's own place on a CAN bus.
+/// The bench's own place on the bus.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Port {
@@ -34,11 +35,23 @@ pub struct Port {
     /// `ip link`. Never tried on a kernel with CAN.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub socketcan: Option<String>,
-    /// The bit rate in kbit/s; default 500.
+    /// A serial adapter of a line of octets: a device such as `/dev/ttyUSB0`, or a pseudo terminal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub serial: Option<String>,
+    /// A line of octets behind a TCP connection that carries the octets and nothing else: `host:port`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tcp: Option<String>,
+    /// Whether line errors stand in the stream itself (a pseudo terminal or `tcp` only); default `none`.
+    #[serde(default, skip_serializing_if = "is_unmarked")]
+    pub marks: Marks,
+    /// Whether a half-duplex adapter gives back what the bench sends; it is compared, and is no part of the record; default false.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub echo: bool,
+    /// The bit rate in kbit/s; default 500. On CAN 10 to 1000; on a line of octets 9.6, 19.2, 93.75, 187.5, 500 or 1500.
     #[serde(default = "half_a_megabit")]
-    #[schemars(range(min = 10, max = 1000))]
-    pub rate: u32,
-    /// Its drives, by number or by identifiers: `[{ node = 1 }, { rx = 0x210, tx = 0x190 }]`.
+    pub rate: KilobitRate,
+    /// Its drives: on CAN by number or by identifiers, `[{ node = 1 }, { rx = 0x210, tx = 0x190 }]`; on a line of octets by address,
+    /// `[{ address = 8, ppo = 1 }]`.
     #[schemars(length(min = 1, max = 127))]
     pub drives: Vec<Node>,
     /// Whether nothing is ever sent, not even an acknowledgement where the adapter can do without; default false.
@@ -63,13 +76,27 @@ impl Port {
             ("slcan", &self.slcan),
             ("socketcand", &self.socketcand),
             ("socketcan", &self.socketcan),
+            ("serial", &self.serial),
+            ("tcp", &self.tcp),
         ];
         let given = all.into_iter().filter(|(_, place)| place.is_some());
         given.map(|(key, _)| key).collect()
     }
+
+    /// The other keys that are given and that only some buses have.
+    #[must_use]
+    pub fn more(&self) -> Vec<&'static str> {
+        let all = [
+            ("channel", self.channel.is_some()),
+            ("marks", self.marks != Marks::None),
+            ("echo", self.echo),
+        ];
+        let given = all.into_iter().filter(|(_, given)| *given);
+        given.map(|(key, _)| key).collect()
+    }
 }
 
-/// A drive on a bus, by its number or by its identifiers.
+/// A drive on a bus: on CAN its number or its identifiers, on a line of octets its address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Node {
@@ -85,15 +112,42 @@ pub struct Node {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 0x7FF))]
     pub tx: Option<u16>,
+    /// Its address, 1 to 126.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 126))]
+    pub address: Option<u8>,
+    /// The PPO type that it is set to, 1 to 4; without it the bench asks the drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 4))]
+    pub ppo: Option<u8>,
 }
 
 /// What only benches with `[port.1]` permit, in `[limits]`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(default)]
 pub struct PortLimits {
-    /// Whether identifiers, bit rate, width of replies and time-out of drives may be changed; default false.
+    /// Whether what drives are reached by may be changed; default false. On CAN: identifiers, bit rate, width of replies and time-out. On
+    /// a line of octets: address, PPO type, bus mode and interface, Unlock, and commands to all slaves.
     #[serde(skip_serializing_if = "is_false")]
     pub allow_bus_settings: bool,
+    /// Whether data of the motor and of its protection may be written, such as ramps, current limits and time-outs; default false.
+    #[serde(skip_serializing_if = "is_false")]
+    pub allow_motor_data: bool,
+    /// Whether stations that the file does not list may be sent more than requests that read; default false.
+    #[serde(skip_serializing_if = "is_false")]
+    pub allow_other_stations: bool,
+    /// Whether a motor may be enabled with nothing to stop it if the bench fails, and the exchange may end while it runs; default false.
+    #[serde(skip_serializing_if = "is_false")]
+    pub allow_unsupervised: bool,
+    /// The highest setpoint, such as `50%` of the maximum frequency; default no limit but the drives' own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_setpoint: Option<Percent>,
+    /// The highest frequency, such as `35Hz`, in place of `max_setpoint`; default no limit but the drives' own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_frequency: Option<Frequency>,
+    /// The most parameters that a session writes to EEPROMs; default no limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_eeprom_writes: Option<u32>,
     /// Whether frames may be sent that no drive of the file receives; default false.
     #[serde(skip_serializing_if = "is_false")]
     pub allow_other_identifiers: bool,
@@ -110,15 +164,45 @@ pub struct PortLimits {
     pub store_bus_settings: Option<String>,
 }
 
+impl PortLimits {
+    /// The keys that are given.
+    #[must_use]
+    pub fn given(&self) -> Vec<&'static str> {
+        let all = [
+            ("allow_bus_settings", self.allow_bus_settings),
+            ("allow_motor_data", self.allow_motor_data),
+            ("allow_other_stations", self.allow_other_stations),
+            ("allow_unsupervised", self.allow_unsupervised),
+            ("max_setpoint", self.max_setpoint.is_some()),
+            ("max_frequency", self.max_frequency.is_some()),
+            ("max_eeprom_writes", self.max_eeprom_writes.is_some()),
+            ("allow_other_identifiers", self.allow_other_identifiers),
+            ("allow_registers", !self.allow_registers.is_empty()),
+            ("bit_rate_way_back", self.bit_rate_way_back.is_some()),
+            ("store_bus_settings", self.store_bus_settings.is_some()),
+        ];
+        let given = all.into_iter().filter(|(_, given)| *given);
+        given.map(|(key, _)| key).collect()
+    }
+}
+
 /// What [`PortLimits::store_bus_settings`] must read.
 pub const CONFIRMATION: &str = "the drive may then be reachable by RS232 only";
 
-const fn half_a_megabit() -> u32 {
-    500
+const fn half_a_megabit() -> KilobitRate {
+    KilobitRate(500.0)
 }
 
 fn twenty_milliseconds() -> Time {
     Time(std::time::Duration::from_millis(20))
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+fn is_unmarked(marks: &Marks) -> bool {
+    *marks == Marks::None
 }
 
 #[expect(

@@ -1,14 +1,18 @@
 //! NORDAC *vector* inverters on PROFIBUS DP: their words in a scenario, simulated slaves, tables and pictures.
 
 pub(crate) mod capture;
+pub(crate) mod cli;
 pub(crate) mod deviations;
 pub(crate) mod dissector;
 pub mod driver;
 pub mod explore;
+pub mod gate;
 pub mod judge;
 pub mod language;
 pub(crate) mod manual;
 pub mod report;
+pub mod rig;
+pub mod safe_state;
 pub(crate) mod serve;
 #[cfg(test)]
 mod serve_tests;

@@ -3,7 +3,7 @@
 use crate::buses::LimitSetting;
 use crate::guard::{Denied, Gate, Guarded};
 use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
-use crate::medium::{Medium, Out};
+use crate::medium::{Heard, Medium, Out};
 use harness_proto::can::{self, BitRate, Frame};
 use harness_proto::time::Instant;
 use harness_proto::unitek::guard::{self, Denial, Limits, Missing};
@@ -132,11 +132,12 @@ impl Gate for SegmentGate {
         }
     }
 
-    fn hear(&mut self, heard: &can::Heard) {
+    fn hear(&mut self, heard: &Heard) {
         match heard {
-            can::Heard::Frame(frame) => self.gate.overhear(frame),
+            Heard::Frame(can::Heard::Frame(frame)) => self.gate.overhear(frame),
             // The bench's own last frame may be lost.
-            can::Heard::Error(_) => self.gate.doubt(),
+            Heard::Frame(can::Heard::Error(_)) => self.gate.doubt(),
+            Heard::Octet(_) => {}
         }
     }
 

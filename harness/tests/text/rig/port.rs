@@ -23,7 +23,7 @@ fn a_port_of_drives_on_can() {
         .zip(&port.drives)
         .map(|(index, node)| port.bus.drive(index, *node))
         .collect();
-    assert_eq!(drives, [(3, (0x203, 0x183)), (2, (0x210, 0x190))]);
+    assert_eq!(drives, [(3, vec![0x203, 0x183]), (2, vec![0x210, 0x190])]);
     assert!(!rig.is_simulated() && rig.rings().count() == 0);
     let printed = toml::to_string(&rig.file).expect("a text");
     assert_eq!(good(&printed).file, rig.file);
@@ -32,6 +32,30 @@ fn a_port_of_drives_on_can() {
         simulated.is_simulated() && simulated.port().is_some_and(|port| port.drives.len() == 2)
     );
     assert!(find("sim:unitek:0", Path::new("nowhere")).is_err());
+}
+
+/// A port of a line of octets: its adapter, its slaves by address, its limits with their units.
+#[test]
+fn a_port_of_slaves_on_a_line() {
+    let text = port("tcp = \"lab:4200\"\nrate = 93.75\necho = true\nmarks = \"in-band\"\n[limits]\nallow_motor_data = true\nmax_frequency = \"35.5Hz\"\nmax_eeprom_writes = 20")
+        .replace("unitek", "nordac")
+        .replace("{ node = 1 }", "{ address = 8, ppo = 2 }, { address = 9 }");
+    let rig = good(&text);
+    let port = rig.port().expect("a port");
+    let addresses: Vec<_> = (0..)
+        .zip(&port.drives)
+        .map(|(index, node)| port.bus.drive(index, *node).0)
+        .collect();
+    assert_eq!(addresses, [8, 9]);
+    assert_eq!(port.rate.bits_per_second(), 93_750);
+    let printed = toml::to_string(&rig.file).expect("a text");
+    assert_eq!(good(&printed).file, rig.file);
+    let simulated = find("sim:nordac:2", Path::new("nowhere")).expect("a rig");
+    let drives = simulated.port().map(|port| port.drives.clone());
+    let addresses: Vec<_> = drives.iter().flatten().map(|own| own.address).collect();
+    assert!(simulated.is_simulated());
+    assert_eq!(addresses, [Some(8), Some(9)]);
+    assert!(find("sim:nordac:120", Path::new("nowhere")).is_err());
 }
 
 #[test]
@@ -114,6 +138,24 @@ fn mistakes_of_ports_are_shown_with_line_and_column() {
             port(
                 "slcan = \"/dev/ttyACM0\"\n[limits]\nallow_registers = [\"B0\", \"FUN_SPEZIA\"]\nbit_rate_way_back = \"\"\nstore_bus_settings = \"yes\"",
             ),
+        ),
+        (
+            "what only other buses have",
+            port(
+                "serial = \"/dev/ttyUSB0\"\nslcan = \"/dev/ttyACM0\"\n[limits]\nmax_setpoint = \"50%\"",
+            ),
+        ),
+        (
+            "slaves without an address, and limits that no line of octets has",
+            port("serial = \"ttyUSB0\"\nrate = 45.45\n[limits]\nmax_speed = \"10%\"\nmax_setpoint = \"50%\"\nmax_frequency = \"35Hz\"")
+                .replace("unitek", "nordac")
+                .replace("{ node = 1 }", "{ node = 1 }, { address = 2 }, { address = 8 }, { address = 8 }"),
+        ),
+        (
+            "values without their unit",
+            port("tcp = \"lab\"\n[limits]\nmax_setpoint = \"50\"\nmax_frequency = \"35rpm\"")
+                .replace("unitek", "nordac")
+                .replace("{ node = 1 }", "{ address = 8 }"),
         ),
         (
             "a drive beyond the last",

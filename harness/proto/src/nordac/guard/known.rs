@@ -3,11 +3,12 @@
 use super::denial::{Fast, Supervision};
 use super::limits::Highest;
 use super::{GuardedSlave, enables};
-use crate::nordac::pkw::Pkw;
+use crate::nordac::pkw::{Answer, Pkw, Task};
 use crate::nordac::ppo::{Image, PpoType};
 use crate::nordac::words::{FULL, set_of, stw};
 use crate::profibus::Pdu;
 use crate::profibus::dp::{GlobalControl, Service, SetPrm};
+use crate::profibus::fdl::Status;
 use alloc::vec::Vec;
 
 /// What the gate knows of a slave.
@@ -28,6 +29,10 @@ pub(super) struct KnownSlave {
     maximum: [Option<u16>; 4],
     /// The last task of the parameter channel.
     pub(super) task: Pkw,
+    /// The number that was written last, until the channel answers for another one: a former answer may still show the value before.
+    stale: Option<u16>,
+    /// It replied that it is not in the exchange: no telegram ends that.
+    left: bool,
 }
 
 impl KnownSlave {
@@ -41,6 +46,8 @@ impl KnownSlave {
             timeout: false,
             maximum: [None; 4],
             task: Pkw::default(),
+            stale: None,
+            left: false,
         }
     }
 
@@ -112,6 +119,9 @@ impl KnownSlave {
 
     /// Whether a telegram ends the exchange, or may end it.
     pub(super) fn ended_by(&self, pdu: &Pdu) -> bool {
+        if self.left {
+            return false;
+        }
         match Service::of(pdu.dsap()) {
             Some(Service::SetPrm) => true,
             Some(Service::ChkCfg) => self.ppo.is_none_or(|ppo| ppo.cfg() != pdu.data()),
@@ -136,6 +146,12 @@ impl KnownSlave {
                     .and_then(|prm| prm.watchdog_tens_of_ms());
                 self.watchdog = on.is_some_and(|time| time > 0) && (sure || self.watchdog);
                 self.task = Pkw::default();
+                0
+            }
+            Some(Service::ChkCfg) => {
+                self.left = false;
+                // A slave may take a configuration that its PPO type is not (`cfg-follows-ppo-type`).
+                self.ppo = self.ppo.filter(|ppo| ppo.cfg() == pdu.data());
                 0
             }
             Some(Service::GlobalControl) => {
@@ -175,7 +191,47 @@ impl KnownSlave {
             return 0;
         }
         self.written(pkw);
+        self.stale = Some(pkw.number());
         1
+    }
+
+    /// Takes notice of a reply to a request.
+    pub(super) fn replied(&mut self, asked: &Pdu, reply: &Pdu) {
+        let service = Service::of(asked.dsap());
+        if reply.fc().status() == Some(Status::Rs) {
+            self.left |= service == Some(Service::DataExchange);
+            return;
+        }
+        match service {
+            Some(Service::GetCfg) if reply.ssap() == asked.dsap() => {
+                if let Some(ppo) = PpoType::from_cfg(reply.data()) {
+                    self.ppo = Some(ppo);
+                }
+            }
+            Some(Service::DataExchange) => {
+                self.left = false;
+                let image = self.ppo.and_then(|ppo| Image::decode(ppo, reply.data()));
+                if let Some(image) = image {
+                    self.answered(image.pkw);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes notice of what the parameter channel shows.
+    fn answered(&mut self, shown: Pkw) {
+        let none = shown.ak() == 0;
+        if none || self.stale.is_some_and(|number| number != shown.number()) {
+            self.stale = None;
+        }
+        let task = self.task;
+        let reads = matches!(task.task(), Task::Request | Task::RequestArray);
+        let same = (task.number(), task.ind) == (shown.number(), shown.ind);
+        let value = matches!(shown.answer(), Some(Answer::Word(_) | Answer::ArrayWord(_)));
+        if reads && same && value && self.stale.is_none() {
+            self.learn(shown.number(), (shown.ind >> 8 & 3) as u8, shown.pwe);
+        }
     }
 
     /// What a write leaves behind; it may also have been refused.

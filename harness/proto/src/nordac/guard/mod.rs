@@ -7,6 +7,7 @@
 
 mod class;
 mod denial;
+mod hear;
 mod known;
 mod limits;
 
@@ -24,6 +25,7 @@ use crate::profibus::rate::SYN_BITS;
 use crate::profibus::{Buffer, BusRate, Pdu, Telegram};
 use crate::time::Instant;
 use alloc::vec::Vec;
+use hear::Ear;
 use known::KnownSlave;
 
 /// A slave of the rig's file.
@@ -55,6 +57,7 @@ pub struct Gate {
     /// The last octet ended a telegram that began surely.
     ended: bool,
     writes: u32,
+    ear: Ear,
 }
 
 impl Gate {
@@ -69,6 +72,7 @@ impl Gate {
             free: Instant::START,
             ended: true,
             writes: 0,
+            ear: Ear::default(),
         }
     }
 
@@ -89,6 +93,7 @@ impl Gate {
         for (pdu, sure) in &completed {
             self.follow(pdu, *sure);
         }
+        self.ear.ask(completed.last().map(|(pdu, _)| pdu));
         self.take(octet, idle || self.ended);
         let begin = if now > self.free { now } else { self.free };
         self.free = begin + self.rate.octet_time();
@@ -119,6 +124,16 @@ impl Gate {
     pub fn learn(&mut self, address: u8, number: u16, set: u8, raw: u32) {
         for slave in self.slaves.iter_mut().filter(|own| own.is(address)) {
             slave.learn(number, set, raw);
+        }
+    }
+
+    /// Takes notice of an octet that another station sent; `None` for one that came damaged. What replies say of 1205, 1622 and 1625 is
+    /// [learnt](Self::learn): answers of the parameter channel to a task that reads, and the configuration that Get_Cfg asks for.
+    pub fn hear(&mut self, octet: Option<u8>) {
+        if let Some((asked, reply)) = self.ear.hear(octet) {
+            for slave in self.slaves.iter_mut().filter(|own| own.is(asked.da())) {
+                slave.replied(&asked, &reply);
+            }
         }
     }
 

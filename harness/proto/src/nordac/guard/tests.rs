@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::nordac::words::stw::{READY, SAFE, START};
-use crate::profibus::fdl::{FrameControl, Sequence};
+use crate::profibus::fdl::{FrameControl, Sequence, Status};
 use crate::time::Span;
 use proptest::prelude::*;
 use std::string::{String, ToString};
@@ -294,6 +294,124 @@ fn supervision() {
         denial(&mut gate, words(8, START, 0)),
         unsupervised(Supervision::Timeout)
     );
+}
+
+/// A slave that has left the exchange can be taken into it again, to stop its motor.
+#[test]
+fn a_slave_that_has_left_is_started_again() {
+    let mut gate = gate(Limits {
+        motion: true,
+        ..Limits::default()
+    });
+    gate.learn(8, 1625, 0, 10);
+    let prm = SetPrm {
+        status: SetPrm::LOCK | SetPrm::WATCHDOG,
+        watchdog: [1, 30],
+        ..SetPrm::lock(0x7531)
+    };
+    let prm = request(8, Service::SetPrm, &prm.encode().unwrap());
+    let cfg = request(8, Service::ChkCfg, PpoType::One.cfg());
+    let still = Some(Denial::StillEnabled { station: 8 });
+    assert_eq!(denial(&mut gate, prm), None);
+    assert_eq!(denial(&mut gate, words(8, START, 0)), None);
+    assert_eq!(denial(&mut gate, prm), still);
+    assert_eq!(denial(&mut gate, words(8, START, 0)), None);
+    let rs = Pdu::new(2, 8, FrameControl::reply(Status::Rs), &[]).unwrap();
+    for octet in Telegram::Pdu(rs).encode().iter() {
+        gate.hear(Some(*octet));
+    }
+    assert_eq!(denial(&mut gate, prm), None);
+    assert_eq!(denial(&mut gate, cfg), None);
+    assert_eq!(denial(&mut gate, prm), still);
+    assert_eq!(gate.enabled().collect::<Vec<_>>(), [8]);
+}
+
+/// The reply of slave 8 to an exchange, with this in its parameter channel.
+fn reply(gate: &mut Gate, shown: Pkw) {
+    let image = Image {
+        pkw: shown,
+        ..Image::default()
+    };
+    let control = FrameControl::reply(Status::DataLow);
+    let pdu = Pdu::new(2, 8, control, &image.encode(PpoType::One)).unwrap();
+    for octet in Telegram::Pdu(pdu).encode().iter() {
+        gate.hear(Some(*octet));
+    }
+}
+
+/// The gate reads the bus time-out and the maximum frequency along with the bench. An answer that may be older than the last write does not count.
+#[test]
+fn what_slaves_reply_is_learnt() {
+    let limits = Limits {
+        motion: true,
+        eeprom: true,
+        motor_data: true,
+        ..Limits::default()
+    };
+    let mut gate = gate(limits);
+    let prm = SetPrm {
+        status: SetPrm::LOCK | SetPrm::WATCHDOG,
+        watchdog: [1, 30],
+        ..SetPrm::lock(0x7531)
+    };
+    let prm = request(8, Service::SetPrm, &prm.encode().unwrap());
+    assert_eq!(denial(&mut gate, prm), None);
+    let unsupervised = Some(Denial::Unsupervised {
+        station: 8,
+        watch: Supervision::Timeout,
+    });
+    let ask = |task| exchange(8, PpoType::One, task, [0, 0]);
+    let (read, ten) = (Pkw::of(1, 1625, 0, 0), Pkw::of(1, 1625, 0, 10));
+    // A reply without a request, one with a damaged octet, and one to another task.
+    reply(&mut gate, ten);
+    assert_eq!(denial(&mut gate, words(8, START, 0)), unsupervised);
+    assert_eq!(denial(&mut gate, ask(read)), None);
+    gate.hear(None);
+    reply(&mut gate, ten);
+    assert_eq!(denial(&mut gate, words(8, START, 0)), unsupervised);
+    assert_eq!(denial(&mut gate, ask(Pkw::of(1, 1202, 0, 0))), None);
+    reply(&mut gate, ten);
+    assert_eq!(denial(&mut gate, words(8, START, 0)), unsupervised);
+    assert_eq!(denial(&mut gate, ask(read)), None);
+    reply(&mut gate, ten);
+    assert_eq!(denial(&mut gate, words(8, START, 0)), None);
+    assert_eq!(denial(&mut gate, words(8, SAFE, 0)), None);
+    // The time-out is switched off: the former answer stands for two exchanges more.
+    assert_eq!(denial(&mut gate, ask(Pkw::of(2, 1625, 0, 0))), None);
+    reply(&mut gate, ten);
+    assert_eq!(denial(&mut gate, ask(read)), None);
+    reply(&mut gate, ten);
+    assert_eq!(denial(&mut gate, words(8, START, 0)), unsupervised);
+    reply(&mut gate, Pkw::default());
+    assert_eq!(denial(&mut gate, ask(read)), None);
+    reply(&mut gate, Pkw::of(1, 1625, 0, 0));
+    assert_eq!(denial(&mut gate, words(8, START, 0)), unsupervised);
+}
+
+/// A configuration of another PPO type leaves it open how the slave reads its outputs.
+#[test]
+fn another_configuration_makes_the_layout_unknown() {
+    let limits = Limits {
+        eeprom: true,
+        ..Limits::default()
+    };
+    let mut gate = gate(limits);
+    // Under PPO4 the first word is the control word, here of a task that reads.
+    let task = exchange(8, PpoType::One, Pkw::of(0, 0x47F, 0, 0), [0, 0]);
+    assert_eq!(denial(&mut gate, task), None);
+    let other = request(8, Service::ChkCfg, PpoType::Four.cfg());
+    assert_eq!(denial(&mut gate, other), None);
+    assert_eq!(missing(&mut gate, task), Some(Missing::Motion));
+    // Get_Cfg shows which one it has.
+    let ask = request(8, Service::GetCfg, &[]);
+    assert_eq!(denial(&mut gate, ask), None);
+    let control = FrameControl::reply(Status::DataLow);
+    let cfg = PpoType::One.cfg();
+    let pdu = Pdu::with_saps(2, 8, control, ask.ssap(), ask.dsap(), cfg).unwrap();
+    for octet in Telegram::Pdu(pdu).encode().iter() {
+        gate.hear(Some(*octet));
+    }
+    assert_eq!(denial(&mut gate, task), None);
 }
 
 /// A word that stops, sent where stations may not take it for the start of a telegram, leaves the motor enabled.

@@ -9,17 +9,71 @@ mod run;
 mod session;
 
 pub use permitted::limits;
-pub(crate) use permitted::special_register;
+use permitted::special_register;
 pub(crate) use run::{DrivesInUse, Judge};
 pub use session::Session;
 
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
-use crate::rig::port_file::{Node, Port};
+use crate::buses::{Bus, PortRow};
+use crate::rig::port_file::{CONFIRMATION, Node, Port};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
 use harness_proto::can::BitRate;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
+
+/// Rigs of this bus.
+pub(crate) const PORT: PortRow = PortRow {
+    bus: Bus::Unitek,
+    keys: &["slcan", "socketcand", "socketcan", "channel"],
+    limits: &[
+        "max_speed",
+        "allow_bus_settings",
+        "allow_other_identifiers",
+        "allow_registers",
+        "bit_rate_way_back",
+        "store_bus_settings",
+    ],
+    most_drives: 127,
+    simulated,
+    named,
+    has_rate: |bits| BitRate::from_bits_per_second(bits).is_some(),
+    drive: |index, node| {
+        let (number, (rx, tx)) = drive(index, node);
+        (number, vec![rx, tx])
+    },
+    setup_mistakes: |port, source| setup(port, source).err(),
+    special_register,
+    run: |rig, options| Ok(Box::new(DrivesInUse::open(rig, options)?)),
+    judge: Some(|rig, allow_motion| Box::new(Judge::new(rig, allow_motion))),
+    command: super::cli::drive,
+    check: super::cli::check,
+    fuzz: super::cli::fuzz::run,
+};
+
+fn simulated(drives: u8) -> (String, String) {
+    let nodes = (1..=drives).map(|node| format!("{{ node = {node} }}"));
+    let limits = format!(
+        "allow_bus_settings = true\nallow_other_identifiers = true\nbit_rate_way_back = \"it is simulated\"\n\
+         store_bus_settings = \"{CONFIRMATION}\"\n"
+    );
+    (nodes.collect::<Vec<_>>().join(", "), limits)
+}
+
+const fn named(node: Node) -> Result<(), (&'static str, &'static str)> {
+    let named = match (node.rx, node.tx) {
+        (Some(_), Some(_)) => true,
+        (None, None) => node.node.is_some(),
+        _ => false,
+    };
+    match named && node.address.is_none() && node.ppo.is_none() {
+        true => Ok(()),
+        false => Err((
+            "a drive needs its number or both identifiers",
+            "`node`, or `rx` and `tx`, expected",
+        )),
+    }
+}
 
 /// A drive of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,9 +112,8 @@ pub fn axes(port: &Port) -> Vec<Axis> {
 /// The bit rate of a port.
 #[must_use]
 pub fn rate(port: &Port) -> BitRate {
-    let bits = port.rate.saturating_mul(1000);
     // The file was checked.
-    BitRate::from_bits_per_second(bits).unwrap_or(BitRate::K500)
+    BitRate::from_bits_per_second(port.rate.bits_per_second()).unwrap_or(BitRate::K500)
 }
 
 /// The drives of a simulated port, as they are switched on. `source` has header lines of a scenario about them; a drive that they do not

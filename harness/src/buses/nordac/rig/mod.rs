@@ -1,0 +1,190 @@
+//! Rig files of NORDAC inverters: addresses, limits, and the simulated bench.
+
+mod permitted;
+mod session;
+pub(crate) mod talk;
+
+pub use permitted::limits;
+pub use session::Session;
+
+use super::language::Nordac;
+use super::simulate::Setup;
+use crate::buses::{Bus, PortRow};
+use crate::rig::port_file::{Node, Port};
+use crate::rig::{Rig, SessionError};
+use crate::scenario::parse::header::{Part, read};
+use crate::scenario::plan::plan as settle;
+use crate::scenario::problem::{Problem, Problems, Span};
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Scenario;
+use harness_proto::nordac::PpoType;
+use harness_proto::nordac::guard::GuardedSlave;
+#[cfg(test)]
+use harness_proto::nordac::properties::{Accepts, Description};
+use harness_proto::profibus::BusRate;
+#[cfg(test)]
+use std::collections::BTreeSet;
+
+/// The address of the bench's own master.
+pub const MASTER: u8 = 2;
+
+/// The address of the first simulated slave.
+const FIRST: u8 = 8;
+
+/// The highest address.
+const LAST: u8 = 126;
+
+/// Rigs of this bus.
+pub(crate) const PORT: PortRow = PortRow {
+    bus: Bus::Nordac,
+    keys: &["serial", "tcp", "marks", "echo"],
+    limits: &[
+        "allow_bus_settings",
+        "allow_motor_data",
+        "allow_other_stations",
+        "allow_unsupervised",
+        "max_setpoint",
+        "max_frequency",
+        "max_eeprom_writes",
+    ],
+    most_drives: LAST - FIRST + 1,
+    simulated,
+    named,
+    has_rate: |bits| BusRate::from_bits_per_second(bits).is_some(),
+    drive: |_, node| (node.address.unwrap_or_default(), Vec::new()),
+    setup_mistakes: |port, source| setup(port, source).err(),
+    special_register: |name| {
+        let expected = "no such permission expected on this bus".to_owned();
+        Err((format!("`{name}` is no register of a NORDAC"), expected))
+    },
+    run: |rig, _| {
+        Err(failed(
+            rig,
+            "scenarios are not played on rigs of this bus yet; `run` without --rig simulates them",
+        ))
+    },
+    judge: None,
+    command: super::cli::drive,
+    check: super::cli::check,
+    fuzz: super::cli::fuzz,
+};
+
+/// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.
+fn simulated(drives: u8) -> (String, String) {
+    let nodes = (0..drives).map(|place| format!("{{ address = {}, ppo = 1 }}", FIRST + place));
+    let limits = "allow_bus_settings = true\nallow_motor_data = true\nallow_other_stations = true\nallow_unsupervised = true\n";
+    (nodes.collect::<Vec<_>>().join(", "), limits.to_owned())
+}
+
+const fn named(node: Node) -> Result<(), (&'static str, &'static str)> {
+    let foreign = node.node.is_some() || node.rx.is_some() || node.tx.is_some();
+    match (node.address, foreign) {
+        (Some(MASTER), _) => Err((
+            "address 2 is that of the bench's own master",
+            "another address expected",
+        )),
+        (Some(_), false) => Ok(()),
+        _ => Err((
+            "a drive needs its address, and nothing but its PPO type beside it",
+            "`address`, and `ppo` where it is known, expected",
+        )),
+    }
+}
+
+/// A slave of a rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slave {
+    /// Its address, 1 to 126.
+    pub address: u8,
+    /// The PPO type that it is set to, as far as it is known.
+    pub ppo: Option<PpoType>,
+}
+
+impl From<Slave> for GuardedSlave {
+    fn from(slave: Slave) -> Self {
+        Self {
+            address: slave.address,
+            ppo: slave.ppo,
+        }
+    }
+}
+
+/// The slaves of a port, as its file lists them.
+#[must_use]
+pub fn slaves(port: &Port) -> Vec<Slave> {
+    let all = port.drives.iter();
+    all.map(|node| Slave {
+        address: node.address.unwrap_or_default(),
+        ppo: node.ppo.and_then(PpoType::from_number),
+    })
+    .collect()
+}
+
+/// The bit rate of a port.
+#[must_use]
+pub fn rate(port: &Port) -> BusRate {
+    // The file was checked.
+    BusRate::from_bits_per_second(port.rate.bits_per_second()).unwrap_or_default()
+}
+
+/// The slaves of a simulated port, as they are switched on. `source` has header lines of a scenario about them. The bus controls them: their
+/// interface is 2 (1621), unless a line says another.
+///
+/// # Errors
+/// The lines have mistakes, or name a slave that the port does not have.
+pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
+    let slaves = slaves(port);
+    let lines = slaves.iter().map(|slave| {
+        let (address, ppo) = (slave.address, slave.ppo.unwrap_or_default().number());
+        format!("slave {address} ppo {ppo}\nslave {address} parameter 1621 = 2\n")
+    });
+    let own = Source {
+        name: "setup".to_owned(),
+        text: lines.collect::<String>().into(),
+    };
+    let mut scenario: Scenario<Nordac> = read(&own, Part::Header)?;
+    let more: Scenario<Nordac> = read(source, Part::Header)?;
+    scenario.header.slaves.extend(more.header.slaves);
+    scenario.header.master = more.header.master;
+    scenario.steps.clear();
+    let setup = settle(&scenario, source, None)?.setup;
+    let there = |address: u8| slaves.iter().any(|own| own.address == address);
+    if let Some(other) = setup.slaves.iter().find(|own| !there(own.address)) {
+        let message = format!("the port has no slave {}", other.address);
+        let problem = Problem::new(Span::default(), message, "an address of `drives` expected");
+        return Err(Problems::new(
+            &source.name,
+            source.text.clone(),
+            vec![problem],
+        ));
+    }
+    Ok(Setup {
+        rate: rate(port),
+        ..setup
+    })
+}
+
+/// Values of a property: each of its words, or numbers from the least to the most.
+#[cfg(test)]
+pub(crate) fn values(property: &Description) -> Vec<String> {
+    match property.accepts {
+        Accepts::Words(words) => words.iter().map(|own| (*own).to_owned()).collect(),
+        Accepts::Count {
+            least,
+            default,
+            most,
+        } => {
+            let numbers =
+                BTreeSet::from([least, default, default.saturating_add(1).min(most), most]);
+            numbers.iter().map(u8::to_string).collect()
+        }
+    }
+}
+
+/// An error about the drives of a rig.
+fn failed(rig: &Rig, why: &str) -> SessionError {
+    SessionError::Drives {
+        rig: rig.id().to_owned(),
+        why: why.to_owned(),
+    }
+}

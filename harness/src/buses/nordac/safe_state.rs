@@ -1,0 +1,436 @@
+//! The safe state of NORDAC inverters: OFF2 with valid process words, held until the status word shows it. Zeros do not stop a motor.
+
+use super::rig::talk::{Talk, TalkError};
+use super::rig::{MASTER, Slave};
+use crate::guard::{Guarded, Safe, SafeStep, Standstill};
+use crate::link::Line;
+use harness_proto::nordac::master::ExchangeError;
+use harness_proto::nordac::words::{State, stw, zsw};
+use harness_proto::nordac::{Image, PpoType};
+use harness_proto::profibus::dp::{Diagnosis, GlobalControl};
+use harness_proto::profibus::fdl::{FrameControl, Function, MAX_TELEGRAM, SD1, SD2, SD3, Sequence};
+use harness_proto::profibus::{Pdu, Telegram};
+use harness_proto::time::Span;
+use std::fmt::Write as _;
+
+/// The DP watchdog of an exchange that is begun to stop a motor: 1 s.
+const WATCHDOG: [u8; 2] = [1, 100];
+
+/// The time between two exchanges while a motor ramps down.
+const AGAIN: Span = Span::from_millis(5);
+
+/// So many replies show no output before an inverter counts as safe that does not take its words from the bus (1621): as many as replies may lag
+/// behind (`pzd-latency`), and more.
+const LAGGING: u32 = 22;
+
+/// The bits of ZSW that show an output: ready, ready for operation, enabled.
+const OUTPUT: u16 = zsw::READY_TO_START | zsw::READY | zsw::ENABLED;
+
+/// The telegrams that stop every motor without waiting for anything: for a watchdog. Each is new to its slave, whatever it was sent last. A
+/// slave of an unknown PPO type is sent the words of each; it takes those of its own.
+#[must_use]
+pub fn last_words(slaves: &[Slave]) -> Vec<Vec<u8>> {
+    let telegram = |address, ppo: PpoType| {
+        let control = FrameControl::request(Function::SrdHigh, Sequence::First);
+        let pdu = Pdu::new(address, MASTER, control, &safe_image().encode(ppo)).ok()?;
+        Some(Telegram::Pdu(pdu).encode().to_vec())
+    };
+    let words = |slave: &Slave| {
+        let known = slave.ppo.map_or(PpoType::ALL.to_vec(), |ppo| vec![ppo]);
+        let address = slave.address;
+        let telegrams = known
+            .into_iter()
+            .filter_map(move |ppo| telegram(address, ppo));
+        telegrams.collect::<Vec<_>>()
+    };
+    slaves.iter().flat_map(words).collect()
+}
+
+fn image(word: u16) -> Image {
+    Image {
+        words: [word, 0, 0, 0, 0, 0],
+        ..Image::default()
+    }
+}
+
+fn safe_image() -> Image {
+    image(stw::SAFE)
+}
+
+/// Takes every inverter to its safe state and reads it back. One that runs is first stopped on its quick-stop ramp (1615), where the rig's
+/// file wants a stop, for as long as the file says; then its output is switched off (OFF2, 047D), until the status word shows it.
+pub fn safe_state<L: Line>(
+    line: &mut Guarded<L>,
+    slaves: &[Slave],
+    patience: Span,
+    standing: &Standstill,
+) -> Safe {
+    let mut reports = String::new();
+    let mut confirmed = true;
+    finish_telegrams(line);
+    let mut talk = Talk::new(Box::new(&mut *line), patience);
+    for slave in slaves {
+        let made = make_safe(&mut talk, *slave, standing);
+        let address = slave.address;
+        // Writing to a String cannot fail.
+        let _infallible = match made {
+            Ok(report) => write!(reports, "\n  slave {address}: {report}"),
+            Err(why) => {
+                confirmed = false;
+                write!(reports, "\n  slave {address}: NOT confirmed: {why}")
+            }
+        };
+    }
+    let words = match confirmed {
+        true => format!("safe state: the output of every inverter is off{reports}"),
+        false => format!("the safe state is NOT confirmed; use the emergency stop{reports}"),
+    };
+    Safe { confirmed, words }
+}
+
+/// Ends telegrams of which a part was sent: the next octet could be their FCS.
+fn finish_telegrams<L: Line>(line: &mut Guarded<L>) {
+    for _ in 0..MAX_TELEGRAM {
+        if line.slaves().is_none_or(|gate| gate.at_rest()) {
+            return;
+        }
+        let begins = |octet: &u8| [SD1, SD2, SD3].contains(octet);
+        let harmless = (0..=u8::MAX).filter(|octet| !begins(octet));
+        let mut harmless =
+            harmless.filter(|octet| line.permits(0, crate::medium::Out::Octets(&[*octet])));
+        let Some(filler) = harmless.next() else {
+            return;
+        };
+        drop(harmless);
+        line.send(0, crate::medium::Out::Octets(&[filler]));
+    }
+}
+
+/// Takes one inverter to its safe state. Returns what it shows, or why it is not confirmed.
+fn make_safe(talk: &mut Talk<'_>, slave: Slave, standing: &Standstill) -> Result<String, String> {
+    let text = |error: TalkError| error.to_string();
+    let address = slave.address;
+    talk.restart(address);
+    let diagnosis = talk.diagnose(address).map_err(text)?;
+    let exchanges = !diagnosis.has(Diagnosis::NOT_READY);
+    let other = diagnosis.master.filter(|own| exchanges && *own != MASTER);
+    if let Some(controls) = other {
+        return Err(format!(
+            "master {controls} controls it: stop it there, or switch that master off"
+        ));
+    }
+    let found = talk.configuration(address).map_err(text)?;
+    let ppo = found
+        .or(slave.ppo)
+        .ok_or("its configuration is of no PPO type")?;
+    let mut off = Off {
+        talk,
+        address,
+        ppo,
+        standing,
+    };
+    let stops = standing.order.contains(&SafeStep::Stop);
+    if diagnosis.has_mode(Diagnosis::SYNC) || diagnosis.has_mode(Diagnosis::FREEZE) {
+        // What waits for Sync is then the word that stops; a frozen status word shows nothing.
+        off.exchange(if stops { stw::QUICK_STOP } else { stw::SAFE })?;
+        let command = GlobalControl::UNSYNC | GlobalControl::UNFREEZE;
+        off.talk.command(address, command).map_err(text)?;
+    }
+    if stops {
+        off.stop()?;
+    }
+    match standing.order.contains(&SafeStep::Block) {
+        true => off.block(),
+        false => Ok("stopped".to_owned()),
+    }
+}
+
+/// An inverter on its way to the safe state.
+struct Off<'t, 'l> {
+    talk: &'t mut Talk<'l>,
+    address: u8,
+    ppo: PpoType,
+    standing: &'t Standstill,
+}
+
+impl Off<'_, '_> {
+    /// One exchange with a control word and setpoint 0; a slave that is not in the exchange is taken into it first. Gives the status word.
+    fn exchange(&mut self, word: u16) -> Result<u16, String> {
+        let text = |error: TalkError| error.to_string();
+        let left = |error: &TalkError| {
+            let why = ExchangeError::Left;
+            matches!(error, TalkError::Exchange { why: own, .. } if *own == why)
+        };
+        let (address, ppo) = (self.address, self.ppo);
+        match self.talk.exchange(address, ppo, &image(word)) {
+            Err(error) if left(&error) => {
+                let started = self.talk.start(address, ppo, Some(WATCHDOG));
+                started.map_err(text)?;
+                let again = self.talk.exchange(address, ppo, &image(word));
+                Ok(again.map_err(text)?.first())
+            }
+            Err(error) => Err(error.to_string()),
+            Ok(inputs) => Ok(inputs.first()),
+        }
+    }
+
+    /// Stops on the quick-stop ramp. One that does not stand in time is switched off all the same.
+    fn stop(&mut self) -> Result<(), String> {
+        let end = self.talk.now() + self.standing.within;
+        loop {
+            let status = self.exchange(stw::QUICK_STOP)?;
+            // OFF3 has been taken, and the output is off; or there is nothing on.
+            let seen = status & zsw::NO_OFF3 == 0 && status & zsw::ENABLED == 0;
+            let off = status & OUTPUT == 0;
+            if seen || off || self.talk.now() >= end {
+                return Ok(());
+            }
+            self.talk.pass(AGAIN).map_err(|error| error.to_string())?;
+        }
+    }
+
+    /// Switches the output off, and waits until the status word shows that.
+    fn block(&mut self) -> Result<String, String> {
+        let end = self.talk.now() + self.standing.within;
+        let mut off_for = 0;
+        loop {
+            let status = self.exchange(stw::SAFE)?;
+            let off = status & OUTPUT == 0;
+            off_for = if off { off_for + 1 } else { 0 };
+            // ZSW bit 4 repeats OFF2: what is seen is behind the word that was sent.
+            let seen = off && status & zsw::NO_OFF2 == 0;
+            if seen || off_for >= LAGGING {
+                let state = State::of_zsw(status).map_or("unknown", State::name);
+                return Ok(format!("{state}, status word {status:04X}"));
+            }
+            if self.talk.now() >= end && off_for == 0 {
+                return Err(format!(
+                    "its status word reads {status:04X} {} after control word 047D was sent first: the output is on, or \
+                     its terminals control it (1621)",
+                    self.standing.within
+                ));
+            }
+            self.talk.pass(AGAIN).map_err(|error| error.to_string())?;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::buses::nordac::gate::guarded;
+    use crate::buses::nordac::rig::values;
+    use crate::buses::nordac::simulate::{Bench, Setup, SlaveSetup};
+    use crate::link::{DriveFault, Link, Moment, Octets, PlacedFault, Trouble};
+    use harness_proto::nordac::Parameter;
+    use harness_proto::nordac::guard::{GuardedSlave, Limits};
+    use harness_proto::nordac::pkw::Index;
+    use harness_proto::nordac::properties::PROPERTIES;
+    use harness_proto::profibus::BusRate;
+
+    const PATIENCE: Span = Span::from_millis(5);
+
+    fn set(slave: &mut SlaveSetup, number: u16, value: i64) {
+        let parameter = Parameter::of(number).expect("a parameter");
+        slave.parameters.push((parameter, Index::default(), value));
+    }
+
+    /// An inverter that the bus controls (1621).
+    fn slave(address: u8, ppo: PpoType) -> SlaveSetup {
+        let mut slave = SlaveSetup::new(address);
+        slave.ppo = ppo;
+        set(&mut slave, 1621, 2);
+        slave
+    }
+
+    fn line(slaves: Vec<SlaveSetup>, limits: Limits) -> (Guarded<Bench>, Vec<Slave>) {
+        let known = slaves.iter().map(|own| Slave {
+            address: own.address,
+            ppo: Some(own.ppo),
+        });
+        let known: Vec<_> = known.collect();
+        let setup = Setup {
+            rate: BusRate::K500,
+            slaves,
+            master: None,
+        };
+        let gated: Vec<_> = known.iter().map(|own| GuardedSlave::from(*own)).collect();
+        (guarded(Bench::new(&setup), limits, &gated, false), known)
+    }
+
+    /// Takes motors to a frequency.
+    fn run(line: &mut Guarded<Bench>, slaves: &[Slave]) {
+        let mut talk = Talk::new(Box::new(line), PATIENCE);
+        for slave in slaves {
+            let ppo = slave.ppo.expect("known");
+            talk.start(slave.address, ppo, None).expect("starts");
+            for word in [stw::READY, stw::START, stw::START] {
+                let words = Image {
+                    words: [word, 0x2000, 0, 0, 0, 0],
+                    ..Image::default()
+                };
+                talk.exchange(slave.address, ppo, &words).expect("answers");
+            }
+            talk.pass(Span::from_millis(2_000)).expect("sound");
+        }
+    }
+
+    fn is_on(line: &Guarded<Bench>, address: u8) -> bool {
+        let drive = line.inner().drive(address).expect("a drive");
+        drive.inverter().state().output_on()
+    }
+
+    fn safe(line: &mut Guarded<Bench>, slaves: &[Slave], order: &[SafeStep]) -> Safe {
+        let standing = Standstill {
+            order: order.to_vec(),
+            within: Span::from_millis(500),
+            ..Standstill::default()
+        };
+        safe_state(line, slaves, PATIENCE, &standing)
+    }
+
+    /// In every PPO type and under every value of every open point: motors that run are off afterwards, and it is seen.
+    #[test]
+    fn motors_that_run_are_stopped_whatever_the_manual_leaves_open() {
+        let mut all = PpoType::ALL
+            .map(|ppo| vec![slave(8, ppo), slave(9, ppo)])
+            .to_vec();
+        for property in PROPERTIES {
+            for word in values(property) {
+                let mut own = slave(8, PpoType::One);
+                assert!(property.set(&mut own.properties, &word), "{word}");
+                all.push(vec![own]);
+            }
+        }
+        for setup in all {
+            let name = format!("{:?} {:?}", setup[0].ppo, setup[0].properties);
+            let (mut line, slaves) = line(setup, Limits::unlimited());
+            run(&mut line, &slaves);
+            assert!(is_on(&line, 8), "{name}");
+            let safe = safe(&mut line, &slaves, &[SafeStep::Stop, SafeStep::Block]);
+            assert!(safe.confirmed, "{safe} {name}");
+            for slave in &slaves {
+                assert!(!is_on(&line, slave.address), "{name}");
+            }
+        }
+    }
+
+    /// Without permission for motion, with words that wait for Sync, and after the slave has fallen out of the exchange.
+    #[test]
+    fn other_ways_in() {
+        let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::default());
+        let none = safe(&mut line, &slaves, &[SafeStep::Block]);
+        assert!(none.confirmed, "{none}");
+        for seconds in [0, 5] {
+            let (mut line, slaves) = self::line(vec![slave(8, PpoType::One)], Limits::unlimited());
+            run(&mut line, &slaves);
+            match seconds {
+                // Sync and Freeze, which Set_Prm asked for.
+                0 => {
+                    let prm = [0xB8, 1, 100, 0, 0x75, 0x31, 0];
+                    let control = FrameControl::request(Function::SrdLow, Sequence::First);
+                    let pdu = Pdu::with_saps(8, MASTER, control, Some(61), Some(62), &prm);
+                    let prm = Telegram::Pdu(pdu.expect("fits")).encode();
+                    let control = FrameControl::request(Function::SrdLow, Sequence::None);
+                    let cfg = PpoType::One.cfg();
+                    let pdu = Pdu::with_saps(8, MASTER, control, Some(62), Some(62), cfg);
+                    let cfg = Telegram::Pdu(pdu.expect("fits")).encode();
+                    let mut talk = Talk::new(Box::new(&mut line), PATIENCE);
+                    for octets in [prm, cfg] {
+                        talk.send(&octets).expect("sent");
+                        talk.pass(PATIENCE).expect("sound");
+                    }
+                    let started = talk.exchange(8, PpoType::One, &image(stw::START));
+                    started.expect("answers");
+                    let both = GlobalControl::SYNC | GlobalControl::FREEZE;
+                    talk.command(8, both).expect("sent");
+                }
+                // The watchdog ends the exchange.
+                _ => {
+                    let mut talk = Talk::new(Box::new(&mut line), PATIENCE);
+                    let started = talk.start(8, PpoType::One, Some(WATCHDOG));
+                    started.expect("starts");
+                    talk.pass(Span::from_millis(5_000)).expect("sound");
+                }
+            }
+            assert!(
+                is_on(&line, 8),
+                "zeros and an end of the exchange stop nothing"
+            );
+            let safe = safe(&mut line, &slaves, &[SafeStep::Stop, SafeStep::Block]);
+            assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
+        }
+    }
+
+    #[test]
+    fn a_silent_slave_is_not_confirmed_and_the_others_are_stopped() {
+        let both = vec![slave(8, PpoType::One), slave(9, PpoType::One)];
+        let (mut line, slaves) = line(both, Limits::unlimited());
+        run(&mut line, &slaves[1..]);
+        line.inject(0, PlacedFault::Drive(8, DriveFault::Off), Moment::Now);
+        let safe = safe(&mut line, &slaves, &[SafeStep::Block]);
+        assert!(!safe.confirmed);
+        assert!(
+            safe.words
+                .contains("slave 8: NOT confirmed: slave 8 does not reply to Slave_Diag"),
+            "{safe}"
+        );
+        assert!(safe.words.contains("slave 9: start-disable"), "{safe}");
+        assert!(!is_on(&line, 9));
+    }
+
+    /// An inverter that ignores OFF2 keeps its output on: that is seen. On its quick-stop ramp it stops.
+    #[test]
+    fn an_output_that_stays_on_is_not_confirmed() {
+        let mut deaf = slave(8, PpoType::One);
+        deaf.deviation = harness_sim::nordac::deviation::deviation("no-off2");
+        assert!(deaf.deviation.is_some());
+        let (mut line, slaves) = line(vec![deaf], Limits::unlimited());
+        run(&mut line, &slaves);
+        let safe = safe(&mut line, &slaves, &[SafeStep::Block]);
+        assert!(!safe.confirmed, "{safe}");
+        assert!(safe.words.contains("the output is on"), "{safe}");
+        let safe = self::safe(&mut line, &slaves, &[SafeStep::Stop]);
+        assert!(safe.confirmed && !is_on(&line, 8), "{safe}");
+    }
+
+    /// A denied telegram of which the begin was sent, and whose FCS is the begin of the telegram that stops: it is ended first.
+    #[test]
+    fn a_begun_telegram_does_not_keep_the_stop_back() {
+        let (mut line, slaves) = line(vec![slave(8, PpoType::One)], Limits::default());
+        // 047F with an HSW that makes the FCS 68.
+        let telegram = (0..=u16::MAX).find_map(|main| {
+            let control = FrameControl::request(Function::SrdHigh, Sequence::First);
+            let words = Image {
+                words: [stw::START, main, 0, 0, 0, 0],
+                ..Image::default()
+            };
+            let pdu = Pdu::new(8, MASTER, control, &words.encode(PpoType::One)).ok()?;
+            let octets = Telegram::Pdu(pdu).encode().to_vec();
+            (octets[octets.len() - 2] == SD2).then_some(octets)
+        });
+        let telegram = telegram.expect("one of them");
+        line.send_octets(0, &telegram[..telegram.len() - 2]);
+        assert_eq!(line.trouble(), None);
+        line.send_octets(0, &[SD2]);
+        assert!(matches!(line.trouble(), Some(Trouble::Denied(_))));
+        line.reset_after_denial();
+        let safe = safe(&mut line, &slaves, &[SafeStep::Block]);
+        assert!(safe.confirmed, "{safe}");
+    }
+
+    #[test]
+    fn last_words_switch_every_output_off() {
+        let (mut line, slaves) = line(
+            vec![slave(8, PpoType::One), slave(9, PpoType::Four)],
+            Limits::unlimited(),
+        );
+        run(&mut line, &slaves);
+        for telegram in last_words(&slaves) {
+            line.send_octets(0, &telegram);
+            let end = line.now() + PATIENCE;
+            while line.now() < end && line.wait(end) {}
+        }
+        assert!(!is_on(&line, 8) && !is_on(&line, 9));
+    }
+}
