@@ -2,6 +2,7 @@
 
 pub mod nordac;
 pub mod novobus;
+pub(crate) mod port_row;
 pub mod unitek;
 
 /// The bus whose drives stand in rings: what rooms take of it by type.
@@ -51,13 +52,12 @@ use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
 use crate::report::html::Html;
-use crate::rig::port_file::{Node, Port};
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{Options, Rig, SessionError};
 use crate::scenario::plan::Plan;
-use crate::scenario::problem::{Problem, Problems};
+use crate::scenario::problem::Problems;
 use crate::scenario::settled::{self, Settled};
-use crate::scenario::source::{Source, line_number};
+use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
 use crate::serve::frames::FrameJob;
@@ -69,6 +69,7 @@ use harness_proto::line::Rate;
 use harness_proto::time::Span;
 use harness_sim::fuzz::{FuzzTarget, Noting};
 use harness_sim::record::{Carried, Trace};
+use port_row::PortRow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
@@ -135,123 +136,12 @@ impl PortBus {
     pub const ALL: [Self; 2] = [Self::Unitek, Self::Nordac];
 
     /// What a rig's file says of its drives, and what the commands do with them.
-    const fn row(self) -> &'static PortRow {
+    pub(crate) const fn row(self) -> &'static PortRow {
         match self {
             Self::Unitek => &unitek::rig::PORT,
             Self::Nordac => &nordac::rig::PORT,
         }
     }
-
-    /// The bus of its scenarios.
-    #[must_use]
-    pub const fn bus(self) -> Bus {
-        self.row().bus
-    }
-
-    /// The name in a rig's file.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        self.bus().name()
-    }
-
-    /// The drive at a place of a port's list: its number, and its identifiers.
-    #[must_use]
-    pub fn drive(self, index: usize, node: Node) -> (u8, Vec<u16>) {
-        (self.row().drive)(index, node)
-    }
-
-    /// The keys of `[port.1]` that not every bus has.
-    #[must_use]
-    pub const fn keys(self) -> &'static [&'static str] {
-        self.row().keys
-    }
-
-    /// The keys of `[limits]` that not every bus has.
-    #[must_use]
-    pub const fn limits(self) -> &'static [&'static str] {
-        self.row().limits
-    }
-
-    /// The most drives of a simulated bench.
-    #[must_use]
-    pub const fn most_drives(self) -> u8 {
-        self.row().most_drives
-    }
-
-    /// The drives of a simulated bench as its file lists them, and the limits with which all is permitted.
-    #[must_use]
-    pub fn simulated(self, drives: u8) -> (String, String) {
-        (self.row().simulated)(drives)
-    }
-
-    /// Whether a drive is named as on this bus.
-    ///
-    /// # Errors
-    /// What is wrong, and what was expected.
-    pub fn named(self, node: Node) -> Result<(), (&'static str, &'static str)> {
-        (self.row().named)(node)
-    }
-
-    /// Whether the bus has a rate of so many bits a second.
-    #[must_use]
-    pub fn has_rate(self, bits: u32) -> bool {
-        (self.row().has_rate)(bits)
-    }
-
-    /// The mistakes of `setup` lines of a simulated port, each with the number of its line, counted from 0.
-    pub(crate) fn setup_mistakes(self, port: &Port, lines: &[String]) -> Vec<(usize, Problem)> {
-        let source = Source {
-            name: "setup".to_owned(),
-            text: lines.join("\n").into(),
-        };
-        let read = (self.row().setup_mistakes)(port, &source);
-        let line = |own: &Problem| line_number(&source.text, own.span.start) - 1;
-        let problems = read.iter().flat_map(Problems::all);
-        let placed = problems.map(|own| (line(own), own.clone()));
-        placed.collect()
-    }
-
-    /// The register of `allow_registers`.
-    ///
-    /// # Errors
-    /// What is wrong, and what was expected.
-    pub(crate) fn special_register(self, text: &str) -> Result<u8, (String, String)> {
-        (self.row().special_register)(text)
-    }
-}
-
-/// What a bus knows of `[port.1]` and of the drives there.
-pub(crate) struct PortRow {
-    /// The bus of its scenarios.
-    pub(crate) bus: Bus,
-    /// See [`PortBus::keys`].
-    pub(crate) keys: &'static [&'static str],
-    /// See [`PortBus::limits`].
-    pub(crate) limits: &'static [&'static str],
-    /// See [`PortBus::most_drives`].
-    pub(crate) most_drives: u8,
-    /// See [`PortBus::simulated`].
-    pub(crate) simulated: fn(u8) -> (String, String),
-    /// See [`PortBus::named`].
-    pub(crate) named: fn(Node) -> Result<(), (&'static str, &'static str)>,
-    /// See [`PortBus::has_rate`].
-    pub(crate) has_rate: fn(u32) -> bool,
-    /// See [`PortBus::drive`].
-    pub(crate) drive: fn(usize, Node) -> (u8, Vec<u16>),
-    /// The mistakes of `setup` lines.
-    pub(crate) setup_mistakes: fn(&Port, &Source) -> Option<Problems>,
-    /// See [`PortBus::special_register`].
-    pub(crate) special_register: fn(&str) -> Result<u8, (String, String)>,
-    /// Takes a rig to play scenarios on it.
-    pub(crate) run: fn(&Rig, &Options) -> Result<Box<dyn SegmentRun>, SessionError>,
-    /// Judges what was played again, with or without `--allow-motion`.
-    pub(crate) judge: Option<fn(&Rig, bool) -> Box<dyn SegmentJudge>>,
-    /// Runs a command on its drives.
-    pub(crate) command: fn(&Rig, &DriveCommand, &mut Output) -> Result<Exit, Failure>,
-    /// Runs `rig check`, as text or for tools.
-    pub(crate) check: fn(&Rig, &Options, bool, &mut Output) -> Result<Exit, Failure>,
-    /// Explores its drives.
-    pub(crate) fuzz: fn(&Rig, &FuzzRunArguments, &mut Output) -> std::io::Result<Exit>,
 }
 
 /// Takes a rig with a port, to play scenarios on it.

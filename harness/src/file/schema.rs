@@ -189,7 +189,7 @@ impl<'a> Walk<'a> {
             (DeValue::Array(array), "array") => {
                 let (least, most) = (&schema["minItems"], &schema["maxItems"]);
                 self.range(
-                    array.len() as i64,
+                    array.len() as f64,
                     least,
                     most,
                     place,
@@ -199,7 +199,13 @@ impl<'a> Walk<'a> {
                     self.value(&schema["items"], entry, path, depth + 1);
                 }
             }
-            (DeValue::Integer(number), "integer") => {
+            (DeValue::Float(number), "number") => {
+                let parsed: Option<f64> = number.as_str().replace('_', "").parse().ok();
+                let (least, most) = (&schema["minimum"], &schema["maximum"]);
+                let number = parsed.unwrap_or(f64::MAX);
+                self.range(number, least, most, place, &format!("for `{name}`"));
+            }
+            (DeValue::Integer(number), "integer" | "number") => {
                 let parsed = i64::from_str_radix(&number.as_str().replace('_', ""), number.radix());
                 // The bounds of the key itself before those of its type.
                 let bound = |key: &str| {
@@ -211,7 +217,7 @@ impl<'a> Walk<'a> {
                 let (least, most) = (bound("minimum"), bound("maximum"));
                 let null = Value::Null;
                 self.range(
-                    parsed.unwrap_or(i64::MAX),
+                    parsed.unwrap_or(i64::MAX) as f64,
                     least.unwrap_or(&null),
                     most.unwrap_or(&null),
                     place,
@@ -245,6 +251,7 @@ impl<'a> Walk<'a> {
                     "object" => "a table expected here",
                     "array" => "a list in [ ] expected here",
                     "integer" => "a whole number expected here",
+                    "number" => "a number expected here",
                     "boolean" => "true or false expected here",
                     _ => "a text in quotes expected here",
                 };
@@ -255,10 +262,9 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn range(&mut self, number: i64, least: &Value, most: &Value, place: Span, what: &str) {
+    fn range(&mut self, number: f64, least: &Value, most: &Value, place: Span, what: &str) {
         let (least, most) = (least.as_f64(), most.as_f64());
-        let number_f = number as f64;
-        if least.is_some_and(|least| number_f < least) || most.is_some_and(|most| number_f > most) {
+        if least.is_some_and(|least| number < least) || most.is_some_and(|most| number > most) {
             let bounds = match (least, most) {
                 (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
                 (Some(least), Some(_)) => least.to_string(),

@@ -185,9 +185,9 @@ impl fmt::Display for Percent {
 /// A frequency written with its unit: `35Hz`.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(try_from = "String", into = "String")]
-pub struct Frequency(pub f64);
+pub struct Hertz(pub f64);
 
-impl FromStr for Frequency {
+impl FromStr for Hertz {
     type Err = ValueError;
 
     fn from_str(text: &str) -> Result<Self, ValueError> {
@@ -203,7 +203,7 @@ impl FromStr for Frequency {
     }
 }
 
-impl fmt::Display for Frequency {
+impl fmt::Display for Hertz {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}Hz", self.0)
     }
@@ -338,6 +338,6 @@ text_values! {
     Speed "drivebench-speed" "a speed above 0 with its unit: 300rpm";
     MaxSpeed "drivebench-max-speed" "a speed above 0 with its unit: 300rpm, 10%";
     Percent "drivebench-percent" "a share above 0% and below 200%: 50%";
-    Frequency "drivebench-frequency" "a frequency with its unit: 35Hz";
+    Hertz "drivebench-frequency" "a frequency with its unit: 35Hz";
     Wire "drivebench-link" "a link by its ends: 98->97, master->99, 0->master";
 }

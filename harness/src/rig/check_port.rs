@@ -118,9 +118,13 @@ impl Check<'_> {
         let limits = &self.file.limits;
         let speed = limits.max_speed.map(|_| "max_speed");
         let given = limits.port.given().into_iter().chain(speed);
-        let keys = port.adapters().into_iter().chain(port.more());
-        let of_port =
-            keys.map(|key| (vec![PORT[0], PORT[1], Step::Key(key)], key, port.bus.keys()));
+        let adapters = port.adapters().into_iter();
+        let adapters = adapters.map(|key| (key, port.bus.adapters()));
+        let more = port.more().into_iter().map(|key| (key, port.bus.keys()));
+        let of_port = adapters.chain(more).map(|(key, own)| {
+            let path = vec![PORT[0], PORT[1], Step::Key(key)];
+            (path, key, own)
+        });
         let of_limits = given.map(|key| {
             let path = vec![Step::Key("limits"), Step::Key(key)];
             (path, key, port.bus.limits())
@@ -129,6 +133,7 @@ impl Check<'_> {
         for (path, key, own) in all {
             if !own.contains(&key) {
                 let message = format!("the bus {} has no `{key}`", port.bus.name());
+                let own: Vec<_> = own.iter().map(|key| format!("`{key}`")).collect();
                 let expected = format!("one of {} expected here", own.join(", "));
                 self.wrong(&path, message, expected);
             }
@@ -150,8 +155,8 @@ impl Check<'_> {
                 &PORT,
                 "the port has no adapter",
                 format!(
-                    "one of {}, or a table [sim] with `bus` for simulated drives, expected",
-                    port.bus.keys().join(", ")
+                    "`{}`, or a table [sim] with `bus` for simulated drives, expected",
+                    port.bus.adapters().join("`, `")
                 ),
             ),
             (None, None, Some(sim)) if sim.bus != Some(port.bus) => {

@@ -1,7 +1,7 @@
 //! `[port.1]` of a rig file: a port of a bus on which all stations hear each other, on CAN or on a serial line.
 
 use super::file::Marks;
-use crate::file::values::{Frequency, KilobitRate, Percent, Time};
+use crate::file::values::{Hertz, KilobitRate, Percent, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -144,7 +144,7 @@ pub struct PortLimits {
     pub max_setpoint: Option<Percent>,
     /// The highest frequency, such as `35Hz`, in place of `max_setpoint`; default no limit but the drives' own.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_frequency: Option<Frequency>,
+    pub max_frequency: Option<Hertz>,
     /// The most parameters that a session writes to EEPROMs; default no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_eeprom_writes: Option<u32>,

@@ -1,7 +1,7 @@
 //! The safe state of NORDAC inverters: OFF2 with valid process words, held until the status word shows it. Zeros do not stop a motor.
 
 use super::rig::talk::{Talk, TalkError};
-use super::rig::{MASTER, Slave};
+use super::rig::{MASTER, RigSlave};
 use crate::guard::{Guarded, Safe, SafeStep, Standstill};
 use crate::link::Line;
 use harness_proto::nordac::master::ExchangeError;
@@ -19,7 +19,7 @@ const WATCHDOG: [u8; 2] = [1, 100];
 /// The time between two exchanges while a motor ramps down.
 const AGAIN: Span = Span::from_millis(5);
 
-/// So many replies show no output before an inverter counts as safe that does not take its words from the bus (1621): as many as replies may lag
+/// This number of replies shows no output before an inverter counts as safe that does not take its words from the bus (1621): as many as replies may lag
 /// behind (`pzd-latency`), and more.
 const LAGGING: u32 = 22;
 
@@ -29,13 +29,13 @@ const OUTPUT: u16 = zsw::READY_TO_START | zsw::READY | zsw::ENABLED;
 /// The telegrams that stop every motor without waiting for anything: for a watchdog. Each is new to its slave, whatever it was sent last. A
 /// slave of an unknown PPO type is sent the words of each; it takes those of its own.
 #[must_use]
-pub fn last_words(slaves: &[Slave]) -> Vec<Vec<u8>> {
+pub fn last_words(slaves: &[RigSlave]) -> Vec<Vec<u8>> {
     let telegram = |address, ppo: PpoType| {
         let control = FrameControl::request(Function::SrdHigh, Sequence::First);
         let pdu = Pdu::new(address, MASTER, control, &safe_image().encode(ppo)).ok()?;
         Some(Telegram::Pdu(pdu).encode().to_vec())
     };
-    let words = |slave: &Slave| {
+    let words = |slave: &RigSlave| {
         let known = slave.ppo.map_or(PpoType::ALL.to_vec(), |ppo| vec![ppo]);
         let address = slave.address;
         let telegrams = known
@@ -61,7 +61,7 @@ fn safe_image() -> Image {
 /// file wants a stop, for as long as the file says; then its output is switched off (OFF2, 047D), until the status word shows it.
 pub fn safe_state<L: Line>(
     line: &mut Guarded<L>,
-    slaves: &[Slave],
+    slaves: &[RigSlave],
     patience: Span,
     standing: &Standstill,
 ) -> Safe {
@@ -107,7 +107,11 @@ fn finish_telegrams<L: Line>(line: &mut Guarded<L>) {
 }
 
 /// Takes one inverter to its safe state. Returns what it shows, or why it is not confirmed.
-fn make_safe(talk: &mut Talk<'_>, slave: Slave, standing: &Standstill) -> Result<String, String> {
+fn make_safe(
+    talk: &mut Talk<'_>,
+    slave: RigSlave,
+    standing: &Standstill,
+) -> Result<String, String> {
     let text = |error: TalkError| error.to_string();
     let address = slave.address;
     talk.restart(address);
@@ -243,8 +247,8 @@ mod tests {
         slave
     }
 
-    fn line(slaves: Vec<SlaveSetup>, limits: Limits) -> (Guarded<Bench>, Vec<Slave>) {
-        let known = slaves.iter().map(|own| Slave {
+    fn line(slaves: Vec<SlaveSetup>, limits: Limits) -> (Guarded<Bench>, Vec<RigSlave>) {
+        let known = slaves.iter().map(|own| RigSlave {
             address: own.address,
             ppo: Some(own.ppo),
         });
@@ -259,7 +263,7 @@ mod tests {
     }
 
     /// Takes motors to a frequency.
-    fn run(line: &mut Guarded<Bench>, slaves: &[Slave]) {
+    fn run(line: &mut Guarded<Bench>, slaves: &[RigSlave]) {
         let mut talk = Talk::new(Box::new(line), PATIENCE);
         for slave in slaves {
             let ppo = slave.ppo.expect("known");
@@ -280,7 +284,7 @@ mod tests {
         drive.inverter().state().output_on()
     }
 
-    fn safe(line: &mut Guarded<Bench>, slaves: &[Slave], order: &[SafeStep]) -> Safe {
+    fn safe(line: &mut Guarded<Bench>, slaves: &[RigSlave], order: &[SafeStep]) -> Safe {
         let standing = Standstill {
             order: order.to_vec(),
             within: Span::from_millis(500),

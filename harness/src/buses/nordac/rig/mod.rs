@@ -9,7 +9,8 @@ pub use session::Session;
 
 use super::language::Nordac;
 use super::simulate::Setup;
-use crate::buses::{Bus, PortRow};
+use crate::buses::Bus;
+use crate::buses::port_row::PortRow;
 use crate::rig::port_file::{Node, Port};
 use crate::rig::{Rig, SessionError};
 use crate::scenario::parse::header::{Part, read};
@@ -37,7 +38,8 @@ const LAST: u8 = 126;
 /// Rigs of this bus.
 pub(crate) const PORT: PortRow = PortRow {
     bus: Bus::Nordac,
-    keys: &["serial", "tcp", "marks", "echo"],
+    adapters: &["serial", "tcp"],
+    keys: &["marks", "echo"],
     limits: &[
         "allow_bus_settings",
         "allow_motor_data",
@@ -93,15 +95,15 @@ const fn named(node: Node) -> Result<(), (&'static str, &'static str)> {
 
 /// A slave of a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Slave {
+pub struct RigSlave {
     /// Its address, 1 to 126.
     pub address: u8,
     /// The PPO type that it is set to, as far as it is known.
     pub ppo: Option<PpoType>,
 }
 
-impl From<Slave> for GuardedSlave {
-    fn from(slave: Slave) -> Self {
+impl From<RigSlave> for GuardedSlave {
+    fn from(slave: RigSlave) -> Self {
         Self {
             address: slave.address,
             ppo: slave.ppo,
@@ -111,9 +113,9 @@ impl From<Slave> for GuardedSlave {
 
 /// The slaves of a port, as its file lists them.
 #[must_use]
-pub fn slaves(port: &Port) -> Vec<Slave> {
+pub fn slaves(port: &Port) -> Vec<RigSlave> {
     let all = port.drives.iter();
-    all.map(|node| Slave {
+    all.map(|node| RigSlave {
         address: node.address.unwrap_or_default(),
         ppo: node.ppo.and_then(PpoType::from_number),
     })

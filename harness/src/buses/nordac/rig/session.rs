@@ -1,7 +1,7 @@
 //! A rig of NORDAC inverters in use: locked, opened, found to answer, guarded, and taken to its safe state on every way out.
 
 use super::talk::Talk;
-use super::{Slave, failed, limits, setup, slaves};
+use super::{RigSlave, failed, limits, setup, slaves};
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
@@ -23,7 +23,7 @@ const LISTEN: Span = Span::from_millis(150);
 /// The inverters of a rig.
 #[derive(Clone, Debug)]
 struct Inverters {
-    slaves: Vec<Slave>,
+    slaves: Vec<RigSlave>,
     patience: Span,
 }
 
@@ -79,7 +79,7 @@ impl Session {
 
     /// Its slaves. Their PPO types are those that they were found with.
     #[must_use]
-    pub fn slaves(&self) -> &[Slave] {
+    pub fn slaves(&self) -> &[RigSlave] {
         &self.0.drives().slaves
     }
 
@@ -183,7 +183,7 @@ fn ask(session: &mut PortSession<Inverters>, ill_as_well: bool) -> Result<(), Se
         });
         match asked {
             Ok((diagnosis, ppo)) => {
-                found.push(Slave { ppo, ..slave });
+                found.push(RigSlave { ppo, ..slave });
                 let wrong = differs(&slave, &diagnosis, ppo.map(|own| own.number()));
                 if silent.is_ok() {
                     silent = wrong;
@@ -206,8 +206,8 @@ fn ask(session: &mut PortSession<Inverters>, ill_as_well: bool) -> Result<(), Se
     }
 }
 
-/// What of a slave is otherwise than the rig's file says.
-fn differs(slave: &Slave, diagnosis: &Diagnosis, ppo: Option<u8>) -> Result<(), String> {
+/// In what a slave differs from the rig's file.
+fn differs(slave: &RigSlave, diagnosis: &Diagnosis, ppo: Option<u8>) -> Result<(), String> {
     let address = slave.address;
     let ident = harness_proto::nordac::IDENT;
     if diagnosis.ident != ident {

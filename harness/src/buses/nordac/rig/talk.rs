@@ -28,7 +28,7 @@ pub enum TalkError {
         /// The service.
         service: &'static str,
     },
-    /// It replies otherwise than the service does.
+    /// Its reply is none to this service.
     #[error("slave {slave} replies to {service} with {found}")]
     Unexpected {
         /// Its address.

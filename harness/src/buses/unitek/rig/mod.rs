@@ -15,7 +15,8 @@ pub use session::Session;
 
 use super::serve;
 use super::simulate::{DriveSetup, Setup};
-use crate::buses::{Bus, PortRow};
+use crate::buses::Bus;
+use crate::buses::port_row::PortRow;
 use crate::rig::port_file::{CONFIRMATION, Node, Port};
 use crate::scenario::problem::{Problem, Problems, Span};
 use crate::scenario::source::Source;
@@ -25,7 +26,8 @@ use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 /// Rigs of this bus.
 pub(crate) const PORT: PortRow = PortRow {
     bus: Bus::Unitek,
-    keys: &["slcan", "socketcand", "socketcan", "channel"],
+    adapters: &["slcan", "socketcand", "socketcan"],
+    keys: &["channel"],
     limits: &[
         "max_speed",
         "allow_bus_settings",
