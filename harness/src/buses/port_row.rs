@@ -12,6 +12,12 @@ use crate::rig::{Options, Rig, SessionError};
 use crate::scenario::problem::{Problem, Problems};
 use crate::scenario::source::{Source, line_number};
 
+/// Takes a rig to play scenarios on it.
+type OpenRun = fn(&Rig, &Options) -> Result<Box<dyn SegmentRun>, SessionError>;
+
+/// Judges what was played on a rig again.
+type OpenJudge = fn(&Rig, bool) -> Box<dyn SegmentJudge>;
+
 /// What a bus knows of `[port.1]` and of the drives there.
 pub(crate) struct PortRow {
     /// The bus of its scenarios.
@@ -37,9 +43,9 @@ pub(crate) struct PortRow {
     /// See [`PortBus::special_register`].
     pub(crate) special_register: fn(&str) -> Result<u8, (String, String)>,
     /// Takes a rig to play scenarios on it.
-    pub(crate) run: fn(&Rig, &Options) -> Result<Box<dyn SegmentRun>, SessionError>,
+    pub(crate) run: OpenRun,
     /// Judges what was played again, with or without `--allow-motion`.
-    pub(crate) judge: Option<fn(&Rig, bool) -> Box<dyn SegmentJudge>>,
+    pub(crate) judge: Option<OpenJudge>,
     /// Runs a command on its drives.
     pub(crate) command: fn(&Rig, &DriveCommand, &mut Output) -> Result<Exit, Failure>,
     /// Runs `rig check`, as text or for tools.
