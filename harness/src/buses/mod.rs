@@ -1,5 +1,6 @@
 //! The buses: one folder each. Only this file names them all.
 
+mod contents;
 pub mod nordac;
 pub mod novobus;
 pub(crate) mod port_row;
@@ -32,14 +33,13 @@ pub(crate) use novobus::language::parse::header;
 /// The bus of a scenario without a `bus` line.
 pub use novobus::language::Novobus as DefaultBus;
 
+pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, twin};
 
-use crate::cli::args::CellsArguments;
-use crate::cli::deviations::DeviationRow;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::fuzz::{FuzzRunArguments, verify};
@@ -413,34 +413,6 @@ pub(crate) fn shrink_frames(
             output.complain("the finding is of a bus without frames");
             Ok(Exit::Usage)
         }
-    }
-}
-
-/// Lists what the drives of a bus hold.
-pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
-    match arguments.bus {
-        Bus::Novobus => novobus::cli::cells::cells(arguments, output),
-        Bus::Unitek if arguments.eeprom => {
-            output.complain("--eeprom is for the bus novobus; a UNITEK drive keeps its RW registers in its EEPROM");
-            Ok(Exit::Usage)
-        }
-        Bus::Unitek => {
-            let filter = arguments.filter.as_deref();
-            unitek::cli::cells::cells(filter.unwrap_or_default(), output)
-        }
-        Bus::Nordac => {
-            output.complain("drivebench does not list the parameters of the bus nordac yet");
-            Ok(Exit::Usage)
-        }
-    }
-}
-
-/// The deviations of the drives of a bus, and those of its master; none for a bus that is not built.
-pub(crate) fn deviations(bus: Bus) -> [Vec<DeviationRow>; 2] {
-    match bus {
-        Bus::Novobus => novobus::cli::deviations::rows(),
-        Bus::Unitek => unitek::cli::deviations::rows(),
-        Bus::Nordac => nordac::deviations::rows(),
     }
 }
 

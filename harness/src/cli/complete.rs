@@ -5,7 +5,7 @@ use super::args::Shell;
 use super::exit::Exit;
 use super::help::command;
 use super::output::Output;
-use crate::buses::commands::{cells, deviations};
+use crate::buses::{cell_names, commands::deviations};
 use crate::campaign::find as campaigns;
 use crate::library;
 use crate::rig::find;
@@ -68,7 +68,7 @@ fn fitting(command: &Command, words: &[String]) -> Fitting {
         }
     }
     let mut fitting = if let Some(option) = waiting {
-        values(option, current)
+        values(option, current, rig(before))
     } else if current.starts_with('-') {
         let options = level.get_arguments().filter(|own| !own.is_hide_set());
         Fitting {
@@ -87,12 +87,25 @@ fn fitting(command: &Command, words: &[String]) -> Fitting {
     } else {
         // The last positional may repeat.
         let positional = level.get_positionals().take(positionals + 1).last();
-        positional.map_or_else(Fitting::default, |own| values(own, current))
+        positional.map_or_else(Fitting::default, |own| values(own, current, rig(before)))
     };
     fitting
         .words
         .retain(|word| word.starts_with(current.as_str()));
     fitting
+}
+
+/// The rig that is named in front of the cursor.
+fn rig(before: &[String]) -> Option<&str> {
+    let pairs = before.windows(2).rev();
+    let apart = pairs
+        .filter(|pair| pair[0] == "--rig")
+        .map(|pair| &*pair[1]);
+    let joined = before
+        .iter()
+        .rev()
+        .filter_map(|word| word.strip_prefix("--rig="));
+    apart.chain(joined).next()
 }
 
 /// Whether an argument is the option `-x` or `--name`, given what stands behind the first hyphen.
@@ -110,7 +123,7 @@ fn is_named(argument: &Arg, option: &str) -> bool {
 }
 
 /// What an argument takes: its fixed values, or by the name of its value the names that the program knows.
-fn values(argument: &Arg, current: &str) -> Fitting {
+fn values(argument: &Arg, current: &str, rig: Option<&str>) -> Fitting {
     let fixed = argument.get_possible_values();
     if !fixed.is_empty() {
         return Fitting {
@@ -131,8 +144,14 @@ fn values(argument: &Arg, current: &str) -> Fitting {
                     .collect()
             }
             "DRIVE" => vec!["all".to_owned()],
-            "CELL" | "SIGNAL" => cells::names().map(str::to_owned).collect(),
-            "CELL=VALUE" => cells::names().map(|name| format!("{name}=")).collect(),
+            "CELL" | "SIGNAL" => cell_names(rig),
+            "CELL=VALUE" => cell_names(rig)
+                .iter()
+                .map(|name| format!("{name}="))
+                .collect(),
+            "WORDS" => ["STW=", "HSW=", "PZD3=", "PZD4=", "then"]
+                .map(str::to_owned)
+                .to_vec(),
             "DRIVE=NAME" => {
                 let drive = current.split_once('=').map_or("0", |(drive, _)| drive);
                 deviations::names()
@@ -222,6 +241,7 @@ mod tests {
         }
         offers("read 0 EE_p", "EE_pole");
         offers("write 0 nsol", "nsoll=");
+        offers("exchange 8 STW=047E t", "then");
         offers("fuzz run --deviates 2=wri", "2=writes-ignored");
     }
 
@@ -258,7 +278,7 @@ mod tests {
                 .get_arguments()
                 .filter(|own| own.get_action().takes_values())
             {
-                let known = values(own, "") != Fitting::default();
+                let known = values(own, "", None) != Fitting::default();
                 let name = own.get_value_names().and_then(<[_]>::first);
                 let name = name.map_or("", |name| name.as_str());
                 assert!(

@@ -155,3 +155,24 @@ fn options_of_other_buses() {
         assert!(said.contains(expected), "{arguments:?}: {said}");
     }
 }
+
+#[path = "../../examples/profibus_master.rs"]
+#[expect(dead_code, reason = "a program, of which the test calls one function")]
+mod profibus_master;
+
+/// The program of the page on masters, over profirust: it turns the motor. The page shows it as it is.
+#[test]
+fn profirust_turns_the_motor() {
+    let mut sim = start(&["--slaves", "8", "--tcp", "127.0.0.1:0"]);
+    let first = sim.line();
+    let address = first.rsplit(' ').next().expect("a word");
+    let turned = profibus_master::turn(address);
+    assert_eq!(turned.expect("it turns"), (0x0F37, 0x2000));
+    let page = include_str!("../../docs/profibus-master.md");
+    let program = include_str!("../../examples/profibus_master.rs");
+    let shown = page
+        .split("```rust\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next());
+    assert_eq!(shown, Some(program));
+}

@@ -11,6 +11,7 @@ mod html;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;
 mod nordac;
+mod nordac_drive;
 mod public_api;
 #[path = "../common/record.rs"]
 mod record;

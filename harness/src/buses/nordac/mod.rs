@@ -17,6 +17,7 @@ pub(crate) mod serve;
 #[cfg(test)]
 mod serve_tests;
 pub mod simulate;
+pub mod value;
 
 /// The GSD file: the unit master file of the manual.
 pub(crate) const GSD: &str = include_str!("nordac.gsd");

@@ -59,8 +59,8 @@ pub(super) struct Page {
 }
 
 /// Languages whose blocks are not commands.
-const OTHER: [&str; 8] = [
-    "text", "toml", "yaml", "json", "xml", "markdown", "python", "c",
+const OTHER: [&str; 9] = [
+    "text", "toml", "yaml", "json", "xml", "markdown", "python", "c", "rust",
 ];
 
 impl Page {

@@ -13,8 +13,17 @@ use std::time::{Duration, Instant};
 /// A page that hangs is ended; no page is judged by how long it takes.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// What a page needs whose commands call `python3` with python-can.
-const PYTHON_CAN: &str = "python-can";
+/// What a page needs whose commands call `python3` with a package: as it is called, and its module.
+const PYTHON: [(&str, &str); 2] = [("python-can", "can"), ("pyprofibus", "pyprofibus")];
+
+/// The module of a package that a block needs; `None` for a block that needs none.
+fn module(mode: &Mode) -> Option<&'static str> {
+    let Mode::Needs(tool) = mode else {
+        return None;
+    };
+    let own = PYTHON.iter().find(|(package, _)| package == tool);
+    own.map(|(_, module)| *module)
+}
 
 /// Runs the steps and returns the differences from the page.
 pub(super) fn differences(steps: &[Step], page: &str) -> String {
@@ -28,11 +37,12 @@ pub(super) fn differences(steps: &[Step], page: &str) -> String {
 
     let mut script = "cd work\n".to_owned();
     let mut commands: Vec<&Shown> = Vec::new();
-    let python = Mode::Needs(PYTHON_CAN.to_owned());
     let python = (steps.iter())
-        .any(|step| matches!(step, Step::Command(mode, _) if *mode == python))
-        .then(|| crate::python::with("can", page))
-        .flatten();
+        .find_map(|step| match step {
+            Step::Command(mode, _) => module(mode),
+            Step::File { .. } => None,
+        })
+        .and_then(|module| crate::python::with(module, page));
     for (number, step) in steps.iter().enumerate() {
         match step {
             Step::File { name, text } => {
@@ -67,9 +77,9 @@ fn wanted(mode: &Mode, page: &str) -> bool {
     let Mode::Needs(tool) = mode else {
         return *mode == Mode::Run;
     };
-    match tool.as_str() {
-        PYTHON_CAN => crate::python::with("can", page).is_some(),
-        tool => debian::has(tool, page),
+    match module(mode) {
+        Some(module) => crate::python::with(module, page).is_some(),
+        None => debian::has(tool, page),
     }
 }
 

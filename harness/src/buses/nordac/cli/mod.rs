@@ -1,24 +1,74 @@
-//! Commands on NORDAC inverters: one file a command.
+//! Commands on NORDAC inverters: one file a command, over the driver [`crate::buses::nordac::driver`].
 
+mod args;
+mod bench;
+pub(crate) mod cells;
 mod check;
+mod control;
+mod info;
+mod params;
+mod read;
+mod watch;
+mod write;
 
+pub(crate) use args::CyclicCommand;
 pub(crate) use check::check;
 
-use crate::buses::commands::DriveCommand;
+use super::driver;
+use crate::buses::commands::{DriveCommand, ParamsCommand};
 use crate::cli::exit::Exit;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, exit_of_trouble};
 use crate::cli::fuzz::FuzzRunArguments;
 use crate::cli::output::Output;
 use crate::rig::Rig;
+use control::Stop;
+
+/// The calls that stop motors, with their names on the command line.
+const OFF: (&str, Stop) = ("off", |driver, slave| driver.off(slave));
+const STOP: (&str, Stop) = ("stop", |driver, slave| driver.off(slave));
+const BLOCK: (&str, Stop) = ("block", |driver, slave| driver.block(slave));
+const QUICK_STOP: (&str, Stop) = ("quick-stop", |driver, slave| driver.quick_stop(slave));
 
 /// Runs a command on a rig.
 ///
 /// # Errors
 /// [`Failure`].
-pub(crate) fn drive(_: &Rig, _: &DriveCommand, _: &mut Output) -> Result<Exit, Failure> {
-    Err(Failure::refused(
-        "this command is not for NORDAC inverters; `rig check` is",
-    ))
+pub(crate) fn drive(
+    rig: &Rig,
+    command: &DriveCommand,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    match command {
+        DriveCommand::Read(own) => read::read(rig, own, output),
+        DriveCommand::Write(own) => write::write(rig, own, output),
+        DriveCommand::Info(own) => info::info(rig, own, output),
+        DriveCommand::Watch(own) => watch::watch(rig, own, output),
+        DriveCommand::Top(own) => info::top(rig, own, output),
+        DriveCommand::Params(ParamsCommand::Save(own)) => params::save(rig, own, output),
+        DriveCommand::Params(ParamsCommand::Diff(own)) => params::diff(rig, own, output),
+        DriveCommand::Params(ParamsCommand::Load(own)) => params::load(rig, own, output),
+        DriveCommand::Stop(own) => control::stop(rig, STOP, own, output),
+        DriveCommand::Block(own) => control::stop(rig, BLOCK, own, output),
+        DriveCommand::Cyclic(CyclicCommand::Start(own)) => control::start(rig, own, output),
+        DriveCommand::Cyclic(CyclicCommand::Exchange(own)) => control::exchange(rig, own, output),
+        DriveCommand::Cyclic(CyclicCommand::On(own)) => control::on(rig, own, output),
+        DriveCommand::Cyclic(CyclicCommand::Off(own)) => control::stop(rig, OFF, own, output),
+        DriveCommand::Cyclic(CyclicCommand::QuickStop(own)) => {
+            control::stop(rig, QUICK_STOP, own, output)
+        }
+        DriveCommand::Cyclic(CyclicCommand::Acknowledge(own)) => {
+            control::acknowledge(rig, own, output)
+        }
+        DriveCommand::Go(_)
+        | DriveCommand::DeleteError(_)
+        | DriveCommand::Position(_)
+        | DriveCommand::Scope(_)
+        | DriveCommand::Reset(_)
+        | DriveCommand::Recover(_)
+        | DriveCommand::Sim(_) => Err(Failure::refused(
+            "this command is for drives of another bus; on NORDAC inverters there are start, exchange, on, off, quick-stop, stop, block, acknowledge, read, write, watch, info, top and params",
+        )),
+    }
 }
 
 /// Explores the inverters of a rig.
@@ -28,4 +78,17 @@ pub(crate) fn drive(_: &Rig, _: &DriveCommand, _: &mut Output) -> Result<Exit, F
 pub(crate) fn fuzz(_: &Rig, _: &FuzzRunArguments, output: &mut Output) -> std::io::Result<Exit> {
     output.complain("`fuzz run` is not for NORDAC inverters yet");
     Ok(Exit::Usage)
+}
+
+impl From<driver::Error> for Failure {
+    fn from(error: driver::Error) -> Self {
+        use driver::Error;
+        let exit = match &error {
+            Error::Link(trouble) => exit_of_trouble(trouble),
+            Error::Taken { .. } | Error::OtherMaster { .. } | Error::NotSent => Exit::RigError,
+            Error::NotRunning(_) | Error::NoChannel { .. } | Error::Setpoint { .. } => Exit::Usage,
+            _ => Exit::Failed,
+        };
+        Self::Bus(exit, error.to_string())
+    }
 }

@@ -9,12 +9,12 @@ use harness_proto::nordac::{Answer, ParameterRef};
 pub enum Written {
     /// The slave answered with the value that it holds now.
     Holds(i64),
-    /// The module began anew (NORDAC 2.6): it has left the exchange, and its answer is never seen.
-    BeganAnew,
+    /// The module restarted (NORDAC 2.6): it has left the exchange, and its answer is never seen.
+    Restarted,
 }
 
-/// Parameters whose change lets the module begin anew: bus mode, PPO type, address, and those that load all factory settings.
-const ANEW: [u16; 5] = [970, 1602, 1619, 1622, 1624];
+/// Parameters whose change lets the module restart: bus mode, PPO type, address, and those that load all factory settings.
+const RESTARTS: [u16; 5] = [970, 1602, 1619, 1622, 1624];
 
 impl Driver<'_> {
     /// Reads a parameter of a slave that was started.
@@ -43,14 +43,14 @@ impl Driver<'_> {
         let raw = parameter.parameter.raw_of(number).unwrap_or_default();
         self.slaves[place].exchange.write(parameter, raw);
         let answer = match self.answer(place, parameter) {
-            Err(Error::Left { .. }) if ANEW.contains(&parameter.parameter.number) => {
-                return Ok(Written::BeganAnew);
+            Err(Error::Left { .. }) if RESTARTS.contains(&parameter.parameter.number) => {
+                return Ok(Written::Restarted);
             }
             other => other?,
         };
         let reads = self.value(slave, parameter, answer, "change")?;
         // Parameter 970 and 1602 do something, and keep nothing.
-        if reads != number && !ANEW.contains(&parameter.parameter.number) {
+        if reads != number && !RESTARTS.contains(&parameter.parameter.number) {
             return Err(Error::Differs {
                 slave,
                 parameter: *parameter,

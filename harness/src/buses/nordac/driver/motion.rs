@@ -182,9 +182,9 @@ const fn bits(image: &Image) -> u16 {
     image.first() & 0x4F
 }
 
-/// Whether the output is off.
+/// Whether the output is off. While a ramp runs down, the status word alone may not tell (`off1-zsw-while-ramping`).
 const fn is_off(image: &Image) -> bool {
-    image.first() & zsw::ENABLED == 0
+    image.first() & zsw::ENABLED == 0 && image.main() == 0
 }
 
 const fn not_reached(slave: u8, expected: &'static str, stw: u16, seen: &Image) -> Error {

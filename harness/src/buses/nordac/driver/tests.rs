@@ -122,15 +122,15 @@ fn parameters_are_read_and_written() {
     assert_eq!(stored, Some(500));
 }
 
-/// 2.6: a change of the PPO type or of the address begins anew, and the slave is found again.
+/// 2.6: a change of the PPO type or of the address restarts, and the slave is found again.
 #[test]
-fn a_slave_that_begins_anew() {
+fn a_slave_that_restarts() {
     let mut bench = bench(BusRate::K500, &[slave(8, PpoType::One, &[])]);
     let mut driver = driver(&mut bench, BusRate::K500);
     driver.start(8, None).expect("a start");
     for (name, value) in [("1622", 1), ("1624", 9)] {
         let written = driver.write(8, &parameter(name), value);
-        assert_eq!(written, Ok(Written::BeganAnew), "{name}");
+        assert_eq!(written, Ok(Written::Restarted), "{name}");
         if name == "1622" {
             assert_eq!(driver.start(8, None).expect("again").ppo, PpoType::Two);
         }

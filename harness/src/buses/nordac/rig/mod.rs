@@ -73,7 +73,7 @@ pub(crate) const PORT: PortRow = PortRow {
 
 /// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.
 fn simulated(drives: u8) -> (String, String) {
-    let nodes = (0..drives).map(|place| format!("{{ address = {}, ppo = 1 }}", FIRST + place));
+    let nodes = (0..drives).map(|place| format!("{{ address = {} }}", FIRST + place));
     let limits = "allow_bus_settings = true\nallow_motor_data = true\nallow_other_stations = true\nallow_unsupervised = true\n";
     (nodes.collect::<Vec<_>>().join(", "), limits.to_owned())
 }

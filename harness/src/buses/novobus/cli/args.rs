@@ -3,6 +3,7 @@
 use super::axes::Axes;
 use super::rig::RigName;
 use super::sim::{SIM_HELP, SimArguments};
+use crate::buses::nordac::cli::CyclicCommand;
 use crate::scenario::argument::{duration, number};
 use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};
@@ -83,6 +84,9 @@ pub enum DriveCommand {
     /// Bring a ring out of the error mode and count its drives (ND21 9.8).
     #[command(after_help = RECOVER_JSON)]
     Recover(RecoverArguments),
+    /// On slaves with a cyclic master.
+    #[command(flatten)]
+    Cyclic(CyclicCommand),
     /// Serve a simulated ring in real time to a master under test.
     #[command(after_help = SIM_HELP)]
     Sim(SimArguments),
@@ -107,6 +111,7 @@ impl DriveCommand {
             Self::Stop(arguments) | Self::Block(arguments) => &arguments.rig,
             Self::DeleteError(arguments) => &arguments.select.rig,
             Self::Recover(arguments) => &arguments.rig,
+            Self::Cyclic(command) => command.rig(),
             Self::Sim(_) => return None,
         })
     }

@@ -56,6 +56,9 @@ pub(crate) fn drive(command: &DriveCommand, output: &mut Output) -> std::io::Res
         DriveCommand::Reset(arguments) => control::reset(arguments, output),
         DriveCommand::DeleteError(arguments) => control::delete_error(arguments, output),
         DriveCommand::Recover(arguments) => recover::recover(arguments, output),
+        DriveCommand::Cyclic(_) => Err(Failure::refused(
+            "this command is for slaves with a cyclic master, such as --rig sim:nordac; on a ring there are go, stop, block and delete-error",
+        )),
         DriveCommand::Sim(arguments) => sim::sim(arguments, output),
     };
     match end {

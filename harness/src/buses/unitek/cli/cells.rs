@@ -5,6 +5,11 @@ use crate::cli::output::Output;
 use harness_proto::unitek::units::usual;
 use harness_proto::unitek::{ALIASES, REGISTERS, Register};
 
+/// The names of all registers.
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    REGISTERS.iter().map(|register| register.name)
+}
+
 /// Shows the registers that have `filter` in their name, number or meaning.
 pub(crate) fn cells(filter: &str, output: &mut Output) -> std::io::Result<Exit> {
     let filter = filter.to_lowercase();

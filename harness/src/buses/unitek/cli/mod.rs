@@ -54,8 +54,9 @@ pub(crate) fn drive(
         DriveCommand::Scope(_)
         | DriveCommand::Reset(_)
         | DriveCommand::Recover(_)
+        | DriveCommand::Cyclic(_)
         | DriveCommand::Sim(_) => Err(Failure::refused(
-            "this command is for rings of ND21; on UNITEK drives there are read, write, watch, info, top, params, position, go, stop, block and delete-error",
+            "this command is for drives of another bus; on UNITEK drives there are read, write, watch, info, top, params, position, go, stop, block and delete-error",
         )),
     }
 }

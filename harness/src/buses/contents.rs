@@ -1,0 +1,51 @@
+//! What the drives of a bus hold, for lists and completions, and how they can deviate.
+
+use super::{Bus, nordac, novobus, unitek};
+use crate::cli::args::CellsArguments;
+use crate::cli::deviations::DeviationRow;
+use crate::cli::exit::Exit;
+use crate::cli::output::Output;
+use crate::rig::find::{find, folder};
+
+/// The names of what drives hold, for completions: of the drives of a rig, or of the default bus where there is no such rig.
+pub(crate) fn cell_names(rig: Option<&str>) -> Vec<String> {
+    let found = rig.and_then(|name| find(name, &folder()).ok());
+    let bus = found.and_then(|rig| Some(rig.port()?.bus.bus()));
+    match bus.unwrap_or(Bus::DEFAULT) {
+        Bus::Novobus => novobus::cli::cells::names().map(str::to_owned).collect(),
+        Bus::Unitek => unitek::cli::cells::names().map(str::to_owned).collect(),
+        Bus::Nordac => nordac::cli::cells::names().collect(),
+    }
+}
+
+/// Lists what the drives of a bus hold.
+pub(crate) fn cells(arguments: &CellsArguments, output: &mut Output) -> std::io::Result<Exit> {
+    match arguments.bus {
+        Bus::Novobus => novobus::cli::cells::cells(arguments, output),
+        Bus::Unitek if arguments.eeprom => {
+            output.complain("--eeprom is for the bus novobus; a UNITEK drive keeps its RW registers in its EEPROM");
+            Ok(Exit::Usage)
+        }
+        Bus::Unitek => {
+            let filter = arguments.filter.as_deref();
+            unitek::cli::cells::cells(filter.unwrap_or_default(), output)
+        }
+        Bus::Nordac if arguments.eeprom => {
+            output.complain("--eeprom is for the bus novobus; a NORDAC inverter keeps every parameter that can be written in its EEPROM");
+            Ok(Exit::Usage)
+        }
+        Bus::Nordac => {
+            let filter = arguments.filter.as_deref();
+            nordac::cli::cells::cells(filter.unwrap_or_default(), output)
+        }
+    }
+}
+
+/// The deviations of the drives of a bus, and those of its master; none for a bus that is not built.
+pub(crate) fn deviations(bus: Bus) -> [Vec<DeviationRow>; 2] {
+    match bus {
+        Bus::Novobus => novobus::cli::deviations::rows(),
+        Bus::Unitek => unitek::cli::deviations::rows(),
+        Bus::Nordac => nordac::deviations::rows(),
+    }
+}

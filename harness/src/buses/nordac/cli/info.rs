@@ -1,0 +1,215 @@
+//! `drivebench info` and `top` on NORDAC inverters: identity, state, fault, frequency, and what guards the motor.
+
+use super::bench::{driver, on, select};
+use super::read::{Found, find};
+use crate::buses::commands::{Axes, InfoArguments, OutputForm, TopArguments, Use, columns};
+use crate::buses::nordac::driver::{Driver, Error};
+use crate::buses::nordac::value::{Cell, ReplyWord, parameter};
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::rig::Rig;
+use harness_proto::nordac::PpoType;
+use serde_json::{Map, Value, json};
+
+/// What is shown of a slave that has a parameter channel: the heading, and the parameter.
+const SHOWN: [(&str, &str); 10] = [
+    ("fault", "1800"),
+    ("past fault", "1801"),
+    ("frequency", "1813"),
+    ("maximum", "1205"),
+    ("heat sink", "1825"),
+    ("link voltage", "1825.2"),
+    ("interface", "1621"),
+    ("bus time-out", "1625"),
+    ("software", "1812"),
+    ("hours", "1808"),
+];
+
+/// A slave as it was found.
+struct Seen {
+    slave: u8,
+    ppo: PpoType,
+    /// The process words, and the parameters.
+    words: Vec<Found>,
+    parameters: Vec<(&'static str, Found)>,
+}
+
+impl Seen {
+    /// What is shown, each with its heading and where it stands.
+    fn rows(&self) -> Vec<(String, String, String)> {
+        let mut rows = vec![(
+            "PPO type".to_owned(),
+            self.ppo.to_string(),
+            "1622".to_owned(),
+        )];
+        let names = ["status", "actual value"];
+        for (name, found) in names.into_iter().zip(&self.words) {
+            rows.push((name.to_owned(), found.words(), found.cell.name()));
+        }
+        for (name, found) in &self.parameters {
+            rows.push(((*name).to_owned(), value(found), found.cell.name()));
+        }
+        rows
+    }
+
+    fn of(&self, heading: &str) -> String {
+        let own = self.parameters.iter().find(|(name, _)| *name == heading);
+        own.map_or_else(|| "-".to_owned(), |(_, found)| value(found))
+    }
+}
+
+/// A value in words; 0 is no fault, and no time-out.
+fn value(found: &Found) -> String {
+    match (found.cell, found.number) {
+        (Cell::Parameter(own), 0) if matches!(own.parameter.number, 1800..=1805) => {
+            "none".to_owned()
+        }
+        (Cell::Parameter(own), 0) if own.parameter.number == 1625 => {
+            "none: nothing stops the motor if the master fails".to_owned()
+        }
+        (Cell::Parameter(own), 0) if own.parameter.number == 1621 => {
+            "0: local, the bus does not control it".to_owned()
+        }
+        _ => found.words(),
+    }
+}
+
+fn look(driver: &mut Driver<'_>, slave: u8, ppo: PpoType) -> Result<Seen, Error> {
+    let words = [ReplyWord::Status, ReplyWord::Actual].map(Cell::Word);
+    let words = find(driver, slave, &words)?;
+    let mut parameters = Vec::new();
+    if ppo.has_pkw() {
+        for (name, text) in SHOWN {
+            let Ok(own) = parameter(text) else {
+                continue;
+            };
+            let found = find(driver, slave, &[Cell::Parameter(own)])?;
+            parameters.extend(found.into_iter().map(|found| (name, found)));
+        }
+    }
+    Ok(Seen {
+        slave,
+        ppo,
+        words,
+        parameters,
+    })
+}
+
+/// Lists slaves. One that does not answer is reported, and the others are listed.
+pub(super) fn info(
+    rig: &Rig,
+    arguments: &InfoArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let as_what = Use::look("info");
+    on(rig, &arguments.rig, as_what, output, |session, output| {
+        let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
+        let mut driver = driver(session);
+        let mut all = Vec::new();
+        let mut exit = Exit::Passed;
+        for slave in slaves {
+            let seen = driver
+                .start(slave, None)
+                .and_then(|started| look(&mut driver, slave, started.ppo));
+            match seen {
+                Ok(seen) => all.push(seen),
+                Err(error @ Error::Link(_)) => return Err(error.into()),
+                Err(error) => exit = exit.max(Failure::from(error).tell(output)),
+            }
+        }
+        match arguments.format {
+            OutputForm::Text => output.result(&output.fitted(&text(&all)))?,
+            OutputForm::Json => {
+                let slaves: Vec<_> = all.iter().map(object).collect();
+                output.result(&format!("{}\n", json!({"schema": 1, "drives": slaves})))?;
+            }
+        }
+        Ok(exit)
+    })
+}
+
+/// Shows all slaves, a row each; with `--once` one page, and without it again and again until the program is interrupted.
+pub(super) fn top(
+    rig: &Rig,
+    arguments: &TopArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    if !arguments.once && !output.full_screen {
+        return Err(Failure::refused(
+            "top needs a terminal; --once prints one page without one",
+        ));
+    }
+    let as_what = Use::look("top");
+    on(rig, &arguments.rig, as_what, output, |session, output| {
+        let slaves = select(&[Axes::All], session)?;
+        let mut driver = driver(session);
+        let mut known = Vec::new();
+        for slave in slaves {
+            known.push((slave, driver.start(slave, None)?.ppo));
+        }
+        loop {
+            let mut seen = Vec::new();
+            for (slave, ppo) in &known {
+                seen.push(look(&mut driver, *slave, *ppo)?);
+            }
+            let page = output.fitted(&page(&seen));
+            if arguments.once {
+                output.result(&page)?;
+                return Ok(Exit::Passed);
+            }
+            // Clears the screen, and begins in its upper left corner.
+            output.result(&format!("\x1b[2J\x1b[H{page}"))?;
+            driver.run(arguments.every)?;
+        }
+    })
+}
+
+/// A row a slave.
+fn page(all: &[Seen]) -> String {
+    let row = |seen: &Seen| {
+        let mut words = seen.words.iter().map(Found::words);
+        let (status, actual) = (words.next(), words.next());
+        [
+            seen.slave.to_string(),
+            seen.ppo.to_string(),
+            seen.of("fault"),
+            seen.of("frequency"),
+            actual.unwrap_or_default(),
+            seen.of("heat sink"),
+            status.unwrap_or_default(),
+        ]
+    };
+    let heading = [
+        "slave",
+        "PPO",
+        "fault",
+        "frequency",
+        "HIW",
+        "heat sink",
+        "status",
+    ];
+    columns(&heading, &all.iter().map(row).collect::<Vec<_>>())
+}
+
+fn text(all: &[Seen]) -> String {
+    let rows: Vec<_> = all
+        .iter()
+        .flat_map(|seen| {
+            let slave = seen.slave.to_string();
+            let rows = seen.rows().into_iter();
+            rows.map(move |(what, value, place)| [slave.clone(), what, value, place])
+        })
+        .collect();
+    columns(&["slave", "what", "value", "parameter"], &rows)
+}
+
+fn object(seen: &Seen) -> Value {
+    let mut object = Map::new();
+    object.insert("slave".to_owned(), json!(seen.slave));
+    for (name, value, _) in seen.rows() {
+        let name = name.to_lowercase().replace([' ', '-'], "_");
+        object.insert(name, json!(value));
+    }
+    Value::Object(object)
+}

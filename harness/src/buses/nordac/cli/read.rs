@@ -1,0 +1,140 @@
+//! `drivebench read` on NORDAC inverters: process words and parameters, with their units.
+
+use super::bench::{driver, on, select};
+use crate::buses::commands::{OutputForm, ReadArguments, Use, columns};
+use crate::buses::nordac::driver::{Driver, Error};
+use crate::buses::nordac::value::{Cell, cells, shown};
+use crate::cli::exit::Exit;
+use crate::cli::failure::Failure;
+use crate::cli::output::Output;
+use crate::rig::Rig;
+use harness_proto::nordac::PkwError;
+use serde_json::json;
+
+/// What was read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub(super) slave: u8,
+    pub(super) cell: Cell,
+    /// A word, or a number in steps of the parameter's unit.
+    pub(super) number: i64,
+}
+
+impl Found {
+    /// The digits as they travel.
+    fn raw(&self) -> String {
+        match self.cell {
+            Cell::Word(_) => format!("{:04X}", self.word()),
+            Cell::Parameter(_) => self.number.to_string(),
+        }
+    }
+
+    fn word(&self) -> u16 {
+        u16::try_from(self.number).unwrap_or_default()
+    }
+
+    /// Its meaning.
+    pub(super) fn words(&self) -> String {
+        match self.cell {
+            Cell::Word(word) => word.words(self.word()),
+            Cell::Parameter(own) => shown(&own, self.number),
+        }
+    }
+}
+
+/// Reads cells and shows them.
+pub(super) fn read(
+    rig: &Rig,
+    arguments: &ReadArguments,
+    output: &mut Output,
+) -> Result<Exit, Failure> {
+    let cells = cells(&arguments.cells).map_err(Failure::refused)?;
+    let as_what = Use::look("read");
+    on(rig, &arguments.rig, as_what, output, |session, output| {
+        let slaves = select(std::slice::from_ref(&arguments.drives), session)?;
+        let mut driver = driver(session);
+        let mut found = Vec::new();
+        for slave in slaves {
+            driver.start(slave, None)?;
+            found.extend(find(&mut driver, slave, &cells)?);
+        }
+        match arguments.format {
+            OutputForm::Text => output.result(&output.fitted(&table(&found)))?,
+            OutputForm::Json => {
+                let cells: Vec<_> = found.iter().map(object).collect();
+                output.result(&format!("{}\n", json!({"schema": 1, "cells": cells})))?;
+            }
+        }
+        Ok(Exit::Passed)
+    })
+}
+
+/// Reads cells of a slave. Of many, those that need the PosiCon option are left out where it is not there, and so are double words where the
+/// PPO type carries none.
+pub(super) fn find(
+    driver: &mut Driver<'_>,
+    slave: u8,
+    cells: &[Cell],
+) -> Result<Vec<Found>, Error> {
+    let mut found = Vec::new();
+    let mut absent = false;
+    for &cell in cells {
+        let number = match cell {
+            Cell::Word(word) => word.of(&driver.cycle(slave)?).into(),
+            Cell::Parameter(own) if absent && own.parameter.needs_posicon() => continue,
+            Cell::Parameter(own) => match driver.read(slave, &own) {
+                Err(Error::Refused { error, .. })
+                    if cells.len() > 1 && own.parameter.needs_posicon() =>
+                {
+                    absent |= error == PkwError::Number;
+                    continue;
+                }
+                other => other?,
+            },
+        };
+        found.push(Found {
+            slave,
+            cell,
+            number,
+        });
+    }
+    Ok(found)
+}
+
+/// Slave, number, name, raw, value and section of the manual.
+fn table(found: &[Found]) -> String {
+    let row = |found: &Found| {
+        let (number, name, section) = match found.cell {
+            Cell::Word(word) => (word.name().to_owned(), "", "3.2"),
+            Cell::Parameter(own) => (own.to_string(), own.parameter.name, own.parameter.section),
+        };
+        [
+            found.slave.to_string(),
+            number,
+            name.to_owned(),
+            found.raw(),
+            found.words(),
+            section.to_owned(),
+        ]
+    };
+    let heading = ["slave", "PNU", "name", "raw", "value", "section"];
+    columns(&heading, &found.iter().map(row).collect::<Vec<_>>())
+}
+
+fn object(found: &Found) -> serde_json::Value {
+    let mut object = json!({
+        "slave": found.slave,
+        "raw": found.number,
+        "value": found.words(),
+    });
+    match found.cell {
+        Cell::Word(word) => object["word"] = json!(word.name()),
+        Cell::Parameter(own) => {
+            object["parameter"] = json!(own.to_string());
+            object["name"] = json!(own.parameter.name);
+            object["unit"] = json!(own.parameter.unit_of(own.index.element).name);
+            object["section"] = json!(own.parameter.section);
+        }
+    }
+    object
+}
