@@ -37,6 +37,7 @@ pub use scenario::verdict::Verdict;
 
 mod counted;
 mod embed;
+mod html;
 mod regular;
 mod signals;
 mod trouble;
@@ -83,3 +84,5 @@ pub mod scenario;
 pub mod serve;
 #[doc(hidden)]
 pub mod top;
+#[doc(hidden)]
+pub mod traffic;

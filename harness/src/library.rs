@@ -7,6 +7,7 @@ use crate::scenario::problem::{Problems, nearest};
 use crate::scenario::settled::Settled;
 use crate::scenario::source::{Source, SourceError};
 use crate::scenario::syntax::Scenario;
+use crate::traffic::SegmentReport;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -78,23 +79,32 @@ impl Entry {
     /// # Errors
     /// Its mistakes.
     pub fn new(source: Source, size: Option<u8>) -> Result<Self, Box<Problems>> {
-        let name = source.name.clone();
         let bus = parse::bus(&source);
-        let (scenario, plan, other) = if bus == Bus::DEFAULT {
-            let scenario = parse(&source)?;
-            let own = plan(&scenario, &source, size)?;
-            (scenario, Some(own), None)
-        } else {
-            let (scenario, other) = settle(bus, &source, size)?;
-            (scenario, None, Some(other))
-        };
+        if bus != Bus::DEFAULT {
+            let found = settle(bus, &source, size)?;
+            return Ok(Self::of_other(source, found));
+        }
+        let scenario = parse(&source)?;
+        let own = plan(&scenario, &source, size)?;
         Ok(Self {
-            name,
+            name: source.name.clone(),
             source,
             scenario,
-            plan,
-            other,
+            plan: Some(own),
+            other: None,
         })
+    }
+
+    /// A scenario of another bus than [`Bus::DEFAULT`], read and settled.
+    pub(crate) fn of_other(source: Source, found: (Scenario, Arc<dyn Settled>)) -> Self {
+        let (scenario, other) = found;
+        Self {
+            name: source.name.clone(),
+            source,
+            scenario,
+            plan: None,
+            other: Some(other),
+        }
     }
 
     /// Reads and settles a scenario, for a ring of this many drives where it is for several sizes and that is one of them.
@@ -122,6 +132,12 @@ impl Entry {
     pub fn settled(&self) -> Option<&dyn Settled> {
         let own = self.plan.as_ref().map(|plan| plan as &dyn Settled);
         own.or(self.other.as_deref())
+    }
+
+    /// How what it carries is shown; `None` for a ring.
+    #[must_use]
+    pub fn report(&self) -> Option<&'static dyn SegmentReport> {
+        self.settled()?.report()
     }
 
     /// How many drives its bench has, as `3+1`; empty for a bus that is not built yet.
@@ -214,8 +230,15 @@ fn built_in() -> Result<Vec<Source>, LibraryError> {
         .into_iter()
         .map(|(name, bytes)| Source::from_bytes(name, bytes.to_vec()))
         .collect::<Result<Vec<_>, _>>()?;
-    sources.sort_by(|a, b| natural(bare(&a.name)).cmp(&natural(bare(&b.name))));
+    sources.sort_by(|a, b| in_order(&a.name).cmp(&in_order(&b.name)));
     Ok(sources)
+}
+
+/// What built-in scenarios are sorted by: the bus of their folder, in the order of the table of buses, then their names.
+fn in_order(name: &str) -> (usize, Vec<(u64, &str)>) {
+    let folder = name.split('/').next();
+    let bus = Bus::NAMES.iter().position(|(own, _)| Some(*own) == folder);
+    (bus.unwrap_or(Bus::NAMES.len()), natural(bare(name)))
 }
 
 /// The remedy for a name that is part of the names of built-in scenarios, or of none.
@@ -284,4 +307,28 @@ fn built_in_named(name: &Path) -> Result<Source, LibraryError> {
         name: wanted,
         remedy,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `list`, `run` and `manual` begin with the first bus of the table.
+    #[test]
+    fn built_in_scenarios_stand_bus_by_bus() {
+        let sources = sources(&[]).expect("the built-in ones");
+        let folders = sources
+            .iter()
+            .map(|own| own.name.split('/').next().unwrap_or_default());
+        let mut folders: Vec<_> = folders.collect();
+        folders.dedup();
+        assert_eq!(folders, Bus::NAMES.map(|(name, _)| name));
+        let bus = |own: &&Source| own.name.starts_with(folders[0]);
+        let names: Vec<_> = sources
+            .iter()
+            .filter(bus)
+            .map(|own| natural(bare(&own.name)))
+            .collect();
+        assert!(names.is_sorted());
+    }
 }

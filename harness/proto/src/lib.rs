@@ -28,6 +28,7 @@ pub mod marks;
 pub mod nd21;
 pub mod nordac;
 pub mod novobus;
+mod open_words;
 pub mod profibus;
 pub mod ratio;
 pub mod time;

@@ -172,6 +172,28 @@ pub fn slug(name: &str) -> String {
     words.join("-")
 }
 
+/// Rows of events: variant, section, words.
+macro_rules! events {
+    ($($name:ident $section:literal $words:literal;)+) => {
+        /// What happens to a drive, or what it does by itself.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(super) enum Event {
+            $(#[doc = concat!($words, " (", $section, ").")] $name,)+
+        }
+
+        impl Event {
+            /// All of them, in order.
+            pub(super) const ALL: &'static [Self] = &[$(Self::$name),+];
+
+            const fn words(self) -> (&'static str, &'static str) {
+                match self { $(Self::$name => ($section, $words),)+ }
+            }
+        }
+    };
+}
+
+pub(crate) use events;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@
 //! the same bytes at the same times. No code sleeps or polls: a run jumps from event to event.
 //!
 //! [`novobus`] is the ring with its drives, [`nd21`] the whole drive on it, [`fault`] the faults of a line, and [`record`]
-//! the records of a run. [`segment`] is a CAN bus, and [`unitek`] the UNITEK drive on it;
+//! the records of a run. [`participant`] is a host or a drive on a shared line. [`segment`] is a CAN bus, and [`unitek`] the UNITEK drive on it;
 //! [`octet_segment`] is a line of octets for several masters and slaves, and [`nordac`] the NORDAC inverter with its PROFIBUS module. [`fuzz`] is what
 //! the fuzz targets of all buses share.
 #![forbid(unsafe_code)]
@@ -15,6 +15,7 @@ pub mod nd21;
 pub mod nordac;
 pub mod novobus;
 pub mod octet_segment;
+pub mod participant;
 pub mod record;
 pub mod segment;
 pub mod unitek;

@@ -6,6 +6,7 @@
 //!
 //! A segment on which no station has anything to do costs nothing.
 
+use crate::participant::Participant;
 use crate::record::{FrameEnd, LineFrame};
 use harness_proto::can::{BitRate, BusError, ERROR_FRAME_BITS, Frame, Heard};
 use harness_proto::time::{Instant, Span};
@@ -590,5 +591,45 @@ impl Station for Host {
 
     fn acknowledges(&self) -> bool {
         !self.silent
+    }
+}
+
+impl<D: Station> Participant<Host, D> {
+    fn station(&self) -> &dyn Station {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => drive,
+        }
+    }
+
+    fn station_mut(&mut self) -> &mut dyn Station {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => drive,
+        }
+    }
+}
+
+impl<D: Station> Station for Participant<Host, D> {
+    fn hear(&mut self, at: Instant, frame: &Frame) {
+        self.station_mut().hear(at, frame);
+    }
+    fn wants(&self) -> Option<(Instant, Frame)> {
+        self.station().wants()
+    }
+    fn sent(&mut self, at: Instant) {
+        self.station_mut().sent(at);
+    }
+    fn notice(&mut self, at: Instant, error: BusError) {
+        self.station_mut().notice(at, error);
+    }
+    fn next_action(&self) -> Option<Instant> {
+        self.station().next_action()
+    }
+    fn advance(&mut self, to: Instant) {
+        self.station_mut().advance(to);
+    }
+    fn acknowledges(&self) -> bool {
+        self.station().acknowledges()
     }
 }

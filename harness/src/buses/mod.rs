@@ -4,6 +4,8 @@ mod contents;
 pub mod nordac;
 pub mod novobus;
 pub(crate) mod port_row;
+#[cfg(test)]
+mod toy;
 pub mod unitek;
 
 /// The bus whose drives stand in rings: what rooms take of it by type.
@@ -51,7 +53,6 @@ use crate::explore::read_as;
 use crate::link::{InnerLink, Link, PortLink};
 use crate::manual::Manual;
 use crate::port::Wire;
-use crate::report::html::Html;
 use crate::rig::segment::{SegmentJudge, SegmentRun};
 use crate::rig::{Options, Rig, SessionError};
 use crate::scenario::plan::Plan;
@@ -62,6 +63,8 @@ use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
 use crate::serve::frames::FrameJob;
 use crate::serve::{End, Host, Job, Marks, ServeError, serve};
+use crate::traffic::SegmentReport;
+pub(crate) use crate::traffic::SharedForm;
 use commands::rig_check::CheckRigArguments;
 use commands::{DriveCommand, RigName};
 use harness_proto::can::Frame;
@@ -170,20 +173,18 @@ pub(crate) fn carry_frames(traces: &[Trace]) -> bool {
     channels.any(|channel| matches!(channel.carried, Carried::Frames(_)))
 }
 
-/// What rings carry.
-pub(crate) const RING_BYTES: &str = "bytes of a ring";
-/// What a bus of frames carries.
-pub(crate) const FRAMES: &str = "frames of CAN";
-/// What a line of octets carries that all stations share.
-pub(crate) const TELEGRAMS: &str = "telegrams of PROFIBUS";
+/// How traces of a shared line are shown, by what the channels carried; `None` for a ring.
+pub(crate) fn report_of(traces: &[Trace]) -> Option<&'static dyn SegmentReport> {
+    match shared(traces)? {
+        Bus::Unitek => Some(&unitek::report::FrameReport),
+        Bus::Nordac => Some(&nordac::report::TelegramReport),
+        Bus::Novobus => None,
+    }
+}
 
 /// What these are traces of.
 pub(crate) fn carried(traces: &[Trace]) -> &'static str {
-    match shared(traces) {
-        Some(Bus::Unitek) => FRAMES,
-        Some(Bus::Nordac) => TELEGRAMS,
-        Some(Bus::Novobus) | None => RING_BYTES,
-    }
+    report_of(traces).map_or("bytes of a ring", SegmentReport::carries)
 }
 
 /// The bus whose stations share one line, by what the channels carried: frames, or octets for all stations. `None` for a ring.
@@ -201,25 +202,6 @@ pub(crate) fn share_a_line(traces: &[Trace]) -> bool {
     shared(traces).is_some()
 }
 
-/// Pictures of a trace of a shared line, each with its heading: what was said, and values against time. `id` names their parts.
-pub(crate) fn pictures(trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
-    let (mut said, mut values) = (Html::new(), Html::new());
-    let drawn = match shared(std::slice::from_ref(trace)) {
-        Some(Bus::Unitek) => (
-            unitek::report::sequence::sequence(&mut said, id, title, trace),
-            unitek::report::curves::curves(&mut values, id, trace),
-        ),
-        Some(Bus::Nordac) => (
-            nordac::report::sequence::sequence(&mut said, id, title, trace),
-            nordac::report::curves::curves(&mut values, id, trace),
-        ),
-        Some(Bus::Novobus) | None => (false, false),
-    };
-    let said = drawn.0.then_some(("What was said", said));
-    let values = drawn.1.then_some(("Values against time", values));
-    said.into_iter().chain(values).collect()
-}
-
 /// The frames or telegrams of a shared line, a row each: the rows that are wanted, counted from 0, and of them `at_most`. `None` for a
 /// ring, which has tables of its own.
 pub(crate) fn rows(
@@ -227,11 +209,8 @@ pub(crate) fn rows(
     wanted: Option<Range<usize>>,
     at_most: Option<usize>,
 ) -> Option<String> {
-    match shared(std::slice::from_ref(trace))? {
-        Bus::Unitek => Some(unitek::report::table::table(trace, wanted, at_most)),
-        Bus::Nordac => Some(nordac::report::table::table(trace, wanted, at_most)),
-        Bus::Novobus => None,
-    }
+    let report = report_of(std::slice::from_ref(trace))?;
+    Some(report.rows(trace, wanted, at_most))
 }
 
 /// The drive that sends a frame, by its identifier; `None` for a frame of a host.
@@ -288,29 +267,6 @@ pub(crate) fn dissector(bus: Bus) -> String {
     }
 }
 
-/// The last rows of a trace of a shared line: playing stops at the first line that is not met. `None` for a ring.
-pub(crate) fn last_rows(trace: &Trace, most: usize) -> Option<String> {
-    let all = rows(trace, None, None)?;
-    let lines: Vec<_> = all.lines().collect();
-    let (head, rest) = lines.split_first()?;
-    let rest = &rest[rest.len().saturating_sub(most)..];
-    let shown: Vec<_> = std::iter::once(*head).chain(rest.iter().copied()).collect();
-    Some(shown.join("\n") + "\n")
-}
-
-/// A form in which the traffic of a shared line is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum SharedForm {
-    /// JSON for tools.
-    Json,
-    /// The log of candump.
-    Candump,
-    /// A row a frame or telegram, for spreadsheets.
-    Csv,
-    /// A capture for Wireshark.
-    Pcapng,
-}
-
 /// Writes traces of a shared line. Only frames have a log of candump.
 ///
 /// # Errors
@@ -318,19 +274,9 @@ pub(crate) enum SharedForm {
 pub(crate) fn write_shared(
     traces: &[Trace],
     form: SharedForm,
-    out: impl Write,
+    mut out: impl Write,
 ) -> std::io::Result<()> {
-    match (form, shared(traces)) {
-        (SharedForm::Json, Some(Bus::Nordac)) => {
-            nordac::report::json::write(Bus::Nordac, traces, out)
-        }
-        (SharedForm::Csv, Some(Bus::Nordac)) => nordac::report::csv::write(traces, out),
-        (SharedForm::Pcapng, Some(Bus::Nordac)) => nordac::report::pcapng::write(traces, out),
-        (SharedForm::Json, _) => unitek::report::json::write(Bus::Unitek, traces, out),
-        (SharedForm::Candump, _) => unitek::report::json::candump(traces, out),
-        (SharedForm::Csv, _) => unitek::report::csv::write(traces, out),
-        (SharedForm::Pcapng, _) => crate::report::pcapng_frames::write(traces, out),
-    }
+    report_of(traces).map_or(Ok(()), |report| report.write(traces, form, &mut out))
 }
 
 /// Compares the telegrams of two runs, and says whether they are the same, and how they differ; `None` unless both are octets of a shared

@@ -8,7 +8,6 @@
 use super::frames::{FrameRead, Sender, assemble, packet};
 use super::telegrams::{self, DAY};
 use super::{Assembly, Capture, CaptureError, ends, line_byte};
-use crate::buses::{FRAMES, RING_BYTES, TELEGRAMS};
 use crate::report::pcapng::{
     COMMENT, END, ERRORS, HEADER, IF_NAME, IF_SPEED, IF_TSRESOL, INTERFACE, LINK_TYPE, LOST, MAGIC,
     NANOSECONDS, PACKET, SECTION,
@@ -89,9 +88,9 @@ pub(crate) fn read(bytes: &[u8], rate: Option<Rate>) -> Result<Capture, CaptureE
     let links = known.iter().flatten().any(is_link);
     let stations = known.iter().flatten().any(is_station);
     let kinds = [
-        (links, RING_BYTES),
-        (stations, TELEGRAMS),
-        (!reader.frames.is_empty(), FRAMES),
+        (links, "bytes of a ring"),
+        (stations, "telegrams of a shared line"),
+        (!reader.frames.is_empty(), "frames of CAN"),
     ];
     let mixed: Vec<_> = kinds.iter().filter(|own| own.0).map(|own| own.1).collect();
     if let [one, other, ..] = mixed.as_slice() {

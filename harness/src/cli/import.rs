@@ -281,22 +281,20 @@ pub(crate) fn diff(arguments: &DiffArguments, output: &mut Output) -> std::io::R
         output.result(&text)?;
         return Ok(if same { Exit::Passed } else { Exit::Failed });
     }
-    match [&left, &right].map(|side| buses::carried(&side.traces)) {
-        [buses::FRAMES, buses::FRAMES] => {
-            let summary = frame_diff(&left, &right, span(arguments.tolerance));
-            output.result(&summary.show([&names[0], &names[1]]))?;
-            return Ok(match summary.same() {
-                true => Exit::Passed,
-                false => Exit::Failed,
-            });
-        }
-        [one, other] if one == other => {}
-        [one, other] => {
-            output.complain(&format!(
-                "one side has {one} and the other {other}; two of one kind expected"
-            ));
-            return Ok(Exit::Usage);
-        }
+    let [one, other] = traces.map(buses::carried);
+    if one != other {
+        output.complain(&format!(
+            "one side has {one} and the other {other}; two of one kind expected"
+        ));
+        return Ok(Exit::Usage);
+    }
+    if carry_frames(&left.traces) {
+        let summary = frame_diff(&left, &right, span(arguments.tolerance));
+        output.result(&summary.show([&names[0], &names[1]]))?;
+        return Ok(match summary.same() {
+            true => Exit::Passed,
+            false => Exit::Failed,
+        });
     }
     let summary = compare(
         ComparedRun {

@@ -55,6 +55,7 @@ impl Page {
             text: &entry.source.text,
             outcome,
             traces,
+            report: entry.report(),
             rate,
             again: &format!("drivebench trace {}", word(name)),
         };

@@ -287,6 +287,7 @@ fn show(
     (outcome, traces): (&Outcome, &[Trace]),
 ) -> ShownScenario {
     let entry = attempt.and_then(|attempt| entry(&case.name, &attempt.text));
+    let report = entry.as_ref().and_then(Entry::report);
     let sources = entry.map_or_else(Vec::new, |entry| {
         let sources = entry.scenario.sources.into_iter();
         sources.map(|source| source.text).collect()
@@ -308,6 +309,7 @@ fn show(
             text: attempt.map_or("", |attempt| &attempt.text),
             outcome,
             traces,
+            report,
             rate,
             again: &again,
         },

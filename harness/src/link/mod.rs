@@ -3,6 +3,7 @@
 //! A scenario sees a link and nothing behind it. Each link says what it can observe and inject; what it
 //! cannot makes a scenario that needs it skipped, never wrong.
 
+pub(crate) mod bench_clock;
 pub mod frames;
 pub(crate) mod inner;
 pub(crate) mod lateness;

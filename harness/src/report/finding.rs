@@ -1,10 +1,10 @@
 //! A finding as a text for people: its line in the scenario, what was expected, what was received, and the table around it.
 
 use super::mismatch::mismatch;
-use crate::buses::last_rows;
 use crate::library::Entry;
 use crate::scenario::run::Mismatch;
 use crate::scenario::source::line_number;
+use crate::traffic::last_rows;
 use harness_sim::record::Trace;
 use std::fmt::Write as _;
 
@@ -32,9 +32,11 @@ pub fn explain(entry: &Entry, finding: &Mismatch, traces: &[Trace]) -> String {
     }
     let bytes = mismatch(finding, traces, &sources);
     if bytes.is_empty() {
-        for rows in traces.iter().filter_map(|trace| last_rows(trace, ROWS)) {
-            // Writing to a String cannot fail.
-            let _infallible = write!(text, "\n{rows}");
+        if let Some(report) = entry.report() {
+            for trace in traces {
+                // Writing to a String cannot fail.
+                let _infallible = write!(text, "\n{}", last_rows(report, trace, ROWS));
+            }
         }
         if !sources.is_empty() {
             let _infallible = writeln!(text, "see {}", sources.join(", "));

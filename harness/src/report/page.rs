@@ -1,6 +1,5 @@
 //! The page that a scenario leaves: verdict, table and plots. Snapshots of scenarios are such pages.
 
-use crate::buses::rows;
 use crate::library::Entry;
 use crate::report::plot::plots;
 use crate::report::table::{LEGEND, TablePart, table, wires};
@@ -31,7 +30,8 @@ pub fn page(entry: &Entry, outcome: &Outcome, traces: &[Trace]) -> String {
     }
     let mut legend = true;
     for trace in traces {
-        if let Some(rows) = rows(trace, None, Some(ROWS)) {
+        if let Some(report) = entry.report() {
+            let rows = report.rows(trace, None, Some(ROWS));
             let _infallible = write!(page, "\n{rows}");
             legend = false;
             continue;

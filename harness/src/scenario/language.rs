@@ -14,6 +14,7 @@ use super::scanner::Scanner;
 use super::syntax::Scenario;
 use crate::buses::Bus;
 use crate::link::{Capability, Link};
+use crate::traffic::SegmentReport;
 use harness_proto::time::{self, Instant};
 use std::fmt::Debug;
 
@@ -32,6 +33,8 @@ pub enum Opening<'w> {
 pub trait Language: Copy + Debug + Send + Sync + 'static {
     /// The bus.
     const BUS: Bus;
+    /// Its name in a `bus` line.
+    const NAME: &'static str = Self::BUS.name();
     /// Whether a message that no line asks for is a failure also without a `strict` line.
     const STRICT: bool;
     /// The longest time for which what was sent may be under way. On a bus that other stations fill it may never leave.
@@ -248,6 +251,11 @@ pub trait Language: Copy + Debug + Send + Sync + 'static {
     fn records(state: Self::State) -> Vec<CellRecord> {
         let _none = state;
         Vec::new()
+    }
+
+    /// How what was carried is shown; `None` for a ring.
+    fn report() -> Option<&'static dyn SegmentReport> {
+        None
     }
 
     /// Writes the header lines: each with its word, and behind them those about devices.

@@ -7,8 +7,6 @@
 
 pub mod expression;
 pub mod language;
-#[cfg(test)]
-mod language_test;
 pub mod parse;
 pub mod pattern;
 pub mod plan;

@@ -8,6 +8,7 @@ use super::run::{AtMismatch, Outcome, play};
 use super::source::Source;
 use super::syntax::Scenario;
 use crate::link::{Capability, Link};
+use crate::traffic::SegmentReport;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -24,6 +25,9 @@ pub trait Settled: Debug + Send + Sync {
 
     /// How many ports the master has on its bench.
     fn ports(&self) -> usize;
+
+    /// How what was carried is shown; `None` for a ring.
+    fn report(&self) -> Option<&'static dyn SegmentReport>;
 
     /// A simulated bench for it.
     fn simulate(&self) -> Box<dyn Link>;
@@ -47,6 +51,10 @@ impl<L: Language> Settled for Plan<L> {
 
     fn ports(&self) -> usize {
         L::ports(self)
+    }
+
+    fn report(&self) -> Option<&'static dyn SegmentReport> {
+        L::report()
     }
 
     fn simulate(&self) -> Box<dyn Link> {

@@ -58,8 +58,8 @@ impl<L: Language> Text<L> {
         for source in &scenario.sources {
             self.word("source", &source.text);
         }
-        if scenario.bus != Bus::DEFAULT {
-            self.word("bus", scenario.bus.name());
+        if L::NAME != Bus::DEFAULT.name() {
+            self.word("bus", L::NAME);
         }
         let (words, devices) = L::write_header(&scenario.header);
         for (word, value) in words {

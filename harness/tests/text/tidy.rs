@@ -139,10 +139,10 @@ fn imports_go_one_way() {
 
 /// The rooms of `harness/src`: each imports from those in front of it only, so there is no circle. The buses are not in the list: a bus
 /// imports what the rooms give it, and a room imports what `buses/mod.rs` or its own `mod.rs` takes from a bus.
-const ROOMS: [&str; 26] = [
-    "counted", "regular", "signals", "trouble", "medium", "frames", "port", "link", "scenario",
-    "library", "manual", "file", "report", "guard", "rig", "capture", "evidence", "explore",
-    "qualify", "campaign", "fuzz", "serve", "embed", "top", "cli", "main",
+const ROOMS: [&str; 28] = [
+    "counted", "regular", "signals", "trouble", "medium", "html", "traffic", "frames", "port",
+    "link", "scenario", "library", "manual", "file", "report", "guard", "rig", "capture",
+    "evidence", "explore", "qualify", "campaign", "fuzz", "serve", "embed", "top", "cli", "main",
 ];
 
 #[test]
@@ -219,6 +219,61 @@ fn files_outside_the_buses_name_no_bus() {
         naming.is_empty(),
         "these files name a bus; what they need of it belongs into its folder or into buses/mod.rs: {naming:#?}"
     );
+}
+
+/// A bus costs its own folders and `buses/mod.rs`: it takes nothing from another one.
+#[test]
+fn no_bus_imports_another() {
+    let buses: [&[&str]; 4] = [
+        &["novobus", "nd21"],
+        &["unitek"],
+        &["nordac", "profibus"],
+        &["toy"],
+    ];
+    for own in buses {
+        for top in ["harness/proto/src", "harness/sim/src", "harness/src/buses"] {
+            let folders = own.iter().map(|name| format!("{top}/{name}"));
+            let folders = folders.filter(|folder| root().join(folder).is_dir());
+            for source in folders.flat_map(|folder| files(&folder, "rs")) {
+                for (number, line) in read(&source).lines().enumerate() {
+                    let code = line.split("//").next().unwrap_or_default();
+                    let others = buses.iter().filter(|other| **other != own);
+                    let imported = others.copied().flatten().find(|other| {
+                        let paths = ["buses", "harness_proto", "harness_sim", "crate"];
+                        paths
+                            .iter()
+                            .any(|path| code.contains(&format!("{path}::{other}")))
+                    });
+                    assert_eq!(imported, None, "{}:{}", source.display(), number + 1);
+                }
+            }
+        }
+    }
+}
+
+/// The page "A fourth bus" names traits that there are.
+#[test]
+fn the_page_on_a_fourth_bus_holds() {
+    let page = read(&root().join("CONTRIBUTING.md"));
+    let start = page.find("## A fourth bus").expect("the page");
+    let page = page[start..].split("\n## ").next().expect("its end");
+    let sources = files("harness/src", "rs")
+        .into_iter()
+        .chain(files("harness/sim/src", "rs"));
+    let sources: String = sources.map(|path| read(&path)).collect();
+    let rows = page.lines().filter(|line| line.starts_with("| ")).skip(1);
+    let cells = rows.filter_map(|row| row.split('|').nth(2));
+    let names: Vec<_> = cells
+        .flat_map(|cell| cell.split('`').skip(1).step_by(2))
+        .collect();
+    assert!(names.len() > 10, "{names:?}");
+    for name in names {
+        let declared = [" ", ":", "<"].map(|end| format!("trait {name}{end}"));
+        assert!(
+            declared.iter().any(|own| sources.contains(own)),
+            "there is no trait {name}"
+        );
+    }
 }
 
 /// Names that stand for more than one public type: twice among the rooms or in one bus, or in a room and in a bus. Two buses may use one name.

@@ -3,47 +3,9 @@
 //! Only a physical drive can settle these. The profile [`ds`](Properties::default) reproduces every worked example of the manual;
 //! [`fw472`](Properties::fw472) is the drive of the dump.
 
+use crate::open_words::words;
 use crate::time::Span;
 use core::fmt;
-
-/// One row an open point with words for values: the enum with its values (the default first) and their words.
-macro_rules! words {
-    ($($(#[$meta:meta])* $name:ident { $($(#[$value_meta:meta])* $value:ident $word:literal,)+ })+) => {
-        $(
-            $(#[$meta])*
-            #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-            pub enum $name {
-                $(
-                    #[doc = concat!("`", $word, "`.")]
-                    $(#[$value_meta])*
-                    $value,
-                )+
-            }
-
-            impl $name {
-                /// The words of all values, in the order of the values.
-                pub const WORDS: &'static [&'static str] = &[$($word),+];
-
-                /// The value with this word.
-                #[must_use]
-                pub fn from_word(word: &str) -> Option<Self> {
-                    match word {
-                        $($word => Some(Self::$value),)+
-                        _ => None,
-                    }
-                }
-
-                /// The word of this value.
-                #[must_use]
-                pub const fn word(self) -> &'static str {
-                    match self {
-                        $(Self::$value => $word,)+
-                    }
-                }
-            }
-        )+
-    };
-}
 
 words! {
     /// `map-reply`: the width of 40 and 8F in polled and cyclic replies (ex 8, App 7). The manual prints both.

@@ -1,9 +1,9 @@
-//! The drive as a station of a line, and what else is on it.
+//! The drive as a station of a line.
 
 use super::inverter::Inverter;
 use super::setup::Setup;
 use super::slave::{Receiver, Slave};
-use crate::octet_segment::{LineHost, LineStation, Octet, Wish};
+use crate::octet_segment::{LineStation, Octet, Wish};
 use harness_proto::line::Received;
 use harness_proto::nordac::Properties;
 use harness_proto::profibus::{Buffer, BusRate, Telegram};
@@ -183,87 +183,5 @@ impl LineStation for Drive {
         if self.powered {
             self.inverter.advance(to);
         }
-    }
-}
-
-/// A host or a drive.
-#[derive(Clone, Debug)]
-pub enum Member<D> {
-    /// A host: a master, a client, a tap.
-    Host(LineHost),
-    /// A drive.
-    Drive(D),
-}
-
-impl<D> Member<D> {
-    /// The host, if it is one.
-    pub const fn host_mut(&mut self) -> Option<&mut LineHost> {
-        match self {
-            Self::Host(host) => Some(host),
-            Self::Drive(_) => None,
-        }
-    }
-
-    /// The host, if it is one.
-    #[must_use]
-    pub const fn host(&self) -> Option<&LineHost> {
-        match self {
-            Self::Host(host) => Some(host),
-            Self::Drive(_) => None,
-        }
-    }
-
-    /// The drive, if it is one.
-    pub const fn drive_mut(&mut self) -> Option<&mut D> {
-        match self {
-            Self::Host(_) => None,
-            Self::Drive(drive) => Some(drive),
-        }
-    }
-
-    /// The drive, if it is one.
-    #[must_use]
-    pub const fn drive(&self) -> Option<&D> {
-        match self {
-            Self::Host(_) => None,
-            Self::Drive(drive) => Some(drive),
-        }
-    }
-}
-
-impl<D: LineStation> Member<D> {
-    fn station(&self) -> &dyn LineStation {
-        match self {
-            Self::Host(host) => host,
-            Self::Drive(drive) => drive,
-        }
-    }
-
-    fn station_mut(&mut self) -> &mut dyn LineStation {
-        match self {
-            Self::Host(host) => host,
-            Self::Drive(drive) => drive,
-        }
-    }
-}
-
-impl<D: LineStation> LineStation for Member<D> {
-    fn hear(&mut self, at: Instant, octet: Received) {
-        self.station_mut().hear(at, octet);
-    }
-    fn wants(&self) -> Option<Wish> {
-        self.station().wants()
-    }
-    fn begin(&mut self, at: Instant, into: &mut Vec<Octet>) {
-        self.station_mut().begin(at, into);
-    }
-    fn sent(&mut self, at: Instant) {
-        self.station_mut().sent(at);
-    }
-    fn next_action(&self) -> Option<Instant> {
-        self.station().next_action()
-    }
-    fn advance(&mut self, to: Instant) {
-        self.station_mut().advance(to);
     }
 }

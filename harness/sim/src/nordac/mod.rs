@@ -10,6 +10,9 @@ pub mod fuzz;
 pub mod inverter;
 pub mod machine;
 pub mod parameters;
+/// A host or a drive.
+pub type Member<D> = crate::participant::Participant<crate::octet_segment::LineHost, D>;
+
 #[cfg(test)]
 mod property;
 pub mod ramp;
@@ -17,7 +20,7 @@ pub mod reference;
 mod setup;
 pub mod slave;
 
-pub use drive::{Drive, Member};
+pub use drive::Drive;
 pub use inverter::Inverter;
 pub use setup::Setup;
 pub use slave::Slave;

@@ -1,6 +1,7 @@
 //! A station without a protocol.
 
 use super::{LineStation, Octet, Wish};
+use crate::participant::Participant;
 use harness_proto::line::Received;
 use harness_proto::time::Instant;
 use std::collections::VecDeque;
@@ -73,4 +74,41 @@ impl LineStation for LineHost {
     }
 
     fn advance(&mut self, _to: Instant) {}
+}
+
+impl<D: LineStation> Participant<LineHost, D> {
+    fn station(&self) -> &dyn LineStation {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => drive,
+        }
+    }
+
+    fn station_mut(&mut self) -> &mut dyn LineStation {
+        match self {
+            Self::Host(host) => host,
+            Self::Drive(drive) => drive,
+        }
+    }
+}
+
+impl<D: LineStation> LineStation for Participant<LineHost, D> {
+    fn hear(&mut self, at: Instant, octet: Received) {
+        self.station_mut().hear(at, octet);
+    }
+    fn wants(&self) -> Option<Wish> {
+        self.station().wants()
+    }
+    fn begin(&mut self, at: Instant, into: &mut Vec<Octet>) {
+        self.station_mut().begin(at, into);
+    }
+    fn sent(&mut self, at: Instant) {
+        self.station_mut().sent(at);
+    }
+    fn next_action(&self) -> Option<Instant> {
+        self.station().next_action()
+    }
+    fn advance(&mut self, to: Instant) {
+        self.station_mut().advance(to);
+    }
 }

@@ -16,4 +16,6 @@ pub use drive::Drive;
 pub use inputs::{Inputs, Stimulus};
 pub use outbox::{Cause, Waiting};
 pub use plant::Control;
-pub use station::Member;
+
+/// A host or a drive.
+pub type Member<D> = crate::participant::Participant<crate::segment::Host, D>;

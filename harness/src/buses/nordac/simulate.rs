@@ -1,6 +1,7 @@
 //! Simulated NORDAC inverters on one PROFIBUS segment, in virtual time.
 
 use crate::buses;
+use crate::link::bench_clock::BenchClock;
 use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::nordac::pkw::Index;
@@ -14,7 +15,6 @@ use harness_sim::octet_segment::{
 };
 use harness_sim::record::{Channel, Trace};
 use std::any::Any;
-use std::collections::VecDeque;
 
 /// The bench's own place on its segment.
 pub(super) const BENCH: usize = 0;
@@ -122,12 +122,7 @@ pub struct Bench {
     rate: BusRate,
     /// The slaves as they were set up: slave `k` has place `k + 1` on the line.
     addresses: Vec<u8>,
-    now: Instant,
-    /// The start of the conversation.
-    origin: Instant,
-    /// When the last octet that the bench has sent will have left, as far as it knows.
-    left: Instant,
-    scheduled: VecDeque<(Instant, PlacedFault)>,
+    clock: BenchClock,
     master: Option<&'static MasterDeviation>,
 }
 
@@ -165,10 +160,7 @@ impl Bench {
             line: OctetSegment::new(setup.rate.format(), stations),
             rate: setup.rate,
             addresses: setup.slaves.iter().map(|own| own.address).collect(),
-            now: Instant::START,
-            origin: Instant::START,
-            left: Instant::START,
-            scheduled: VecDeque::new(),
+            clock: BenchClock::new(),
             master: setup.master,
         }
     }
@@ -202,13 +194,13 @@ impl Bench {
 
     /// When something happens next.
     pub(super) fn next_event(&self) -> Option<Instant> {
-        let scheduled = self.scheduled.front().map(|(at, _)| *at);
-        self.line.next_event().into_iter().chain(scheduled).min()
+        let fault = self.clock.next_fault();
+        self.line.next_event().into_iter().chain(fault).min()
     }
 
     /// The time of the segment.
     pub(super) const fn time(&self) -> Instant {
-        self.now
+        self.clock.now
     }
 
     /// A parameter of a slave beside its bus; `None` if the slave does not have it.
@@ -249,27 +241,16 @@ impl Bench {
         self.line.station(BENCH).host().and_then(LineHost::heard_at)
     }
 
-    fn since_origin(&self, at: Instant) -> Instant {
-        Instant::START + at.since(self.origin)
-    }
-
-    fn on_bench(&self, at: Instant) -> Instant {
-        self.origin + at.since_start()
-    }
-
     pub(super) fn run_to(&mut self, at: Instant) {
         self.line.run_until(at);
-        self.now = self.now.max(at);
-        while let Some(&(at, fault)) = self.scheduled.front()
-            && at <= self.now
-        {
-            self.scheduled.pop_front();
+        self.clock.now = self.clock.now.max(at);
+        while let Some(fault) = self.clock.due() {
             self.suffer(fault);
         }
     }
 
     fn suffer(&mut self, fault: PlacedFault) {
-        let now = self.now;
+        let now = self.clock.now;
         match fault {
             PlacedFault::Drive(slave, fault) => {
                 if let Some(drive) = self.drive_mut(slave) {
@@ -306,7 +287,7 @@ impl Line for Bench {
     }
 
     fn now(&self) -> Instant {
-        self.since_origin(self.now)
+        self.clock.since_origin(self.clock.now)
     }
 
     /// Sends one telegram: idle time in front of it (T_SYN), and no gap in it.
@@ -316,39 +297,35 @@ impl Line for Bench {
             None => MasterLine::of(what.octets()),
         };
         if octets.is_empty() {
-            return self.since_origin(self.left.max(self.now));
+            return self.clock.since_origin(self.clock.left.max(self.clock.now));
         }
         let idle = self.rate.bit_time() * idle_bits;
-        let free = self.left.max(self.line.busy_until()) + idle;
+        let free = self.clock.left.max(self.line.busy_until()) + idle;
         let time = self.line.format().octet_time() * octets.len() as u64;
-        self.left = free.max(self.now) + time;
+        self.clock.left = free.max(self.clock.now) + time;
         let wish = Wish {
-            ready: self.now,
+            ready: self.clock.now,
             idle_bits,
         };
         if let Some(host) = self.host() {
             host.send(wish, octets);
         }
-        self.since_origin(self.left)
+        self.clock.since_origin(self.clock.left)
     }
 
     fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
-        let now = self.now;
+        let now = self.clock.now;
         self.heard_at().filter(|at| *at <= now)?;
         let (at, octet) = self.host()?.receive()?;
-        Some((self.since_origin(at), Heard::Octet(octet)))
+        Some((self.clock.since_origin(at), Heard::Octet(octet)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        let until = if until == Instant::NEVER {
-            until
-        } else {
-            self.on_bench(until)
-        };
+        let until = self.clock.on_bench(until);
         let unread = self.heard_at().is_some();
         let busy = self.busy();
         loop {
-            let fault = self.scheduled.front().map(|(at, _)| *at);
+            let fault = self.clock.next_fault();
             let event = self.line.next_event();
             let Some(next) = [fault, event].into_iter().flatten().min() else {
                 if until != Instant::NEVER {
@@ -360,7 +337,7 @@ impl Line for Bench {
                 self.run_to(until);
                 return true;
             }
-            self.run_to(next.max(self.now));
+            self.run_to(next.max(self.clock.now));
             let heard = !unread && self.heard_at().is_some();
             if heard || fault == Some(next) || busy != self.busy() {
                 return true;
@@ -379,9 +356,7 @@ impl Link for Bench {
     }
 
     fn begin(&mut self) {
-        self.origin = self.now;
-        self.left = self.now;
-        self.scheduled.clear();
+        self.clock.begin();
         self.line.begin();
         if let Some(host) = self.host() {
             host.forget();
@@ -399,11 +374,10 @@ impl Link for Bench {
     fn inject(&mut self, _port: usize, fault: PlacedFault, moment: Moment) {
         match moment {
             Moment::Now | Moment::Byte(_) => self.suffer(fault),
-            Moment::At(at) if self.on_bench(at) <= self.now => self.suffer(fault),
             Moment::At(at) => {
-                let at = self.on_bench(at);
-                let place = self.scheduled.partition_point(|(other, _)| *other <= at);
-                self.scheduled.insert(place, (at, fault));
+                if let Some(due) = self.clock.schedule(at, fault) {
+                    self.suffer(due);
+                }
             }
         }
     }
@@ -414,9 +388,8 @@ impl Link for Bench {
 
     fn unused_faults(&self) -> Vec<String> {
         let placed = self.line.unused_faults().iter().map(|own| self.words(own));
-        let scheduled = self.scheduled.iter();
-        let scheduled =
-            scheduled.map(|(at, fault)| format!("{fault:?} at {}", self.since_origin(*at)));
+        let scheduled = self.clock.left_over();
+        let scheduled = scheduled.map(|(at, fault)| format!("{fault:?} at {at}"));
         placed.chain(scheduled).collect()
     }
 
@@ -437,7 +410,7 @@ impl Link for Bench {
             channels: senders.enumerate().map(channel).collect(),
             ..Trace::empty(self.drives(port))
         };
-        trace.count_from(self.origin.since_start());
+        trace.count_from(self.clock.origin().since_start());
         trace
     }
 }

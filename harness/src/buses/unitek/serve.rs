@@ -109,11 +109,11 @@ impl SharedBus for Shared {
     }
 
     fn now(&self) -> Instant {
-        self.bench.now
+        self.bench.clock.now
     }
 
     fn advance(&mut self, to: Instant) {
-        while let Some(&(at, _)) = self.bench.scheduled.front()
+        while let Some(at) = self.bench.clock.next_fault()
             && at <= to
         {
             self.bench.run_to(at);
@@ -125,7 +125,7 @@ impl SharedBus for Shared {
     }
 
     fn next_event(&self) -> Option<Instant> {
-        let scheduled = self.bench.scheduled.front().map(|(at, _)| *at);
+        let scheduled = self.bench.clock.next_fault();
         let event = self.bench.segment.next_event();
         event.into_iter().chain(scheduled).min()
     }

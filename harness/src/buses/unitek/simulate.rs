@@ -1,6 +1,7 @@
 //! Simulated UNITEK drives on one CAN segment, in virtual time.
 
 use crate::buses;
+use crate::link::bench_clock::BenchClock;
 use crate::link::{Capability, DriveFault, Line, Link, Moment, PlacedFault};
 use crate::medium::{Heard, Medium, Out};
 use harness_proto::can::BitRate;
@@ -12,7 +13,6 @@ use harness_sim::segment::{Host, Placed, Segment};
 use harness_sim::unitek::deviation::{Deviant, Deviation};
 use harness_sim::unitek::{Cause, Control, Drive, Inputs, Member, Stimulus};
 use std::any::Any;
-use std::collections::VecDeque;
 
 /// A station of the simulated segment: a host or a drive, which may deviate.
 pub type Station = Member<Box<Deviant>>;
@@ -106,12 +106,7 @@ pub struct Bench {
     pub(super) segment: Segment<Station>,
     /// Place `k` is that of the `k`-th drive, counted from 1.
     pub(super) nodes: Vec<u8>,
-    pub(super) now: Instant,
-    /// The start of the conversation.
-    origin: Instant,
-    /// When the last frame that the bench has sent will have left, as far as it knows.
-    left: Instant,
-    pub(super) scheduled: VecDeque<(Instant, PlacedFault)>,
+    pub(super) clock: BenchClock,
 }
 
 impl Bench {
@@ -139,10 +134,7 @@ impl Bench {
         Self {
             segment: setup.segment(guests),
             nodes: setup.drives.iter().map(|own| own.node).collect(),
-            now: Instant::START,
-            origin: Instant::START,
-            left: Instant::START,
-            scheduled: VecDeque::new(),
+            clock: BenchClock::new(),
         }
     }
 
@@ -172,23 +164,6 @@ impl Bench {
         self.segment.station(BENCH).host().and_then(Host::heard_at)
     }
 
-    fn since_origin(&self, at: Instant) -> Instant {
-        Instant::START + at.since(self.origin)
-    }
-
-    fn on_bench(&self, at: Instant) -> Instant {
-        self.origin + at.since_start()
-    }
-
-    fn suffer_what_is_due(&mut self) {
-        while let Some(&(at, fault)) = self.scheduled.front()
-            && at <= self.now
-        {
-            self.scheduled.pop_front();
-            self.suffer(fault);
-        }
-    }
-
     fn suffer(&mut self, fault: PlacedFault) {
         let next = self.segment.frames() + 1;
         match fault {
@@ -216,7 +191,7 @@ impl Bench {
         let Some(place) = self.place(node) else {
             return;
         };
-        let now = self.now;
+        let now = self.clock.now;
         if let Some(drive) = self.segment.station_mut(place).drive_mut() {
             match fault {
                 DriveFault::Off => drive.drive_mut().switch_off(now),
@@ -237,7 +212,7 @@ impl Bench {
         if stimulus == Stimulus::BusOff {
             return self.segment.switch_off(place);
         }
-        let now = self.now;
+        let now = self.clock.now;
         let Some(drive) = self.segment.station_mut(place).drive_mut() else {
             return;
         };
@@ -267,8 +242,10 @@ impl Bench {
 
     pub(super) fn run_to(&mut self, at: Instant) {
         self.segment.run_until(at);
-        self.now = self.now.max(at);
-        self.suffer_what_is_due();
+        self.clock.now = self.clock.now.max(at);
+        while let Some(fault) = self.clock.due() {
+            self.suffer(fault);
+        }
     }
 }
 
@@ -278,36 +255,36 @@ impl Line for Bench {
     }
 
     fn now(&self) -> Instant {
-        self.since_origin(self.now)
+        self.clock.since_origin(self.clock.now)
     }
 
     fn send(&mut self, _port: usize, what: Out<'_>) -> Instant {
         let rate = self.segment.rate();
-        let now = self.now;
+        let now = self.clock.now;
         let free = self.segment.free_at();
-        self.left = self.left.max(now).max(free);
+        self.clock.left = self.clock.left.max(now).max(free);
         for frame in what.frames() {
-            self.left += rate.time_of(frame.wire_bits());
+            self.clock.left += rate.time_of(frame.wire_bits());
             if let Some(host) = self.host() {
                 host.send(now, *frame);
             }
         }
-        self.since_origin(self.left)
+        self.clock.since_origin(self.clock.left)
     }
 
     fn receive(&mut self, _port: usize) -> Option<(Instant, Heard)> {
-        let now = self.now;
+        let now = self.clock.now;
         self.heard_at().filter(|at| *at <= now)?;
         let (at, heard) = self.host()?.receive()?;
-        Some((self.since_origin(at), Heard::Frame(heard)))
+        Some((self.clock.since_origin(at), Heard::Frame(heard)))
     }
 
     fn wait(&mut self, until: Instant) -> bool {
-        let until = self.on_bench(until);
+        let until = self.clock.on_bench(until);
         let busy = self.busy();
         loop {
-            let heard = self.heard_at().filter(|at| *at > self.now);
-            let fault = self.scheduled.front().map(|(at, _)| *at);
+            let heard = self.heard_at().filter(|at| *at > self.clock.now);
+            let fault = self.clock.next_fault();
             let event = self.segment.next_event();
             let next = [heard, fault, event].into_iter().flatten().min();
             let Some(next) = next else {
@@ -318,7 +295,7 @@ impl Line for Bench {
                 self.run_to(until);
                 return true;
             }
-            self.run_to(next.max(self.now));
+            self.run_to(next.max(self.clock.now));
             if heard == Some(next) || fault == Some(next) || busy != self.busy() {
                 return true;
             }
@@ -336,9 +313,7 @@ impl Link for Bench {
     }
 
     fn begin(&mut self) {
-        self.origin = self.now;
-        self.left = self.now;
-        self.scheduled.clear();
+        self.clock.begin();
         self.segment.begin();
         if let Some(host) = self.host() {
             host.forget();
@@ -349,7 +324,7 @@ impl Link for Bench {
         let host = self.segment.station(BENCH).host();
         let speaks = !self.segment.is_unheard(BENCH) && !self.segment.is_off(BENCH);
         let sends = speaks && host.is_some_and(|host| host.waiting() > 0);
-        let hears = self.heard_at().is_some_and(|at| at > self.now);
+        let hears = self.heard_at().is_some_and(|at| at > self.clock.now);
         sends || (speaks && hears) || (1..=self.nodes.len()).any(|place| self.owes(place))
     }
 
@@ -357,11 +332,10 @@ impl Link for Bench {
         match moment {
             Moment::Now => self.suffer(fault),
             Moment::Byte(number) => self.arm(number, fault),
-            Moment::At(at) if self.on_bench(at) <= self.now => self.suffer(fault),
             Moment::At(at) => {
-                let at = self.on_bench(at);
-                let place = self.scheduled.partition_point(|(other, _)| *other <= at);
-                self.scheduled.insert(place, (at, fault));
+                if let Some(due) = self.clock.schedule(at, fault) {
+                    self.suffer(due);
+                }
             }
         }
     }
@@ -373,13 +347,10 @@ impl Link for Bench {
     fn unused_faults(&self) -> Vec<String> {
         let placed = self.segment.unused_faults().iter();
         let placed = placed.map(|own| format!("frame {}: {}", own.frame, own.fault));
-        let scheduled = self.scheduled.iter().map(|(at, fault)| {
-            let at = self.since_origin(*at);
-            match fault {
-                PlacedFault::Frame(fault) => format!("the next frame at {at}: {fault}"),
-                PlacedFault::Drive(node, fault) => format!("drive {node} at {at}: {fault}"),
-                other => format!("{other:?} at {at}"),
-            }
+        let scheduled = self.clock.left_over().map(|(at, fault)| match fault {
+            PlacedFault::Frame(fault) => format!("the next frame at {at}: {fault}"),
+            PlacedFault::Drive(node, fault) => format!("drive {node} at {at}: {fault}"),
+            other => format!("{other:?} at {at}"),
         });
         placed.chain(scheduled).collect()
     }
@@ -407,7 +378,7 @@ impl Link for Bench {
             )],
             ..Trace::empty(self.drives(port))
         };
-        trace.count_from(self.origin.since_start());
+        trace.count_from(self.clock.origin().since_start());
         trace
     }
 }

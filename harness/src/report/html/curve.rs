@@ -1,6 +1,6 @@
 //! A curve of values against time.
 
-use super::write::Html;
+use crate::html::Html;
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 760.0;

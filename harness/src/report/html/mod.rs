@@ -6,12 +6,12 @@
 //!
 //! | file | what it makes |
 //! |---|---|
-//! | `write.rs` | the only way into a page: everything but the program's own words is escaped |
+//! | `../../html.rs` | the only way into a page: everything but the program's own words is escaped |
 //! | `page.rs` | the page around its sections, within its bounds |
 //! | `summary.rs` | the verdicts of a run in a table |
 //! | `scenario.rs` | the section of a scenario: verdict, section of the manual, expected beside received |
 //! | `diagram.rs` | the space-time diagram of a ring, and the data that the script shows of it |
-//! | `sequence.rs` | what the master and the drives said, one after another |
+//! | `sequence.rs` | what the master and the drives of a shared line said, one after another |
 //! | `curve.rs` | values against time |
 //! | `lines.rs` | recorded cells against time |
 //! | `style.css`, `script.js` | how it looks, and what it shows when the pointer is on a byte |
@@ -19,12 +19,12 @@
 mod curve;
 mod page;
 mod scenario;
+pub(crate) mod sequence;
 mod summary;
-mod write;
 
+pub use crate::html::{Attribute, Html};
 pub(crate) use curve::Curve;
 pub use page::{FoldedPart, MAX_PAGE, Section, page};
 pub use scenario::{ScenarioView, section};
 pub(crate) use summary::colour;
 pub use summary::{Head, ShownScenario, run};
-pub use write::{Attribute, Html};

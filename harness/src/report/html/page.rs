@@ -1,6 +1,6 @@
 //! The page around its sections, and its bounds.
 
-use super::write::Html;
+use crate::html::Html;
 use sha2::{Digest, Sha256};
 
 /// The most bytes of a page, unless what is always shown is longer.

@@ -2,14 +2,14 @@
 
 use super::page::{FoldedPart, Section};
 use super::summary::{Row, ShownScenario, colour};
-use super::write::Html;
-use crate::buses::{pictures, rows};
+use crate::html::Html;
 use crate::report::diagram::diagram;
 use crate::report::lines::lines;
 use crate::report::sequence::sequence;
 use crate::scenario::run::{ByteDifference, Mismatch, Outcome, show};
 use crate::scenario::source::line_number;
 use crate::scenario::verdict::Verdict;
+use crate::traffic::SegmentReport;
 use harness_proto::line::Rate;
 use harness_sim::record::Trace;
 
@@ -42,6 +42,8 @@ pub struct ScenarioView<'p> {
     pub outcome: &'p Outcome,
     /// What the links carried, ring by ring.
     pub traces: &'p [Trace],
+    /// How they are shown; `None` for a ring.
+    pub report: Option<&'static dyn SegmentReport>,
     /// The rate of the line.
     pub rate: Rate,
     /// The command that shows it again.
@@ -246,8 +248,9 @@ fn parts(id: &str, played: &ScenarioView<'_>) -> Vec<FoldedPart> {
     let two = played.traces.len() > 1;
     let instead = format!("It is shown by: {}", played.again);
     for (ring, trace) in played.traces.iter().enumerate() {
-        if let Some(rows) = rows(trace, None, Some(FRAMES)) {
-            let pictures = pictures(trace, &format!("{id}-{ring}"), played.title);
+        if let Some(report) = played.report {
+            let rows = report.rows(trace, None, Some(FRAMES));
+            let pictures = report.pictures(trace, &format!("{id}-{ring}"), played.title);
             parts.extend(pictures.into_iter().map(|(heading, html)| FoldedPart {
                 heading: heading.to_owned(),
                 html,

@@ -2,8 +2,8 @@
 
 use super::page::{Section, page};
 use super::scenario::ScenarioView;
-use super::write::Html;
 use crate::counted::counted;
+use crate::html::Html;
 use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 

@@ -149,7 +149,10 @@ impl<L: Language> Reader<L> {
                 Ok(())
             }
             "bus" => {
-                let bus = named(scanner, &Bus::NAMES, "a bus")?;
+                let bus = match scanner.eat_word(L::NAME) {
+                    true => L::BUS,
+                    false => named(scanner, &Bus::NAMES, "a bus")?,
+                };
                 scanner.expect_end()?;
                 once(&mut self.bus, bus, word)
             }

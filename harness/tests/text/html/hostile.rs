@@ -44,6 +44,7 @@ fn page() -> String {
             text: &own,
             outcome: &outcome,
             traces: &traces,
+            report: None,
             rate: harness_proto::line::Rate::default(),
             again: text,
         };

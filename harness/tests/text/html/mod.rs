@@ -62,6 +62,7 @@ fn shown(number: usize, name: &str, text: &str) -> ShownScenario {
         text,
         outcome: &outcome,
         traces: &traces,
+        report: entry.report(),
         rate: entry.plan.as_ref().expect("novobus").rate,
         again: "drivebench trace it",
     };

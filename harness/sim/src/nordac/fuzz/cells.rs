@@ -1,6 +1,6 @@
 //! The states of a drive and what can happen to it, as the target `nordac-slave` counts them: DP state, drive state, event.
 
-use crate::fuzz::Feature;
+use crate::fuzz::{Feature, events};
 use crate::nordac::Drive;
 use harness_proto::nordac::words::State as DriveState;
 use harness_proto::profibus::dp::DpState;
@@ -50,26 +50,6 @@ impl State {
         };
         format!("{dp}, {}", self.drive)
     }
-}
-
-/// Rows of events: variant, section, words.
-macro_rules! events {
-    ($($name:ident $section:literal $words:literal;)+) => {
-        /// What happens to a drive, or what it does by itself.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub(super) enum Event {
-            $(#[doc = concat!($words, " (", $section, ").")] $name,)+
-        }
-
-        impl Event {
-            /// All of them, in order.
-            pub(super) const ALL: &'static [Self] = &[$(Self::$name),+];
-
-            const fn words(self) -> (&'static str, &'static str) {
-                match self { $(Self::$name => ($section, $words),)+ }
-            }
-        }
-    };
 }
 
 events! {

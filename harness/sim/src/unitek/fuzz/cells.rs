@@ -2,7 +2,7 @@
 //!
 //! A state is made of MODE (lock, sending by event), the hardware enable, ready, and the number of cycles.
 
-use crate::fuzz::Feature;
+use crate::fuzz::{Feature, events};
 use crate::unitek::Drive;
 use harness_proto::unitek::frame::CYCLES;
 use harness_proto::unitek::words::{MODE_EVENT, MODE_LOCK};
@@ -93,26 +93,6 @@ impl State {
         };
         format!("{lock}, events {events}, enable {enable}, {ready}, {cycles}")
     }
-}
-
-/// Rows of events: variant, section, words.
-macro_rules! events {
-    ($($name:ident $section:literal $words:literal;)+) => {
-        /// What happens to a drive, or what it does by itself.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub(super) enum Event {
-            $(#[doc = concat!($words, " (", $section, ").")] $name,)+
-        }
-
-        impl Event {
-            /// All of them, in order.
-            pub(super) const ALL: &'static [Self] = &[$(Self::$name),+];
-
-            const fn words(self) -> (&'static str, &'static str) {
-                match self { $(Self::$name => ($section, $words),)+ }
-            }
-        }
-    };
 }
 
 events! {

@@ -13,6 +13,7 @@ pub use jobs::KnownSlaves;
 use self::plan::{PlannedAct, Planner, SentTelegram, WantedOctet};
 use self::syntax::{Header, Message, Step};
 use crate::buses::Bus;
+use crate::buses::nordac::report::TelegramReport;
 use crate::buses::nordac::simulate;
 use crate::link::Link;
 use crate::scenario::language::{Language, Opening};
@@ -22,6 +23,7 @@ use crate::scenario::run::outcome::{Mismatch, Stop};
 use crate::scenario::run::player::Runner;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
+use crate::traffic::SegmentReport;
 use harness_proto::line::Received;
 use harness_proto::time::{self, Instant};
 
@@ -47,6 +49,10 @@ impl Language for Nordac {
     type Received = Received;
     type State = KnownSlaves;
     type Planner = Planner;
+
+    fn report() -> Option<&'static dyn SegmentReport> {
+        Some(&TelegramReport)
+    }
 
     fn header_words() -> Vec<&'static str> {
         parse::HEADER.to_vec()

@@ -145,6 +145,7 @@ fn shown(
         text: &text,
         outcome: &outcome,
         traces: &traces,
+        report: None,
         rate: Rate::default(),
         again: &again,
     };

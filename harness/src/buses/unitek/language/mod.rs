@@ -14,6 +14,7 @@ pub(crate) use write::identifier;
 use self::plan::{Act, Bench, Planner, WantedFrame};
 use self::syntax::{Header, Message, Step};
 use crate::buses::Bus;
+use crate::buses::unitek::report::FrameReport;
 use crate::buses::unitek::simulate;
 use crate::link::Link;
 use crate::medium::Out;
@@ -24,6 +25,7 @@ use crate::scenario::run::outcome::{Mismatch, Stop};
 use crate::scenario::run::player::Runner;
 use crate::scenario::scanner::Scanner;
 use crate::scenario::syntax::Scenario;
+use crate::traffic::SegmentReport;
 use harness_proto::can::Frame;
 use harness_proto::time::{self, Instant};
 
@@ -49,6 +51,10 @@ impl Language for Unitek {
     type Received = Frame;
     type State = State;
     type Planner = Planner;
+
+    fn report() -> Option<&'static dyn SegmentReport> {
+        Some(&FrameReport)
+    }
 
     fn comment(line: &str) -> Option<usize> {
         parse::comment(line)

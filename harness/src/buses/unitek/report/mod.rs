@@ -6,12 +6,49 @@ pub mod json;
 pub(crate) mod sequence;
 pub mod table;
 
+use crate::buses::Bus;
+use crate::report::html::Html;
+use crate::report::pcapng_frames;
+use crate::traffic::{SegmentReport, SharedForm, drawn};
 use harness_proto::can::Frame;
 use harness_proto::unitek::properties::Dlc4;
 use harness_proto::unitek::register::Unit;
 use harness_proto::unitek::units::{Scaling, shown, usual};
 use harness_proto::unitek::words::{Bit, ERRORS, IO, MODE, STATUS, set_bits};
 use harness_proto::unitek::{Data, Register, Reply, Request};
+use harness_sim::record::Trace;
+use std::io::{Error, Write};
+use std::ops::Range;
+
+/// How frames are shown.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameReport;
+
+impl SegmentReport for FrameReport {
+    fn carries(&self) -> &'static str {
+        "frames of CAN"
+    }
+
+    fn rows(&self, trace: &Trace, wanted: Option<Range<usize>>, at_most: Option<usize>) -> String {
+        table::table(trace, wanted, at_most)
+    }
+
+    fn pictures(&self, trace: &Trace, id: &str, title: &str) -> Vec<(&'static str, Html)> {
+        drawn(
+            |html| sequence::sequence(html, id, title, trace),
+            |html| curves::curves(html, id, trace),
+        )
+    }
+
+    fn write(&self, traces: &[Trace], form: SharedForm, out: &mut dyn Write) -> Result<(), Error> {
+        match form {
+            SharedForm::Json => json::write(Bus::Unitek, traces, out),
+            SharedForm::Candump => json::candump(traces, out),
+            SharedForm::Csv => csv::write(traces, out),
+            SharedForm::Pcapng => pcapng_frames::write(traces, out),
+        }
+    }
+}
 
 /// The drive that sends a frame where identifiers are those of 3.1: 180 + n is drive n. `None` for other frames.
 #[must_use]

@@ -4,24 +4,20 @@
 
 use super::meaning;
 use crate::buses::unitek::language::identifier;
-use crate::report::html::Html;
+use crate::report::html::sequence::{Arrow, SequenceWords};
+use crate::report::html::{self, Html};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Arrows drawn at most.
-const DRAWN: usize = 300;
 /// How much the gaps of a cycle may differ (2: cyclic frames of a drive).
 const JITTER: Span = Span::from_millis(2);
 
-const COLUMN: usize = 110;
-const ROW: usize = 22;
-const TOP: usize = 34;
 /// Room for what the frames mean.
 const WORDS: usize = 640;
 
-/// An arrow, and the frames of the same cycle that are folded into it.
-struct Arrow<'t> {
+/// The first frame of an arrow, and the frames of the same cycle that are folded into it.
+struct Folded<'t> {
     first: &'t LineFrame,
     last: &'t LineFrame,
     times: usize,
@@ -36,41 +32,14 @@ struct Begun {
 
 /// Writes the picture; false where there is nothing to draw.
 pub(crate) fn sequence(html: &mut Html, id: &str, title: &str, trace: &Trace) -> bool {
-    let arrows = folded(trace);
-    if arrows.is_empty() {
-        return false;
-    }
-    let drives = drives(trace);
-    let drawn = &arrows[..arrows.len().min(DRAWN)];
-    let width = (drives.len() + 2) * COLUMN + WORDS;
-    let height = TOP + (drawn.len() + 1) * ROW;
-    let description = format!(
-        "{} arrows between the master and {}, one below the other. The table of frames says the same.",
-        drawn.len(),
-        crate::counted::counted(drives.len() as u64, "drive"),
-    );
-    html.scroll(title, |html| {
-        html.picture(
-            &format!("{id}-s"),
-            (width, height),
-            (&title, &description),
-            |html| {
-                lifelines(html, &drives, height);
-                for (row, arrow) in drawn.iter().enumerate() {
-                    draw(html, arrow, TOP + (row + 1) * ROW, &drives);
-                }
-            },
-        );
-    });
-    if drawn.len() < arrows.len() {
-        let more = arrows.len() - drawn.len();
-        html.line(
-            "p",
-            &[("class", &"note")],
-            format_args!("{more} more are not drawn."),
-        );
-    }
-    true
+    let folded = folded(trace);
+    let arrows = folded.iter().map(drawn);
+    let words = SequenceWords {
+        drive: "drive",
+        carried: "frames",
+        room: WORDS,
+    };
+    html::sequence::sequence(html, (id, title), &drives(trace), arrows, words)
 }
 
 fn frames(trace: &Trace) -> impl Iterator<Item = &LineFrame> {
@@ -97,8 +66,8 @@ fn receiver(frame: &LineFrame) -> Option<u8> {
 
 /// The arrows. A frame is folded into the one before it of the same drive and register where the gaps are those of a cycle, and the
 /// master has sent nothing since.
-fn folded(trace: &Trace) -> Vec<Arrow<'_>> {
-    let mut arrows: Vec<Arrow<'_>> = Vec::new();
+fn folded(trace: &Trace) -> Vec<Folded<'_>> {
+    let mut arrows: Vec<Folded<'_>> = Vec::new();
     let mut begun: BTreeMap<(u8, Option<u8>), Begun> = BTreeMap::new();
     for frame in frames(trace) {
         let key = frame
@@ -134,8 +103,8 @@ fn folded(trace: &Trace) -> Vec<Arrow<'_>> {
     arrows
 }
 
-fn one(frame: &LineFrame) -> Arrow<'_> {
-    Arrow {
+fn one(frame: &LineFrame) -> Folded<'_> {
+    Folded {
         first: frame,
         last: frame,
         times: 1,
@@ -146,63 +115,15 @@ fn alike(one: Span, other: Span) -> bool {
     one.max(other) <= one.min(other) + JITTER
 }
 
-/// Where the line of a drive stands; that of the master is in front of them.
-fn place(drives: &[u8], drive: Option<u8>) -> usize {
-    let place = drive.and_then(|drive| drives.iter().position(|own| *own == drive));
-    COLUMN * place.map_or(1, |place| place + 2)
-}
-
-fn lifelines(html: &mut Html, drives: &[u8], height: usize) {
-    let names = std::iter::once(("master".to_owned(), None)).chain(
-        drives
-            .iter()
-            .map(|drive| (format!("drive {drive}"), Some(*drive))),
-    );
-    for (name, drive) in names {
-        let x = place(drives, drive);
-        html.line(
-            "text",
-            &[("class", &"m"), ("x", &x), ("y", &(TOP - 12))],
-            name,
-        );
-        let line = format!("M{x} {}V{height}", TOP - 4);
-        html.shape("path", &[("class", &"zero"), ("d", &line)]);
-    }
-}
-
-fn draw(html: &mut Html, arrow: &Arrow<'_>, y: usize, drives: &[u8]) {
+/// The arrow as it is drawn.
+fn drawn(folded: &Folded<'_>) -> Arrow {
     let LineFrame {
         at,
         from,
         frame,
         ended,
         ..
-    } = *arrow.first;
-    let last = COLUMN * (drives.len() + 1);
-    let start = place(drives, from);
-    let end = match (from, receiver(arrow.first)) {
-        (Some(_), _) => COLUMN,
-        (None, Some(drive)) if drives.contains(&drive) => place(drives, Some(drive)),
-        (None, _) => last,
-    };
-    let back = if end < start { 7 } else { -7 };
-    let good = matches!(ended, FrameEnd::Good);
-    let head = if good {
-        format!("M{end} {y}l{back} -4v8z")
-    } else {
-        String::new()
-    };
-    let class = if good { "arrow" } else { "x" };
-    let line = format!("M{start} {y}H{end}{head}");
-    html.shape("path", &[("class", &class), ("d", &line)]);
-    let text = |html: &mut Html, class: &str, x: usize, text: String| {
-        html.line(
-            "text",
-            &[("class", &class), ("x", &x), ("y", &(y + 4))],
-            text,
-        );
-    };
-    text(html, "e", COLUMN - 14, at.to_string());
+    } = *folded.first;
     let mut words = format!(
         "{}  {}",
         identifier(frame.id()),
@@ -213,12 +134,21 @@ fn draw(html: &mut Html, arrow: &Arrow<'_>, y: usize, drives: &[u8]) {
         FrameEnd::Lost => words.push_str("  [lost]"),
         FrameEnd::Error(error) => words.push_str(&format!("  [{error}]")),
     }
-    if arrow.times > 1 {
-        let more = arrow.times - 1;
-        let end = meaning(&arrow.last.frame, true);
-        words.push_str(&format!("  and {more} more up to {}: {end}", arrow.last.at));
+    if folded.times > 1 {
+        let more = folded.times - 1;
+        let end = meaning(&folded.last.frame, true);
+        words.push_str(&format!(
+            "  and {more} more up to {}: {end}",
+            folded.last.at
+        ));
     }
-    text(html, "s", last + 14, words);
+    Arrow {
+        at,
+        from,
+        to: receiver(folded.first),
+        good: matches!(ended, FrameEnd::Good),
+        words,
+    }
 }
 
 #[cfg(test)]

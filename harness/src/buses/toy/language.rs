@@ -1,0 +1,318 @@
+//! The words of the bus: header lines, messages and steps, as read, settled, played and written.
+
+use super::bench::Bench;
+use super::report::ValveReport;
+use super::valve::Said;
+use crate::buses::Bus;
+use crate::link::{Capability, Link};
+use crate::medium::Out;
+use crate::scenario::expression::Scope;
+use crate::scenario::language::{Language, Opening, Settle};
+use crate::scenario::parse::words::{equals, required};
+use crate::scenario::pattern::{self, Expected, Pattern};
+use crate::scenario::plan::{Plan, PlannedStep, Unroll};
+use crate::scenario::problem::{Problem, Span, Spanned};
+use crate::scenario::run::outcome::Stop;
+use crate::scenario::run::player::Runner;
+use crate::scenario::scanner::Scanner;
+use crate::scenario::syntax::Scenario;
+use crate::traffic::SegmentReport;
+use harness_proto::can::{BitRate, Frame, Heard};
+use harness_proto::time::{self, Instant};
+
+/// The bus.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Valves;
+
+/// `101 01 32`: an identifier and bytes.
+#[derive(Clone, Debug)]
+pub(super) struct Message {
+    id: u16,
+    data: Pattern,
+}
+
+/// A step of the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Own {
+    /// `open 1 = 50`: moves a valve, and waits for its answer.
+    Open(u8, u8),
+    /// `? valve 1 at 50`: looks at it beside the bus.
+    At(u8, u8),
+}
+
+/// An identifier and bytes.
+#[derive(Clone, Debug)]
+pub(super) struct Wanted(u16, Vec<Expected>);
+
+/// A decimal number of at most `most`.
+fn number(scanner: &mut Scanner<'_>, most: u8, what: &str) -> Result<u8, Problem> {
+    let before = scanner.clone();
+    let digits = scanner.take_while(|c| c.is_ascii_digit());
+    let number = digits.and_then(|digits| digits.value.parse().ok());
+    number.filter(|own| *own <= most).ok_or_else(|| {
+        *scanner = before;
+        scanner.unexpected(what)
+    })
+}
+
+fn valve(scanner: &mut Scanner<'_>) -> Result<u8, Problem> {
+    number(scanner, 127, "the number of a valve, 0 to 127,")
+}
+
+fn percent(scanner: &mut Scanner<'_>) -> Result<u8, Problem> {
+    number(scanner, 100, "0 to 100 percent")
+}
+
+fn frame(id: u16, data: &[u8], span: Span) -> Result<Frame, Problem> {
+    let wrong = |error| Problem::new(span, format!("{error}"), "at most 8 bytes expected here");
+    Frame::base(id, data).map_err(wrong)
+}
+
+/// Settles steps; it has the valves of the header.
+pub(super) struct Planner(Vec<(u8, bool)>);
+
+impl Settle<Valves> for Planner {
+    fn unroll<'s>(&self, scenario: &'s Scenario<Valves>) -> Unroll<'s, Valves> {
+        Unroll::new(&scenario.steps, Scope::default())
+    }
+
+    fn enter(&mut self, _: Scope) {}
+
+    fn byte_time(&self) -> time::Span {
+        BitRate::K500.time_of(8)
+    }
+
+    fn room(&self) -> usize {
+        10_000
+    }
+
+    fn send(&self, _: usize, message: &Message) -> Result<Vec<Frame>, Problem> {
+        let data = message.data.expand_known(Scope::default(), 8)?;
+        Ok(vec![frame(message.id, &data, message.data.span)?])
+    }
+
+    fn receive(&self, _: usize, message: &Message) -> Result<Vec<Wanted>, Problem> {
+        let data = message.data.expand(Scope::default(), 8)?;
+        Ok(vec![Wanted(message.id, data)])
+    }
+
+    fn act(&mut self, own: &Own, span: Span, needs: &mut Vec<Capability>) -> Result<Own, Problem> {
+        let (Own::Open(valve, _) | Own::At(valve, _)) = *own;
+        if !self.0.iter().any(|(known, _)| *known == valve) {
+            let message = format!("the bench has no valve {valve}");
+            return Err(Problem::new(
+                span,
+                message,
+                "a valve of the header expected",
+            ));
+        }
+        needs.extend(matches!(own, Own::At(..)).then_some(Capability::Simulator));
+        Ok(*own)
+    }
+
+    fn pieces(own: &Own) -> (usize, usize) {
+        match own {
+            Own::Open(..) => (1, 1),
+            Own::At(..) => (0, 0),
+        }
+    }
+
+    fn needs(&self, _: &Scenario<Valves>) -> Vec<Capability> {
+        Vec::new()
+    }
+
+    fn finish(self) -> Vec<(u8, bool)> {
+        self.0
+    }
+}
+
+impl Language for Valves {
+    // A bus of the product has its own line in `buses/mod.rs`.
+    const BUS: Bus = Bus::DEFAULT;
+    const NAME: &'static str = "valves";
+    const STRICT: bool = true;
+    const SOURCE: &'static str = "valves 2.1";
+    const EXAMPLE: &'static str = "`> 101 00`: the bench asks valve 1";
+
+    type Header = Vec<(u8, bool)>;
+    type Message = Message;
+    type Step = Own;
+    type Setup = Vec<(u8, bool)>;
+    type Sent = Frame;
+    type Wanted = Wanted;
+    type Act = Own;
+    type Received = Frame;
+    type State = ();
+    type Planner = Planner;
+
+    fn header_words() -> Vec<&'static str> {
+        vec!["valve"]
+    }
+
+    fn step_words() -> (Vec<&'static str>, &'static [&'static str]) {
+        (vec!["open"], &[])
+    }
+
+    fn header(
+        word: &Spanned<&str>,
+        scanner: &mut Scanner<'_>,
+        header: &mut Vec<(u8, bool)>,
+        _: bool,
+    ) -> Option<Result<(), Problem>> {
+        (word.value == "valve").then(|| {
+            header.push((valve(scanner)?, scanner.eat_word("sticks")));
+            scanner.expect_end()
+        })
+    }
+
+    fn incomplete(header: &Vec<(u8, bool)>) -> Option<Problem> {
+        let none = || Problem::new(Span::default(), "the scenario has no valve", "`valve 1`");
+        header.is_empty().then(none)
+    }
+
+    fn message(scanner: &mut Scanner<'_>) -> Result<Message, Problem> {
+        let before = scanner.clone();
+        let digits = scanner.take_while(|c| c.is_ascii_hexdigit());
+        let digits = digits.filter(|own| own.value.len() == 3);
+        let id = digits.and_then(|own| u16::from_str_radix(own.value, 16).ok());
+        let Some(id) = id else {
+            *scanner = before;
+            return Err(scanner.unexpected("an identifier of three hexadecimal digits"));
+        };
+        let data = pattern::pattern(scanner)?;
+        Ok(Message { id, data })
+    }
+
+    fn step(opening: Opening<'_>, scanner: &mut Scanner<'_>) -> Option<Result<Own, Problem>> {
+        let look = |scanner: &mut Scanner<'_>| {
+            let valve = valve(scanner)?;
+            required(scanner, &["at"])?;
+            Ok(Own::At(valve, percent(scanner)?))
+        };
+        let open = |scanner: &mut Scanner<'_>| {
+            let valve = valve(scanner)?;
+            equals(scanner)?;
+            Ok(Own::Open(valve, percent(scanner)?))
+        };
+        match opening {
+            Opening::Check if scanner.eat_word("valve") => Some(look(scanner)),
+            Opening::Word(word) if word.value == "open" => Some(open(scanner)),
+            _ => None,
+        }
+    }
+
+    fn settle(
+        scenario: &Scenario<Self>,
+        _: Option<u8>,
+        _: &mut Vec<Problem>,
+    ) -> Result<Planner, Problem> {
+        Ok(Planner(scenario.header.clone()))
+    }
+
+    fn resume(setup: &Vec<(u8, bool)>) -> Planner {
+        Planner(setup.clone())
+    }
+
+    fn simulate(plan: &Plan<Self>) -> Box<dyn Link> {
+        Box::new(Bench::new(&plan.setup))
+    }
+
+    fn size(plan: &Plan<Self>) -> String {
+        plan.setup.len().to_string()
+    }
+
+    fn ports(_: &Plan<Self>) -> usize {
+        1
+    }
+
+    fn state(_: &Plan<Self>, _: &dyn Link) {}
+
+    fn begin(_: &mut Runner<'_, Self>) -> Result<(), Stop> {
+        Ok(())
+    }
+
+    fn act(runner: &mut Runner<'_, Self>, own: &Own, step: &PlannedStep<Self>) -> Result<(), Stop> {
+        match *own {
+            Own::Open(valve, place) => {
+                let (id, data) = Said::Move(valve, place).encode();
+                let request = Frame::base(id, &data);
+                let request =
+                    request.map_err(|error| Stop::failed(step.span, error.to_string()))?;
+                let (id, data) = Said::At(valve, place).encode();
+                let answer = Wanted(id, data.into_iter().map(Expected::Byte).collect());
+                runner.transmit(0, &[request]);
+                runner.expect(step.span, 0, &[answer], None)
+            }
+            Own::At(valve, place) => {
+                runner.settle();
+                let bench = runner
+                    .link
+                    .beside()
+                    .and_then(|own| own.downcast_ref::<Bench>());
+                match bench.and_then(|bench| bench.place(valve)) {
+                    Some(found) if found == place => Ok(()),
+                    Some(found) => {
+                        let message = format!("valve {valve} is at {found} %, expected {place} %");
+                        Err(Stop::failed(step.span, message))
+                    }
+                    None => Err(Stop::failed(
+                        step.span,
+                        "the valve cannot be seen".to_owned(),
+                    )),
+                }
+            }
+        }
+    }
+
+    fn transmit(link: &mut dyn Link, port: usize, frames: &[Frame]) -> Instant {
+        link.send(port, Out::Frames(frames))
+    }
+
+    fn fetch(_: &mut (), link: &mut dyn Link, port: usize) -> Option<(Instant, Frame)> {
+        loop {
+            let (at, heard) = link.receive(port)?;
+            if let Heard::Frame(frame) = heard.frame()? {
+                return Some((at, frame));
+            }
+        }
+    }
+
+    fn matches(Wanted(id, data): &Wanted, frame: Frame) -> bool {
+        let mut pairs = data.iter().zip(frame.data());
+        frame.id().number() == u32::from(*id)
+            && frame.data().len() == data.len()
+            && pairs.all(|(own, byte)| *own == Expected::Any || *own == Expected::Byte(*byte))
+    }
+
+    fn describe(Wanted(id, data): &Wanted) -> String {
+        let bytes = data.iter().map(|own| format!(" {own}"));
+        format!("{id:03X}{}", bytes.collect::<String>())
+    }
+
+    fn show(frame: Frame) -> String {
+        frame.to_string()
+    }
+
+    fn report() -> Option<&'static dyn SegmentReport> {
+        Some(&ValveReport)
+    }
+
+    fn write_header(header: &Vec<(u8, bool)>) -> (Vec<(&'static str, String)>, Vec<String>) {
+        let line = |&(valve, sticks): &(u8, bool)| match sticks {
+            true => format!("valve {valve} sticks"),
+            false => format!("valve {valve}"),
+        };
+        (Vec::new(), header.iter().map(line).collect())
+    }
+
+    fn write_message(message: &Message) -> String {
+        format!("{:03X} {}", message.id, message.data)
+    }
+
+    fn write_step(own: &Own) -> String {
+        match own {
+            Own::Open(valve, place) => format!("open {valve} = {place}"),
+            Own::At(valve, place) => format!("? valve {valve} at {place}"),
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! A bus in a few hundred lines: valves on frames. It is the example of the page "A fourth bus" in CONTRIBUTING.md, and proves that a
+//! bus needs nothing outside its own folder: from the text of a scenario to the table and the page of HTML.
+//!
+//! | file | what it has | trait |
+//! |---|---|---|
+//! | `valve.rs` | what a frame says; the simulated device, with one deviation | `Station` |
+//! | `bench.rs` | the bus as a scenario sees it | `Line`, `Link` |
+//! | `language.rs` | the words of a scenario | `Language`, `Settle` |
+//! | `report.rs` | the table | `SegmentReport` |
+
+mod bench;
+mod language;
+mod report;
+mod valve;
+
+use crate::cli::run::play_entry;
+use crate::library::Entry;
+use crate::report::finding::explain;
+use crate::report::html::{Head, ScenarioView, run, section};
+use crate::report::page::page;
+use crate::scenario::parse::parse;
+use crate::scenario::run::{AtMismatch, Outcome};
+use crate::scenario::settled::settle;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Scenario;
+use crate::scenario::verdict::Verdict;
+use crate::scenario::write::write;
+use harness_sim::record::Trace;
+use language::Valves;
+
+const HEADER: &str = "title   A valve opens\nsource  valves 2.1\nbus     valves\n";
+
+fn source(text: &str) -> Source {
+    Source {
+        name: "valves.scn".to_owned(),
+        text: text.into(),
+    }
+}
+
+/// Plays it as `run` does.
+fn played(text: &str) -> (Entry, Outcome, Vec<Trace>) {
+    let source = source(&format!("{HEADER}{text}"));
+    let found = settle::<Valves>(&source, None).expect("a scenario");
+    let entry = Entry::of_other(source, found);
+    let played = play_entry(&entry, AtMismatch::GoOn);
+    (entry, played.outcome, played.traces)
+}
+
+/// The page of HTML that `run --html` writes.
+fn html((entry, outcome, traces): &(Entry, Outcome, Vec<Trace>)) -> String {
+    let shown = ScenarioView {
+        name: entry.short_name(),
+        title: &entry.scenario.title,
+        sources: &[],
+        drives: &entry.drives(),
+        text: &entry.source.text,
+        outcome,
+        traces,
+        report: entry.report(),
+        rate: harness_proto::line::Rate::default(),
+        again: "",
+    };
+    let head = Head {
+        title: "Valves",
+        facts: Vec::new(),
+    };
+    run(&head, vec![section(1, &shown)])
+}
+
+const OPENS: &str = "valve 1\n\nopen 1 = 50\n? valve 1 at 50\n+0.1ms > 101 00\n< 201 00 xx\n";
+
+#[test]
+fn from_a_scenario_to_a_table_and_a_page() {
+    let all = played(OPENS);
+    let (entry, outcome, traces) = &all;
+    assert_eq!(outcome.finding.as_ref().map(|own| &own.message), None);
+    assert_eq!(outcome.verdict, Verdict::Passed);
+    let table = "meaning\n0.126 ms  valve 1: go to 50 %\n0.352 ms  valve 1 is at 50 %\n";
+    let text = page(entry, outcome, traces);
+    assert!(
+        text.starts_with("A valve opens\npins valves 2.1\npassed after "),
+        "{text}"
+    );
+    assert!(text.contains(table), "{text}");
+    let html = html(&all);
+    assert!(html.contains("valve 1: go to 50 %"), "{html}");
+    assert!(html.contains("passed"), "{html}");
+}
+
+#[test]
+fn a_wrong_device_fails_in_the_words_of_its_bus() {
+    let all = played(&OPENS.replace("valve 1\n\n", "valve 1 sticks\n\n"));
+    let (entry, outcome, traces) = &all;
+    let finding = outcome.finding.as_ref().expect("it fails");
+    assert_eq!(outcome.verdict, Verdict::Failed);
+    let expected = "the master received 201#0100 where 201 01 32 is expected";
+    assert_eq!(finding.message, expected);
+    let text = explain(entry, finding, traces);
+    assert!(
+        text.starts_with("valves.scn:6:1: the master received"),
+        "{text}"
+    );
+    assert!(text.contains("    open 1 = 50\n"), "{text}");
+    assert!(text.contains("valve 1 is at 0 %\n"), "{text}");
+    assert!(html(&all).contains(expected));
+    let (_, outcome, _) = played("valve 1 sticks\n\n> 101 01 32\n< 201 01 xx\n? valve 1 at 50\n");
+    let message = outcome.finding.map(|own| own.message);
+    assert_eq!(message.as_deref(), Some("valve 1 is at 0 %, expected 50 %"));
+}
+
+#[test]
+fn what_no_line_asks_for_is_a_failure() {
+    let (_, outcome, _) = played("valve 1\n\n> 101 00\n");
+    assert_eq!(outcome.verdict, Verdict::Failed);
+    let message = outcome.finding.map(|own| own.message).unwrap_or_default();
+    assert!(message.starts_with("201#0000 was received"), "{message}");
+}
+
+/// The writer is the inverse of the parser, also for what the core gives: times, patterns, loops.
+#[test]
+fn what_is_written_is_read_again() {
+    let text = format!(
+        "{HEADER}valve 1\nvalve 2 sticks\n\n> 101 01 32\n+0.1ms..20ms < 201 01 xx\nfor k in 1..3\nopen 1 = 7\nend\n? valve 2 at 0\n"
+    );
+    let scenario: Scenario<Valves> = parse(&source(&text)).expect("a scenario");
+    assert_eq!(write(&scenario), text);
+    let (_, outcome, _) = played(text.strip_prefix(HEADER).expect("the header"));
+    assert_eq!(outcome.verdict, Verdict::Passed);
+}
+
+#[test]
+fn its_mistakes_have_their_places_and_suggestions() {
+    let mistake = |steps: &str| {
+        let source = source(&format!("{HEADER}valve 1\n\n{steps}\n"));
+        let found = settle::<Valves>(&source, None).expect_err("a mistake");
+        let first = found.all()[0].clone();
+        let place = source.text[first.span.start..first.span.end].to_owned();
+        (place, first.help.unwrap_or_default())
+    };
+    assert_eq!(mistake("> 10 00").0, "10");
+    assert_eq!(mistake("open 1 = 101").0, "101");
+    assert_eq!(mistake("open 2 = 10").0, "open 2 = 10");
+    let found = mistake("opne 1 = 10");
+    assert_eq!(
+        found,
+        ("opne".to_owned(), "did you mean `open`?".to_owned())
+    );
+}
