@@ -9,6 +9,7 @@ mod evidence;
 mod explore;
 mod named;
 mod on_can;
+mod on_profibus;
 #[path = "../common/program.rs"]
 mod program;
 mod simulated;

@@ -1,5 +1,7 @@
 //! The driver against simulated slaves, in virtual time.
 
+mod any_slave;
+
 use super::*;
 use crate::buses::nordac::simulate::{Bench, Happening, Setup, SlaveSetup, Stimulus};
 use crate::buses::{self};
