@@ -14,8 +14,6 @@ pub use novobus::language::{argument, plan, syntax};
 pub use novobus::link::SimulatedLink;
 pub use novobus::simulate;
 pub use novobus::stream::StreamLink;
-/// Campaigns of the bus whose conversations are frames.
-pub use unitek::campaign as frame_campaign;
 
 /// What of playing belongs to the one bus whose drives are played on over their bus today.
 pub mod run {
@@ -42,6 +40,7 @@ pub(crate) use unitek::dbc::dbc;
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;
 pub(crate) use novobus::{cli as commands, driver, drives, qualify, twin};
 
+use crate::campaign::line::LineCampaign;
 use crate::cli::exit::Exit;
 use crate::cli::failure::Failure;
 use crate::cli::fuzz::{FuzzRunArguments, verify};
@@ -87,6 +86,25 @@ pub(crate) const MANUALS: [Manual; 3] = [
     unitek::manual::MANUAL,
     nordac::manual::MANUAL,
 ];
+
+/// The names of the built-in campaigns on buses whose stations share one line, in order.
+pub(crate) fn line_campaigns() -> Vec<String> {
+    [nordac::campaign::names(), unitek::campaign::names()].concat()
+}
+
+/// Finds and reads a campaign on such a bus: a file that names the bus, or a built-in one by its name. `None` where it is neither.
+///
+/// # Errors
+/// What is wrong with it, with file, place and remedy.
+pub(crate) fn line_campaign(name: &Path) -> Option<Result<Box<dyn LineCampaign>, String>> {
+    fn boxed<C: LineCampaign + 'static>(
+        own: Result<C, String>,
+    ) -> Result<Box<dyn LineCampaign>, String> {
+        own.map(|own| -> Box<dyn LineCampaign> { Box::new(own) })
+    }
+    let unitek = || unitek::campaign::find(name).map(boxed);
+    nordac::campaign::find(name).map(boxed).or_else(unitek)
+}
 
 /// A scenario in the words of every bus, and settled in those of its own; or its mistakes.
 type Found = Result<(Scenario, Arc<dyn Settled>), Problems>;
@@ -234,12 +252,12 @@ pub(crate) fn shared_scenario(
     }
 }
 
-/// What came of judging a capture of frames.
+/// What came of judging a capture of a shared line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct JudgedFrames {
     /// Passed, failed, or inconclusive where nothing was compared.
     pub(crate) verdict: Verdict,
-    /// How many frames of drives were compared.
+    /// How many frames or telegrams of drives were compared.
     pub(crate) compared: usize,
     /// What differs, a sentence each.
     pub(crate) differences: Vec<String>,
@@ -247,15 +265,32 @@ pub(crate) struct JudgedFrames {
     pub(crate) remarks: Vec<String>,
 }
 
-/// Judges a capture of frames; `setup` describes the drives.
+/// Judges a capture of a shared line; `setup` describes the drives.
 ///
 /// # Errors
 /// It does not say enough of the drives, in a sentence.
-pub(crate) fn judge_frames(
+pub(crate) fn judge_shared(
     traces: &[Trace],
     setup: Option<&Source>,
 ) -> Result<JudgedFrames, String> {
-    unitek::capture::judged(traces, setup)
+    match shared(traces) {
+        Some(Bus::Nordac) => Ok(nordac::capture::judged(traces)),
+        _ => unitek::capture::judged(traces, setup),
+    }
+}
+
+/// How many frames or telegrams a capture of a shared line has, and what they are called.
+pub(crate) fn counted_pieces(traces: &[Trace]) -> (usize, &'static str) {
+    match shared(traces) {
+        Some(Bus::Nordac) => (nordac::report::count(traces), "telegram"),
+        _ => {
+            let channels = traces.iter().flat_map(|trace| &trace.channels);
+            (
+                channels.map(|channel| channel.frames().len()).sum(),
+                "frame",
+            )
+        }
+    }
 }
 
 /// The dissector of a bus for Wireshark.

@@ -9,6 +9,7 @@ pub mod fault;
 pub mod file;
 pub mod find;
 mod html;
+pub mod line;
 pub mod plan;
 pub mod replay;
 pub(crate) mod run;
@@ -18,7 +19,5 @@ pub use fault::CaseFaults;
 pub use html::campaigns;
 pub use run::{Campaign, CaseOutcome, Contradiction, PlayedCampaign};
 
-/// Campaigns of the bus whose conversations are frames.
-pub use crate::buses::frame_campaign as frames;
 /// The classes of the one bus whose conversations are disturbed today, and how a case is played there.
 pub use crate::buses::rings::campaign::{by_driver, by_manual, class, conversation, report, sound};

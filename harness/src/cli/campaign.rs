@@ -5,10 +5,11 @@ use super::exit::Exit;
 use super::output::Output;
 use super::page::{writable, write};
 use super::run::progress_bar;
+use crate::buses::{line_campaign, line_campaigns};
 use crate::campaign::find::{FindCampaignError, find, names};
-use crate::campaign::frames::{self, FrameCampaign, FrameClass, PlayedFrames};
+use crate::campaign::line::{self, LineCampaign, PlayedLine};
 use crate::campaign::replay::scenario;
-use crate::campaign::report::{json, line, table};
+use crate::campaign::report::{json, line as case_line, table};
 use crate::campaign::{Campaign, CaseClass, CaseFaults, PlayedCampaign};
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -19,21 +20,21 @@ pub(crate) fn campaign(
     output: &mut Output,
 ) -> std::io::Result<Exit> {
     let wanted = if arguments.campaigns.is_empty() {
-        let of_frames = frames::names().into_iter().map(PathBuf::from);
+        let on_lines = line_campaigns().into_iter().map(PathBuf::from);
         names()
             .into_iter()
             .map(PathBuf::from)
-            .chain(of_frames)
+            .chain(on_lines)
             .collect()
     } else {
         arguments.campaigns.clone()
     };
     let mut campaigns = Vec::new();
-    let mut of_frames = Vec::new();
+    let mut on_lines = Vec::new();
     for name in &wanted {
-        match frames::find(name) {
+        match line_campaign(name) {
             Some(Ok(campaign)) => {
-                of_frames.push(campaign);
+                on_lines.push(campaign);
                 continue;
             }
             Some(Err(error)) => {
@@ -51,7 +52,7 @@ pub(crate) fn campaign(
         }
     }
     if let Some(name) = &arguments.case {
-        return replay(name, &campaigns, &of_frames, output);
+        return replay(name, &campaigns, &on_lines, output);
     }
     if let Some(path) = &arguments.html
         && writable(path, output).is_err()
@@ -80,7 +81,7 @@ pub(crate) fn campaign(
     }
     let mut listed = json(&all, arguments.only.and_then(ClassName::of_rings));
     let mut differs = all.iter().any(|finished| !finished.differs().is_empty());
-    let played = play_frames(&of_frames, arguments, &mut listed, output)?;
+    let played = play_lines(&on_lines, arguments, &mut listed, output)?;
     differs |= played.iter().any(|own| !own.differs().is_empty());
     if arguments.format == TableFormat::Json {
         output.result(&format!("{listed}\n"))?;
@@ -93,37 +94,37 @@ pub(crate) fn campaign(
     Ok(if differs { Exit::Failed } else { Exit::Passed })
 }
 
-fn campaigns_page(all: &[PlayedCampaign], of_frames: &[PlayedFrames<'_>]) -> String {
-    let sections = (all.len() + 1..).zip(of_frames);
-    let sections = sections.map(|(number, own)| frames::section(number, own));
+fn campaigns_page(all: &[PlayedCampaign], on_lines: &[PlayedLine]) -> String {
+    let sections = (all.len() + 1..).zip(on_lines);
+    let sections = sections.map(|(number, own)| line::section(number, own));
     crate::campaign::campaigns(all, sections.collect())
 }
 
-/// Plays campaigns of frames, and shows them.
-fn play_frames<'c>(
-    campaigns: &'c [FrameCampaign],
+/// Plays campaigns on shared lines, and shows them.
+fn play_lines(
+    campaigns: &[Box<dyn LineCampaign>],
     arguments: &CampaignArguments,
     listed: &mut serde_json::Value,
     output: &mut Output,
-) -> std::io::Result<Vec<PlayedFrames<'c>>> {
+) -> std::io::Result<Vec<PlayedLine>> {
     let mut all = Vec::new();
-    let only = arguments.only.map(ClassName::of_frames);
     for campaign in campaigns {
-        let bar = progress_bar(campaign.cases.len(), output.progress);
-        bar.set_message(campaign.name.clone());
+        let bar = progress_bar(campaign.cases(), output.progress);
+        bar.set_message(campaign.name().to_owned());
         let played = campaign.run(&|done| bar.inc(done));
         bar.finish_and_clear();
+        let only = arguments.only.map(|own| played.class(&own.name()));
         match (arguments.format, only) {
-            (TableFormat::Table, None) => output.result(&(frames::table(&played) + "\n"))?,
+            (TableFormat::Table, None) => output.result(&(line::table(&played) + "\n"))?,
             (TableFormat::Table, Some(class)) => {
-                let shown = class.map(|class| frames::only(&played, class));
+                let shown = class.map(|class| line::only(&played, class));
                 output.result(&shown.unwrap_or_default())?;
             }
             (_, class) => {
-                // A class of rings leaves out the campaigns of frames.
+                // A class that this campaign does not have leaves it out.
                 let wanted = class != Some(None);
                 if let Some(list) = listed["campaigns"].as_array_mut().filter(|_| wanted) {
-                    list.push(frames::json(&played, class.flatten()));
+                    list.push(line::json(&played, class.flatten()));
                 }
             }
         }
@@ -145,7 +146,7 @@ fn shown(finished: &PlayedCampaign, only: Option<ClassName>) -> String {
     let outcomes = finished.outcomes.iter();
     let wanted = outcomes.filter(|outcome| Some(outcome.class) == only);
     wanted
-        .map(|outcome| line(outcome, finished.drives))
+        .map(|outcome| case_line(outcome, finished.drives))
         .collect()
 }
 
@@ -160,16 +161,16 @@ fn complain(error: &FindCampaignError, output: &mut Output) {
 fn replay(
     name: &str,
     campaigns: &[Campaign],
-    of_frames: &[FrameCampaign],
+    on_lines: &[Box<dyn LineCampaign>],
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    if campaigns.is_empty() && !of_frames.is_empty() {
+    if campaigns.is_empty() && !on_lines.is_empty() {
         output.complain(
-            "--case is for campaigns on rings; for one of frames --format json lists every case",
+            "--case is for campaigns on rings; for another one --format json lists every case",
         );
         return Ok(Exit::Usage);
     }
-    let ([campaign], []) = (campaigns, of_frames) else {
+    let ([campaign], []) = (campaigns, on_lines) else {
         output.complain("--case needs exactly one campaign; name the one that the case belongs to");
         return Ok(Exit::Usage);
     };
@@ -209,17 +210,33 @@ pub enum ClassName {
     Corrupted,
     /// Not noticed, and a value is wrong.
     SilentCorruption,
-    /// On a bus of frames: nothing is different.
+    /// On CAN: nothing is different.
     Answered,
-    /// On a bus of frames: a request was repeated, and nothing else is different.
+    /// On CAN: a request was repeated, and nothing else is different.
     Retried,
-    /// On a bus of frames: the master reported the fault.
+    /// On CAN: the master reported the fault.
     Noticed,
-    /// On a bus of frames: the master reported nothing, and something is wrong.
+    /// On CAN: the master reported nothing, and something is wrong.
     Unnoticed,
+    /// On PROFIBUS: nothing is different.
+    Unharmed,
+    /// On PROFIBUS: a request was repeated, and nothing else is different.
+    Repeated,
+    /// On PROFIBUS: the master started the slave again, or gave up.
+    FellBack,
+    /// On PROFIBUS: the master noticed nothing, and a word is wrong.
+    WrongWord,
 }
 
 impl ClassName {
+    /// The name on the command line and in tables.
+    fn name(self) -> String {
+        let value = self.to_possible_value();
+        value
+            .map(|own| own.get_name().to_owned())
+            .unwrap_or_default()
+    }
+
     /// The class of campaigns on rings; `None` for one of frames.
     const fn of_rings(self) -> Option<CaseClass> {
         Some(match self {
@@ -230,17 +247,6 @@ impl ClassName {
             Self::NotRecovered => CaseClass::NotRecovered,
             Self::Corrupted => CaseClass::Corrupted,
             Self::SilentCorruption => CaseClass::SilentCorruption,
-            Self::Answered | Self::Retried | Self::Noticed | Self::Unnoticed => return None,
-        })
-    }
-
-    /// The class of campaigns of frames; `None` for one on rings.
-    const fn of_frames(self) -> Option<FrameClass> {
-        Some(match self {
-            Self::Answered => FrameClass::Answered,
-            Self::Retried => FrameClass::Retried,
-            Self::Noticed => FrameClass::Noticed,
-            Self::Unnoticed => FrameClass::Unnoticed,
             _ => return None,
         })
     }

@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
+use crate::buses::{self, Bus, JudgedFrames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
     Capture, ComparedRun, Judged, Options, diff as compare, is_capture, judge, read_file, scenario,
@@ -112,19 +112,18 @@ pub(crate) fn import(arguments: &ImportArguments, output: &mut Output) -> std::i
     Ok(Exit::of(&[judged.verdict], false))
 }
 
-/// Reports what came of judging frames.
+/// Reports what came of judging a shared line.
 fn told(
     judged: &JudgedFrames,
     capture: &Capture,
     title: &str,
     output: &mut Output,
 ) -> std::io::Result<Exit> {
-    let frames = capture.traces.iter().flat_map(|trace| &trace.channels);
-    let frames: usize = frames.map(|channel| channel.frames().len()).sum();
+    let (count, what) = buses::counted_pieces(&capture.traces);
     output.result(&format!(
         "{} {title}: {} in {}, {} of drives compared\n",
         output.verdict(judged.verdict).trim_end_matches(' '),
-        counted(frames, "frame"),
+        counted(count, what),
         capture.end(),
         judged.compared,
     ))?;
@@ -147,21 +146,13 @@ fn of_shared_line(
 ) -> std::io::Result<Exit> {
     let path = arguments.file.display();
     if !arguments.scenario {
-        if carry_frames(&capture.traces) {
-            return match buses::judge_frames(&capture.traces, setup) {
-                Ok(judged) => told(&judged, capture, title, output),
-                Err(error) => {
-                    output.complain(&format!("{path}: {error}"));
-                    Ok(Exit::Usage)
-                }
-            };
-        }
-        output.complain(&format!(
-            "{path}: nothing compared: {} are not compared with a model; `--format table` shows them, `--scenario` makes \
-             a scenario of them that `drivebench run` plays, and `drivebench diff` compares them with another capture",
-            buses::carried(&capture.traces)
-        ));
-        return Ok(Exit::Usage);
+        return match buses::judge_shared(&capture.traces, setup) {
+            Ok(judged) => told(&judged, capture, title, output),
+            Err(error) => {
+                output.complain(&format!("{path}: {error}"));
+                Ok(Exit::Usage)
+            }
+        };
     }
     match buses::shared_scenario(&capture.traces, title, setup) {
         Some(Ok(text)) => write_scenario(&text, arguments, output),

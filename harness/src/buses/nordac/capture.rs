@@ -1,8 +1,11 @@
 //! A scenario made of a capture: what the master sent is sent again at its time, and what slaves sent is expected.
 
+use super::judge::judge;
 use super::report::pcapng::rate;
 use super::report::{TelegramRun, octets, runs};
+use crate::buses::JudgedFrames;
 use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 use harness_proto::line::LineError;
 use harness_proto::nordac::PpoType;
 use harness_proto::profibus::dp::Service;
@@ -57,6 +60,34 @@ pub(crate) fn scenario(
     let octet = rate.unwrap_or_default().octet_time();
     runs.iter().for_each(|run| step(run, octet, &mut text));
     Ok(text)
+}
+
+/// Judges what slaves sent: a slave is accused only of what no right one does, whatever its history.
+pub(crate) fn judged(traces: &[Trace]) -> JudgedFrames {
+    let mut all = JudgedFrames {
+        verdict: Verdict::Passed,
+        compared: 0,
+        differences: Vec::new(),
+        remarks: Vec::new(),
+    };
+    for trace in traces {
+        let judged = judge(trace);
+        all.compared += judged.compared;
+        all.remarks.extend(judged.remarks);
+        let breaches = judged.breaches.into_iter();
+        all.differences.extend(breaches.map(|own| {
+            format!(
+                "telegram {}, slave {}: {} (NORDAC {})",
+                own.telegram, own.slave, own.about, own.section
+            )
+        }));
+    }
+    all.verdict = match (all.differences.is_empty(), all.compared) {
+        (false, _) => Verdict::Failed,
+        (true, 0) => Verdict::Inconclusive,
+        (true, _) => Verdict::Passed,
+    };
+    all
 }
 
 /// The slaves that sent, and the PPO type that the last Chk_Cfg to them named.

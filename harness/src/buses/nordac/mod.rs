@@ -1,5 +1,6 @@
 //! NORDAC *vector* inverters on PROFIBUS DP: their words in a scenario, simulated slaves, tables and pictures.
 
+pub mod campaign;
 pub(crate) mod capture;
 pub(crate) mod cli;
 pub(crate) mod deviations;

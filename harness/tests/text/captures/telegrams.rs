@@ -110,14 +110,28 @@ fn telegrams_are_written_read_and_compared() {
     std::fs::write(&changed, other).expect("room");
     let said = ended(&drivebench(&["diff", plain(&capture), plain(&changed)]), 1);
     assert!(said.contains("first difference: telegram "), "{said}");
-    let said = ended(&drivebench(&["import", plain(&capture)]), 2);
-    assert!(
-        said.contains("nothing compared: telegrams of PROFIBUS are not compared with a model"),
-        "{said}"
-    );
     let said = ended(&drivebench(&["diff", plain(&path), "10.1-read-byte"]), 2);
     assert!(
         said.contains("telegrams of PROFIBUS and the other bytes of a ring"),
+        "{said}"
+    );
+}
+
+/// A slave is accused of what no right one does, and of nothing else.
+#[test]
+fn telegrams_of_a_capture_are_judged() {
+    let talk = "title Judged\nsource nordac 3.2.1\nbus nordac\nslave 8\n\nstart 8\nread 8 1202\nexchange 8 STW=047E\n";
+    let [_, right] = captured("telegrams-right", talk);
+    let said = ended(&drivebench(&["import", plain(&right)]), 0);
+    assert!(
+        said.contains("passed") && said.contains("of drives compared"),
+        "{said}"
+    );
+    let wrong = talk.replace("slave 8\n", "slave 8\nslave 8 deviates hides-prm-req\n");
+    let [_, wrong] = captured("telegrams-wrong", &wrong);
+    let said = ended(&drivebench(&["import", plain(&wrong)]), 1);
+    assert!(
+        said.contains("slave 8: Slave_Diag: Prm_Req and the address of a master contradict each other (NORDAC EN 2)"),
         "{said}"
     );
 }

@@ -125,7 +125,7 @@ fn right_slaves(seconds: u64) {
 
 #[test]
 fn no_right_slave_is_accused() {
-    right_slaves(5);
+    right_slaves(4);
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn missed(some: impl Iterator<Item = &'static Deviation>) -> Vec<&'static str> {
 /// Chance does not bring everything together in ten minutes of bus time.
 #[test]
 fn wrong_slaves_are_found_and_their_findings_are_scenarios() {
-    let missed = missed(deviations().step_by(6));
+    let missed = missed(deviations().step_by(8));
     assert!(missed.len() <= 1, "{missed:?}");
 }
 
@@ -191,8 +191,7 @@ fn wrong_slaves_are_found_and_their_findings_are_scenarios() {
 #[ignore = "a minute; the nightly run plays it"]
 fn nearly_all_wrong_slaves_are_found() {
     let missed = missed(deviations());
-    println!("{} {missed:?}", missed.len());
-    assert!(missed.len() <= 8, "{missed:?}");
+    assert!(missed.len() <= 6, "{missed:?}");
 }
 
 #[test]

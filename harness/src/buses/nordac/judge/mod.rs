@@ -1,5 +1,15 @@
-//! How replies of slaves can differ from those of a right one.
+//! Judges telegrams of slaves whose history is unknown: a capture.
+//!
+//! A [`Follower`] hears every telegram of the line and knows no more of a slave than these show. What the manual leaves open may have any
+//! value, and what parameters, a plant or the supply decide is not compared. It compares who replies and in which form, repetitions, the
+//! diagnosis, status words and answers of the parameter channel. Times are not compared: an adapter decides over them.
 
+mod channel;
+mod diagnosis;
+mod follower;
 mod symptom;
+#[cfg(test)]
+mod tests;
 
+pub use follower::{Breach, JudgedSlaves, judge};
 pub use symptom::{Place, Symptom};

@@ -51,3 +51,8 @@ impl SegmentReport for TelegramReport {
         }
     }
 }
+
+/// How many telegrams these traces have.
+pub(crate) fn count(traces: &[Trace]) -> usize {
+    traces.iter().map(|trace| said(trace).len()).sum()
+}

@@ -5,14 +5,12 @@
 
 mod converse;
 pub mod file;
-mod html;
-mod report;
 
 pub use converse::{Conversation, JobEnd};
 pub use file::{FrameCampaignFile, Step};
-pub(crate) use html::section;
-pub use report::{json, only, table};
 
+use crate::buses::Bus;
+use crate::campaign::line::{LineCampaign, LineClass, LineOutcome, PlayedLine};
 use harness_sim::segment::{FrameFault, Placed};
 use include_dir::{Dir, include_dir};
 use std::fmt;
@@ -45,31 +43,35 @@ impl FrameClass {
         Self::Noticed,
         Self::Unnoticed,
     ];
-
-    /// Its name in files and tables.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Answered => "answered",
-            Self::Retried => "retried",
-            Self::Noticed => "noticed",
-            Self::Unnoticed => "unnoticed",
-        }
-    }
-
-    /// What it means.
-    #[must_use]
-    pub const fn about(self) -> &'static str {
-        match self {
-            Self::Answered => "every job ended as without the fault",
-            Self::Retried => "every job ended as without the fault, after a repeated request",
-            Self::Noticed => "the master reported the fault",
-            Self::Unnoticed => {
-                "the master reported nothing, and a result or what the drive holds is wrong"
-            }
-        }
-    }
 }
+
+/// The classes, in order.
+const CLASSES: [LineClass; 4] = [
+    LineClass {
+        name: "answered",
+        about: "every job ended as without the fault",
+        letter: '.',
+        gravity: 0,
+    },
+    LineClass {
+        name: "retried",
+        about: "every job ended as without the fault, after a repeated request",
+        letter: 'R',
+        gravity: 2,
+    },
+    LineClass {
+        name: "noticed",
+        about: "the master reported the fault",
+        letter: 'N',
+        gravity: 4,
+    },
+    LineClass {
+        name: "unnoticed",
+        about: "the master reported nothing, and a result or what the drive holds is wrong",
+        letter: 'U',
+        gravity: 6,
+    },
+];
 
 /// A fault at a frame of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,52 +220,74 @@ impl FrameCampaign {
             FrameClass::Answered
         }
     }
+}
 
-    /// Plays every case, in order; `progress` is called behind each.
-    #[must_use]
-    pub fn run(&self, progress: &dyn Fn(u64)) -> PlayedFrames<'_> {
-        let play = |case: &FrameCase| {
-            let outcome = self.play(*case);
-            progress(1);
-            outcome
-        };
-        PlayedFrames {
-            campaign: self,
-            outcomes: self.cases.iter().map(play).collect(),
+impl FrameOutcome {
+    /// What happened, in a line.
+    fn happened(&self) -> String {
+        let played = &self.conversation;
+        let jobs = played
+            .ends
+            .iter()
+            .enumerate()
+            .filter(|(_, end)| !end.is_well());
+        let jobs = jobs.map(|(step, end)| format!("step {}: {}", step + 1, end.words()));
+        let parts: Vec<_> = jobs
+            .chain(played.troubles.iter().cloned())
+            .take(4)
+            .collect();
+        if parts.is_empty() {
+            let ends: Vec<_> = played.ends.iter().map(JobEnd::words).collect();
+            return format!("reported: {}", ends.join(", "));
+        }
+        parts.join("; ")
+    }
+
+    /// In no bus's words.
+    fn line(&self) -> LineOutcome {
+        LineOutcome {
+            case: self.case.to_string(),
+            place: self.case.frame,
+            fault: self.case.fault.to_string(),
+            disturbed: self.disturbed.clone(),
+            class: self.class as usize,
+            happened: self.happened(),
+            steps: self.conversation.ends.iter().map(JobEnd::words).collect(),
+            troubles: self.conversation.troubles.clone(),
         }
     }
 }
 
-/// A campaign that was played.
-#[derive(Clone, Debug)]
-pub struct PlayedFrames<'c> {
-    /// The campaign.
-    pub campaign: &'c FrameCampaign,
-    /// Every case, in order.
-    pub outcomes: Vec<FrameOutcome>,
-}
-
-impl PlayedFrames<'_> {
-    /// How many cases there are of a class.
-    #[must_use]
-    pub fn count(&self, class: FrameClass) -> u64 {
-        let of_class = |outcome: &&FrameOutcome| outcome.class == class;
-        self.outcomes.iter().filter(of_class).count() as u64
+impl LineCampaign for FrameCampaign {
+    fn name(&self) -> &str {
+        &self.name
     }
 
-    /// The pinned figures that were not met: what is counted, expected, found.
-    #[must_use]
-    pub fn differs(&self) -> Vec<(&'static str, u64, u64)> {
-        let expect = &self.campaign.file.expect;
-        let cases = ("cases", expect.cases, self.outcomes.len() as u64);
-        let classes =
-            FrameClass::ALL.map(|class| (class.name(), expect.of(class), self.count(class)));
-        let pinned = std::iter::once(cases).chain(classes);
-        let differing = pinned.filter_map(|(name, expected, found)| {
-            let expected = expected.filter(|expected| *expected != found)?;
-            Some((name, expected, found))
-        });
-        differing.collect()
+    fn cases(&self) -> usize {
+        self.cases.len()
+    }
+
+    fn run(&self, progress: &dyn Fn(u64)) -> PlayedLine {
+        let play = |case: &FrameCase| {
+            let outcome = self.play(*case).line();
+            progress(1);
+            outcome
+        };
+        let expect = &self.file.expect;
+        let all = expect.cases.map(|count| ("cases", count));
+        let classes = CLASSES.iter().zip(FrameClass::ALL);
+        let pinned = classes.filter_map(|(class, own)| Some((class.name, expect.of(own)?)));
+        PlayedLine {
+            name: self.name.trim_end_matches(".toml").to_owned(),
+            bus: Bus::Unitek.name(),
+            title: self.file.title.clone(),
+            units: "frames",
+            count: self.frames(),
+            heading: "As candump writes it",
+            classes: &CLASSES,
+            expect: all.into_iter().chain(pinned).collect(),
+            outcomes: self.cases.iter().map(play).collect(),
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The built-in campaigns have the figures that they pin, and mistakes in files are named.
 
 use super::*;
+use crate::campaign::line::table;
 
 /// The page with the figures.
 const PAGE: &str = include_str!("../../../../../corpora/campaigns/README.md");

@@ -1,0 +1,306 @@
+//! A conversation of a master with one slave on a line.
+//!
+//! The master repeats a request without a reply, and starts the slave again where that does not help, or where the slave has left the
+//! exchange. Every request begins at its own time, so that a repetition does not shift what follows.
+
+use super::file::{Step, TelegramCampaignFile};
+use harness_proto::decode::Decoded;
+use harness_proto::nordac::master::{Exchange, Startup};
+use harness_proto::nordac::pkw::Index;
+use harness_proto::nordac::{Image, PARAMETERS, PpoType};
+use harness_proto::profibus::dp::DpState;
+use harness_proto::profibus::fdl::Pdu;
+use harness_proto::profibus::master::{Requests, SlaveReply};
+use harness_proto::profibus::rate::SYN_BITS;
+use harness_proto::profibus::{BusRate, Telegram};
+use harness_proto::time::{Instant, Span};
+use harness_sim::nordac::inverter::Outputs;
+use harness_sim::nordac::{Drive, Member, Setup};
+use harness_sim::octet_segment::{LineFaultAt, LineHost, OctetSegment, Wish};
+
+/// The stations.
+const MASTER: usize = 0;
+const SLAVE: usize = 1;
+const ADDRESSES: (u8, u8) = (2, 8);
+
+const RATE: BusRate = BusRate::K500;
+
+/// Bits behind a request within which a reply must begin (slot time).
+const SLOT_BITS: u64 = 300;
+
+/// The time from one request to the next: long enough for all repetitions.
+const CYCLE: Span = Span::from_millis(20);
+
+/// How often the master starts the slave again in one step.
+const MOST_STARTS: u8 = 2;
+
+/// The most exchanges of a task.
+const MOST_EXCHANGES: u8 = 8;
+
+/// Behind the last step: what is late arrives.
+const REST: Span = Span::from_millis(50);
+
+/// How a step ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StepEnd {
+    /// The slave exchanges data.
+    Started,
+    /// The inputs of an exchange.
+    Exchanged(Image),
+    /// The answer of the parameter channel, as it stands in the inputs.
+    Answered(String),
+    /// A wait has passed.
+    Waited,
+    /// The master gave up, and why.
+    GaveUp(String),
+}
+
+impl StepEnd {
+    /// Whether the master reports it as done.
+    #[must_use]
+    pub const fn is_well(&self) -> bool {
+        !matches!(self, Self::GaveUp(_))
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match self {
+            Self::Started => "started".to_owned(),
+            Self::Exchanged(image) => {
+                format!("ZSW {:04X} HIW {:04X}", image.first(), image.main())
+            }
+            Self::Answered(answer) => answer.clone(),
+            Self::Waited => "waited".to_owned(),
+            Self::GaveUp(why) => format!("gave up: {why}"),
+        }
+    }
+}
+
+/// What the slave holds at the end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlaveState {
+    dp: DpState,
+    words: Outputs,
+    zsw: u16,
+    parameters: Vec<Option<i64>>,
+}
+
+/// What a conversation gave.
+#[derive(Clone, Debug)]
+pub struct Conversation {
+    /// How each step ended.
+    pub ends: Vec<StepEnd>,
+    /// Requests that were repeated.
+    pub repeats: u64,
+    /// How often the slave was started again.
+    pub starts: u64,
+    /// Telegrams on the line, in order: whether the slave sent it, and its octets.
+    pub telegrams: Vec<(bool, Vec<u8>)>,
+    /// What the slave holds at the end.
+    pub state: Option<SlaveState>,
+}
+
+/// Plays the steps, with a fault or without.
+pub(super) fn converse(
+    file: &TelegramCampaignFile,
+    ppo: PpoType,
+    steps: &[Step],
+    fault: Option<LineFaultAt>,
+) -> Option<Conversation> {
+    let mut desk = Desk::new(file, ppo)?;
+    if let Some(fault) = fault {
+        desk.line.inject(fault);
+    }
+    let ends = steps.iter().map(|step| desk.step(*step)).collect();
+    desk.run(desk.now + REST);
+    let state = desk.state();
+    Some(Conversation {
+        ends,
+        repeats: desk.repeated,
+        starts: desk.starts,
+        telegrams: desk.telegrams,
+        state,
+    })
+}
+
+struct Desk {
+    line: OctetSegment<Member<Drive>>,
+    requests: Requests,
+    exchange: Exchange,
+    ppo: PpoType,
+    repeats: u8,
+    now: Instant,
+    repeated: u64,
+    starts: u64,
+    telegrams: Vec<(bool, Vec<u8>)>,
+}
+
+impl Desk {
+    fn new(file: &TelegramCampaignFile, ppo: PpoType) -> Option<Self> {
+        let none = Index::default();
+        let setup = Setup {
+            parameters: vec![
+                (1624, none, ADDRESSES.1.into()),
+                (1621, none, 2),
+                (1622, none, ppo.raw().into()),
+            ],
+            ..Setup::default()
+        };
+        let drive = Drive::new(&setup, RATE, Instant::START);
+        let stations = vec![Member::Host(LineHost::default()), Member::Drive(drive)];
+        Some(Self {
+            line: OctetSegment::new(RATE.format(), stations),
+            requests: Requests::new(ADDRESSES.0, ADDRESSES.1).ok()?,
+            exchange: Exchange::new(ppo),
+            ppo,
+            repeats: file.repeats,
+            now: Instant::START,
+            repeated: 0,
+            starts: 0,
+            telegrams: Vec::new(),
+        })
+    }
+
+    fn state(&self) -> Option<SlaveState> {
+        let drive = self.line.station(SLAVE).drive()?;
+        let inverter = drive.inverter();
+        let values = PARAMETERS.iter().flat_map(|own| {
+            let sets = 0..own.sets();
+            sets.map(move |set| inverter.parameter(own, Index { element: 0, set }))
+        });
+        Some(SlaveState {
+            dp: drive.slave().state(),
+            words: inverter.words(),
+            zsw: inverter.inputs(self.now).zsw,
+            parameters: values.collect(),
+        })
+    }
+
+    fn run(&mut self, to: Instant) {
+        self.line.run_until(to);
+        self.now = self.now.max(to);
+    }
+
+    fn step(&mut self, step: Step) -> StepEnd {
+        for _ in 0..=MOST_STARTS {
+            let done = match step {
+                Step::Wait(time) => {
+                    self.run(self.now + time);
+                    Ok(StepEnd::Waited)
+                }
+                Step::Start => self.start().map(|()| StepEnd::Started),
+                Step::Exchange(control, setpoint) => {
+                    self.exchange.outputs.words[..2].copy_from_slice(&[control, setpoint]);
+                    self.once().map(|(inputs, _)| StepEnd::Exchanged(inputs))
+                }
+                Step::Read(parameter) => {
+                    self.exchange.read(&parameter);
+                    self.task()
+                }
+                Step::Write(parameter, raw) => {
+                    self.exchange.write(&parameter, raw);
+                    self.task()
+                }
+            };
+            match done {
+                Ok(end) => return end,
+                Err(_) => {
+                    self.starts += 1;
+                    // What goes out stays the same.
+                    if let Err(why) = self.start()
+                        && self.starts > u64::from(MOST_STARTS)
+                    {
+                        return StepEnd::GaveUp(why);
+                    }
+                }
+            }
+        }
+        StepEnd::GaveUp("the slave does not stay in the exchange".to_owned())
+    }
+
+    /// From the diagnosis to the exchange.
+    fn start(&mut self) -> Result<(), String> {
+        let mut startup = Startup::new(self.ppo, None);
+        while let Some(request) = startup
+            .next(&mut self.requests)
+            .map_err(|own| own.to_string())?
+        {
+            let reply = self.ask(&request);
+            startup.take(reply).map_err(|own| own.to_string())?;
+        }
+        Ok(())
+    }
+
+    /// One exchange: its inputs, and an answer that has come with it.
+    fn once(&mut self) -> Result<(Image, Option<String>), String> {
+        let request = self.exchange.exchange(&mut self.requests);
+        let reply = self.ask(&request.map_err(|own| own.to_string())?);
+        let done = self.exchange.take(reply).map_err(|own| own.to_string())?;
+        let answer = done.answer.map(|_| done.inputs.pkw.to_string());
+        Ok((done.inputs, answer))
+    }
+
+    /// Exchanges until the answer to a task has come.
+    fn task(&mut self) -> Result<StepEnd, String> {
+        for _ in 0..MOST_EXCHANGES {
+            if let (_, Some(answer)) = self.once()? {
+                return Ok(StepEnd::Answered(answer));
+            }
+        }
+        Err("the task is not answered".to_owned())
+    }
+
+    /// Sends a request, again where no reply comes, and waits for the time of the next one.
+    fn ask(&mut self, request: &Pdu) -> Option<SlaveReply> {
+        let begin = self.now;
+        let octets = Telegram::Pdu(*request).encode();
+        let mut reply = None;
+        for turn in 0..=self.repeats {
+            self.repeated += u64::from(turn > 0);
+            self.telegrams.push((false, octets.to_vec()));
+            reply = self.send(&octets);
+            if reply.is_some() {
+                break;
+            }
+        }
+        self.run(self.now.max(begin + CYCLE));
+        reply
+    }
+
+    /// Sends, and takes what has come until the line is idle.
+    fn send(&mut self, octets: &[u8]) -> Option<SlaveReply> {
+        let slot = RATE.bit_time() * SLOT_BITS;
+        let own = octets.iter().copied().map(Into::into).collect();
+        let wish = Wish {
+            ready: self.now,
+            idle_bits: SYN_BITS,
+        };
+        let host = self.line.station_mut(MASTER).host_mut()?;
+        host.forget();
+        host.send(wish, own);
+        let sent = self.now + RATE.bit_time() * SYN_BITS + RATE.octet_time() * octets.len() as u64;
+        self.run(sent + slot);
+        while self.line.is_busy() {
+            self.run(self.now + slot);
+        }
+        let host = self.line.station_mut(MASTER).host_mut()?;
+        let heard: Vec<_> = std::iter::from_fn(|| host.receive())
+            .map(|(_, own)| own)
+            .collect();
+        if heard.is_empty() {
+            return None;
+        }
+        let octets: Vec<u8> = heard.iter().map(|own| own.byte).collect();
+        self.telegrams.push((true, octets.clone()));
+        // What comes behind a whole telegram is not read.
+        match Telegram::decode(&octets) {
+            Decoded::Value { value, used }
+                if heard[..used].iter().all(|own| own.error.is_none()) =>
+            {
+                self.requests.take(&value)
+            }
+            _ => None,
+        }
+    }
+}

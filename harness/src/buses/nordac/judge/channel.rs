@@ -1,0 +1,138 @@
+//! What the parameter channel can answer to the tasks that were sent (3.4).
+
+use harness_proto::nordac::parameter::Flag;
+use harness_proto::nordac::{Parameter, Pkw};
+
+/// The tasks of an exchange since its start.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tasks(Vec<Pkw>);
+
+/// Tasks that are kept at most; beyond them nothing is compared.
+const MOST: usize = 2_000;
+
+/// Errors that the manual prints, and those that later manuals add (3.4.1).
+const ERRORS: [u32; 11] = [0, 1, 2, 3, 4, 5, 7, 9, 17, 201, 202];
+
+/// Numbers whose value need not be what was written: the control word, and what loads or stores settings or holds a password.
+const OTHERS: [u16; 6] = [CONTROL_WORD, 970, 971, 1602, 1603, 1604];
+
+/// The control word, which may be written or not (`967-write`).
+const CONTROL_WORD: u16 = 967;
+
+impl Tasks {
+    /// A task goes out.
+    pub(super) fn push(&mut self, task: Pkw) {
+        if self.0.last() != Some(&task) && self.0.len() <= MOST {
+            self.0.push(task);
+        }
+    }
+
+    /// What is wrong with an answer, and the section; `None` if a right inverter can send it.
+    pub(super) fn wrong(&self, answer: Pkw) -> Option<(&'static str, String)> {
+        if self.0.len() > MOST {
+            return None;
+        }
+        if answer.ak() == 0 {
+            let zero = answer == Pkw::default();
+            return (!zero).then(|| ("3.4.1", format!("{answer} is no answer, and is not zero")));
+        }
+        let of_number = |own: &&Pkw| own.number() == answer.number() && own.ak() != 0;
+        let mut asked = self.0.iter().filter(of_number).peekable();
+        if asked.peek().is_none() {
+            return Some(("3.4.1", format!("{answer} answers no task that was sent")));
+        }
+        let asked: Vec<_> = asked.filter(|own| own.ind == answer.ind).collect();
+        if asked.is_empty() {
+            return Some(("3.4.2", format!("{answer} carries an IND that no task had")));
+        }
+        let reasons: Vec<_> = asked
+            .iter()
+            .map(|task| self.unlike(**task, answer))
+            .collect();
+        match reasons.iter().all(Option::is_some) {
+            true => reasons.into_iter().flatten().next(),
+            false => None,
+        }
+    }
+
+    /// Why an answer is none to a task with the same number and index.
+    fn unlike(&self, task: Pkw, answer: Pkw) -> Option<(&'static str, String)> {
+        let wrong = |why: &str| Some(("3.4.1", format!("{answer} answers the task {task}: {why}")));
+        let parameter = Parameter::of(task.number());
+        let (is_long, is_array) =
+            parameter.map_or((false, false), |own| (own.has(Flag::Long), own.is_array()));
+        let kind = match answer.ak() {
+            1 => !is_long && matches!(task.ak(), 1..=3),
+            2 => is_long && matches!(task.ak(), 1..=3),
+            4 => !is_long && is_array && matches!(task.ak(), 6..=8),
+            5 => is_long && is_array && matches!(task.ak(), 6..=8),
+            6 => is_array && task.ak() == 9,
+            7 => true,
+            _ => false,
+        };
+        if !kind || answer.ak() != 7 && parameter.is_none() {
+            return wrong("an answer of another kind is expected");
+        }
+        let (high, low) = (answer.high_word(), answer.low_word());
+        if answer.ak() == 7 {
+            return self
+                .unlike_error(task, answer.pwe, parameter)
+                .and_then(|why| wrong(&why));
+        }
+        let extended = high == 0xFFFF && low & 0x8000 != 0;
+        if !is_long && high != 0 && !extended {
+            return wrong("a word stands in PWE2, and PWE1 is 0");
+        }
+        let kind = task.task();
+        if !kind.is_change() {
+            return None;
+        }
+        let read_only = parameter.is_some_and(|own| own.has(Flag::ReadOnly));
+        if read_only && task.number() != CONTROL_WORD {
+            return wrong("the parameter can only be read");
+        }
+        let mask = if is_long { u32::MAX } else { 0xFFFF };
+        let alone = self.changes(task.number()) == 1 && !OTHERS.contains(&task.number());
+        let differs = (task.pwe ^ answer.pwe) & mask != 0;
+        (alone && differs).then(|| {
+            (
+                "3.4.3",
+                format!("{answer} answers the task {task}: the value written is expected"),
+            )
+        })
+    }
+
+    /// Why an error is none of a task.
+    fn unlike_error(&self, task: Pkw, error: u32, parameter: Option<&Parameter>) -> Option<String> {
+        let possible: &[u32] = match (task.ak(), parameter) {
+            // What bit 11 leads to is open (`spm`).
+            _ if task.spm() => &ERRORS,
+            (10.., _) => &[201],
+            (4, None) => &[0, 9],
+            (5, None) => &[0, 7],
+            (_, None) => &[0],
+            (_, Some(own)) if own.needs_posicon() => &ERRORS,
+            (4, _) => &[9],
+            (5, _) => &[7],
+            _ => &ERRORS[1..],
+        };
+        let words = || {
+            possible
+                .iter()
+                .map(u32::to_string)
+                .collect::<Vec<_>>()
+                .join(" or ")
+        };
+        (!possible.contains(&error)).then(|| format!("error {} is expected", words()))
+    }
+
+    /// How many different tasks may change a parameter.
+    fn changes(&self, number: u16) -> usize {
+        let loads = |own: &&Pkw| [970, 1602].contains(&own.number());
+        let own = |task: &&Pkw| task.number() == number && task.task().is_change();
+        self.0
+            .iter()
+            .filter(|task| own(task) || loads(task))
+            .count()
+    }
+}

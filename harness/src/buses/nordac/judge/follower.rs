@@ -1,0 +1,631 @@
+//! Follows the telegrams of a line, slave by slave.
+
+use super::channel::Tasks;
+use super::diagnosis::{wrong, wrong_status};
+use super::symptom::Place;
+use super::symptom::Symptom::{self, Form, Missing, NoTelegram, Unasked, Value};
+use crate::buses::nordac::report::{TelegramRun, runs};
+use harness_proto::decode::Decoded;
+use harness_proto::nordac::{IDENT, Image, PpoType};
+use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
+use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Status};
+use harness_proto::profibus::{Buffer, Telegram};
+use harness_sim::record::Trace;
+use std::collections::BTreeMap;
+
+/// Differences that are kept at most.
+const MOST_BREACHES: usize = 50;
+
+/// Something that a slave does, and that no value of what the manual leaves open explains.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Breach {
+    /// How it differs.
+    pub what: Symptom,
+    /// The number of the telegram where it shows, counted from 1 over all stations.
+    pub telegram: usize,
+    /// The slave.
+    pub slave: u8,
+    /// The section, such as `EN 2` or `3.4.1`.
+    pub section: &'static str,
+    /// What was expected and what has come.
+    pub about: String,
+}
+
+/// What came of judging telegrams.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct JudgedSlaves {
+    /// What differs, in order.
+    pub breaches: Vec<Breach>,
+    /// Replies of slaves that were compared.
+    pub compared: usize,
+    /// What was not compared, in sentences.
+    pub remarks: Vec<String>,
+}
+
+/// The way of a slave into the exchange, as far as it was heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    Unknown,
+    /// Set_Prm of this master was confirmed; whether the slave must take it, and whether it has the watchdog on.
+    Parametrised {
+        master: u8,
+        right: bool,
+        watchdog: bool,
+    },
+    /// And Chk_Cfg of the same master behind it.
+    Configured {
+        master: u8,
+        ppo: Option<PpoType>,
+        watchdog: bool,
+    },
+}
+
+/// What a slave remembers of the last counted request (EN 1), as far as it was heard.
+#[derive(Clone, Debug)]
+enum Record {
+    Unknown,
+    /// The last request was not counted.
+    Nothing,
+    /// Its master and frame count bit, and the reply to it.
+    Counted(u8, bool, Buffer),
+}
+
+/// What the telegrams show of one slave.
+#[derive(Debug)]
+struct Follower {
+    address: u8,
+    way: Way,
+    record: Record,
+    tasks: Tasks,
+    /// A request without a reply: it is missing if the slave turns out to have gone on exchanging.
+    unanswered: Option<(usize, String)>,
+    /// Whether the slave was exchanging when it last replied.
+    exchanging: bool,
+    /// Whether the last telegram to the slave was the one before.
+    fresh: bool,
+}
+
+/// A request that was understood, and its number.
+struct Asked {
+    number: usize,
+    /// `None` for octets to which no slave may reply.
+    pdu: Option<Pdu>,
+    /// Whether a slave may have read something else: two telegrams in a row.
+    doubtful: bool,
+}
+
+/// Judges what the slaves of a line sent.
+#[must_use]
+pub fn judge(trace: &Trace) -> JudgedSlaves {
+    let mut judge = Judge::default();
+    for (number, run) in (1..).zip(runs(trace)) {
+        match run.from {
+            None => judge.asks(number, &run),
+            Some(_) => judge.replies(number, &run),
+        }
+    }
+    judge.finished();
+    judge.judged
+}
+
+#[derive(Debug, Default)]
+struct Judge {
+    followers: BTreeMap<u8, Follower>,
+    asked: Option<Asked>,
+    judged: JudgedSlaves,
+}
+
+impl std::fmt::Debug for Asked {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Asked").field(&self.number).finish()
+    }
+}
+
+impl Judge {
+    fn breach(
+        &mut self,
+        (telegram, slave): (usize, u8),
+        (what, section): (Symptom, &'static str),
+        about: String,
+    ) {
+        if self.judged.breaches.len() < MOST_BREACHES {
+            self.judged.breaches.push(Breach {
+                what,
+                telegram,
+                slave,
+                section,
+                about,
+            });
+        }
+    }
+
+    fn follower(&mut self, address: u8) -> &mut Follower {
+        self.followers
+            .entry(address)
+            .or_insert_with(|| Follower::new(address))
+    }
+
+    /// A master sends.
+    fn asks(&mut self, number: usize, run: &TelegramRun) {
+        self.silent();
+        let said = run.said();
+        let decoded = said.as_ref().map(|own| Telegram::decode(&own.octets));
+        let whole = |used: usize| said.as_ref().is_some_and(|own| used == own.octets.len());
+        let sound = said.as_ref().is_some_and(|own| own.error.is_none());
+        let (pdu, doubtful) = match decoded {
+            Some(Decoded::Value { value, used }) if sound && whole(used) => {
+                (value.pdu().copied(), false)
+            }
+            Some(Decoded::Value { used, .. }) => (None, !whole(used)),
+            _ => (None, false),
+        };
+        if let Some(pdu) = &pdu {
+            self.sent(pdu);
+        } else {
+            // What was damaged may have been heard by some.
+            self.followers
+                .values_mut()
+                .for_each(|own| own.fresh = false);
+        }
+        self.asked = Some(Asked {
+            number,
+            pdu,
+            doubtful,
+        });
+    }
+
+    /// A right request: what it does before it is answered.
+    fn sent(&mut self, pdu: &Pdu) {
+        let service = Service::of(pdu.dsap());
+        if pdu.da() == BROADCAST {
+            self.followers
+                .values_mut()
+                .for_each(|own| own.fresh = false);
+            return;
+        }
+        let follower = self.follower(pdu.da());
+        let exchanges = pdu.dsap().is_none() && service == Some(Service::DataExchange);
+        let (Way::Configured { ppo: Some(ppo), .. }, true) = (follower.way, exchanges) else {
+            return;
+        };
+        if let Some(image) = Image::decode(ppo, pdu.data()) {
+            follower.tasks.push(image.pkw);
+        }
+    }
+
+    /// The last request has found no reply.
+    fn silent(&mut self) {
+        let Some(Asked {
+            number,
+            pdu: Some(pdu),
+            ..
+        }) = self.asked.take()
+        else {
+            return;
+        };
+        let answered = match pdu.fc().function() {
+            Some(Function::FdlStatus) => pdu.form() == Shape::Plain,
+            Some(function) => function.is_srd(),
+            None => false,
+        };
+        if !answered || pdu.da() == BROADCAST {
+            let counts = pdu.fc().function().is_some_and(|own| !own.is_sdn());
+            if let Some(own) = self.followers.get_mut(&pdu.da()) {
+                own.fresh = false;
+                if counts {
+                    own.record = Record::Unknown;
+                }
+            }
+            return;
+        }
+        let name = Place::of(Some(&Telegram::Pdu(pdu))).part;
+        let follower = self.follower(pdu.da());
+        follower.record = Record::Unknown;
+        follower.fresh = false;
+        // What sets the slave up may have been lost, or not.
+        if matches!(
+            Service::of(pdu.dsap()),
+            Some(Service::SetPrm | Service::ChkCfg)
+        ) {
+            follower.way = Way::Unknown;
+            follower.unanswered = None;
+            follower.exchanging = false;
+        } else if follower.exchanging && follower.unanswered.is_none() {
+            follower.unanswered = Some((number, name));
+        }
+    }
+
+    fn finished(&mut self) {
+        self.asked = None;
+        if self.judged.compared == 0 {
+            self.judged
+                .remarks
+                .push("no reply of a slave was compared".to_owned());
+        }
+    }
+
+    /// A slave sends.
+    fn replies(&mut self, number: usize, run: &TelegramRun) {
+        let asked = self.asked.take();
+        let Some(said) = run.said() else {
+            return;
+        };
+        let damaged = run
+            .octets
+            .iter()
+            .any(|own| own.sent != own.received || own.error.is_some());
+        let from = said.from.unwrap_or(0);
+        let Some(asked) = asked else {
+            let about = "it sends again without a request in between".to_owned();
+            return self.breach((number, from), (Unasked, "EN 1"), about);
+        };
+        if damaged {
+            // On the way to the master: nothing is known of it.
+            if let Some(own) = asked.pdu.and_then(|pdu| self.followers.get_mut(&pdu.da())) {
+                (own.record, own.way, own.fresh) = (Record::Unknown, Way::Unknown, false);
+            }
+            return;
+        }
+        self.judged.compared += 1;
+        let Some(request) = asked.pdu else {
+            if !asked.doubtful {
+                let about = format!(
+                    "it replies to telegram {}, which is no request",
+                    asked.number
+                );
+                self.breach((number, from), (Unasked, "EN 1"), about);
+            }
+            return;
+        };
+        let address = request.da();
+        let found = match said.telegram() {
+            None => Some((NoTelegram, "EN 1", "its reply is no telegram".to_owned())),
+            Some(reply) => self.follower(address).judge(&request, &reply, &said.octets),
+        };
+        let shown = self.follower(address).shown();
+        if let Some((earlier, what)) = shown {
+            let about = format!("{what} is not answered, and the slave goes on exchanging");
+            self.breach((earlier, address), (Missing, "EN 1"), about);
+        }
+        if let Some((what, section, why)) = found {
+            let place = Place::of(Some(&Telegram::Pdu(request))).part;
+            self.breach((number, from), (what, section), format!("{place}: {why}"));
+        }
+    }
+}
+
+type Found = Option<(Symptom, &'static str, String)>;
+
+fn form(why: &str) -> Found {
+    Some((Form, "EN 1", why.to_owned()))
+}
+
+impl Follower {
+    fn new(address: u8) -> Self {
+        Self {
+            address,
+            way: Way::Unknown,
+            record: Record::Unknown,
+            tasks: Tasks::default(),
+            unanswered: None,
+            exchanging: false,
+            fresh: false,
+        }
+    }
+
+    /// A request whose missing reply is proven.
+    fn shown(&mut self) -> Option<(usize, String)> {
+        match self.exchanging {
+            true => self.unanswered.take(),
+            false => None,
+        }
+    }
+
+    /// Compares a reply with what the request allows.
+    fn judge(&mut self, request: &Pdu, reply: &Telegram, octets: &[u8]) -> Found {
+        if request.da() == BROADCAST {
+            return form("a request to all stations is answered");
+        }
+        let Some(function) = request.fc().function() else {
+            return form("an unknown function is answered");
+        };
+        let counts = function != Function::FdlStatus && !function.is_sdn();
+        if counts && let Some(found) = self.repetition(request, octets) {
+            return found;
+        }
+        if let Some(found) = self.head(function, request, reply) {
+            return Some(found);
+        }
+        if function == Function::FdlStatus {
+            let right = matches!(reply, Telegram::Pdu(own) if own.fc().0 == 0);
+            return (!right).then(|| (Form, "EN 1", "FC 00 is expected".to_owned()));
+        }
+        if !function.is_srd() {
+            return (!is_refusal(reply)).then(|| (Form, "EN 1", "RS is expected".to_owned()));
+        }
+        let found = self.service(request, reply);
+        self.fresh = true;
+        found
+    }
+
+    /// Who may reply, to whom, and with which service access points.
+    fn head(&self, function: Function, request: &Pdu, reply: &Telegram) -> Found {
+        if function.is_sdn() {
+            return form("a telegram without acknowledgement is answered");
+        }
+        let own = match reply {
+            Telegram::Token { .. } => return form("a slave passes no token"),
+            Telegram::Confirmation => return None,
+            Telegram::Pdu(own) => own,
+        };
+        if own.sa() != self.address || own.da() != request.sa() {
+            return form("DA or SA is another one than that of the request asks for");
+        }
+        if own.fc().is_request() || own.fc().0 & 0x30 != 0 {
+            return form("its FC is none of a slave's reply");
+        }
+        let saps = (own.dsap(), own.ssap()) == (request.ssap(), request.dsap());
+        match own.fc().status() {
+            None => form("its FC is none of a slave's reply"),
+            Some(Status::DataLow | Status::DataHigh) if !saps => {
+                form("its service access points are not those of the request in the other order")
+            }
+            Some(Status::DataHigh) if request.dsap().is_some() => {
+                form("only Data_Exchange reports that a diagnosis waits")
+            }
+            Some(Status::Ok) if function != Function::FdlStatus => {
+                form("FC 00 replies to FDL status only")
+            }
+            Some(Status::Ok | Status::Rs) if own.form() != Shape::Plain => {
+                form("a reply without data is an SD1 without service access points")
+            }
+            _ => None,
+        }
+    }
+
+    /// Takes note of the count of a request. A repetition gets the last reply again, and what may be one is not compared: `Some`.
+    fn repetition(&mut self, request: &Pdu, octets: &[u8]) -> Option<Found> {
+        let control = request.fc();
+        let (master, bit) = (request.sa(), control.fcb());
+        let reply = Buffer::of(octets);
+        let now = match reply {
+            Some(reply) if control.fcv() || bit => Record::Counted(master, bit, reply),
+            Some(_) => Record::Nothing,
+            None => Record::Unknown,
+        };
+        match std::mem::replace(&mut self.record, now) {
+            _ if !control.fcv() => None,
+            Record::Unknown => {
+                (self.way, self.fresh) = (Way::Unknown, false);
+                Some(None)
+            }
+            Record::Counted(before, count, former) if (before, count) == (master, bit) => {
+                let same = *former == *octets;
+                let why = "the reply to a repeated request is another one";
+                Some((!same).then(|| (Value, "EN 1", why.to_owned())))
+            }
+            Record::Nothing | Record::Counted(..) => None,
+        }
+    }
+
+    fn service(&mut self, request: &Pdu, reply: &Telegram) -> Found {
+        let both = request.dsap().is_some() == request.ssap().is_some();
+        let service = Service::of(request.dsap()).filter(|_| both);
+        let confirmed = *reply == Telegram::Confirmation;
+        let data = match reply {
+            Telegram::Pdu(own) if !is_refusal(reply) => Some(own.data()),
+            _ => None,
+        };
+        let refused = is_refusal(reply);
+        let only_refused =
+            |section| (!refused).then(|| (Form, section, "RS is expected".to_owned()));
+        match service {
+            Some(Service::SetPrm) => self.set_up(request, confirmed, refused),
+            Some(Service::ChkCfg) => self.configured(request, confirmed, refused),
+            Some(Service::DataExchange) => self.exchanged(request, data, confirmed),
+            Some(Service::SlaveDiag | Service::GetCfg | Service::RdInp | Service::RdOutp)
+                if !request.data().is_empty() =>
+            {
+                only_refused("EN 2")
+            }
+            Some(Service::SlaveDiag) => match data {
+                None => Some((Form, "EN 2", "a diagnosis is expected".to_owned())),
+                Some(data) => self.diagnosis(data),
+            },
+            Some(Service::GetCfg) => {
+                let cfg = data.and_then(PpoType::from_cfg);
+                let other = matches!(self.way, Way::Configured { ppo: Some(own), .. } if self.exchanging && cfg != Some(own));
+                (cfg.is_none() || other).then(|| {
+                    (
+                        Value,
+                        "3.1",
+                        "the configuration of its PPO type is expected".to_owned(),
+                    )
+                })
+            }
+            Some(Service::RdInp | Service::RdOutp) => match data {
+                None if refused => None,
+                Some(data) if PpoType::ALL.iter().any(|own| own.octets() == data.len()) => None,
+                _ => Some((
+                    Form,
+                    "EN 2",
+                    "RS or the process data are expected".to_owned(),
+                )),
+            },
+            _ => only_refused("EN 2"),
+        }
+    }
+
+    fn set_up(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Found {
+        (self.exchanging, self.unanswered) = (false, None);
+        let prm = SetPrm::decode(request.data());
+        let locks = prm
+            .as_ref()
+            .is_some_and(|own| own.has(SetPrm::LOCK) && !own.has(SetPrm::UNLOCK));
+        self.way = match (&prm, confirmed) {
+            (Some(own), true) if locks => Way::Parametrised {
+                master: request.sa(),
+                right: own.ident == IDENT
+                    && own.watchdog_tens_of_ms() != Some(0)
+                    && own.user.is_empty(),
+                watchdog: own.has(SetPrm::WATCHDOG),
+            },
+            // Too short.
+            (None, true) => Way::Parametrised {
+                master: request.sa(),
+                right: false,
+                watchdog: false,
+            },
+            _ => Way::Unknown,
+        };
+        // Parameters that a slave may take or not (`user-prm`).
+        if prm.is_some_and(|own| !own.user.is_empty()) {
+            self.way = Way::Unknown;
+        }
+        (!confirmed && !refused).then(|| (Form, "EN 2", "a confirmation is expected".to_owned()))
+    }
+
+    fn configured(&mut self, request: &Pdu, confirmed: bool, refused: bool) -> Found {
+        let was_exchanging = std::mem::replace(&mut self.exchanging, false);
+        self.unanswered = None;
+        let ppo = PpoType::from_cfg(request.data());
+        self.way = match self.way {
+            Way::Parametrised {
+                master,
+                right: true,
+                watchdog,
+            } if confirmed && master == request.sa() => {
+                self.tasks = Tasks::default();
+                Way::Configured {
+                    master,
+                    ppo,
+                    watchdog,
+                }
+            }
+            // The same again leaves the slave where it is.
+            same @ Way::Configured { ppo: own, .. }
+                if confirmed && was_exchanging && own == ppo && ppo.is_some() =>
+            {
+                same
+            }
+            _ => Way::Unknown,
+        };
+        (!confirmed && !refused)
+            .then(|| (Form, "EN 2", "a confirmation or RS is expected".to_owned()))
+    }
+
+    fn exchanged(&mut self, request: &Pdu, data: Option<&[u8]>, confirmed: bool) -> Found {
+        if confirmed {
+            return Some((Form, "EN 2", "RS or the inputs are expected".to_owned()));
+        }
+        let Some(data) = data else {
+            (self.exchanging, self.unanswered) = (false, None);
+            if matches!(self.way, Way::Configured { .. }) {
+                self.way = Way::Unknown;
+            }
+            return None;
+        };
+        let early = matches!(self.way, Way::Parametrised { master, .. } if master == request.sa() && self.fresh);
+        if early {
+            return Some((Form, "EN 2", "RS is expected before Chk_Cfg".to_owned()));
+        }
+        if request.data().len() != data.len()
+            || !PpoType::ALL.iter().any(|own| own.octets() == data.len())
+        {
+            return Some((
+                Form,
+                "3.1",
+                "as many octets as the request has are expected, or RS".to_owned(),
+            ));
+        }
+        let way = match self.way {
+            Way::Configured { master, ppo, .. } => Some((master, ppo)),
+            _ => None,
+        };
+        if way.is_some_and(|(master, _)| master != request.sa() && self.exchanging) {
+            return Some((
+                Form,
+                "EN 2",
+                "RS is expected: another master has locked the slave".to_owned(),
+            ));
+        }
+        self.exchanging = true;
+        let by_length = match data.len() {
+            4 => Some(PpoType::Three),
+            20 => Some(PpoType::Two),
+            _ => None,
+        };
+        let known = way.and_then(|(_, ppo)| ppo);
+        let image = known
+            .or(by_length)
+            .and_then(|ppo| Some((ppo, Image::decode(ppo, data)?)));
+        let Some((ppo, image)) = image else {
+            return None;
+        };
+        self.inputs(&image, known.is_some() && ppo.has_pkw())
+    }
+
+    fn inputs(&self, image: &Image, tasks: bool) -> Found {
+        let [zsw, actual, third, _, rest @ ..] = image.words;
+        if let Some((section, rule)) = wrong_status(zsw, actual) {
+            return Some((
+                Value,
+                section,
+                format!("ZSW {zsw:04X}, HIW {actual:04X}: {rule}"),
+            ));
+        }
+        if third != 0 || rest != [0, 0] {
+            return Some((Value, "3.1", "PZD3, PZD5 and PZD6 are 0".to_owned()));
+        }
+        let wrong = tasks.then(|| self.tasks.wrong(image.pkw)).flatten();
+        wrong.map(|(section, why)| (Value, section, why))
+    }
+
+    fn diagnosis(&mut self, data: &[u8]) -> Found {
+        let value = |why: String| Some((Value, "EN 2", why));
+        if let Some(why) = wrong(data) {
+            return value(why);
+        }
+        let own = Diagnosis::decode(data)?;
+        let waits = own.has_mode(Diagnosis::PRM_REQ);
+        if waits {
+            (self.exchanging, self.unanswered) = (false, None);
+        }
+        let of = |master: u8| own.master == Some(master);
+        match self.way {
+            Way::Parametrised { right: false, .. }
+                if self.fresh && waits && !own.has(Diagnosis::PRM_FAULT) =>
+            {
+                value("Prm_Fault is expected behind wrong parameters".to_owned())
+            }
+            Way::Configured { ppo: None, .. }
+                if self.fresh && waits && !own.has(Diagnosis::CFG_FAULT) =>
+            {
+                value("Cfg_Fault is expected behind a wrong configuration".to_owned())
+            }
+            Way::Parametrised {
+                right: true,
+                master,
+                ..
+            } if of(master) && !own.has(Diagnosis::NOT_READY) && self.fresh => {
+                value("Station_Not_Ready is expected before Chk_Cfg".to_owned())
+            }
+            Way::Parametrised {
+                right: true,
+                master,
+                watchdog,
+            }
+            | Way::Configured {
+                master, watchdog, ..
+            } if of(master) && own.has_mode(Diagnosis::WD_ON) != watchdog => {
+                value("WD_On is not what Set_Prm has asked for".to_owned())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Whether a telegram is RS.
+fn is_refusal(telegram: &Telegram) -> bool {
+    matches!(telegram, Telegram::Pdu(own) if own.fc().status() == Some(Status::Rs))
+}
