@@ -314,6 +314,12 @@ pub(crate) fn write_shared(
     report_of(traces).map_or(Ok(()), |report| report.write(traces, form, &mut out))
 }
 
+/// The bit rate of octets on a shared line, by their times; the usual one where they do not show it.
+pub(crate) fn bits_per_second(traces: &[Trace]) -> u32 {
+    let rate = traces.iter().find_map(nordac::report::pcapng::rate);
+    rate.unwrap_or_default().bits_per_second()
+}
+
 /// Compares the telegrams of two runs, and says whether they are the same, and how they differ; `None` unless both are octets of a shared
 /// line. Times may differ by `tolerance`.
 pub(crate) fn telegram_difference(

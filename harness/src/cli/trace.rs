@@ -4,7 +4,7 @@ use super::args::{TraceArguments, TraceFormat, TraceLayout, TraceOutput};
 use super::exit::Exit;
 use super::output::{Output, unless_closed};
 use super::run::{details, play_entry};
-use crate::buses::{SharedForm, carry_frames, rows, share_a_line, write_shared};
+use crate::buses::{SharedForm, bits_per_second, carry_frames, rows, share_a_line, write_shared};
 use crate::library::{Entry, sources};
 use crate::regular;
 use crate::report::plot::plots;
@@ -117,19 +117,13 @@ fn write(
 ) -> std::io::Result<()> {
     let rows = showing.rows.map(|rows| rows.first - 1..rows.last);
     if share_a_line(shown.traces) {
-        return of_shared_line(shown.traces, format, rows, out);
+        let signals = signals(showing);
+        return of_shared_line(shown.traces, (format, signals), rows, out);
     }
     match format {
         TraceFormat::Json => json::write(shown.traces, shown.records, out),
         TraceFormat::Csv => csv::write(shown.traces, out),
-        TraceFormat::Vcd => {
-            let signals = if showing.lines_only {
-                Signals::Lines
-            } else {
-                Signals::All
-            };
-            vcd::write(shown.traces, shown.rate, signals, out)
-        }
+        TraceFormat::Vcd => vcd::write(shown.traces, shown.rate, signals(showing), out),
         TraceFormat::Pcapng => pcapng::write(shown.traces, shown.rate, out),
         TraceFormat::Svg => {
             let options = Options {
@@ -162,14 +156,22 @@ fn write(
     }
 }
 
+fn signals(showing: &TraceOutput) -> Signals {
+    match showing.lines_only {
+        true => Signals::Lines,
+        false => Signals::All,
+    }
+}
+
 /// Writes what a shared line carried. Other forms have been refused by [`fits_bus`].
 fn of_shared_line(
     traces: &[Trace],
-    format: TraceFormat,
+    (format, signals): (TraceFormat, Signals),
     wanted: Option<Range<usize>>,
     mut out: impl Write,
 ) -> std::io::Result<()> {
     match format {
+        TraceFormat::Vcd => vcd::write_shared(traces, bits_per_second(traces), signals, out),
         TraceFormat::Json => write_shared(traces, SharedForm::Json, out),
         TraceFormat::Candump => write_shared(traces, SharedForm::Candump, out),
         TraceFormat::Csv => write_shared(traces, SharedForm::Csv, out),
@@ -193,8 +195,8 @@ pub(crate) fn fits_bus(format: TraceFormat, traces: &[Trace], output: &mut Outpu
         (true, _, format) if OF_RINGS.contains(&format) => {
             format!("`--format {name}` shows bytes of a ring, and this bus carries frames; use table, json, csv, candump or pcapng")
         }
-        (false, true, format) if OF_RINGS.contains(&format) => {
-            format!("`--format {name}` shows bytes of a ring, and the stations of this bus share one line; use table, json, csv or pcapng")
+        (false, true, TraceFormat::Svg) => {
+            format!("`--format {name}` shows bytes of a ring, and the stations of this bus share one line; use table, json, csv, vcd or pcapng")
         }
         (false, _, TraceFormat::Candump) => {
             "`--format candump` shows frames of CAN, and this bus carries bytes; use table, json or csv".to_owned()

@@ -18,6 +18,9 @@
 //! as a line that is low for eleven and a half bits (how long it really was, a trace does not say), an overrun as the good
 //! byte that the line carried. A byte that did not arrive is not on the line. Bytes that come closer than a byte time are
 //! drawn one behind the other.
+//!
+//! A line that all stations share has for each station one wire with what this station sends, 8E1, and no `state`. The time scale is 10 ns: a bit
+//! at 1.5 Mbit/s is 66.7 of them.
 
 use super::pcapng::name;
 use crate::report::walk::{Reader, SenderState};
@@ -28,8 +31,18 @@ use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 use std::io::Write;
 
-/// Thirds of a nanosecond in a tick of 100 ns.
-const TICK: u64 = 300;
+/// How lines are drawn.
+#[derive(Clone, Copy)]
+struct Drawing {
+    /// Thirds of a nanosecond in a bit, and in a tick.
+    bit: u64,
+    tick: u64,
+    /// The time scale, as the file says it.
+    scale: &'static str,
+    /// Whether parity is odd.
+    odd: bool,
+    signals: Signals,
+}
 
 /// What is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,14 +63,61 @@ pub fn write(
     signals: Signals,
     mut out: impl Write,
 ) -> std::io::Result<()> {
-    let bit = rate.bit_time().units();
+    let drawing = Drawing {
+        bit: rate.bit_time().units(),
+        tick: 300,
+        scale: "100 ns",
+        odd: true,
+        signals,
+    };
     let mut links = Vec::new();
     for (ring, trace) in traces.iter().enumerate() {
         for (link, reader) in trace.channels.iter().zip(Reader::all(trace)) {
-            links.push(Drawn::new(ring, link, reader, (bit, signals)));
+            // `98->97` as a word that every program takes for a name.
+            let name = name(ring, link)
+                .replace("->", "_to_")
+                .replace("2:", "ring2_");
+            let place = match link.from {
+                None => 250,
+                Some(drive) => usize::from(drive),
+            };
+            let place = ring * 256 + place;
+            links.push(Drawn::new(name, place, link, (Some(reader), drawing)));
         }
     }
-    head(&links, signals, &mut out)?;
+    draw(&mut links, drawing, &mut out)
+}
+
+/// Writes what the stations of a shared line sent, 8E1, at a number of bits a second.
+///
+/// # Errors
+/// What the writer says.
+pub fn write_shared(
+    traces: &[Trace],
+    bits_per_second: u32,
+    signals: Signals,
+    mut out: impl Write,
+) -> std::io::Result<()> {
+    let drawing = Drawing {
+        bit: 3_000_000_000 / u64::from(bits_per_second.max(1)),
+        tick: 30,
+        scale: "10 ns",
+        odd: false,
+        signals,
+    };
+    let channels = traces.iter().flat_map(|trace| &trace.channels);
+    let named = channels.enumerate().map(|(place, channel)| {
+        let name = match channel.from {
+            None => "master".to_owned(),
+            Some(drive) => format!("drive_{drive}"),
+        };
+        Drawn::new(name, place, channel, (None, drawing))
+    });
+    draw(&mut named.collect::<Vec<_>>(), drawing, &mut out)
+}
+
+fn draw(links: &mut [Drawn<'_>], drawing: Drawing, out: &mut impl Write) -> std::io::Result<()> {
+    head(links, drawing, out)?;
     let mut heap: BinaryHeap<Reverse<(u64, usize)>> = BinaryHeap::new();
     for (place, link) in links.iter_mut().enumerate() {
         heap.extend(link.next_tick().map(|tick| Reverse((tick, place))));
@@ -84,15 +144,17 @@ pub fn write(
         }
     }
     out.write_all(text.as_bytes())?;
-    let end = links.iter().map(|link| link.free / TICK).max().unwrap_or(0);
+    let ends = links.iter().map(|link| link.free / drawing.tick);
+    let end = ends.max().unwrap_or(0);
     // A quiet byte time behind the last one, so that a decoder sees its stop bit.
-    writeln!(out, "#{}", end.max(now) + 11 * bit / TICK)?;
+    writeln!(out, "#{}", end.max(now) + 11 * drawing.bit / drawing.tick)?;
     out.flush()
 }
 
-fn head(links: &[Drawn<'_>], signals: Signals, out: &mut impl Write) -> std::io::Result<()> {
-    let vectors = signals == Signals::All;
-    writeln!(out, "$version drivebench $end\n$timescale 100 ns $end")?;
+fn head(links: &[Drawn<'_>], drawing: Drawing, out: &mut impl Write) -> std::io::Result<()> {
+    let vectors = drawing.signals == Signals::All;
+    let scale = drawing.scale;
+    writeln!(out, "$version drivebench $end\n$timescale {scale} $end")?;
     for link in links {
         let [line, byte, status, state] = &link.codes;
         let name = &link.name;
@@ -101,6 +163,8 @@ fn head(links: &[Drawn<'_>], signals: Signals, out: &mut impl Write) -> std::io:
         if vectors {
             writeln!(out, "$var wire 8 {byte} {name}_byte $end")?;
             writeln!(out, "$var wire 3 {status} {name}_status $end")?;
+        }
+        if vectors && link.reader.is_some() {
             writeln!(out, "$var wire 3 {state} {name}_state $end")?;
         }
         writeln!(out, "$upscope $end")?;
@@ -110,7 +174,10 @@ fn head(links: &[Drawn<'_>], signals: Signals, out: &mut impl Write) -> std::io:
         let [line, byte, status, state] = &link.codes;
         writeln!(out, "1{line}")?;
         if vectors {
-            writeln!(out, "bxxxxxxxx {byte}\nbxxx {status}\nbxxx {state}")?;
+            writeln!(out, "bxxxxxxxx {byte}\nbxxx {status}")?;
+        }
+        if vectors && link.reader.is_some() {
+            writeln!(out, "bxxx {state}")?;
         }
     }
     writeln!(out, "$end")
@@ -132,9 +199,9 @@ struct Drawn<'t> {
     name: String,
     codes: [String; 4],
     bytes: std::slice::Iter<'t, LineByte>,
-    reader: Reader<'t>,
-    bit: u64,
-    vectors: bool,
+    /// Tells what the sender was doing; `None` where `state` is not shown.
+    reader: Option<Reader<'t>>,
+    drawing: Drawing,
     /// Until when the line is drawn, in thirds of a nanosecond.
     free: u64,
     changes: VecDeque<(u64, Change)>,
@@ -144,27 +211,18 @@ struct Drawn<'t> {
 
 impl<'t> Drawn<'t> {
     fn new(
-        ring: usize,
-        link: &'t Channel,
-        reader: Reader<'t>,
-        (bit, signals): (u64, Signals),
+        name: String,
+        place: usize,
+        channel: &'t Channel,
+        (reader, drawing): (Option<Reader<'t>>, Drawing),
     ) -> Self {
-        // `98->97` as a word that every program takes for a name.
-        let name = name(ring, link)
-            .replace("->", "_to_")
-            .replace("2:", "ring2_");
-        let place = match link.from {
-            None => 250,
-            Some(drive) => usize::from(drive),
-        };
-        let code = |kind| code(ring * 1_024 + place * 4 + kind);
+        let code = |kind| code(place * 4 + kind);
         Self {
             name,
             codes: [code(0), code(1), code(2), code(3)],
-            bytes: link.octets().iter(),
+            bytes: channel.octets().iter(),
             reader,
-            bit,
-            vectors: signals == Signals::All,
+            drawing,
             free: 0,
             changes: VecDeque::new(),
             shown: (None, 7, 7),
@@ -177,14 +235,16 @@ impl<'t> Drawn<'t> {
             self.draw(byte);
         }
         // A decoder wants to see the line idle before the first start bit, which may be at the very start.
-        self.changes.front().map(|(at, _)| (at / TICK).max(1))
+        let tick = self.drawing.tick;
+        self.changes.front().map(|(at, _)| (at / tick).max(1))
     }
 
     /// The changes of the line for one byte, from its start bit on.
     fn draw(&mut self, byte: &LineByte) {
-        let seen = self.reader.see(byte);
+        let seen = self.reader.as_mut().map(|reader| reader.see(byte).state);
+        let Drawing { bit, odd, .. } = self.drawing;
         let at = byte.at.since_start().units();
-        let start = at.saturating_sub(11 * self.bit).max(self.free);
+        let start = at.saturating_sub(11 * bit).max(self.free);
         let status = match (byte.received, byte.error) {
             (None, _) => 5,
             (_, None) => 0,
@@ -193,7 +253,7 @@ impl<'t> Drawn<'t> {
             (_, Some(LineError::Break)) => 3,
             (_, Some(LineError::Overrun)) => 4,
         };
-        let state = SenderState::ALL.iter().position(|own| *own == seen.state);
+        let state = seen.and_then(|seen| SenderState::ALL.iter().position(|own| *own == seen));
         let read = Change::Read {
             byte: byte.received,
             status,
@@ -206,36 +266,36 @@ impl<'t> Drawn<'t> {
         };
         if byte.error == Some(LineError::Break) {
             self.changes.push_back((start, Change::Line(false)));
-            self.changes.push_back((start + 11 * self.bit, read));
-            let end = start + 11 * self.bit + self.bit / 2;
+            self.changes.push_back((start + 11 * bit, read));
+            let end = start + 11 * bit + bit / 2;
             self.changes.push_back((end, Change::Line(true)));
-            self.free = start + 12 * self.bit;
+            self.free = start + 12 * bit;
             return;
         }
         let wrong = byte.error == Some(LineError::Parity);
-        let odd = (received.count_ones() % 2 == 0) != wrong;
+        let parity = (received.count_ones().is_multiple_of(2) == odd) != wrong;
         // Start bit 0, data bits with the lowest first, parity bit: bit 0 goes first.
-        let bits = u16::from(received) << 1 | u16::from(odd) << 9;
+        let bits = u16::from(received) << 1 | u16::from(parity) << 9;
         let mut level = true;
         for place in 0..10 {
             let next = bits >> place & 1 == 1;
             if next != level {
-                let at = start + place * self.bit;
+                let at = start + place * bit;
                 self.changes.push_back((at, Change::Line(next)));
                 level = next;
             }
         }
-        let stop = start + 10 * self.bit;
+        let stop = start + 10 * bit;
         if byte.error == Some(LineError::Framing) {
             if level {
                 self.changes.push_back((stop, Change::Line(false)));
             }
-            let end = stop + self.bit * 3 / 4;
+            let end = stop + bit * 3 / 4;
             self.changes.push_back((end, Change::Line(true)));
         } else if !level {
             self.changes.push_back((stop, Change::Line(true)));
         }
-        self.free = start + 11 * self.bit;
+        self.free = start + 11 * bit;
         self.changes.push_back((self.free, read));
     }
 
@@ -250,7 +310,7 @@ impl<'t> Drawn<'t> {
                 text.push_str(line);
                 text.push('\n');
             }
-            Change::Read { .. } if !self.vectors => {}
+            Change::Read { .. } if self.drawing.signals == Signals::Lines => {}
             Change::Read {
                 byte,
                 status,
@@ -262,7 +322,7 @@ impl<'t> Drawn<'t> {
                 if self.shown.1 != status {
                     vector(text, 3, Some(status), status_code);
                 }
-                if self.shown.2 != state {
+                if self.reader.is_some() && self.shown.2 != state {
                     vector(text, 3, Some(state), state_code);
                 }
                 self.shown = (byte, status, state);
