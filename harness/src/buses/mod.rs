@@ -377,18 +377,21 @@ pub(crate) fn fuzz_port(
     }
 }
 
-/// Judges the findings of a run on drives of a bus of frames again; `None` if the folder has no such run.
-pub(crate) fn verify_frames(
+/// Judges the findings of a run on drives of a shared line again; `None` if the folder has no such run.
+pub(crate) fn verify_shared(
     folder: &Path,
     signer: Option<Signer<'_>>,
     output: &mut Output,
 ) -> Option<std::io::Result<Exit>> {
-    let (kept, _) = read_as::<unitek::explore::FrameTalk>(folder).ok()?;
+    if let Ok((kept, _)) = read_as::<unitek::explore::FrameTalk>(folder) {
+        return Some(verify(folder, &kept, signer, output));
+    }
+    let (kept, _) = read_as::<nordac::explore::TelegramTalk>(folder).ok()?;
     Some(verify(folder, &kept, signer, output))
 }
 
-/// Makes a finding on drives of a bus of frames small.
-pub(crate) fn shrink_frames(
+/// Makes a finding on drives of a shared line small.
+pub(crate) fn shrink_shared(
     bus: Bus,
     finding: &Path,
     most: u32,
@@ -396,8 +399,9 @@ pub(crate) fn shrink_frames(
 ) -> std::io::Result<Exit> {
     match bus {
         Bus::Unitek => unitek::cli::fuzz::shrink(finding, most, output),
-        Bus::Novobus | Bus::Nordac => {
-            output.complain("the finding is of a bus without frames");
+        Bus::Nordac => nordac::cli::fuzz::shrink(finding, most, output),
+        Bus::Novobus => {
+            output.complain("the finding is of a ring, and names another bus");
             Ok(Exit::Usage)
         }
     }

@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::output::Output;
 use super::run::play_entry;
 use super::trace::{ShownRun, fits_bus, fits_output, show};
-use crate::buses::{self, Bus, JudgedFrames, share_a_line, telegram_difference};
+use crate::buses::{self, Bus, JudgedFrames, carry_frames, share_a_line, telegram_difference};
 use crate::capture::frame_diff::frame_diff;
 use crate::capture::{
     Capture, ComparedRun, Judged, Options, diff as compare, is_capture, judge, read_file, scenario,

@@ -4,7 +4,7 @@ use super::args::duration;
 use super::exit::Exit;
 use super::fuzz::tell;
 use super::output::Output;
-use crate::buses::{shrink_frames, shrink_rings};
+use crate::buses::{shrink_rings, shrink_shared};
 use crate::counted::counted;
 use crate::explore::{ExploreError, Finding, FuzzCase, bus_of};
 use clap::Args;
@@ -40,7 +40,7 @@ pub struct ShrinkArguments {
 pub(crate) fn shrink(arguments: &ShrinkArguments, output: &mut Output) -> std::io::Result<Exit> {
     if let Some(bus) = bus_of(&arguments.finding) {
         let most = arguments.runs.unwrap_or(RUNS);
-        return shrink_frames(bus, &arguments.finding, most, output);
+        return shrink_shared(bus, &arguments.finding, most, output);
     }
     shrink_rings(arguments, output)
 }

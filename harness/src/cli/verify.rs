@@ -4,7 +4,7 @@ use super::args::VerifyArguments;
 use super::exit::Exit;
 use super::fuzz;
 use super::output::Output;
-use crate::buses::verify_frames;
+use crate::buses::verify_shared;
 use crate::counted::counted;
 use crate::evidence::{Signer, verify as judge_again};
 use crate::explore::read as read_run;
@@ -19,7 +19,7 @@ pub(crate) fn verify(arguments: &VerifyArguments, output: &mut Output) -> std::i
     if let Ok((kept, _)) = read_run(&arguments.folder) {
         return fuzz::verify(&arguments.folder, &kept, signer, output);
     }
-    if let Some(exit) = verify_frames(&arguments.folder, signer, output) {
+    if let Some(exit) = verify_shared(&arguments.folder, signer, output) {
         return exit;
     }
     let verified = match judge_again(&arguments.folder, signer) {

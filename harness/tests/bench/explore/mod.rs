@@ -6,6 +6,7 @@ mod frames;
 mod masters;
 mod rings;
 mod runs;
+mod telegrams;
 mod texts;
 mod witness;
 

@@ -155,3 +155,27 @@ fn campaigns_over_frames() {
     let page = std::fs::read_to_string(&page).expect("a page");
     assert!(page.contains("Where: faults across, frames down"));
 }
+
+/// Campaigns of telegrams have classes of their own.
+#[test]
+fn campaigns_over_telegrams() {
+    let wrong = drivebench(&["campaign", "nordac/3.3-telegrams", "--only", "wrong-word"]);
+    let lines = stdout(&wrong);
+    assert_eq!(
+        (wrong.status.code(), lines.lines().count()),
+        (Some(0), 6),
+        "{lines}"
+    );
+    assert!(
+        lines.lines().all(|line| line.contains(":former")),
+        "{lines}"
+    );
+    let bits = drivebench(&["campaign", "nordac/3.3-single-bits", "--format", "json"]);
+    let listed: Value = serde_json::from_str(&stdout(&bits)).expect("JSON");
+    let own = &listed["campaigns"][0];
+    assert_eq!(
+        (&own["bus"], &own["telegrams"]),
+        (&"nordac".into(), &36.into())
+    );
+    assert_eq!(own["cases"].as_array().map(Vec::len), Some(8124));
+}

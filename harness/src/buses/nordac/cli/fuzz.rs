@@ -98,9 +98,8 @@ fn refused(rig: &Rig, arguments: &FuzzRunArguments) -> Option<&'static str> {
         );
     }
     let second = arguments.deviates.iter().any(|own| own.ring != 0);
-    second.then_some(
-        "a deviation of a NORDAC inverter is planted as ADDRESS=NAME, such as 8=no-off2",
-    )
+    second
+        .then_some("a deviation of a NORDAC inverter is planted as ADDRESS=NAME, such as 8=no-off2")
 }
 
 /// Makes a finding small, in at most `most` runs, and writes what came of it beside it.

@@ -5,6 +5,7 @@ mod bench;
 pub(crate) mod cells;
 mod check;
 mod control;
+pub(crate) mod fuzz;
 mod info;
 mod params;
 mod read;
@@ -18,7 +19,6 @@ use super::driver;
 use crate::buses::commands::{DriveCommand, ParamsCommand};
 use crate::cli::exit::Exit;
 use crate::cli::failure::{Failure, exit_of_trouble};
-use crate::cli::fuzz::FuzzRunArguments;
 use crate::cli::output::Output;
 use crate::rig::Rig;
 use control::Stop;
@@ -69,15 +69,6 @@ pub(crate) fn drive(
             "this command is for drives of another bus; on NORDAC inverters there are start, exchange, on, off, quick-stop, stop, block, acknowledge, read, write, watch, info, top and params",
         )),
     }
-}
-
-/// Explores the inverters of a rig.
-///
-/// # Errors
-/// The output cannot be written.
-pub(crate) fn fuzz(_: &Rig, _: &FuzzRunArguments, output: &mut Output) -> std::io::Result<Exit> {
-    output.complain("`fuzz run` is not for NORDAC inverters yet");
-    Ok(Exit::Usage)
 }
 
 impl From<driver::Error> for Failure {

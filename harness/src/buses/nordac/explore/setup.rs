@@ -1,9 +1,11 @@
 //! What the simulated slaves of a run are made of.
 
 use crate::buses::Bus;
+use crate::buses::nordac::rig::{rate, slaves};
 use crate::buses::nordac::serve;
 use crate::buses::nordac::simulate::Setup;
 use crate::explore::ExploreError;
+use crate::rig::Rig;
 use crate::scenario::source::Source;
 use harness_proto::nordac::Properties;
 use harness_sim::nordac::deviation::deviation;
@@ -67,6 +69,21 @@ impl TelegramSetup {
             header: others,
             deviates,
         }
+    }
+
+    /// The line of a simulated rig, with more deviations than its file plants.
+    #[must_use]
+    pub fn of_rig(rig: &Rig, more: Vec<PlantedSlave>) -> Self {
+        let port = rig.port();
+        let rate = port.map(|port| format!("rate {}", rate(port).name()));
+        let own = port.map(slaves).unwrap_or_default();
+        let own = own.iter().flat_map(|own| {
+            let (address, ppo) = (own.address, own.ppo.unwrap_or_default().number());
+            let there = format!("slave {address} ppo {ppo}");
+            [there, format!("slave {address} parameter 1621 = 2")]
+        });
+        let lines = rig.file.sim.iter().flat_map(|sim| sim.setup.clone());
+        Self::new(rate.into_iter().chain(own).chain(lines).collect(), more)
     }
 
     /// The slaves under test.

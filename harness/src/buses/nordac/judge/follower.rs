@@ -7,9 +7,9 @@ use super::symptom::Symptom::{self, Form, Missing, NoTelegram, Unasked, Value};
 use crate::buses::nordac::report::{TelegramRun, runs};
 use harness_proto::decode::Decoded;
 use harness_proto::nordac::{IDENT, Image, PpoType};
+use harness_proto::profibus::Telegram;
 use harness_proto::profibus::dp::{Diagnosis, Service, SetPrm};
 use harness_proto::profibus::fdl::{BROADCAST, Form as Shape, Function, Pdu, Status};
-use harness_proto::profibus::{Buffer, Telegram};
 use harness_sim::record::Trace;
 use std::collections::BTreeMap;
 
@@ -67,7 +67,7 @@ enum Record {
     /// The last request was not counted.
     Nothing,
     /// Its master and frame count bit, and the reply to it.
-    Counted(u8, bool, Buffer),
+    Counted(u8, bool, Vec<u8>),
 }
 
 /// What the telegrams show of one slave.
@@ -387,11 +387,9 @@ impl Follower {
     fn repetition(&mut self, request: &Pdu, octets: &[u8]) -> Option<Found> {
         let control = request.fc();
         let (master, bit) = (request.sa(), control.fcb());
-        let reply = Buffer::of(octets);
-        let now = match reply {
-            Some(reply) if control.fcv() || bit => Record::Counted(master, bit, reply),
-            Some(_) => Record::Nothing,
-            None => Record::Unknown,
+        let now = match control.fcv() || bit {
+            true => Record::Counted(master, bit, octets.to_vec()),
+            false => Record::Nothing,
         };
         match std::mem::replace(&mut self.record, now) {
             _ if !control.fcv() => None,
@@ -400,7 +398,7 @@ impl Follower {
                 Some(None)
             }
             Record::Counted(before, count, former) if (before, count) == (master, bit) => {
-                let same = *former == *octets;
+                let same = former == octets;
                 let why = "the reply to a repeated request is another one";
                 Some((!same).then(|| (Value, "EN 1", why.to_owned())))
             }
@@ -559,9 +557,7 @@ impl Follower {
         let image = known
             .or(by_length)
             .and_then(|ppo| Some((ppo, Image::decode(ppo, data)?)));
-        let Some((ppo, image)) = image else {
-            return None;
-        };
+        let (ppo, image) = image?;
         self.inputs(&image, known.is_some() && ppo.has_pkw())
     }
 

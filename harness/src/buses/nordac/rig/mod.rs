@@ -68,7 +68,7 @@ pub(crate) const PORT: PortRow = PortRow {
     judge: None,
     command: super::cli::drive,
     check: super::cli::check,
-    fuzz: super::cli::fuzz,
+    fuzz: super::cli::fuzz::run,
 };
 
 /// Drives of a simulated bench, as its file lists them, and the limits with which all is permitted.
