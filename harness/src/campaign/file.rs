@@ -71,7 +71,7 @@ pub struct CampaignFile {
     pub seed: Option<u32>,
     /// How many cases there must be of each class; what is not named is not looked at.
     #[serde(default)]
-    pub expect: Expect,
+    pub expect: ExpectedCounts,
 }
 
 /// A kind of faults.
@@ -162,7 +162,7 @@ pub enum Pairs {
 /// The figures that a campaign pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
-pub struct Expect {
+pub struct ExpectedCounts {
     /// All cases together.
     #[schemars(range(min = 0))]
     pub cases: Option<u64>,
@@ -189,7 +189,7 @@ pub struct Expect {
     pub silent_corruption: Option<u64>,
 }
 
-impl Expect {
+impl ExpectedCounts {
     /// How many cases of a class are expected.
     #[must_use]
     pub const fn of(&self, class: CaseClass) -> Option<u64> {

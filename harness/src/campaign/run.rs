@@ -1,7 +1,7 @@
 //! A campaign, read and played.
 
 use super::fault::CaseFaults;
-use super::file::{CampaignFile, Expect, read};
+use super::file::{CampaignFile, ExpectedCounts, read};
 use super::plan::{Shape, cases};
 use crate::buses::syntax::{Setup, SetupKind};
 use crate::campaign::by_driver::ByDriver;
@@ -83,7 +83,7 @@ pub struct PlayedCampaign {
     /// Every case, in the order of the plan.
     pub outcomes: Vec<CaseOutcome>,
     /// The figures that the file pins.
-    pub expect: Expect,
+    pub expect: ExpectedCounts,
 }
 
 impl Campaign {

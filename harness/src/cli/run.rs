@@ -9,7 +9,7 @@ use super::rig_failure::find_any_rig;
 use super::run_rig::{PlayOrder, reports, work};
 use super::run_segment;
 use super::tally::Tally;
-use crate::evidence::{About, EvidenceError, Folder, too_large};
+use crate::evidence::{AboutRun, EvidenceError, Folder, too_large};
 use crate::library::{Entry, LibraryError, sources};
 use crate::link::Recording;
 use crate::report::finding::explain;
@@ -106,10 +106,10 @@ fn on_simulated(
 ) -> std::io::Result<Exit> {
     let folder = rig.zip(arguments.evidence.as_deref());
     let folder = folder.map(|(rig, path)| {
-        let about = About {
+        let about = AboutRun {
             sign: arguments.sign.as_deref(),
             selected: entries.iter().map(|entry| &*entry.source.text).collect(),
-            ..About::own_rings(rig)
+            ..AboutRun::own_rings(rig)
         };
         Folder::create(path, &about)
     });

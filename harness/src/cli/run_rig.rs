@@ -9,7 +9,7 @@ use super::rig_failure::{alarm, exit_of, give_back};
 use super::run::{details, drives, line, progress_bar};
 use super::tally::Tally;
 use crate::counted::counted;
-use crate::evidence::{About, EvidenceError, Folder, PAGE};
+use crate::evidence::{AboutRun, EvidenceError, Folder, PAGE};
 use crate::library::Entry;
 use crate::link::{Line, Octets, Trouble};
 use crate::qualify::Qualification;
@@ -356,7 +356,7 @@ pub(crate) fn over(run: &mut Run<'_>, output: &mut Output) -> bool {
 }
 
 /// What a record begins with.
-fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> About<'r> {
+fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> AboutRun<'r> {
     // Those for another bus are never begun.
     let selected = entries.iter().filter(|entry| entry.plan.is_some());
     let exactness = run.exactness();
@@ -365,7 +365,7 @@ fn about<'r>(run: &'r mut Run<'_>, job: &'r PlayOrder, entries: &'r [Entry]) -> 
     let capabilities = run.capabilities();
     let mut rates = Rate::ALL.into_iter();
     let rate = rates.find(|rate| rate.byte_time() == byte_time);
-    About {
+    AboutRun {
         rate: rate.unwrap_or_default().bits_per_second(),
         tolerance: exactness.tolerance,
         capabilities,

@@ -6,7 +6,7 @@ use super::page::Page;
 use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
 use super::run_rig::{Course, PlayOrder, Stop, course_of, keep, reports};
 use crate::buses::run_on;
-use crate::evidence::{About, Folder};
+use crate::evidence::{AboutRun, Folder};
 use crate::library::Entry;
 use crate::rig::segment::SegmentRun;
 use crate::rig::{Options, Played, Rig};
@@ -79,7 +79,7 @@ fn all(
     if let Some(path) = &job.evidence {
         let segment = course.run.segment();
         let selected = entries.iter().filter(|entry| course.is_for(entry));
-        let about = About {
+        let about = AboutRun {
             rig: course.rig,
             rate: segment.rate,
             tolerance: segment.tolerance,

@@ -2,7 +2,7 @@
 
 use super::Error;
 use crate::buses::drives::released;
-use crate::serve::{Ending, Host, Job, Marks, Pace, ServeError, ServedAt, Server, serve_until};
+use crate::serve::{EndRequest, Host, Job, Marks, Pace, ServeError, ServedAt, Server, serve_until};
 use std::io;
 use std::net::SocketAddr;
 use std::os::unix::net::UnixStream;
@@ -32,7 +32,7 @@ impl Served {
             places: vec![ServedAt::Tcp(address.to_owned())],
             ..Job::default()
         };
-        let (handle, ending) = Ending::by_handle().map_err(ServeError::Wait)?;
+        let (handle, ending) = EndRequest::by_handle().map_err(ServeError::Wait)?;
         let (listens, listening) = channel();
         let thread =
             spawn(move || serve_until(ending, server, &job, &mut Teller(listens)).map(|_end| ()));

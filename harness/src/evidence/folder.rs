@@ -48,7 +48,7 @@ pub enum EvidenceError {
 
 /// What a record begins with.
 #[derive(Clone, Debug)]
-pub struct About<'r> {
+pub struct AboutRun<'r> {
     /// The rig.
     pub rig: &'r Rig,
     /// Bits a second on its line.
@@ -69,7 +69,7 @@ pub struct About<'r> {
     pub sign: Option<&'r Path>,
 }
 
-impl<'r> About<'r> {
+impl<'r> AboutRun<'r> {
     /// Of scenarios that are each played on simulated rings of their own.
     #[must_use]
     pub fn own_rings(rig: &'r Rig) -> Self {
@@ -108,7 +108,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`EvidenceError`].
-    pub fn create(path: &Path, about: &About<'_>) -> Result<Self, EvidenceError> {
+    pub fn create(path: &Path, about: &AboutRun<'_>) -> Result<Self, EvidenceError> {
         about.sign.map_or(Ok(()), signature::ready)?;
         let failed = |error| EvidenceError::File {
             path: path.display().to_string(),

@@ -38,7 +38,7 @@ mod verify;
 pub use cases::too_large;
 pub use derive::{Derived, derive};
 pub use files::{DEVIATIONS, PAGE, PROFILE, RIG};
-pub use folder::{About, EvidenceError, Folder, KeptAttempts};
+pub use folder::{AboutRun, EvidenceError, Folder, KeptAttempts};
 pub use junit::{JunitCase, junit};
 pub use read::{MAX_SIZE, MAX_TIME, RecordError, read};
 pub use record::{RecordLine, Writer, schema};

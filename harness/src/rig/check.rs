@@ -132,7 +132,7 @@ pub fn parse_beside(source: &Source, profile: &FindProfile<'_>) -> Result<Rig, P
         return Err(problems(mistakes));
     }
     let file: RigFile = toml::from_str(&source.text).map_err(|e| problems(vec![syntax(&e)]))?;
-    let mut check = Check {
+    let mut check = RigCheck {
         table: &table,
         file: &file,
         problems: Vec::new(),
@@ -157,13 +157,13 @@ pub(crate) fn is_address(text: &str) -> bool {
     })
 }
 
-pub(crate) struct Check<'a> {
+pub(crate) struct RigCheck<'a> {
     pub(crate) table: &'a Spanned<DeTable<'a>>,
     pub(crate) file: &'a RigFile,
     pub(crate) problems: Vec<Problem>,
 }
 
-impl Check<'_> {
+impl RigCheck<'_> {
     /// The place of a value, or of the nearest table around it that is there.
     pub(crate) fn place(&self, path: &[Step<'_>]) -> Span {
         place(self.table, path)

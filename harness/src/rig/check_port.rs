@@ -1,6 +1,6 @@
 //! The part of the check that is about `[port.1]`.
 
-use super::check::{Check, is_address};
+use super::check::{RigCheck, is_address};
 use super::file::SCHEMA;
 use super::port_file::{CONFIRMATION, Port};
 use crate::file::schema::Step;
@@ -8,7 +8,7 @@ use crate::file::values::MaxSpeed;
 
 const PORT: [Step<'static>; 2] = [Step::Key("port"), Step::Key("1")];
 
-impl Check<'_> {
+impl RigCheck<'_> {
     /// Checks whether the file has rings or a port, and what it says of the port. Returns whether it has a port in place of rings.
     pub(crate) fn has_port(&mut self) -> bool {
         let (rings, ports) = (&self.file.ring, &self.file.port);

@@ -1,6 +1,6 @@
 //! The part of the check that simulated drives are made of: the profile that a rig names, and the lines of `[sim]`.
 
-use super::check::{Check, FindProfile};
+use super::check::{FindProfile, RigCheck};
 use super::file::Sim;
 use super::profile::{KnownProfile, Profile};
 use crate::buses::header::{for_other_rings, parse_lines};
@@ -10,7 +10,7 @@ use crate::rig::sim::{mistakes, sizes};
 use crate::scenario::problem::{Problem, Span};
 use crate::scenario::source::{Source, line_number};
 
-impl Check<'_> {
+impl RigCheck<'_> {
     /// The profile that the rig's file names.
     pub(crate) fn profile(&mut self, find: &FindProfile<'_>) -> Option<KnownProfile> {
         let named = self.file.rig.profile.as_ref()?;

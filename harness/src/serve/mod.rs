@@ -21,4 +21,4 @@ pub(crate) use control::first;
 pub use place::{ClientRole, ControlPlace, Inner, Marks, Pace, ServedAt};
 pub use served::ServedBus;
 pub use shell::{End, Host, Job, ServeError, serve};
-pub(crate) use shell::{Ending, serve_until};
+pub(crate) use shell::{EndRequest, serve_until};

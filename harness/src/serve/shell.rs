@@ -123,7 +123,7 @@ pub trait Host {
 /// # Errors
 /// A place cannot be opened, or the system fails. Nothing is left behind then.
 pub fn serve(server: impl ServedBus, job: &Job, host: &mut dyn Host) -> Result<End, ServeError> {
-    let ending = Ending::by_signals().map_err(ServeError::Wait)?;
+    let ending = EndRequest::by_signals().map_err(ServeError::Wait)?;
     serve_until(ending, server, job, host)
 }
 
@@ -132,7 +132,7 @@ pub fn serve(server: impl ServedBus, job: &Job, host: &mut dyn Host) -> Result<E
 /// # Errors
 /// As [`serve`].
 pub(crate) fn serve_until(
-    ending: Ending,
+    ending: EndRequest,
     mut server: impl ServedBus,
     job: &Job,
     host: &mut dyn Host,
@@ -173,12 +173,12 @@ pub(crate) fn serve_until(
 
 /// What ends serving from outside, as a stream that is readable then.
 #[derive(Debug)]
-pub(crate) struct Ending {
+pub(crate) struct EndRequest {
     read: UnixStream,
     ids: Vec<signal_hook::SigId>,
 }
 
-impl Ending {
+impl EndRequest {
     /// The signals that end the program.
     pub(super) fn by_signals() -> io::Result<Self> {
         let (read, write) = UnixStream::pair()?;
@@ -213,7 +213,7 @@ impl Ending {
     }
 }
 
-impl Drop for Ending {
+impl Drop for EndRequest {
     fn drop(&mut self) {
         for id in &self.ids {
             signal_hook::low_level::unregister(*id);
@@ -232,7 +232,7 @@ struct Shell<'a> {
     ends: Vec<Seat>,
     control: Option<ControlStream>,
     host: &'a mut dyn Host,
-    ending: Ending,
+    ending: EndRequest,
     clock: Clock,
     /// Clients there are.
     here: usize,

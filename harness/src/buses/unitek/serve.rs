@@ -29,7 +29,7 @@ pub(crate) fn serve(
     job: &FrameJob,
     host: &mut dyn Host,
 ) -> Result<End, ServeError> {
-    serve_frames(Shared::new(plan), job, host)
+    serve_frames(SharedDrives::new(plan), job, host)
 }
 
 /// The bench of a header, and nodes 1 to `drives` on it. By default that is node 1, if the header has no drive.
@@ -57,12 +57,12 @@ pub(crate) fn bench(drives: Option<u8>, header: Option<&Source>) -> Result<Plan<
 
 /// A simulated bench that clients share.
 #[derive(Debug)]
-pub(crate) struct Shared {
+pub(crate) struct SharedDrives {
     bench: Bench,
     plan: Plan<Unitek>,
 }
 
-impl Shared {
+impl SharedDrives {
     /// A bench with places for clients. Its own host neither sends nor acknowledges.
     pub(crate) fn new(plan: Plan<Unitek>) -> Self {
         let setup: &Setup = &plan.setup.setup;
@@ -98,7 +98,7 @@ impl Shared {
     }
 }
 
-impl SharedBus for Shared {
+impl SharedBus for SharedDrives {
     fn rate(&self) -> BitRate {
         self.bench.segment.rate()
     }

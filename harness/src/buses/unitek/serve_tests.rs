@@ -1,6 +1,6 @@
 //! Clients of a simulated bus in virtual time: nothing here depends on the speed of a machine.
 
-use super::serve::{Shared, bench};
+use super::serve::{SharedDrives, bench};
 use crate::scenario::source::Source;
 use crate::serve::Answer;
 use crate::serve::frames::{FrameServer, MOST_CLIENTS, Protocol, SharedBus};
@@ -12,21 +12,21 @@ fn at(micros: u64) -> Instant {
 }
 
 /// A server with drives as delivered; its time began 1000.5 s after 1970.
-fn server(drives: u8) -> FrameServer<Shared> {
+fn server(drives: u8) -> FrameServer<SharedDrives> {
     let started = Duration::from_millis(1_000_500);
     let plan = bench(Some(drives), None).expect("no header");
-    FrameServer::new(Shared::new(plan), started)
+    FrameServer::new(SharedDrives::new(plan), started)
 }
 
 /// A client that has opened its channel.
-fn slcan(server: &mut FrameServer<Shared>, opening: &str) -> usize {
+fn slcan(server: &mut FrameServer<SharedDrives>, opening: &str) -> usize {
     let client = server.come(Protocol::Slcan).expect("a place");
     assert_eq!(server.receive(client, opening.as_bytes()), [""; 0]);
     took(server, client);
     client
 }
 
-fn socketcand(server: &mut FrameServer<Shared>) -> usize {
+fn socketcand(server: &mut FrameServer<SharedDrives>) -> usize {
     let client = server.come(Protocol::Socketcand).expect("a place");
     assert_eq!(took(server, client), "< hi >");
     assert_eq!(
@@ -38,14 +38,14 @@ fn socketcand(server: &mut FrameServer<Shared>) -> usize {
 }
 
 /// What the client reads now.
-fn took(server: &mut FrameServer<Shared>, client: usize) -> String {
+fn took(server: &mut FrameServer<SharedDrives>, client: usize) -> String {
     let text = String::from_utf8_lossy(server.transmit(client)).into_owned();
     server.transmitted(client, text.len());
     text
 }
 
 /// Lets time pass as the shell does: from deadline to deadline.
-fn run(server: &mut FrameServer<Shared>, until: Instant) {
+fn run(server: &mut FrameServer<SharedDrives>, until: Instant) {
     server.advance(server.deadline().min(until));
     while server.deadline() < until {
         server.advance(server.deadline());
@@ -301,7 +301,7 @@ fn a_header_describes_the_drives() {
         Some(&source("rate 250\ndrive 1 register 1B = 0200\n")),
     )
     .expect("a header");
-    let mut server = FrameServer::new(Shared::new(plan), Duration::ZERO);
+    let mut server = FrameServer::new(SharedDrives::new(plan), Duration::ZERO);
     assert_eq!(server.about(), "1 drive, 250 kbit/s");
     let one = slcan(&mut server, "S5\rO\r");
     server.receive(one, b"t20133D1B00\r");

@@ -235,22 +235,22 @@ fn broken_loop<L: Language>(steps: &[Step<L>]) -> Option<Problem> {
 /// Keeps the value of a line that may stand once.
 ///
 /// # Errors
-/// It stands twice.
+/// It is given twice.
 pub(crate) fn once<T>(
     place: &mut Option<T>,
     value: T,
     word: &Spanned<&str>,
 ) -> Result<(), Problem> {
     if place.is_some() {
-        return Err(stands_twice(word));
+        return Err(given_twice(word));
     }
     *place = Some(value);
     Ok(())
 }
 
-/// A line that may stand once and stands twice.
-pub(crate) fn stands_twice(word: &Spanned<&str>) -> Problem {
-    let what = format!("`{}` stands twice", word.value);
+/// A line that may be given once and is given twice.
+pub(crate) fn given_twice(word: &Spanned<&str>) -> Problem {
+    let what = format!("`{}` is given twice", word.value);
     Problem::new(word.span, what, "this line may appear only once")
 }
 

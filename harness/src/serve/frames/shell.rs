@@ -7,7 +7,7 @@ use crate::serve::arrival::Client;
 use crate::serve::clock::Clock;
 use crate::serve::control_stream::ControlStream;
 use crate::serve::pty::{Change, Pty};
-use crate::serve::shell::{End, Ending, Host, ServeError};
+use crate::serve::shell::{End, EndRequest, Host, ServeError};
 use crate::serve::tcp::Listener;
 use crate::serve::{ControlPlace, ServedAt};
 use harness_proto::time::{Instant, Span};
@@ -50,7 +50,7 @@ pub fn serve_frames<B: SharedBus>(
     job: &FrameJob,
     host: &mut dyn Host,
 ) -> Result<End, ServeError> {
-    let ending = Ending::by_signals().map_err(ServeError::Wait)?;
+    let ending = EndRequest::by_signals().map_err(ServeError::Wait)?;
     let mut doors = Vec::new();
     let mut seats = Vec::new();
     for FramePlace { protocol, at } in &job.places {
@@ -113,7 +113,7 @@ struct Shell<'a, B> {
     seats: Vec<Seat>,
     control: Option<ControlStream>,
     host: &'a mut dyn Host,
-    ending: Ending,
+    ending: EndRequest,
     clock: Clock,
     /// Clients there are.
     here: usize,

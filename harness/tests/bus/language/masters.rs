@@ -48,7 +48,7 @@ fn masters_deviate() {
         );
     }
     let twice = "master deviates names-drive-0\nmaster deviates names-drive-0";
-    refused(&text(twice, read), "master", "stands twice", None);
+    refused(&text(twice, read), "master", "is given twice", None);
     let late = format!("{read}\nmaster deviates names-drive-0");
     refused(&text("", &late), "master", "after the first step", None);
     refused(

@@ -326,7 +326,12 @@ fn what_cannot_be_is_refused_with_its_range() {
         "38400, 19200 or 9600",
         None,
     );
-    refused("title x\ntitle y\nring 3\n", "title", "stands twice", None);
+    refused(
+        "title x\ntitle y\nring 3\n",
+        "title",
+        "is given twice",
+        None,
+    );
     refused("title x\n> 80\n", "", "how many drives", Some("ring 4"));
     refused(&steps("2> 80"), "80", "one ring", Some("ring 4, 3"));
 }

@@ -1,6 +1,6 @@
 //! Rig files, locks, quarantine, hooks and the commands for them.
 
-use harness::buses::novobus::rig::Condition;
+use harness::buses::novobus::rig::InterlockCondition;
 use harness::file::values::{MaxSpeed, Speed};
 use harness::rig::file::{Level, LineFormat, Transport};
 use harness::rig::hook::{self, HookError};
@@ -116,11 +116,11 @@ fn what_a_file_says_is_what_is_read() {
         .map(|one| one.condition().expect("checked"))
         .collect();
     assert!(
-        matches!(conditions[0], Condition::Cell { min: None, max: Some(max), .. } if (max - 75.0).abs() < 1e-9)
+        matches!(conditions[0], InterlockCondition::Cell { min: None, max: Some(max), .. } if (max - 75.0).abs() < 1e-9)
     );
     assert!(matches!(
         conditions[1],
-        Condition::Input {
+        InterlockCondition::Input {
             level: Level::High,
             ..
         }

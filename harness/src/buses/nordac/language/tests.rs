@@ -208,7 +208,12 @@ fn mistakes() {
         ),
         ("slave 127\n> 10\n", "127", "there is no slave 127", ""),
         ("slave 8 ppo 5\n> 10\n", "5", "a PPO type, 1 to 4", ""),
-        ("slave 8 ppo 1 ppo 2\n> 10\n", "ppo", "it stands twice", ""),
+        (
+            "slave 8 ppo 1 ppo 2\n> 10\n",
+            "ppo",
+            "it is given twice",
+            "",
+        ),
         (
             "slave 8 property pzd-invald = hold\n> 10\n",
             "pzd-invald",

@@ -114,7 +114,7 @@ fn read_ring(object: &Object, ring: usize, assembly: &mut Assembly) -> Result<u8
         }
         let own = assembly.link(ring, from, to);
         if !own.bytes.is_empty() {
-            return wrong(name, "this link stands twice");
+            return wrong(name, "this link is given twice");
         }
         for (index, byte) in link.bytes.iter().enumerate() {
             own.bytes

@@ -2,7 +2,7 @@
 
 use crate::file::schema::Step;
 use crate::file::values::ValueError;
-use crate::rig::check::Check;
+use crate::rig::check::RigCheck;
 use crate::rig::file::{Interlock, Level};
 use crate::scenario::problem::Problem;
 use crate::scenario::quantity::{Dimension, parse as quantity};
@@ -12,9 +12,9 @@ use harness_proto::nd21::io::Input;
 impl Interlock {
     /// What must hold; `None` only where the file was not checked.
     #[must_use]
-    pub fn condition(&self) -> Option<Condition> {
+    pub fn condition(&self) -> Option<InterlockCondition> {
         if let Some(name) = &self.input {
-            return Some(Condition::Input {
+            return Some(InterlockCondition::Input {
                 input: Input::from_name(name)?,
                 level: self.level?,
             });
@@ -24,7 +24,7 @@ impl Interlock {
             text.as_deref()
                 .and_then(|text| self::bound(cell, text).ok())
         };
-        Some(Condition::Cell {
+        Some(InterlockCondition::Cell {
             cell,
             min: bound(&self.min),
             max: bound(&self.max),
@@ -34,7 +34,7 @@ impl Interlock {
 
 /// What an interlock looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Condition {
+pub enum InterlockCondition {
     /// The value of a cell stays within bounds, in the unit of its scale.
     Cell {
         /// The cell.
@@ -78,7 +78,7 @@ fn bound(cell: &Cell, text: &str) -> Result<f64, ValueError> {
     }
 }
 
-impl Check<'_> {
+impl RigCheck<'_> {
     /// One entry of `[[interlock]]`.
     pub(crate) fn interlock(&mut self, path: &[Step<'_>], interlock: &Interlock) {
         let at = |key| [path, &[Step::Key(key)]].concat();

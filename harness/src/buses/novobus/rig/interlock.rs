@@ -1,6 +1,6 @@
 //! Interlocks: what must hold of drives throughout a run, asked over the bus while nothing else is under way.
 
-use super::condition::Condition;
+use super::condition::InterlockCondition;
 use crate::buses::novobus::language::scale::shown;
 use crate::guard::Watch;
 use crate::link::Line;
@@ -25,7 +25,7 @@ struct Entry {
     drive: u8,
     /// How many drives the ring has.
     drives: u8,
-    condition: Condition,
+    condition: InterlockCondition,
     every: Span,
     /// On a clock that is never set back.
     next: Instant,
@@ -95,8 +95,8 @@ impl Entry {
     fn words(&self) -> String {
         let ring = if self.ring == 0 { "" } else { "2:" };
         let what = match self.condition {
-            Condition::Cell { cell, .. } => cell.printed,
-            Condition::Input { input, .. } => input.name(),
+            InterlockCondition::Cell { cell, .. } => cell.printed,
+            InterlockCondition::Input { input, .. } => input.name(),
         };
         let message = self.message.as_ref();
         let message = message.map_or(String::new(), |message| format!(" ({message})"));
@@ -109,8 +109,10 @@ impl Entry {
     /// It does not hold, in a sentence.
     fn look(&mut self, line: &mut dyn Line) -> Result<Option<()>, String> {
         let found = match self.condition {
-            Condition::Cell { cell, min, max } => self.look_at_cell(line, cell, (min, max)),
-            Condition::Input { input, level } => self.look_at_input(line, input, level),
+            InterlockCondition::Cell { cell, min, max } => {
+                self.look_at_cell(line, cell, (min, max))
+            }
+            InterlockCondition::Input { input, level } => self.look_at_input(line, input, level),
         };
         match found {
             Some(Ok(())) => Ok(Some(())),

@@ -13,7 +13,7 @@ pub(crate) mod run;
 pub(crate) mod session;
 pub(crate) mod sim;
 
-pub use condition::Condition;
+pub use condition::InterlockCondition;
 pub use driven::Driven;
 pub use health::{Health, Unhealthy, examine};
 pub use line_test::Cause;

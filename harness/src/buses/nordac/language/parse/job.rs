@@ -93,7 +93,7 @@ fn start(scanner: &mut Scanner<'_>) -> Result<JobKind, Problem> {
         };
         if twice {
             *scanner = before;
-            return Err(scanner.unexpected("the end of the line (it stands twice)"));
+            return Err(scanner.unexpected("the end of the line (it is given twice)"));
         }
     }
     Ok(JobKind::Start { ppo, watchdog })

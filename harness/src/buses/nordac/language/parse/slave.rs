@@ -113,7 +113,7 @@ fn there(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
         };
         if twice {
             *scanner = before;
-            return Err(scanner.unexpected("the end of the line (it stands twice)"));
+            return Err(scanner.unexpected("the end of the line (it is given twice)"));
         }
     }
     Ok(Setup::There { ppo, posicon })

@@ -4,7 +4,7 @@ use super::drive::{self, DriveLine};
 use super::step;
 use super::words::master_deviates;
 use crate::buses::novobus::language::syntax::header::{Header, RingRange, Setup, SetupKind};
-use crate::scenario::parse::header::{Part, once, read, stands_twice};
+use crate::scenario::parse::header::{Part, given_twice, once, read};
 use crate::scenario::parse::step as core;
 use crate::scenario::problem::{Problem, Problems, Span, Spanned};
 use crate::scenario::scanner::Scanner;
@@ -33,7 +33,7 @@ pub(crate) fn line(
                 header.rings = rings;
                 return Ok(());
             }
-            Err(stands_twice(word))
+            Err(given_twice(word))
         })),
         "line" => Some(rate(scanner).and_then(|rate| once(&mut header.rate, rate, word))),
         "master" => {

@@ -138,7 +138,7 @@ fn identifiers(scanner: &mut Scanner<'_>) -> Result<Setup, Problem> {
         let place = if receives { &mut rx } else { &mut tx };
         if place.replace(number).is_some() {
             *scanner = before;
-            return Err(scanner.unexpected("the end of the line (it stands twice)"));
+            return Err(scanner.unexpected("the end of the line (it is given twice)"));
         }
     }
     Ok(Setup::There { rx, tx })
