@@ -35,6 +35,7 @@ pub use novobus::language::Novobus as DefaultBus;
 
 pub(crate) use contents::{cell_names, cells, deviations};
 pub(crate) use nordac::GSD;
+pub(crate) use nordac::cli::CyclicCommand;
 pub(crate) use unitek::dbc::dbc;
 
 pub(crate) use novobus::cli::shrink::shrink as shrink_rings;

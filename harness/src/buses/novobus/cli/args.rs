@@ -3,7 +3,7 @@
 use super::axes::Axes;
 use super::rig::RigName;
 use super::sim::{SIM_HELP, SimArguments};
-use crate::buses::nordac::cli::CyclicCommand;
+use crate::buses::CyclicCommand;
 use crate::scenario::argument::{duration, number};
 use crate::scenario::quantity::{Dimension, Quantity};
 use clap::{Args, Subcommand, ValueEnum};
