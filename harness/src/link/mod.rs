@@ -4,6 +4,7 @@
 //! cannot makes a scenario that needs it skipped, never wrong.
 
 pub(crate) mod bench_clock;
+pub(crate) mod echo;
 pub mod frames;
 pub(crate) mod inner;
 pub(crate) mod lateness;

@@ -1,6 +1,7 @@
 //! One port of the bench's own station, over a stream of octets: what waits for the operating system, and what has come.
 
 use super::Trouble;
+use super::echo::Echo;
 use super::stamp::stamped;
 use super::tamper::Tamper;
 use crate::port::{Outgoing, Wire};
@@ -22,10 +23,15 @@ pub(crate) trait Accounting: fmt::Debug + Send {
     fn rest(&mut self);
 
     /// An octet leaves.
-    fn sent(&mut self);
+    fn sent(&mut self, octet: u8);
 
     /// An octet has come.
-    fn came(&mut self);
+    fn came(&mut self, octet: Received);
+
+    /// How long the line is idle before what is sent together.
+    fn idle(&self) -> Span {
+        Span::ZERO
+    }
 
     /// Whether more has left than has come.
     fn is_owed(&self) -> bool;
@@ -50,6 +56,10 @@ pub(crate) struct PortEnd<A> {
     pub(crate) queue: VecDeque<(Instant, bool, Outgoing)>,
     /// When the line is free for the next byte.
     pub(crate) free: Instant,
+    /// The next byte must not be given to the operating system before that.
+    exact: bool,
+    /// What an adapter gives back that hears itself; `None` for one that does not.
+    pub(crate) echo: Option<Echo>,
     /// When the awaited reply is due.
     pub(crate) attended: Option<Instant>,
     pub(crate) received: VecDeque<(Instant, Received)>,
@@ -68,6 +78,8 @@ impl<A: Accounting> PortEnd<A> {
             accounting,
             queue: VecDeque::new(),
             free: Instant::START,
+            exact: false,
+            echo: None,
             attended: None,
             received: VecDeque::new(),
             last_arrival: Instant::START,
@@ -84,6 +96,7 @@ impl<A: Accounting> PortEnd<A> {
         let given = self.queue.front().map_or(self.free, |(start, ..)| *start);
         self.queue.clear();
         self.free = Instant::START + given.since(now);
+        self.exact = false;
         self.attended = None;
         self.received.clear();
         self.last_arrival = Instant::START;
@@ -94,18 +107,28 @@ impl<A: Accounting> PortEnd<A> {
         self.log = [Vec::new(), Vec::new()];
     }
 
+    /// Leaves the line idle before the next byte, for as long as the bus says, counted from the last byte in either direction.
+    pub(crate) fn pause(&mut self, now: Instant) {
+        let idle = self.accounting.idle();
+        let free = (self.free.max(self.last_arrival) + idle).max(now);
+        if idle > Span::ZERO && free > self.free {
+            self.free = free;
+            self.exact = free > now;
+        }
+    }
+
     /// Queues a byte of the bench's.
     pub(crate) fn send(&mut self, now: Instant, byte: u8, byte_time: Span) {
         let start = self.free.max(now);
         let passed = self.outgoing.pass(Received::good(byte), start);
         let begun = start + passed.delay;
-        let mut exact = passed.delay > Span::ZERO;
+        let mut exact = std::mem::take(&mut self.exact) || passed.delay > Span::ZERO;
         let mut free = begun;
         let mut queue = |outgoing, length: Span| {
             self.queue
                 .push_back((free, std::mem::take(&mut exact), outgoing));
             free += length;
-            self.accounting.sent();
+            self.accounting.sent(byte);
         };
         for received in passed.bytes() {
             let outgoing = match received.error {
@@ -133,6 +156,9 @@ impl<A: Accounting> PortEnd<A> {
                 break;
             }
             self.queue.pop_front();
+            if let Some(echo) = &mut self.echo {
+                echo.sent(outgoing);
+            }
             self.wire.send(outgoing)?;
         }
         self.wire.flush()
@@ -145,13 +171,18 @@ impl<A: Accounting> PortEnd<A> {
         byte_time: Span,
     ) -> Result<(), Trouble> {
         let mut bytes = Vec::new();
-        let result = self.wire.receive(&mut bytes);
+        let mut result = self.wire.receive(&mut bytes);
+        if let Some(echo) = &mut self.echo
+            && let Err(wrong) = echo.remove(&mut bytes, self.wire.name())
+        {
+            result = Err(wrong);
+        }
         if !bytes.is_empty() {
             self.last_arrival = self.last_arrival.max(told);
         }
         self.unplaced += self.wire.take_unplaced();
         for (at, byte) in stamped(bytes, now, byte_time, &mut self.last_arrival) {
-            self.accounting.came();
+            self.accounting.came(byte);
             self.carried += 1;
             let passed = self.incoming.pass(byte, at);
             let recording = self.log[1].len() < MOST_RECORDED;

@@ -163,6 +163,21 @@ impl<A: Accounting> Pump<A> {
             let inner = self.inner.iter_mut().filter(|inner| inner.ring == port);
             inner.for_each(InnerLink::rest);
         }
+        if !octets.is_empty() {
+            own.pause(now);
+            let silent = own
+                .echo
+                .as_ref()
+                .is_some_and(|echo| rest && echo.owed() > 0);
+            if silent {
+                let name = own.wire.name();
+                let text = format!(
+                    "{name}: the adapter has given back nothing of what was sent: set `echo = false`"
+                );
+                self.trouble = Some(Trouble::Garbled(text));
+                return now;
+            }
+        }
         for octet in octets {
             own.send(now, *octet, octet_time);
         }
@@ -475,8 +490,8 @@ mod tests {
 
     impl Accounting for Silent {
         fn rest(&mut self) {}
-        fn sent(&mut self) {}
-        fn came(&mut self) {}
+        fn sent(&mut self, _octet: u8) {}
+        fn came(&mut self, _octet: Received) {}
 
         fn is_owed(&self) -> bool {
             false
@@ -502,7 +517,7 @@ mod tests {
         let address = listener.local_addr().expect("an address").to_string();
         let settings = PortSettings {
             endpoint: Endpoint::Tcp(address),
-            rate: Rate::default(),
+            format: Rate::default().into(),
             marks: false,
             low_latency: false,
         };

@@ -14,6 +14,8 @@ pub struct LastWords {
     pub(super) fd: OwnedFd,
     pub(super) name: String,
     pub(super) bytes: Vec<u8>,
+    /// How long the wire is left alone before them.
+    pub(super) gap: Duration,
 }
 
 /// The bytes could not be sent.
@@ -30,7 +32,18 @@ impl LastWords {
     /// Bytes as they are, for a descriptor that is no wire.
     #[cfg(feature = "socketcan")]
     pub(crate) const fn raw(fd: OwnedFd, name: String, bytes: Vec<u8>) -> Self {
-        Self { fd, name, bytes }
+        let gap = Duration::ZERO;
+        Self {
+            fd,
+            name,
+            bytes,
+            gap,
+        }
+    }
+
+    /// The same, with the wire left alone for this time before them: for stations that tell telegrams apart by pauses.
+    pub(crate) fn after(self, gap: Duration) -> Self {
+        Self { gap, ..self }
     }
 
     /// Sends them, behind whatever the operating system has taken before; at most for two seconds.
@@ -45,6 +58,7 @@ impl LastWords {
     }
 
     fn write(&self) -> std::io::Result<()> {
+        std::thread::sleep(self.gap);
         let end = Instant::now() + PATIENCE;
         let mut rest = &self.bytes[..];
         while !rest.is_empty() {

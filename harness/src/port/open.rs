@@ -3,7 +3,7 @@
 use super::rfc2217::{self, NegotiationError};
 use super::serial;
 use super::wire::{Coding, Wire};
-use harness_proto::line::Rate;
+use harness_proto::line::{Format, Parity};
 use harness_proto::marks::Unmark;
 use rustix::fs::{Mode, OFlags};
 use rustix::termios::{OptionalActions, QueueSelector};
@@ -42,8 +42,8 @@ impl std::fmt::Display for Endpoint {
 pub struct PortSettings {
     /// Where.
     pub endpoint: Endpoint,
-    /// The rate of a serial line; always 8O1.
-    pub rate: Rate,
+    /// The rate and the format of a serial line, with 8 data bits.
+    pub format: Format,
     /// Whether a pty or a socket carries line errors as in-band marks.
     pub marks: bool,
     /// Whether to ask a USB adapter for its lowest latency. It is not an error if it cannot.
@@ -73,9 +73,7 @@ pub enum OpenError {
     #[error("{0} is a pseudo terminal, which has no parity: say transport = \"pty\"")]
     PseudoTerminal(String),
     /// The port does not take the settings.
-    #[error(
-        "{port}: the adapter refused {what}; the line needs 8 data bits, odd parity and 1 stop bit: use another adapter"
-    )]
+    #[error("{port}: the adapter refused {what}; the line needs it: use another adapter")]
     Setting {
         /// The port.
         port: String,
@@ -128,6 +126,16 @@ impl OpenError {
     }
 }
 
+/// A format as it is printed: `8O1`.
+pub(super) fn printed(format: Format) -> String {
+    let parity = match format.parity {
+        Parity::None => 'N',
+        Parity::Odd => 'O',
+        Parity::Even => 'E',
+    };
+    format!("8{parity}{}", format.stop_bits)
+}
+
 /// Opens a stream: raw, with nothing sent, and what was received before dropped.
 ///
 /// # Errors
@@ -140,7 +148,7 @@ pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
     };
     match &settings.endpoint {
         Endpoint::Serial(path) => {
-            let (fd, serial) = serial::open(path, settings.rate, settings.low_latency)?;
+            let (fd, serial) = serial::open(path, settings.format, settings.low_latency)?;
             let coding = Coding::Serial(Unmark::default(), Box::new(serial));
             Ok(Wire::new(fd, name, coding))
         }
@@ -148,7 +156,7 @@ pub fn open(settings: &PortSettings) -> Result<Wire, OpenError> {
         Endpoint::Tcp(address) => Ok(Wire::new(connect(address)?.into(), name, plain())),
         Endpoint::Rfc2217(address) => {
             let stream = connect(address)?;
-            let telnet = rfc2217::negotiate(&stream, settings.rate).map_err(|error| {
+            let telnet = rfc2217::negotiate(&stream, settings.format).map_err(|error| {
                 OpenError::Negotiation {
                     address: address.clone(),
                     error,

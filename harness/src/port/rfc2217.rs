@@ -1,9 +1,9 @@
 //! A serial port behind a socket: Telnet (RFC 854, 856) with the COM port options of RFC 2217.
 //!
-//! Rate and 8O1 are asked for and checked. So is the notification of line errors, to which some servers (ser2net among them) say nothing. The
+//! Rate and format are asked for and checked. So is the notification of line errors, to which some servers (ser2net among them) say nothing. The
 //! protocol tells that there was a line error, not at which byte: what such a link cannot show makes a verdict inconclusive.
 
-use harness_proto::line::Rate;
+use harness_proto::line::{Format, Parity};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -63,12 +63,17 @@ pub enum NegotiationError {
 }
 
 /// The settings, in the order in which they are asked for: name, command, value, bytes of it.
-fn settings(rate: Rate) -> [(&'static str, u8, u32, usize); 5] {
+fn settings(format: Format) -> [(&'static str, u8, u32, usize); 5] {
+    let (parity, code) = match format.parity {
+        Parity::None => ("no parity", 1),
+        Parity::Odd => ("odd parity", 2),
+        Parity::Even => ("even parity", 3),
+    };
     [
-        ("the rate", 1, rate.bits_per_second(), 4),
+        ("the rate", 1, format.bits_per_second, 4),
         ("8 data bits", 2, 8, 1),
-        ("odd parity", 3, 2, 1),
-        ("1 stop bit", 4, 1, 1),
+        (parity, 3, code, 1),
+        ("stop bits", 4, format.stop_bits.into(), 1),
         ("no flow control", 5, 1, 1),
     ]
 }
@@ -205,8 +210,8 @@ fn ask(command: u8, value: u32, size: usize) -> Vec<u8> {
     bytes
 }
 
-/// Requests the rate, 8O1 and notification of line errors, and checks every answer.
-pub(super) fn negotiate(stream: &TcpStream, rate: Rate) -> Result<Telnet, NegotiationError> {
+/// Requests the rate, the format and notification of line errors, and checks every answer.
+pub(super) fn negotiate(stream: &TcpStream, format: Format) -> Result<Telnet, NegotiationError> {
     let mut telnet = Telnet::default();
     let end = Instant::now() + PATIENCE;
     let mut stream = stream;
@@ -217,7 +222,7 @@ pub(super) fn negotiate(stream: &TcpStream, rate: Rate) -> Result<Telnet, Negoti
     if telnet.refused {
         return Err(NegotiationError::Refused);
     }
-    for (what, command, asked, size) in settings(rate) {
+    for (what, command, asked, size) in settings(format) {
         stream.write_all(&ask(command, asked, size))?;
         let got = converse(&mut telnet, stream, end, what, |telnet| {
             telnet.answer_to(command)
@@ -354,11 +359,11 @@ mod tests {
     #[test]
     fn settings_are_checked() {
         let (stream, thread) = server(2);
-        assert!(negotiate(&stream, Rate::Baud38400).is_ok());
+        assert!(negotiate(&stream, harness_proto::line::Rate::Baud38400.into()).is_ok());
         drop(stream);
         thread.join().expect("an end");
         let (stream, thread) = server(1);
-        let error = negotiate(&stream, Rate::Baud38400).map(|_| ());
+        let error = negotiate(&stream, harness_proto::line::Rate::Baud38400.into()).map(|_| ());
         let error = error.expect_err("another parity").to_string();
         assert_eq!(error, "odd parity: asked for 2, the other end set 1");
         drop(stream);

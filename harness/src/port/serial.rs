@@ -1,10 +1,10 @@
-//! A serial port: 8O1, every line error marked by the kernel, bytes with a wrong parity bit on demand.
+//! A serial port: 8O1 or 8E1, every line error marked by the kernel, bytes with a wrong parity bit on demand.
 //!
 //! The crate `serialport` opens the port and sets rate and format. The marks of POSIX termios (`INPCK` and `PARMRK`
 //! without `IGNPAR` and `ISTRIP`) are set behind it on the same terminal.
 
-use super::open::OpenError;
-use harness_proto::line::Rate;
+use super::open::{OpenError, printed};
+use harness_proto::line::{Format, Parity as LineParity};
 use harness_proto::time::Span;
 use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
 use rustix::io::Errno;
@@ -29,6 +29,8 @@ pub(super) struct Serial {
     /// The settings with which it was found.
     before: Termios,
     fd: OwnedFd,
+    /// Whether the right parity is odd.
+    odd: bool,
     gaps: Vec<Duration>,
 }
 
@@ -43,16 +45,21 @@ impl Drop for Serial {
 /// Opens a serial port.
 pub(super) fn open(
     path: &Path,
-    rate: Rate,
+    format: Format,
     low_latency: bool,
 ) -> Result<(OwnedFd, Serial), OpenError> {
     let name = path.display().to_string();
     let wrong = |error: &serialport::Error| OpenError::Setting {
         port: name.clone(),
-        what: format!("{} 8O1 ({error})", rate.bits_per_second()),
+        what: format!("{} {} ({error})", format.bits_per_second, printed(format)),
     };
-    let (fd, serial) = raw(path, rate.bits_per_second(), Parity::Odd, &wrong)?;
-    set_marks(&fd, rate).map_err(|what| OpenError::Setting {
+    let parity = match format.parity {
+        LineParity::None => Parity::None,
+        LineParity::Odd => Parity::Odd,
+        LineParity::Even => Parity::Even,
+    };
+    let (fd, serial) = raw(path, format.bits_per_second, parity, &wrong)?;
+    set_marks(&fd, format).map_err(|what| OpenError::Setting {
         port: name.clone(),
         what,
     })?;
@@ -102,6 +109,7 @@ fn raw(
         fd: fd
             .try_clone()
             .map_err(|error| OpenError::of(path, &error))?,
+        odd: parity == Parity::Odd,
         gaps: Vec::new(),
     };
     rustix::io::ioctl_fionbio(&fd, true).map_err(other)?;
@@ -132,7 +140,7 @@ fn duplicate(port: &TTYPort) -> Result<OwnedFd, Errno> {
 }
 
 /// Lets the kernel mark every line error, and reads back whether the port does what it must.
-fn set_marks(fd: impl AsFd, rate: Rate) -> Result<(), String> {
+fn set_marks(fd: impl AsFd, format: Format) -> Result<(), String> {
     let failed = |error: Errno| error.to_string();
     let mut termios = rustix::termios::tcgetattr(&fd).map_err(failed)?;
     termios.input_modes |= InputModes::INPCK | InputModes::PARMRK;
@@ -140,16 +148,21 @@ fn set_marks(fd: impl AsFd, rate: Rate) -> Result<(), String> {
     termios.input_modes -= InputModes::BRKINT;
     rustix::termios::tcsetattr(&fd, OptionalActions::Now, &termios).map_err(failed)?;
     let now = rustix::termios::tcgetattr(&fd).map_err(failed)?;
-    let control = ControlModes::PARENB | ControlModes::PARODD | ControlModes::CS8;
+    let control = ControlModes::PARENB | ControlModes::CS8;
     let input = InputModes::INPCK | InputModes::PARMRK;
-    if !now.control_modes.contains(control) || now.control_modes.contains(ControlModes::CSTOPB) {
-        return Err("8O1".to_owned());
+    let odd = now.control_modes.contains(ControlModes::PARODD);
+    let other = odd != (format.parity == LineParity::Odd);
+    if !now.control_modes.contains(control)
+        || other
+        || now.control_modes.contains(ControlModes::CSTOPB)
+    {
+        return Err(printed(format));
     }
     if !now.input_modes.contains(input) {
         return Err("the marking of line errors (INPCK and PARMRK)".to_owned());
     }
-    if now.output_speed() != rate.bits_per_second() {
-        return Err(format!("{} bit/s", rate.bits_per_second()));
+    if now.output_speed() != format.bits_per_second {
+        return Err(format!("{} bit/s", format.bits_per_second));
     }
     Ok(())
 }
@@ -174,7 +187,7 @@ impl Serial {
 
     /// Sends a byte with a wrong parity bit, and remembers how long that held up the line.
     pub(super) fn send_wrong_parity(&mut self, fd: &OwnedFd, byte: u8) -> io::Result<()> {
-        let gap = send_wrong_parity(&mut fd.as_fd(), byte)?;
+        let gap = send_wrong_parity(&mut fd.as_fd(), byte, self.odd)?;
         if self.gaps.len() < MOST_GAPS {
             self.gaps.push(gap);
         }
@@ -202,18 +215,18 @@ trait ParityPort {
     fn put(&mut self, byte: u8) -> io::Result<()>;
 }
 
-/// Sends a byte with a wrong parity bit: even parity between drained bytes. Even is wrong for every byte of an odd line;
+/// Sends a byte with a wrong parity bit: the other parity between drained bytes, which is wrong for every byte of the line;
 /// mark and space (CMSPAR) would be right for half of them, and fewer drivers know them.
 ///
 /// Says how long the line was held up. Whatever happens, what comes next has the right parity again, or it is an error.
-fn send_wrong_parity(port: &mut impl ParityPort, byte: u8) -> io::Result<Duration> {
+fn send_wrong_parity(port: &mut impl ParityPort, byte: u8, odd: bool) -> io::Result<Duration> {
     port.drain()?;
     let start = Instant::now();
     let sent = port
-        .set_odd(false)
+        .set_odd(!odd)
         .and_then(|()| port.put(byte))
         .and_then(|()| port.drain());
-    let restored = port.set_odd(true);
+    let restored = port.set_odd(odd);
     sent.and(restored)?;
     Ok(start.elapsed())
 }

@@ -41,7 +41,7 @@ impl ParityPort for Noted {
 #[test]
 fn the_parity_is_switched_between_drained_bytes() {
     let mut port = Noted::default();
-    let gap = send_wrong_parity(&mut port, 0x13).expect("sent");
+    let gap = send_wrong_parity(&mut port, 0x13, true).expect("sent");
     assert_eq!(port.done, ["drain", "even", "13", "drain", "odd"]);
     // The second drain is in the gap.
     assert!(gap >= Duration::from_millis(2), "{gap:?}");
@@ -59,7 +59,7 @@ fn the_parity_is_right_again_after_every_failure() {
             fails_at: Some(fails_at),
             ..Noted::default()
         };
-        let error = send_wrong_parity(&mut port, 0x13).expect_err(fails_at);
+        let error = send_wrong_parity(&mut port, 0x13, true).expect_err(fails_at);
         assert_eq!(error.kind(), io::ErrorKind::BrokenPipe, "{fails_at}");
         assert_eq!(port.done, done, "{fails_at}");
     }
@@ -123,7 +123,7 @@ fn a_pty_shows_even_parity_at_the_byte_and_odd_around_it() {
         odd_at_byte: Vec::new(),
     };
     port.put(0x12).expect("a good byte");
-    send_wrong_parity(&mut port, 0x13).expect("a bad byte");
+    send_wrong_parity(&mut port, 0x13, true).expect("a bad byte");
     port.put(0x14).expect("a good byte");
     assert_eq!(port.odd_at_byte, [true, false, true]);
     assert!(is_odd(&master));
@@ -144,7 +144,7 @@ fn what_is_no_serial_port() {
         (null, "is not a serial port"),
         (missing, "there is no port"),
     ] {
-        let error = open(&path, Rate::default(), false).expect_err("no serial port");
+        let error = open(&path, Rate::default().into(), false).expect_err("no serial port");
         let text = error.to_string();
         assert!(text.contains(part), "{text}");
         assert!(text.contains(&path.display().to_string()), "{text}");

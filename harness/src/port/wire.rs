@@ -126,6 +126,7 @@ impl Wire {
             bytes: coded.collect(),
             fd: self.fd.try_clone()?,
             name: self.name.clone(),
+            gap: std::time::Duration::ZERO,
         })
     }
 

@@ -140,7 +140,7 @@ fn wire(
     let name = place.to_string();
     let wire = port::open(&PortSettings {
         endpoint: place,
-        rate: endpoint.line.into(),
+        format: Rate::from(endpoint.line).into(),
         marks: endpoint.marks == Marks::InBand,
         low_latency: endpoint.low_latency,
     })?;

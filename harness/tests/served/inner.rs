@@ -90,7 +90,7 @@ impl Served {
         let endpoint = self.endpoints[index].clone();
         open(&PortSettings {
             endpoint,
-            rate: Rate::default(),
+            format: Rate::default().into(),
             marks: self.marks,
             low_latency: false,
         })

@@ -30,7 +30,7 @@ fn link(served: &Served, marks: bool) -> StreamLink {
 fn wire(endpoint: &Endpoint, marks: bool) -> Wire {
     let settings = PortSettings {
         endpoint: endpoint.clone(),
-        rate: Rate::default(),
+        format: Rate::default().into(),
         marks,
         low_latency: false,
     };

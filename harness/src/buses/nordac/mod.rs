@@ -19,6 +19,7 @@ pub(crate) mod serve;
 mod serve_tests;
 pub mod simulate;
 pub mod value;
+pub(crate) mod stream;
 
 /// The GSD file: the unit master file of the manual.
 pub(crate) const GSD: &str = include_str!("nordac.gsd");

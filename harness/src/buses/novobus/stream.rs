@@ -11,7 +11,7 @@ use crate::link::{
 };
 use crate::medium::{Heard, Medium, Out, Pieces};
 use crate::port::{LastWords, Wire};
-use harness_proto::line::Rate;
+use harness_proto::line::{Rate, Received};
 use harness_proto::time::{Instant, Span};
 use harness_sim::record::{Channel, Trace};
 use std::sync::Arc;
@@ -45,11 +45,11 @@ impl Accounting for RoundTrip {
         (self.sent, self.came) = (0, 0);
     }
 
-    fn sent(&mut self) {
+    fn sent(&mut self, _octet: u8) {
         self.sent += 1;
     }
 
-    fn came(&mut self) {
+    fn came(&mut self, _octet: Received) {
         self.came += 1;
     }
 

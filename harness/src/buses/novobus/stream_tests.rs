@@ -16,7 +16,7 @@ fn link() -> (StreamLink, TcpStream) {
     let address = listener.local_addr().expect("an address").to_string();
     let settings = PortSettings {
         endpoint: Endpoint::Tcp(address),
-        rate: Rate::default(),
+        format: Rate::default().into(),
         marks: false,
         low_latency: false,
     };

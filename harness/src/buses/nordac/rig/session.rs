@@ -1,14 +1,18 @@
 //! A rig of NORDAC inverters in use: locked, opened, found to answer, guarded, and taken to its safe state on every way out.
 
 use super::talk::Talk;
-use super::{RigSlave, failed, limits, setup, slaves};
+use super::{RigSlave, failed, limits, rate, setup, slaves};
 use crate::buses::nordac::gate::guarded;
 use crate::buses::nordac::safe_state::{last_words, safe_state};
 use crate::buses::nordac::simulate::Bench;
+use crate::buses::nordac::stream::{SegmentLink, TOLERANCE};
 use crate::guard::{Guarded, Safe, Standstill};
 use crate::link::Line;
 use crate::medium::Pieces;
+use crate::port::{Endpoint, PortSettings};
+use crate::rig::file::Marks;
 use crate::rig::lock::PortLock;
+use crate::rig::port_file::Port;
 use crate::rig::port_session::{PortDrives, PortSession};
 use crate::rig::taken::take;
 use crate::rig::{End, Ends, Options, Rig, SessionError};
@@ -57,10 +61,14 @@ impl Session {
         let known: Vec<_> = slaves.iter().map(|own| GuardedSlave::from(*own)).collect();
         let limits = limits(rig, options.allow_motion);
         let link = guarded(ends, limits, &known, port.listen_only);
-        let nanos = u64::try_from(port.patience.0.as_nanos()).unwrap_or(u64::MAX);
+        let real = if rig.is_simulated() {
+            Span::ZERO
+        } else {
+            TOLERANCE
+        };
         let drives = Inverters {
             slaves,
-            patience: Span::from_nanos(nanos),
+            patience: patience(port) + real,
         };
         let ill_as_well = options.ill_as_well;
         let ready = |session: &mut PortSession<Inverters>| {
@@ -229,7 +237,7 @@ fn differs(slave: &RigSlave, diagnosis: &Diagnosis, ppo: Option<u8>) -> Result<(
 }
 
 /// The end of the line: simulated, or an adapter that is opened and locked. Nothing is sent.
-fn ends(rig: &Rig, _options: &Options) -> Result<(Ends, Vec<PortLock>), SessionError> {
+fn ends(rig: &Rig, options: &Options) -> Result<(Ends, Vec<PortLock>), SessionError> {
     let port = rig
         .port()
         .ok_or_else(|| failed(rig, "it has no [port.1]"))?;
@@ -243,5 +251,41 @@ fn ends(rig: &Rig, _options: &Options) -> Result<(Ends, Vec<PortLock>), SessionE
         let setup = setup.map_err(|problems| failed(rig, &problems.to_string()))?;
         return Ok((Ends::Simulated(Box::new(Bench::new(&setup))), Vec::new()));
     }
-    Err(failed(rig, "adapters of this bus are not served yet"))
+    let (endpoint, locks) = match (&port.serial, &port.tcp) {
+        (Some(path), _) if is_pseudo_terminal(path) => (Endpoint::Pty(path.into()), true),
+        (Some(path), _) => (Endpoint::Serial(path.into()), true),
+        (None, Some(address)) => (Endpoint::Tcp(address.clone()), false),
+        (None, None) => return Err(failed(rig, "its port has no adapter")),
+    };
+    let place = endpoint.to_string();
+    let rate = rate(port);
+    let wire = crate::port::open(&PortSettings {
+        endpoint,
+        format: rate.format(),
+        marks: port.marks == Marks::InBand,
+        low_latency: true,
+    });
+    options.unless_interrupted(rig)?;
+    let wire = wire.map_err(|error| failed(rig, &error.to_string()))?;
+    let lock = locks.then(|| {
+        let lock = PortLock::acquire(wire.fd());
+        lock.map_err(|error| failed(rig, &format!("{place}: {error}")))
+    });
+    let locks = lock.transpose()?.into_iter().collect();
+    let addresses = slaves(port).iter().map(|own| own.address).collect();
+    let how = (patience(port), port.echo);
+    let link = SegmentLink::new(wire, rate, addresses, how, options.interrupt.clone());
+    Ok((Ends::Ports(Box::new(link)), locks))
+}
+
+/// Whether a device is the end of a pseudo terminal, behind links such as those that `sim --pty` makes.
+fn is_pseudo_terminal(path: &str) -> bool {
+    let real = std::fs::canonicalize(path);
+    real.is_ok_and(|own| own.starts_with("/dev/pts"))
+}
+
+/// How long a reply may take beside its own time on the line.
+fn patience(port: &Port) -> Span {
+    let nanos = u64::try_from(port.patience.0.as_nanos()).unwrap_or(u64::MAX);
+    Span::from_nanos(nanos)
 }

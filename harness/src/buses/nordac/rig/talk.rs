@@ -20,6 +20,9 @@ pub enum TalkError {
     /// The line carries nothing more.
     #[error("{0}")]
     Line(Trouble),
+    /// The adapter hears what the bench sends.
+    #[error("the adapter gives back what the bench sends: set `echo = true` in [port.1]")]
+    Echo,
     /// It does not reply.
     #[error("slave {slave} does not reply to {service}")]
     NoReply {
@@ -158,6 +161,9 @@ impl<'l> Talk<'l> {
             let Some(telegram) = self.reply(end)? else {
                 continue;
             };
+            if telegram == Telegram::Pdu(pdu) {
+                return Err(TalkError::Echo);
+            }
             if let Some(reply) = self.requests(slave).take(&telegram) {
                 return Ok(Some(reply));
             }
