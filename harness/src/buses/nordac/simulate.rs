@@ -128,7 +128,7 @@ pub struct Bench {
 
 impl Bench {
     /// What a simulated bench can do.
-    const CAPABILITIES: [Capability; 9] = [
+    pub(super) const CAPABILITIES: [Capability; 9] = [
         Capability::Interposer,
         Capability::Tap,
         Capability::Memory,

@@ -29,7 +29,8 @@ pub(crate) const TOLERANCE: Span = SLACK;
 const LONGEST_REPLY: u64 = 29;
 
 /// What a real line can do beside carrying octets.
-const CAPABILITIES: [Capability; 3] = [Capability::Memory, Capability::Motion, Capability::Eeprom];
+pub(super) const CAPABILITIES: [Capability; 3] =
+    [Capability::Memory, Capability::Motion, Capability::Eeprom];
 
 /// How long the line is left alone before each telegram that a watchdog sends: the reply to the one before has passed.
 const LAST_WORDS_GAP: time::Duration = time::Duration::from_millis(60);

@@ -1,10 +1,15 @@
 //! Rig files of NORDAC inverters: addresses, limits, and the simulated bench.
 
+mod known;
+mod observed;
 mod permitted;
+mod player;
+mod run;
 mod session;
 pub(crate) mod talk;
 
 pub use permitted::limits;
+use run::{InverterJudge, InvertersInUse};
 pub use session::Session;
 
 use super::language::Nordac;
@@ -20,10 +25,8 @@ use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use harness_proto::nordac::PpoType;
 use harness_proto::nordac::guard::GuardedSlave;
-#[cfg(test)]
 use harness_proto::nordac::properties::{Accepts, Description};
 use harness_proto::profibus::BusRate;
-#[cfg(test)]
 use std::collections::BTreeSet;
 
 /// The address of the bench's own master.
@@ -59,13 +62,8 @@ pub(crate) const PORT: PortRow = PortRow {
         let expected = "no such permission expected on this bus".to_owned();
         Err((format!("`{name}` is no register of a NORDAC"), expected))
     },
-    run: |rig, _| {
-        Err(failed(
-            rig,
-            "scenarios are not played on rigs of this bus yet; `run` without --rig simulates them",
-        ))
-    },
-    judge: None,
+    run: |rig, options| Ok(Box::new(InvertersInUse::open(rig, options)?)),
+    judge: Some(|rig, allow_motion| Box::new(InverterJudge::new(rig, allow_motion))),
     command: super::cli::drive,
     check: super::cli::check,
     fuzz: super::cli::fuzz::run,
@@ -167,7 +165,6 @@ pub fn setup(port: &Port, source: &Source) -> Result<Setup, Problems> {
 }
 
 /// Values of a property: each of its words, or numbers from the least to the most.
-#[cfg(test)]
 pub(crate) fn values(property: &Description) -> Vec<String> {
     match property.accepts {
         Accepts::Words(words) => words.iter().map(|own| (*own).to_owned()).collect(),

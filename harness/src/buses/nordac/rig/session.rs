@@ -61,14 +61,9 @@ impl Session {
         let known: Vec<_> = slaves.iter().map(|own| GuardedSlave::from(*own)).collect();
         let limits = limits(rig, options.allow_motion);
         let link = guarded(ends, limits, &known, port.listen_only);
-        let real = if rig.is_simulated() {
-            Span::ZERO
-        } else {
-            TOLERANCE
-        };
         let drives = Inverters {
             slaves,
-            patience: patience(port) + real,
+            patience: patience_of(rig, port),
         };
         let ill_as_well = options.ill_as_well;
         let ready = |session: &mut PortSession<Inverters>| {
@@ -282,6 +277,14 @@ fn ends(rig: &Rig, options: &Options) -> Result<(Ends, Vec<PortLock>), SessionEr
 fn is_pseudo_terminal(path: &str) -> bool {
     let real = std::fs::canonicalize(path);
     real.is_ok_and(|own| own.starts_with("/dev/pts"))
+}
+
+/// How long a reply may take beside its own time on the line, with what an adapter and a busy computer add.
+pub(super) fn patience_of(rig: &Rig, port: &Port) -> Span {
+    match rig.is_simulated() {
+        true => patience(port),
+        false => patience(port) + TOLERANCE,
+    }
 }
 
 /// How long a reply may take beside its own time on the line.

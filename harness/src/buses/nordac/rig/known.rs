@@ -1,0 +1,124 @@
+//! What is known of a slave: what its parameters read.
+
+use super::RigSlave;
+use super::talk::{Talk, TalkError};
+use crate::buses::nordac::simulate::SlaveSetup;
+use harness_proto::nordac::parameter::Flag;
+use harness_proto::nordac::pkw::Index;
+use harness_proto::nordac::properties::{PROPERTIES, Properties, SubindexBits};
+use harness_proto::nordac::{Answer, Image, PARAMETERS, Parameter, Pkw, PpoType, Task};
+use std::collections::BTreeMap;
+
+/// How many exchanges a task may take (3.4.1 says 2; `pkw-latency`).
+const MOST_EXCHANGES: u32 = 40;
+
+/// The address and the PPO type, which the setup of a slave has apart.
+const APART: [u16; 2] = [1622, 1624];
+
+/// A slave, as far as it is known.
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    pub(super) slave: RigSlave,
+    /// What the parameters read, by number and IND.
+    pub(super) values: BTreeMap<(u16, u16), u32>,
+}
+
+impl Known {
+    pub(super) const fn new(slave: RigSlave) -> Self {
+        Self {
+            slave,
+            values: BTreeMap::new(),
+        }
+    }
+
+    pub(super) fn ppo(&self) -> PpoType {
+        self.slave.ppo.unwrap_or_default()
+    }
+
+    /// Reads every parameter that can be written. Where one is refused, it is not known. The slave is in the exchange afterwards.
+    ///
+    /// # Errors
+    /// The slave does not reply, or does not get into the exchange.
+    pub(super) fn read_all(&mut self, talk: &mut Talk<'_>) -> Result<(), TalkError> {
+        talk.start(self.slave.address, self.ppo(), None)?;
+        if !self.ppo().has_pkw() {
+            return Ok(());
+        }
+        let all = PARAMETERS.iter().filter(|own| !own.has(Flag::ReadOnly));
+        for parameter in all.filter(|own| !own.needs_posicon()) {
+            for ind in indices(parameter) {
+                let task = Pkw::of(Task::read(parameter).ak(), parameter.number, ind, 0);
+                if let Some(answer) = self.task(talk, task)? {
+                    self.values.insert((parameter.number, ind), answer);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Carries a task out; `None` where it is refused, or not answered. Words that are not valid go with it.
+    ///
+    /// # Errors
+    /// The exchange fails.
+    pub(super) fn task(&self, talk: &mut Talk<'_>, task: Pkw) -> Result<Option<u32>, TalkError> {
+        let (address, ppo) = (self.slave.address, self.ppo());
+        let mut outputs = Image::default();
+        // Another number or IND, or no task: a former answer is not taken for this one.
+        for _ in 0..MOST_EXCHANGES {
+            let shown = talk.exchange(address, ppo, &outputs)?.pkw;
+            if shown.ak() == 0 || (shown.number(), shown.ind) != (task.number(), task.ind) {
+                break;
+            }
+        }
+        outputs.pkw = task;
+        for _ in 0..MOST_EXCHANGES {
+            let shown = talk.exchange(address, ppo, &outputs)?.pkw;
+            if shown.ak() == 0 || (shown.number(), shown.ind) != (task.number(), task.ind) {
+                continue;
+            }
+            return Ok(match shown.answer() {
+                Some(Answer::Error(_) | Answer::None) | None => None,
+                Some(answer) => Some(answer.pwe()),
+            });
+        }
+        Ok(None)
+    }
+
+    /// The model of the slave as it is, just switched on.
+    pub(super) fn model(&self, properties: Properties) -> SlaveSetup {
+        let mut slave = SlaveSetup::new(self.slave.address);
+        slave.ppo = self.ppo();
+        slave.properties = properties;
+        for ((number, ind), raw) in &self.values {
+            if let Some(parameter) = Parameter::of(*number).filter(|_| !APART.contains(number)) {
+                let index = Index::of(parameter, *ind, SubindexBits::default());
+                let value = parameter.number_of(*raw);
+                slave.parameters.push((parameter, index, value));
+            }
+        }
+        slave
+    }
+}
+
+/// The IND of each value of a parameter.
+fn indices(parameter: &Parameter) -> impl Iterator<Item = u16> {
+    let count = match parameter.has(Flag::Set) {
+        true => u16::from(parameter.sets()),
+        false => 1,
+    };
+    (0..count).map(|own| own << 8)
+}
+
+/// The properties that differ from these in one point that the manual leaves open, each with the words of the difference.
+pub(super) fn candidates(own: Properties) -> Vec<(String, Properties)> {
+    let mut all = Vec::new();
+    for property in PROPERTIES {
+        for word in super::values(property) {
+            let mut other = own;
+            if property.set(&mut other, &word) && other != own {
+                all.push((format!("{} = {word}", property.name), other));
+            }
+        }
+    }
+    all
+}
