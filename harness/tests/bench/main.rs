@@ -7,6 +7,7 @@ mod edits;
 mod embedded;
 mod evidence;
 mod explore;
+mod inverters_on_rig;
 mod named;
 mod on_can;
 mod on_profibus;

@@ -12,6 +12,7 @@ mod evidence;
 mod explore;
 mod frames;
 mod inner;
+mod inverters_on_line;
 #[path = "../common/junit_rules.rs"]
 mod junit_rules;
 #[path = "../common/program.rs"]

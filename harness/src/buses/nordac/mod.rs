@@ -18,8 +18,8 @@ pub(crate) mod serve;
 #[cfg(test)]
 mod serve_tests;
 pub mod simulate;
-pub mod value;
 pub(crate) mod stream;
+pub mod value;
 
 /// The GSD file: the unit master file of the manual.
 pub(crate) const GSD: &str = include_str!("nordac.gsd");

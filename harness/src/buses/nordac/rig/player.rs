@@ -34,6 +34,13 @@ use harness_proto::profibus::BusRate;
 use harness_proto::time::Span;
 use std::collections::BTreeSet;
 
+/// The word that a slave holds when a scenario begins: OFF2 and OFF3 are not active, as after power-up, and ON without enabling: an ON that
+/// stands does nothing before an OFF1 (3.3, rule 2).
+const IDLE: u16 = 0x0477;
+
+/// How often it is sent: what the next reply shows may lag behind.
+const IDLE_TIMES: usize = 2;
+
 /// The watchdog by which a slave forgets its master before a scenario begins: 100 ms.
 const FORGET: [u8; 2] = [1, 10];
 
@@ -382,6 +389,11 @@ impl Player {
                         link.inject(0, fault, Moment::Now);
                     }
                 }
+                // A slave that looks for the rate may miss the first telegram (`autobaud`); a request for its status changes nothing.
+                let mut talk = Talk::new(Box::new(&mut *link), self.patience);
+                for slave in &own.plan.setup.slaves {
+                    talk.status(slave.address)?;
+                }
             }
             false => {
                 for slave in &own.plan.setup.slaves {
@@ -390,6 +402,13 @@ impl Player {
                         .iter()
                         .find(|own| own.slave.address == slave.address);
                     let ppo = known.map(Known::ppo).unwrap_or_default();
+                    let idle = Image {
+                        words: [IDLE, 0, 0, 0, 0, 0],
+                        ..Image::default()
+                    };
+                    for _ in 0..IDLE_TIMES {
+                        talk.exchange(slave.address, ppo, &idle)?;
+                    }
                     talk.start(slave.address, ppo, Some(FORGET))?;
                 }
                 talk.pass(FORGOTTEN)?;

@@ -204,6 +204,18 @@ impl<'l> Talk<'l> {
         self.requests(slave).restart();
     }
 
+    /// Asks for the FDL status, and says whether the station replies.
+    ///
+    /// # Errors
+    /// [`TalkError::Line`].
+    pub fn status(&mut self, slave: u8) -> Result<bool, TalkError> {
+        let Ok(pdu) = self.requests(slave).status() else {
+            return Ok(false);
+        };
+        let end = self.send(&Telegram::Pdu(pdu).encode())?;
+        Ok(self.reply(end)?.is_some())
+    }
+
     /// The diagnosis.
     ///
     /// # Errors

@@ -1,0 +1,112 @@
+//! Scenarios on simulated rigs of NORDAC inverters that are not those of the scenarios: nothing is played past the limits, no right inverter
+//! is accused, and the record bears every verdict out.
+
+use crate::edits;
+use crate::program::{Desk, ended, said};
+use std::process::Output;
+
+const ALL: &str = "allow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\nallow_motor_data = true\n\
+                   allow_other_stations = true\nallow_unsupervised = true\n";
+
+/// A rig with one simulated inverter, set up by a line.
+fn desk(setup: &str, limits: &str) -> Desk {
+    let setup = match setup {
+        "" => String::new(),
+        line => format!("\"slave 8 {line}\""),
+    };
+    Desk::of_file(&format!(
+        "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"nordac\"\ndrives = [{{ address = 8, ppo = 1 }}]\n\
+         [sim]\nbus = \"nordac\"\nsetup = [{setup}]\n[limits]\n{limits}"
+    ))
+}
+
+fn run(desk: &Desk, more: &[&str]) -> Output {
+    let fixed = ["run", "--rig", "desk.toml", "--allow-motion"];
+    desk.run(&[&fixed, more].concat())
+}
+
+/// Right inverters that differ from the model in a point that the manual leaves open, in the scenarios of the process words.
+#[test]
+fn no_right_inverter_is_accused() {
+    for line in [
+        "property pzd-invalid = stop",
+        "property bit4-ramp = at-once",
+        "property off1-zsw-while-ramping = 3",
+        "property zsw8 = only-when-enabled",
+        "property zsw11-at-rest = 0",
+        "property pzd-latency = 3",
+        "property initial-zsw-4-5 = 0",
+        "parameter 1205 = 50.0Hz",
+        "parameter 1202 = 1s",
+        "parameter 1625 = 1s",
+    ] {
+        let output = run(&desk(line, ALL), &["--filter", "nordac-3.2"]);
+        let code = output.status.code();
+        assert!(matches!(code, Some(0 | 5)), "{line}: {}", said(&output));
+    }
+}
+
+const LOOKS: &str = "title Looks\nsource nordac 2.6\nbus nordac\nslave 8\n> 68 05 05 68 88 82 6C 3C 3E F0 16\n\
+                     < 68 0B 0B 68 82 88 08 3E 3C 02 05 00 FF 75 31 38 16\n";
+const MOVES: &str = "title Moves\nsource nordac 3.2.1\nbus nordac\nslave 8\nstart 8 ppo 1\non 8\n";
+const WRITES: &str =
+    "title Writes\nsource nordac 5.1\nbus nordac\nslave 8\nstart 8 ppo 1\nwrite 8 1202 = 3s\n";
+const ENDS: &str = "title Ends\nsource nordac 2.6\nbus nordac\nslave 8\nslave 8 parameter 1625 = 1s\nstart 8 ppo 1 watchdog 1s\nread 8 1625\non 8\n";
+
+fn with(desk: &Desk, name: &str, text: &str) {
+    std::fs::write(desk.path(name), text).expect("room");
+}
+
+/// What a scenario needs follows from its telegrams; what the rig does not permit is skipped, and the limit that it needs is named.
+#[test]
+fn what_a_scenario_needs_follows_from_its_telegrams() {
+    let careful = desk("", "");
+    for (name, text) in [
+        ("looks.scn", LOOKS),
+        ("moves.scn", MOVES),
+        ("writes.scn", WRITES),
+    ] {
+        with(&careful, name, text);
+    }
+    ended(&run(&careful, &["looks.scn"]), 0, "1 passed");
+    ended(&run(&careful, &["moves.scn"]), 5, "needs `allow_motion`");
+    ended(&run(&careful, &["writes.scn"]), 5, "needs `allow_eeprom`");
+    let stored = desk("", "allow_eeprom = true\n");
+    with(&stored, "writes.scn", WRITES);
+    ended(
+        &run(&stored, &["writes.scn"]),
+        5,
+        "needs `allow_motor_data`",
+    );
+    let watched = desk(
+        "",
+        "allow_motion = true\nallow_eeprom = true\nallow_motor_data = true\n",
+    );
+    with(&watched, "moves.scn", MOVES);
+    with(&watched, "ends.scn", ENDS);
+    ended(&run(&watched, &["moves.scn"]), 5, "bus time-out (1625)");
+    ended(&run(&watched, &["ends.scn"]), 0, "1 passed");
+    let free = desk("", ALL);
+    ended(
+        &run(&free, &["nordac-en-2-two-slaves"]),
+        5,
+        "the rig has no slave",
+    );
+    ended(
+        &run(&free, &["8.2-exchange-1"]),
+        5,
+        "the rig has no such bus",
+    );
+}
+
+/// An edit of any line or file is found: the inverters are simulated, so that the run can be played again.
+#[test]
+fn edited_evidence_is_found() {
+    let desk = desk("deviates no-off2", ALL);
+    let off2 = "title Off\nsource nordac 3.2.1\nbus nordac\nslave 8\nstart 8 ppo 1\non 8\nexchange 8 STW=047D\nexchange 8 STW=047D -> ZSW=xx60\n";
+    with(&desk, "off2.scn", off2);
+    with(&desk, "looks.scn", LOOKS);
+    let more = ["off2.scn", "looks.scn", "--evidence", "kept"];
+    ended(&run(&desk, &more), 5, "inconclusive");
+    edits::check_each(&edits::of(desk, false), 3);
+}
