@@ -120,8 +120,8 @@ impl DriveCommand {
 /// Which bench.
 #[derive(Clone, Debug, Args)]
 pub struct RigArguments {
-    /// The rig: a file, a name that `rig list` shows, sim:N for a simulated ring of N drives, sim:N,M for two rings, or sim:unitek:N for
-    /// UNITEK drives on CAN; by default sim:3.
+    /// The rig: a file, a name that `rig list` shows, sim:N for a simulated ring of N drives, sim:N,M for two rings, sim:unitek:N for
+    /// UNITEK drives on CAN, or sim:nordac:N for NORDAC inverters on PROFIBUS; by default sim:3.
     #[arg(long, value_name = "RIG")]
     pub rig: Option<RigName>,
     /// Put the rig sim:N into the state that the header of a scenario describes; its steps are ignored. By default the inputs
@@ -157,7 +157,8 @@ pub struct ReadArguments {
     /// The drives: 3, 2:3 in the second ring, 0..2, or all.
     #[arg(value_name = "DRIVE")]
     pub drives: Axes,
-    /// A cell: its printed name (nist, EE_pole), or an address: FF0C, FF0C:2 for a word, ee:47 in the EEPROM.
+    /// A cell: its printed name (nist, EE_pole), or an address: FF0C, FF0C:2 for a word, ee:47 in the EEPROM. On NORDAC inverters a
+    /// parameter (1205.3, "Accel. time"), a word of the reply (ZSW, HIW, PZD4) or `all`.
     #[arg(value_name = "CELL", required = true)]
     pub cells: Vec<String>,
     /// Output format.
@@ -174,7 +175,7 @@ pub struct WriteArguments {
     /// The drives: 3, 2:3 in the second ring, 0..2, or all.
     #[arg(value_name = "DRIVE")]
     pub drives: Axes,
-    /// A cell and its value: nsoll=1500rpm, FF08:2=0652, nRampe+=off, EE_pole=06.
+    /// A cell and its value: nsoll=1500rpm, FF08:2=0652, nRampe+=off, EE_pole=06. On NORDAC inverters 1205.3=50.0Hz, "Accel. time" = 5s.
     #[arg(value_name = "CELL=VALUE", required = true)]
     pub values: Vec<String>,
     /// Write even if a motor may turn.
