@@ -176,3 +176,48 @@ fn profirust_turns_the_motor() {
         .and_then(|rest| rest.split("```").next());
     assert_eq!(shown, Some(program));
 }
+
+/// The bench's own master over a socket and over a pseudo terminal, in real time: start, parameters, on at 50 %, and the ways to stop.
+#[test]
+fn commands_over_a_line() {
+    let setup = "slave 8 parameter 1621 = 2\nslave 8 parameter 1202 = 0.5s\nslave 8 parameter 1203 = 0.5s\nslave 8 parameter 1625 = 5s\n";
+    let setup = file("dp-commands.scn", setup.as_bytes());
+    let terminal = path("dp-commands");
+    let terminal = terminal.to_str().expect("text");
+    for place in [["--tcp", "127.0.0.1:0"], ["--pty", terminal]] {
+        let mut sim = start(&[&place[..], &["--setup", &setup]].concat());
+        let first = sim.line();
+        let address = first.rsplit(' ').next().expect("a word");
+        let port = match place[0] {
+            "--tcp" => format!("tcp = \"{address}\""),
+            _ => format!("serial = \"{address}\""),
+        };
+        let rig = format!(
+            "schema = 2\n[rig]\nid = \"dp{}\"\n[port.1]\nbus = \"nordac\"\n{port}\ndrives = [{{ address = 8 }}]\n\
+             [limits]\nallow_motion = true\nallow_eeprom = true\nallow_motor_data = true\n",
+            place[0]
+        );
+        let rig = file(&format!("dp{}.toml", place[0]), rig.as_bytes());
+        let run = |arguments: &[&str]| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_drivebench"));
+            let command = command.args(arguments).args(["--rig", &rig]);
+            let output = command.env("DRIVEBENCH_STATE", path("dp-state")).output();
+            let output = output.expect("the program");
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
+            String::from_utf8(output.stdout).expect("text")
+        };
+        assert!(run(&["start", "8"]).starts_with("slave 8: PPO1 (12 octets)"));
+        assert_eq!(
+            run(&["write", "8", "1205.3 = 50.0Hz", "--move"]),
+            "slave 8: 1205.3 Maximum frequ. = 50.0 Hz\n"
+        );
+        assert!(run(&["read", "8", "1205.3", "Bus timeout"]).contains("50.0 Hz"));
+        let on = run(&["on", "8", "--setpoint", "50%", "--for", "2s", "--move"]);
+        let lines: Vec<_> = on.lines().collect();
+        assert!(lines[1].ends_with("HIW 2000 (50.0 %)"), "{on}");
+        assert!(lines[2].contains("(ready to start"), "{on}");
+        assert!(run(&["quick-stop", "8"]).contains("start-disable, OFF3 active"));
+        assert!(run(&["info", "8"]).contains("5.0 s"));
+    }
+}
