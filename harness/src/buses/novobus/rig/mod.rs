@@ -1,5 +1,7 @@
 //! A ring with ports: in use, its scenarios, whether it is sound, what its line is like, and its figures.
 
+#[cfg(test)]
+mod busy;
 mod condition;
 mod driven;
 pub mod figures;

@@ -10,8 +10,8 @@ use crate::link::{Line, Link, Octets, PortLink, Trouble};
 use crate::medium::Pieces;
 use crate::rig::around::Around;
 use crate::rig::lock::{PortLock, RigLock};
-use crate::rig::open::open;
-use crate::rig::taken::take;
+use crate::rig::open::{Opened, open};
+use crate::rig::taken::{Taken, take};
 use crate::rig::watchdog::{Watchdog, watch_over};
 use crate::rig::{
     Alarm, End, Ends, Options, Rig, SessionError, file, limits, standing, state, stated_rate,
@@ -45,7 +45,8 @@ pub struct Session {
     /// While drives may move.
     watchdog: Option<Watchdog>,
     _ports: Vec<PortLock>,
-    _lock: Option<RigLock>,
+    /// `None` for a simulated rig.
+    lock: Option<RigLock>,
 }
 
 impl Session {
@@ -107,6 +108,16 @@ impl Session {
             rig: rig.id().to_owned(),
             error: Box::new(error),
         })?;
+        Self::over(rig, options, taken, opened)
+    }
+
+    /// Takes a rig that is taken and whose ends are open: listens, examines its rings, and looks at its interlocks.
+    fn over(
+        rig: &Rig,
+        options: &Options,
+        taken: Taken,
+        opened: Opened,
+    ) -> Result<Self, SessionError> {
         let rings: Vec<_> = rig
             .rings()
             .filter_map(|(_, ring)| RingSize::new(ring.drives.into()).ok())
@@ -124,7 +135,7 @@ impl Session {
             around: taken.around,
             watchdog: None,
             _ports: opened.locks,
-            _lock: taken.lock,
+            lock: taken.lock,
         };
         if rig.is_simulated() {
             session.link.set_interrupt(options.interrupt.clone());
@@ -153,6 +164,24 @@ impl Session {
         session.around.used();
         session.watchdog = session.watched(options.alarm.clone())?;
         Ok(session)
+    }
+
+    /// A rig without a lock behind an open port.
+    #[cfg(test)]
+    pub(crate) fn at_port(
+        rig: &Rig,
+        options: &Options,
+        port: Box<dyn PortLink>,
+    ) -> Result<Self, SessionError> {
+        let taken = Taken {
+            around: Around::begin(rig).expect("no hooks"),
+            lock: None,
+        };
+        let opened = Opened {
+            ends: Ends::Ports(port),
+            locks: Vec::new(),
+        };
+        Self::over(rig, options, taken, opened)
     }
 
     /// The rig.
@@ -360,7 +389,7 @@ impl Session {
 
     /// Whether the rig was left at rest and its drives answer: then they are asked nothing more, and go on as they are.
     fn opens_quietly(&mut self) -> bool {
-        if self.rig.is_simulated() {
+        if self.lock.is_none() {
             return false;
         }
         let left = state::folder().is_ok_and(|folder| state::take_rest(&folder, self.rig.id()));
@@ -504,7 +533,7 @@ impl Session {
     /// Waits until what was sent has come round, and keeps that the rig is left at rest where it is.
     fn come_home(&mut self) {
         self.come_round();
-        if self.rig.is_simulated() || !self.link.at_rest() || self.link.busy() {
+        if self.lock.is_none() || !self.link.at_rest() || self.link.busy() {
             return;
         }
         if let Ok(folder) = state::folder() {

@@ -57,13 +57,18 @@ impl Comparer<'_> {
             false => known_places(&sent, (&places, &roles), expected, received),
         };
         let real_time = self.exactness.tolerance > Span::ZERO;
-        let unasked = real_time.then(|| {
-            let all = conversation.sent_at(ring);
-            let answered: Vec<_> = places.iter().map(|place| all[*place]).collect();
-            let (all, answered) = (&all[..], &answered[..]);
-            Sent { answered, all }.judge(size, (answer, received), self.exactness.tolerance)
-        });
-        let unasked = unasked.flatten();
+        let answered_at: Vec<_> = places.iter().map(|place| starts[*place]).collect();
+        let times = Sent {
+            answered: &answered_at,
+            all: &starts,
+            way,
+        };
+        let race = || times.judge(size, (answer, received), self.exactness.tolerance);
+        let unasked = real_time.then(race).flatten();
+        let may = self.comparison.monitored || self.knowledge.may_monitor(ring, size);
+        let excused =
+            || times.excused_from(size, (expected, received), (may, self.comparison.monitored));
+        let excused = real_time.then(excused).flatten();
         let (shorter, short);
         // A race of clocks is compared up to its first byte, and the long runs behind it do not matter.
         let (expected, received) = if aligned || unasked.is_some() || !real_time {
@@ -150,7 +155,11 @@ impl Comparer<'_> {
                 }
                 return;
             }
-            self.comparison.divergence.get_or_insert(found);
+            if self.comparison.divergence.is_none() {
+                let behind = |from| found.received.is_none_or(|(at, _)| at >= from);
+                self.comparison.silenced = excused.is_some_and(behind);
+                self.comparison.divergence = Some(found);
+            }
             return;
         }
     }

@@ -205,6 +205,11 @@ pub struct Comparison {
     pub own: Vec<OwnByte>,
     /// The first byte that differs in more than its time.
     pub divergence: Option<Divergence>,
+    /// Whether a drive of the model monitored time-outs (ND21 9.9).
+    pub monitored: bool,
+    /// In real time, whether the bench was silent or late in front of that byte, so that drives that monitor time-outs may have missed their
+    /// bytes (ND21 9.9).
+    pub silenced: bool,
     /// In real time, the first byte of each ring that a drive sent unasked. The bytes behind it are a race of clocks: only properties that
     /// hold for every order are compared.
     pub unasked: Vec<Unasked>,

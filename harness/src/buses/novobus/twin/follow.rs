@@ -214,7 +214,7 @@ impl Twin {
         let real_time = exactness.tolerance > Span::ZERO;
         let slack = if real_time { SLACK } else { Span::ZERO };
         let mut recording = self.recording();
-        let mut received = self.answer(conversation, slack);
+        let (mut received, monitored) = self.answer(conversation, slack);
         if real_time {
             self.add_later(conversation, exactness.tolerance, &mut received);
         }
@@ -227,6 +227,7 @@ impl Twin {
             knowledge: &mut self.knowledge,
             recording,
             comparison: Comparison {
+                monitored,
                 left_out: !left_out.is_empty(),
                 ..Comparison::default()
             },
@@ -301,9 +302,11 @@ impl Twin {
         comparisons
     }
 
-    /// Plays a conversation and `slack` more, and returns what the twin received, ring by ring.
-    fn answer(&mut self, conversation: &Conversation, slack: Span) -> Vec<TwinBytes> {
+    /// Plays a conversation and `slack` more, and returns what the twin received, ring by ring, and whether a drive has monitored
+    /// time-outs meanwhile.
+    fn answer(&mut self, conversation: &Conversation, slack: Span) -> (Vec<TwinBytes>, bool) {
         self.link.begin();
+        let mut monitored = self.monitors();
         let byte_time = self.link.byte_time();
         let mut done = conversation.done.iter().peekable();
         while let Some((ring, done_here)) = done.next() {
@@ -322,6 +325,7 @@ impl Twin {
                         next += byte_time;
                     }
                     self.link.run_until(*at);
+                    monitored = monitored || self.monitors();
                     self.link.send_octets(*ring, &bytes);
                 }
                 Done::Fault(at, fault, moment) => {
@@ -340,7 +344,7 @@ impl Twin {
         for (ring, received) in received.iter_mut().enumerate() {
             received.fetch(&mut self.link, ring);
         }
-        received
+        (received, monitored || self.monitors())
     }
 
     /// Adds what the twin would receive until `tolerance` behind the end of a conversation, where more bytes came than it received itself:

@@ -8,6 +8,7 @@ use harness_proto::nd21::bits::{flags2, ps_status, status};
 use harness_proto::nd21::io::{GPO1, GPO2, OUTPUTS};
 use harness_proto::nd21::own::{self, Worker};
 use harness_proto::nd21::ram;
+use harness_proto::novobus::address::RingSize;
 use harness_proto::novobus::command::{Command, PAGE};
 use harness_proto::novobus::output::Output;
 use std::collections::{BTreeMap, BTreeSet};
@@ -142,6 +143,8 @@ pub(crate) struct Knowledge {
     survived: BTreeMap<CellByte, BTreeSet<u8>>,
     /// Drives whose EEPROM may have been written in the present attempt.
     saved: BTreeSet<(usize, u8)>,
+    /// Drives that are known not to monitor time-outs (14.10.2): their `Flags2` says so, and nothing was written to it since.
+    trusting: BTreeSet<(usize, u8)>,
 }
 
 impl Knowledge {
@@ -159,6 +162,7 @@ impl Knowledge {
     pub(crate) fn converse(&mut self, faults: bool) {
         if faults || self.disturbed {
             self.working.clear();
+            self.trusting.clear();
         }
         self.disturbed = faults;
     }
@@ -182,6 +186,12 @@ impl Knowledge {
         self.started.retain(|own| (own.0, own.1) != (ring, drive));
         self.programs.entry((ring, drive)).or_default().begin();
         self.working.remove(&(ring, drive));
+        self.trusting.remove(&(ring, drive));
+    }
+
+    /// Whether a drive of a ring may monitor time-outs: it is a setting of its EEPROM (14.3.6), which is loaded at a reset.
+    pub(crate) fn may_monitor(&self, ring: usize, size: RingSize) -> bool {
+        (0..size.drives()).any(|drive| !self.trusting.contains(&(ring, drive)))
     }
 
     /// The master has written to a byte.
@@ -209,6 +219,9 @@ impl Knowledge {
         if started || ordered || address == ram::EEPROM_CONTROL {
             self.saved.insert((ring, drive));
         }
+        if ordered || address == ram::FLAGS2 && write.sets(flags2::MONITORING) {
+            self.trusting.remove(&(ring, drive));
+        }
         let program = self.programs.entry((ring, drive)).or_default();
         program.write(address, write);
         let own = self.cells.entry(place).or_default();
@@ -229,6 +242,7 @@ impl Knowledge {
             None => {
                 self.cells
                     .retain(|cell, _| (cell.0, cell.1) != (ring, drive) || cell.2 < PAGE);
+                self.trusting.remove(&(ring, drive));
                 let all = [Worker::Positioning, Worker::Eeprom, Worker::Scope];
                 self.started.extend(all.map(|worker| (ring, drive, worker)));
             }
@@ -295,6 +309,12 @@ impl Knowledge {
 
     /// Judges a byte that was read, where the model holds `wanted`.
     pub(crate) fn read(&mut self, place: CellByte, wanted: u8, value: u8) -> ByteRead {
+        if place.2 == ram::FLAGS2 {
+            match value & flags2::MONITORING {
+                0 => self.trusting.insert((place.0, place.1)),
+                _ => self.trusting.remove(&(place.0, place.1)),
+            };
+        }
         let program = self.programs.entry((place.0, place.1)).or_default();
         match program.read(place.2, wanted, value) {
             Some(true) => return ByteRead::Right,

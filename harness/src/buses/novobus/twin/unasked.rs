@@ -2,11 +2,16 @@
 //!
 //! The number of zeros before another byte, and which drive sends the first zero, depend on the clocks of the drives, which no model
 //! knows. From the first unasked byte to the next byte of the master, only properties that hold for every order are checked.
+//!
+//! A bench that stands still leaves the line silent. Drives that monitor time-outs miss their bytes then, and that is not their fault. The
+//! same holds for drives of which it is not known whether they monitor: it is a setting (14.3.6).
 
 use super::comparison::Symptom;
 use super::follow::TwinBytes;
+use crate::link::HARMLESS;
 use harness_proto::line::Received;
 use harness_proto::novobus::address::RingSize;
+use harness_proto::novobus::check_sequence::ZEROS;
 use harness_proto::time::{Instant, Span};
 
 /// A byte and when it came.
@@ -29,6 +34,8 @@ pub(crate) struct Sent<'a> {
     pub(crate) answered: &'a [Instant],
     /// When every byte began.
     pub(crate) all: &'a [Instant],
+    /// How long behind the start of a byte its answer comes.
+    pub(crate) way: Span,
 }
 
 impl Sent<'_> {
@@ -39,6 +46,59 @@ impl Sent<'_> {
             early && *at >= from
         };
         received.iter().enumerate().position(unasked)
+    }
+
+    /// From when on the bench itself may be the cause of a difference. Drives that `may` monitor time-outs miss their bytes when it is silent
+    /// or late; and a model that `does` is wrong about the time of a silence when the bench was late.
+    pub(crate) fn excused_from(
+        &self,
+        size: RingSize,
+        (expected, received): (&[Heard], &[Heard]),
+        (may, does): (bool, bool),
+    ) -> Option<Instant> {
+        let missed = may.then(|| self.timed_out(size, (expected, received)));
+        let late = || (0..received.len()).find(|index| is_late(expected, received, *index));
+        let late = does.then(late);
+        let first = missed.into_iter().chain(late).flatten().min()?;
+        Some(received[first].0)
+    }
+
+    /// The first byte of the zeros and addresses of drives that have missed their master (ND21 9.9): in front of the byte that it
+    /// answers, the bench left the line silent or was late.
+    fn timed_out(
+        &self,
+        size: RingSize,
+        (expected, received): (&[Heard], &[Heard]),
+    ) -> Option<usize> {
+        let silent = |index: usize| {
+            let start = self.answered.get(index)?;
+            let before = self.all.partition_point(|own| own < start).checked_sub(1)?;
+            Some(start.since(self.all[before]) > HARMLESS)
+        };
+        // No answer comes before it has been round the ring.
+        let early = |index: usize| {
+            let start = self.answered.get(index);
+            start.is_none_or(|start| received[index].0 < *start + self.way)
+        };
+        let begins = |index: &usize| {
+            early(*index) || is_late(expected, received, *index) || silent(*index).unwrap_or(true)
+        };
+        let spelled = |(_, byte): &Heard| byte.error.is_none() && byte.byte < size.drives();
+        // How many of them come from a byte on, and whether nothing else comes behind them. The check sequence begins with some too.
+        let mut run = 0;
+        let mut in_error_mode = vec![false; received.len()];
+        let last = received.iter().rposition(|heard| !spelled(heard));
+        for (index, heard) in received.iter().enumerate().rev() {
+            run = if spelled(heard) { run + 1 } else { 0 };
+            let at_end = last.is_none_or(|last| index > last);
+            in_error_mode[index] = run > usize::from(ZEROS) || at_end;
+        }
+        let same =
+            |index: &usize| expected.get(*index).map(|own| own.1) == Some(received[*index].1);
+        let first = (0..received.len()).find(|index| in_error_mode[*index] && begins(index))?;
+        (first..received.len())
+            .any(|index| !same(&index))
+            .then_some(first)
     }
 
     /// The first byte that was sent unasked, by the ring or by its model, and what is wrong from there to the next byte of the master's.
@@ -88,6 +148,12 @@ impl Sent<'_> {
             fault: here.map(|what| (first, what)).or_else(foreign),
         })
     }
+}
+
+/// Whether a byte came so much later than in the model that the bench may have left the line silent for longer than it knows.
+fn is_late(expected: &[Heard], received: &[Heard], index: usize) -> bool {
+    let times = expected.get(index).zip(received.get(index));
+    times.is_some_and(|((due, _), (at, _))| at.since(*due) > HARMLESS)
 }
 
 fn apart(one: Instant, other: Instant) -> Span {

@@ -317,7 +317,10 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
             .map(|(cell, _)| *cell)
             .collect();
         match waiting.first() {
-            None => return Ok(()),
+            None => {
+                ask_whether_they_monitor(link, all);
+                return Ok(());
+            }
             Some(cell) if link.now() >= end || link.trouble().is_some() => {
                 let why = "it does not answer after its reset";
                 return Err(NotReady::new(*cell, Unready::NoAnswer, why));
@@ -328,6 +331,21 @@ pub fn reset_drives(link: &mut dyn Link, all: &[(usize, u8)]) -> Result<(), NotR
             }
             Some(_) => {}
         }
+    }
+}
+
+/// Reads `Flags2`: whether drives monitor time-outs (ND21 14.10.2) is a setting of their EEPROM (14.3.6), and the model must know it.
+fn ask_whether_they_monitor(link: &mut dyn Link, all: &[(usize, u8)]) {
+    let cell = |&(ring, drive): &(usize, u8)| Before {
+        ring,
+        drive,
+        address: nd21::ram::FLAGS2,
+        data: 0,
+    };
+    let cells: Vec<Before> = all.iter().map(cell).collect();
+    for own in cells.chunk_by(|one, other| one.ring == other.ring) {
+        // The model reads the answers in the record.
+        let _in_the_record = together(link, own, Before::read);
     }
 }
 

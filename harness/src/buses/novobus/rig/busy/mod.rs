@@ -1,0 +1,105 @@
+//! Right drives on a computer that stands still between any two actions: whatever it does, no drive is accused (ND21 9.9, 10.5).
+
+mod line;
+
+use super::run::Run;
+use super::session::Session;
+use crate::library::{Entry, sources};
+use crate::link::Line as _;
+use crate::rig::check::parse;
+use crate::rig::{Options, Rig, SessionError};
+use crate::scenario::simulate::bench;
+use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
+use harness_proto::time::Span;
+use line::{BusyLine, Stalls};
+
+fn entry(name: &str, text: String) -> Entry {
+    let source = Source {
+        name: name.to_owned(),
+        text: text.into(),
+    };
+    Entry::new(source, None).expect("a scenario")
+}
+
+/// The rig's file: a ring of two behind a port.
+fn rig(more: &str) -> Rig {
+    let text = format!(
+        "schema = 1\n[rig]\nid = \"busy\"\n[ring.1]\ndrives = 3\ntransport = \"tcp\"\nport = \"127.0.0.1:1\"\n\
+         marks = \"in-band\"\ntime_tolerance = \"20ms\"\n[limits]\nallow_motion = true\nallow_eeprom = true\nallow_reset = true\n\
+         allow_outputs = true\nallow_monitoring = true\n{more}"
+    );
+    let source = Source {
+        name: "busy.toml".to_owned(),
+        text: text.into(),
+    };
+    parse(&source).expect("a rig")
+}
+
+/// Two right drives, set up by these header lines, behind a computer that stands still like this.
+fn session(rig: &Rig, drives: &str, stalls: Stalls) -> Result<Session, SessionError> {
+    let text = format!("title t\nring 3\ndrive 0..last model nd21\n{drives}\n> 80\n");
+    let plan = entry("ring.scn", text).plan.expect("a plan");
+    let mut ring = bench(&plan);
+    ring.run_until(ring.now() + Span::from_millis(500));
+    let options = Options {
+        allow_motion: true,
+        ill_as_well: true,
+        ..Options::default()
+    };
+    Session::at_port(rig, &options, Box::new(BusyLine::new(ring, stalls)))
+}
+
+/// Plays the built-in scenarios with this in their name, and returns those that accuse a drive. A rig error accuses none.
+fn accused(drives: &str, (seed, one_in): (u64, u64), name: &str) -> Vec<String> {
+    let rig = rig("");
+    let mut session =
+        session(&rig, drives, Stalls::new(seed, one_in)).expect("a right ring that opens");
+    let mut run = Run::new(&mut session).expect("a run");
+    run.repeat();
+    let mut accused = Vec::new();
+    let mut played = 0;
+    for source in sources(&[]).expect("the library") {
+        let entry = Entry::new(source, Some(3)).ok();
+        let Some(entry) = entry.filter(|entry| entry.short_name().contains(name)) else {
+            continue;
+        };
+        let Some(plan) = &entry.plan else { continue };
+        let Ok(found) = run.play(plan, None) else {
+            break;
+        };
+        played += found.attempts.len();
+        if found.outcome.verdict == Verdict::Failed {
+            let remarks = found.outcome.remarks.join("; ");
+            accused.push(format!("seed {seed}, {}: {remarks}", entry.short_name()));
+        }
+    }
+    assert!(played > 0, "nothing was played");
+    accused
+}
+
+/// A computer that stands still for up to half a second at one action of `one_in`.
+fn check(drives: &str, seeds: std::ops::Range<u64>, one_in: u64, name: &str) {
+    let accused = seeds.flat_map(|seed| accused(drives, (seed, one_in), name));
+    assert_eq!(accused.collect::<Vec<_>>(), [] as [String; 0]);
+}
+
+/// ND21 8.2: bytes that are read late or sent late are no fault of a drive.
+#[test]
+fn a_computer_that_stands_still_accuses_no_drive() {
+    check("", 1..3, 300, "");
+}
+
+/// ND21 9.9: drives that monitor time-outs miss their bytes when the computer stands still, wherever it does.
+#[test]
+fn a_silence_of_the_bench_accuses_no_drive() {
+    check("", 1..7, 60, "9.9-");
+}
+
+/// ND21 14.3.6: the same where the drives' EEPROM switches monitoring on, which the rig's file does not say.
+#[test]
+fn drives_that_monitor_by_their_eeprom_are_not_accused() {
+    let monitors = "drive 0..last eeprom 47 = 80";
+    check(monitors, 1..3, 0, "10.2-");
+    check(monitors, 1..3, 1_000, "10.");
+}
