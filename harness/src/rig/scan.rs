@@ -176,7 +176,8 @@ pub fn propose(ports: &[Port]) -> String {
             "{gap}# {device}{model}\n[ring.1]\ndrives = 1                      # how many there are\n\
              transport = \"serial\"\n{place}\nline = \"38400 8O1\"\n"
         );
-        for bus in PortBus::ALL {
+        let at_slcan = |bus: &PortBus| bus.adapters().contains(&"slcan");
+        for bus in PortBus::ALL.into_iter().filter(at_slcan) {
             let _infallible = write!(
                 text,
                 "# Or, if it is an SLCAN adapter, in a file with schema = 2:\n# [port.1]\n# bus = {}\n# slcan = {}\n# drives = [{{ node = 1 }}]\n",

@@ -201,7 +201,7 @@ fn files_outside_the_buses_name_no_bus() {
                 .any(|top| path.starts_with(root().join(top).join(folder)))
         };
         path.starts_with(root().join("harness/src/buses"))
-            || folders.iter().any(|folder| of_crate(folder))
+            || folders.iter().any(of_crate)
             || DECLARE.iter().any(|file| path == root().join(file))
     };
     let all = crates.map(|top| files(top, "rs")).concat();

@@ -130,7 +130,11 @@ fn drives_are_moved() {
         shown("block 1 --rig sim:unitek"),
         "drive 1: locked, with commands 0; ready\n"
     );
-    refused("recover --rig sim:unitek", 2, &["for rings of ND21"]);
+    refused(
+        "recover --rig sim:unitek",
+        2,
+        &["for drives of another bus"],
+    );
     refused(
         "qualify --rig sim:unitek unitek-ex-8-status",
         2,
