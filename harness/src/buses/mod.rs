@@ -180,10 +180,15 @@ pub(crate) fn run_on(rig: &Rig, options: &Options) -> Result<Box<dyn SegmentRun>
     }
 }
 
-/// Judges what was played on a rig with a port again, with or without `--allow-motion`; `None` for a bench with rings.
-pub(crate) fn judge_of(rig: &Rig, allow_motion: bool) -> Option<Box<dyn SegmentJudge>> {
+/// Judges what was played on a rig with a port again, with or without `--allow-motion`, by a qualification or by a run; `None` for a bench
+/// with rings.
+pub(crate) fn judge_of(
+    rig: &Rig,
+    allow_motion: bool,
+    qualifies: bool,
+) -> Option<Box<dyn SegmentJudge>> {
     let judge = rig.port()?.bus.row().judge?;
-    Some(judge(rig, allow_motion))
+    Some(judge(rig, allow_motion, qualifies))
 }
 
 /// Whether these are traces of a bus of frames.

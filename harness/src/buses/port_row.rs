@@ -16,7 +16,7 @@ use crate::scenario::source::{Source, line_number};
 type OpenRun = fn(&Rig, &Options) -> Result<Box<dyn SegmentRun>, SessionError>;
 
 /// Judges what was played on a rig again.
-type OpenJudge = fn(&Rig, bool) -> Box<dyn SegmentJudge>;
+type OpenJudge = fn(&Rig, bool, bool) -> Box<dyn SegmentJudge>;
 
 /// What a bus knows of `[port.1]` and of the drives there.
 pub(crate) struct PortRow {

@@ -5,9 +5,10 @@ use super::args::QualifyArguments;
 use super::exit::Exit;
 use super::output::Output;
 use super::page::Page;
-use super::rig_failure::find_rig;
-use super::run::{details, line, select};
-use super::run_rig::{PlayOrder, Stop, over, play, work};
+use super::rig_failure::find_any_rig;
+use super::run::select;
+use super::run_rig::{PlayOrder, Stop, over, play, show, work};
+use super::run_segment;
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::evidence::{DEVIATIONS, Folder, PROFILE};
@@ -21,11 +22,11 @@ use std::time::SystemTime;
 
 /// Qualifies a rig.
 pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std::io::Result<Exit> {
-    let Some(rig) = find_rig(&arguments.rig, output) else {
+    let Some(rig) = find_any_rig(&arguments.rig, output) else {
         return Ok(Exit::Usage);
     };
-    let size = rig.ring_size();
-    let entries = match select(&arguments.selection, Some(size)) {
+    let size = Some(rig.ring_size()).filter(|own| *own > 0);
+    let entries = match select(&arguments.selection, size) {
         Ok(entries) => entries,
         Err(errors) => {
             errors.iter().for_each(|error| output.library_error(error));
@@ -52,7 +53,10 @@ pub(crate) fn qualify(arguments: &QualifyArguments, output: &mut Output) -> std:
         thorough: arguments.thorough,
         sign: arguments.sign.clone(),
     };
-    work(&rig, &entries, &job, page, output)
+    match rig.port() {
+        Some(_) => run_segment::work(&rig, &entries, &job, page, output),
+        None => work(&rig, &entries, &job, page, output),
+    }
 }
 
 /// A rig in use, and the folder that keeps what is played on it.
@@ -83,11 +87,7 @@ impl Bench for Live<'_, '_> {
     }
 
     fn show(&mut self, entry: &Entry, played: &Played) -> Result<(), Stop> {
-        let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
-        let text = line(entry, &played.outcome, self.output);
-        self.output.result(&text)?;
-        self.output.say(&details(entry, &played.outcome, traces));
-        Ok(())
+        Ok(show(entry, played, self.output)?)
     }
 }
 

@@ -186,18 +186,30 @@ fn all(
             folder: folder.as_mut(),
             output,
         };
-        match settle(course, live)? {
-            // What a drive does wrong is the drive's fault, whatever the outcome.
-            Exit::Failed => exit = Exit::Failed,
-            // What is not settled takes no failure back.
-            Exit::Incomplete if exit == Exit::Failed => {}
-            other => exit = exit.max(other),
-        }
+        exit = worse(exit, settle(course, live)?);
     }
     for gap in measured(&mut run) {
         output.say(&gap);
     }
     Ok(exit)
+}
+
+/// The exit code of a qualification, with that of its scenarios: what a drive does wrong is the drive's fault, whatever the outcome.
+pub(super) fn worse(scenarios: Exit, all: Exit) -> Exit {
+    match (scenarios, all) {
+        // What is not settled takes no failure back.
+        (_, Exit::Failed) | (Exit::Failed, Exit::Incomplete) => Exit::Failed,
+        _ => scenarios.max(all),
+    }
+}
+
+/// Reports the outcome of a conversation of a qualification.
+pub(super) fn show(entry: &Entry, played: &Played, output: &mut Output) -> std::io::Result<()> {
+    let traces = played.attempts.last().map_or(&[][..], |last| &last.traces);
+    let text = line(entry, &played.outcome, output);
+    output.result(&text)?;
+    output.say(&details(entry, &played.outcome, traces));
+    Ok(())
 }
 
 /// A rig on which scenarios are played one after another.

@@ -4,9 +4,9 @@ use super::exit::Exit;
 use super::output::Output;
 use super::page::Page;
 use super::rig_failure::{alarm, exit_of, exit_of_end, tell_end};
-use super::run_rig::{Course, PlayOrder, Stop, course_of, keep, reports};
+use super::run_rig::{Course, PlayOrder, Stop, course_of, keep, reports, show, worse};
 use crate::buses::run_on;
-use crate::evidence::{AboutRun, Folder};
+use crate::evidence::{AboutRun, DEVIATIONS, Folder, PROFILE};
 use crate::library::Entry;
 use crate::rig::segment::SegmentRun;
 use crate::rig::{Options, Played, Rig};
@@ -25,6 +25,7 @@ pub(crate) fn work(
         purpose: job.purpose.to_owned(),
         wait: job.wait,
         allow_motion: job.allow_motion,
+        ill_as_well: job.qualify,
         interrupt: interrupt_flag(),
         alarm: alarm(),
         ..Options::default()
@@ -76,6 +77,10 @@ fn all(
     (folder, page): (&mut Option<Folder>, Option<&mut Page>),
     output: &mut Output,
 ) -> Result<Exit, Stop> {
+    if job.qualify && course.run.qualified("", false).is_none() {
+        output.complain("drives of this bus cannot be qualified; use `run --rig`");
+        return Ok(Exit::Usage);
+    }
     if let Some(path) = &job.evidence {
         let segment = course.run.segment();
         let selected = entries.iter().filter(|entry| course.is_for(entry));
@@ -92,7 +97,51 @@ fn all(
         };
         *folder = Some(Folder::create(path, &about)?);
     }
-    course_of(course, entries, job, (folder.as_mut(), page), output)
+    let exit = course_of(course, entries, job, (folder.as_mut(), page), output)?;
+    match job.qualify {
+        true => Ok(worse(exit, qualify(course, folder.as_mut(), output)?)),
+        false => Ok(exit),
+    }
+}
+
+/// Plays the conversations of a qualification, and writes what all attempts come to.
+fn qualify(
+    course: &mut SegmentCourse<'_>,
+    mut folder: Option<&mut Folder>,
+    output: &mut Output,
+) -> Result<Exit, Stop> {
+    let sources = course.run.conversations();
+    let mut whole = true;
+    for source in sources {
+        whole &= !course.over(output);
+        if !whole {
+            break;
+        }
+        let entry = match Entry::new(source, None) {
+            Ok(entry) => entry,
+            Err(problems) => {
+                output.mistakes(&problems);
+                return Ok(Exit::RigError);
+            }
+        };
+        let (name, played) = course.play(&entry, folder.as_deref_mut())?;
+        show(&entry, &played, output)?;
+        course.note(&entry, &name, &played, output);
+    }
+    let began = folder
+        .as_ref()
+        .map_or_else(String::new, |own| own.began().to_owned());
+    let Some(qualified) = course.run.qualified(&began, whole) else {
+        return Ok(Exit::Usage);
+    };
+    if let Some(folder) = folder {
+        if let Some(profile) = &qualified.profile {
+            folder.add(PROFILE, profile)?;
+        }
+        folder.add(DEVIATIONS, &qualified.deviations)?;
+    }
+    output.result(&qualified.deviations)?;
+    Ok(Exit::of(&[qualified.verdict], false))
 }
 
 /// A rig with a port in use.

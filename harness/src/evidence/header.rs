@@ -128,7 +128,7 @@ pub(super) fn header(
         listed.join(", "),
     );
     must("`anew`", anew.to_string(), expected_anew.to_string());
-    let purposes = match *own_rings || segment.is_some() {
+    let purposes = match *own_rings {
         true => &["run"][..],
         false => &["run", "qualify"],
     };
@@ -173,7 +173,7 @@ pub(super) fn header(
 
 /// What the first line must say of a rig with a port that has these capabilities, and whether motors could turn; `None` for rings.
 fn segment(names: &[String], rig: &Rig) -> Option<(OnSegment, bool)> {
-    let [moving, still] = judge_of(rig, true)?.segments();
+    let [moving, still] = judge_of(rig, true, false)?.segments();
     let listed = |own: &OnSegment| {
         let own = own.capabilities.iter().map(|own| own.name());
         own.eq(names.iter().map(String::as_str))

@@ -4,11 +4,12 @@ use super::attempt::reached;
 use super::files::{DEVIATIONS, PROFILE, read_text, sum};
 use super::record::RecordLine;
 use super::verify::{Judged, Opened};
-use crate::buses::qualify::{Bench, Qualification, QualificationFacts, Qualified, thorough};
+use crate::buses::qualify::{Bench, Qualification, QualificationFacts, thorough};
 use crate::buses::syntax::Header;
 use crate::buses::twin::Twin;
 use crate::library::Entry;
 use crate::rig::run::twin;
+use crate::rig::segment::Qualified;
 use crate::rig::{Attempt, Played};
 use crate::scenario::problem::Problems;
 use crate::scenario::run::Outcome;
@@ -50,7 +51,7 @@ pub(super) fn differences(path: &Path, opened: &Opened, judged: &[Judged]) -> Ve
 }
 
 /// Compares the files of a folder with those that its record gives.
-fn compare(path: &Path, made: &Qualified) -> Vec<String> {
+pub(super) fn compare(path: &Path, made: &Qualified) -> Vec<String> {
     let mut wrong = Vec::new();
     match &made.profile {
         Some(profile) => wrong.extend(difference(path, PROFILE, profile)),

@@ -95,6 +95,15 @@ struct Qualifying {
 
 fn qualifying(opened: &Opened) -> Vec<Qualifying> {
     let header = &opened.header;
+    if let Some(judge) = opened.segment_judge() {
+        let all = judge.conversations().into_iter();
+        let listed = all.map(|source| Qualifying {
+            sum: sum(source.text.as_bytes()),
+            name: source.name,
+            always: true,
+        });
+        return listed.collect();
+    }
     let drives = header.drives.first().copied().unwrap_or(1);
     let all = reached(&opened.rig, header);
     let reaches =

@@ -19,7 +19,7 @@ use super::signature::{self, Signer};
 use crate::buses::judge_of;
 use crate::rig::judge::known;
 use crate::rig::run::twin;
-use crate::rig::segment::SegmentJudge;
+use crate::rig::segment::{Qualified, SegmentJudge};
 use crate::rig::{Rig, parse_beside};
 use crate::scenario::source::Source;
 use harness_proto::line::Rate;
@@ -90,7 +90,7 @@ pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, Evide
     }
     let opened = Opened::folder(path)?;
     let scenario = scenarios(path);
-    let judged = opened.judged(&scenario)?;
+    let (judged, qualification) = opened.judged_and_qualified(&scenario)?;
     let mut verified = opened.verified(&judged, &scenario);
     verified.files.splice(0..0, files);
     if signer.is_none() {
@@ -117,7 +117,10 @@ pub fn verify(path: &Path, signer: Option<Signer<'_>>) -> Result<Verified, Evide
         verified.files.extend(wrong);
         verified.files.extend(rerun(path, &opened, &scenario));
         if opened.header.qualified && verified.is_right() {
-            let wrong = qualified::differences(path, &opened, &judged);
+            let wrong = match &qualification {
+                Some(made) => qualified::compare(path, made),
+                None => qualified::differences(path, &opened, &judged),
+            };
             verified.files.extend(wrong);
         } else if opened.header.qualified {
             verified.unconfirmed.push(format!(
@@ -202,9 +205,30 @@ impl Opened {
         &self,
         scenario: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Vec<Judged>, EvidenceError> {
-        if let Some(mut judge) = self.segment_judge() {
-            return Ok(self.judged_on_segment(judge.as_mut(), scenario));
+        match self.segment_judge() {
+            Some(mut judge) => Ok(self.judged_on_segment(judge.as_mut(), scenario)),
+            None => self.judged_on_rings(scenario),
         }
+    }
+
+    /// The same, and what a qualification on a rig with a port comes to.
+    fn judged_and_qualified(
+        &self,
+        scenario: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<(Vec<Judged>, Option<Qualified>), EvidenceError> {
+        let Some(mut judge) = self.segment_judge().filter(|_| self.header.qualified) else {
+            return Ok((self.judged(scenario)?, None));
+        };
+        let judged = self.judged_on_segment(judge.as_mut(), scenario);
+        let whole = selection::compare(self).missing.is_none();
+        let made = judge.qualified(&self.header.started, whole);
+        Ok((judged, made))
+    }
+
+    fn judged_on_rings(
+        &self,
+        scenario: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Vec<Judged>, EvidenceError> {
         let fresh = || {
             twin(&self.rig, &known(&self.rig))
                 .map_err(|problems| EvidenceError::Foreign(RIG.to_owned(), problems.to_string()))
@@ -243,7 +267,7 @@ impl Opened {
 
     /// What judges attempts on a rig with a port; `None` for rings, and where each scenario had a bench of its own.
     pub(super) fn segment_judge(&self) -> Option<Box<dyn SegmentJudge>> {
-        judge_of(&self.rig, self.header.on_segment?)
+        judge_of(&self.rig, self.header.on_segment?, self.header.qualified)
     }
 
     /// Judges every attempt on a rig with a port again.

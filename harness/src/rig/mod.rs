@@ -38,7 +38,9 @@ pub(crate) use open::{line_rate, stated_rate};
 pub(crate) use permitted::{limits, standing};
 pub(crate) use played::{Again, attempts_of};
 pub use played::{Attempt, Played};
-pub use profile::{KnownProfile, Profile, ProfileError, SettledProperty};
+pub use profile::{
+    KnownProfile, Profile, ProfileError, ProfileLines, ProfileSetup, SettledProperty,
+};
 pub use session_error::SessionError;
 pub use shared::{Shared, SharedLine};
 pub use watchdog::Alarm;

@@ -1,24 +1,46 @@
 //! A profile: what is known about the drives of a rig, as a file that the simulator can load.
 
 use crate::buses::syntax::Header;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Header lines of a scenario, as a profile keeps what makes simulated drives behave as was found.
+pub type ProfileLines = Vec<String>;
+
+/// What makes simulated drives behave as was found.
+pub trait ProfileSetup: Default {
+    /// Adds what was found of another drive.
+    fn add(&mut self, more: &Self);
+}
+
+impl ProfileSetup for Header {
+    fn add(&mut self, more: &Self) {
+        *self = self.and(more);
+    }
+}
+
+impl ProfileSetup for ProfileLines {
+    fn add(&mut self, more: &Self) {
+        self.extend_from_slice(more);
+    }
+}
 
 /// A drive profile (TOML).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Profile {
+pub struct Profile<S = Header> {
     /// The version of this form: 1.
     pub schema: u32,
     /// Which rig was asked.
     pub rig: String,
     /// When, as a date and time of day in UTC.
     pub date: String,
-    /// How many drives each ring has.
+    /// How many drives each ring has; one number for drives that share a segment.
     pub rings: Vec<u8>,
     /// The properties that were settled, by name.
-    #[serde(default)]
-    pub property: BTreeMap<String, SettledProperty>,
+    #[serde(default = "BTreeMap::new")]
+    pub property: BTreeMap<String, SettledProperty<S>>,
     /// The properties that were not, with the reason.
     #[serde(default)]
     pub open: BTreeMap<String, String>,
@@ -27,13 +49,13 @@ pub struct Profile {
 /// A property that was settled.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SettledProperty {
+pub struct SettledProperty<S = Header> {
     /// What was found, for people.
     pub value: String,
     /// The section that leaves it open.
     pub section: String,
     /// What makes a simulated drive behave so; in a file, a list of header lines of the scenario language.
-    pub setup: Header,
+    pub setup: S,
 }
 
 /// A profile that a rig's file names.
@@ -56,7 +78,7 @@ pub enum ProfileError {
     Schema(u32),
 }
 
-impl Profile {
+impl<S: ProfileSetup + DeserializeOwned> Profile<S> {
     /// Reads a profile.
     ///
     /// # Errors
@@ -70,15 +92,15 @@ impl Profile {
     }
 
     /// Notes what was found of a property, of one drive after another.
-    pub fn settle(&mut self, property: &str, section: &str, value: &str, header: &Header) {
+    pub fn settle(&mut self, property: &str, section: &str, value: &str, setup: &S) {
         let settled = self.property.entry(property.to_owned());
         let settled = settled.or_insert_with(|| SettledProperty {
             value: String::new(),
             section: section.to_owned(),
-            setup: Header::default(),
+            setup: S::default(),
         });
         add(&mut settled.value, value);
-        settled.setup = settled.setup.and(header);
+        settled.setup.add(setup);
     }
 
     /// Notes why a property is not known, of one drive after another.
@@ -88,9 +110,11 @@ impl Profile {
 
     /// What makes simulated drives behave as was found.
     #[must_use]
-    pub fn header(&self) -> Header {
+    pub fn header(&self) -> S {
+        let mut all = S::default();
         let settled = self.property.values();
-        settled.fold(Header::default(), |all, own| all.and(&own.setup))
+        settled.for_each(|own| all.add(&own.setup));
+        all
     }
 }
 

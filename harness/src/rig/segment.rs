@@ -4,6 +4,7 @@ use super::{End, Keeper, Played, SessionError};
 use crate::link::{Capability, LinkEvent, Trouble};
 use crate::scenario::run::Outcome;
 use crate::scenario::source::Source;
+use crate::scenario::verdict::Verdict;
 use harness_proto::time::Span;
 use harness_sim::record::Trace;
 
@@ -18,6 +19,17 @@ pub(crate) struct OnSegment {
     pub(crate) tolerance: Span,
     /// What its link can do.
     pub(crate) capabilities: Vec<Capability>,
+}
+
+/// What a qualification comes to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Qualified {
+    /// The text of `profile.toml`; `None` where the drives were not asked.
+    pub(crate) profile: Option<String>,
+    /// The text of `deviations.txt`: which deviations there are, and what was compared.
+    pub(crate) deviations: String,
+    /// The verdict on the drives.
+    pub(crate) verdict: Verdict,
 }
 
 /// A rig in use, on which scenarios of its bus are played.
@@ -35,6 +47,17 @@ pub(crate) trait SegmentRun {
         source: &Source,
         keeper: Option<&mut dyn Keeper>,
     ) -> Result<Played, SessionError>;
+
+    /// The scenarios that a qualification plays behind the selected ones.
+    fn conversations(&self) -> Vec<Source> {
+        Vec::new()
+    }
+
+    /// What the attempts so far come to, in a qualification that began at this date and time of day in UTC; `whole` if everything was played.
+    /// `None` for a bus whose drives cannot be qualified.
+    fn qualified(&mut self, _began: &str, _whole: bool) -> Option<Qualified> {
+        None
+    }
 
     /// Notes about the drives since the last call, in sentences.
     fn notes(&mut self) -> Vec<String>;
@@ -71,6 +94,16 @@ pub(crate) trait SegmentJudge {
 
     /// Why a scenario is not begun on this rig; `None` if it is.
     fn not_begun(&self, source: &Source) -> Option<Outcome>;
+
+    /// The scenarios that a qualification plays behind the selected ones.
+    fn conversations(&self) -> Vec<Source> {
+        Vec::new()
+    }
+
+    /// What the attempts judged so far come to; see [`SegmentRun::qualified`].
+    fn qualified(&mut self, _began: &str, _whole: bool) -> Option<Qualified> {
+        None
+    }
 
     /// Judges an attempt again.
     ///

@@ -10,6 +10,7 @@ mod explore;
 mod inverters_on_rig;
 mod named;
 mod on_can;
+mod on_can_qualify;
 mod on_profibus;
 #[path = "../common/program.rs"]
 mod program;

@@ -63,7 +63,7 @@ pub(crate) const PORT: PortRow = PortRow {
         Err((format!("`{name}` is no register of a NORDAC"), expected))
     },
     run: |rig, options| Ok(Box::new(InvertersInUse::open(rig, options)?)),
-    judge: Some(|rig, allow_motion| Box::new(InverterJudge::new(rig, allow_motion))),
+    judge: Some(|rig, allow_motion, _| Box::new(InverterJudge::new(rig, allow_motion))),
     command: super::cli::drive,
     check: super::cli::check,
     fuzz: super::cli::fuzz::run,

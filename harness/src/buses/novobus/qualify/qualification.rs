@@ -13,6 +13,7 @@ use super::settle::{Answer, answer, silence};
 use crate::buses::novobus::language::syntax::Header;
 use crate::buses::novobus::twin::{Exactness, Twin};
 use crate::library::Entry;
+use crate::rig::segment::Qualified;
 use crate::rig::{Played, Profile, Rig};
 use crate::scenario::problem::Problems;
 use crate::scenario::verdict::Verdict;
@@ -78,17 +79,6 @@ pub(crate) struct QualificationFacts {
     pub(crate) began: String,
     /// Whether the long conversations are played too.
     pub(crate) thorough: bool,
-}
-
-/// What a qualification comes to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Qualified {
-    /// The text of `profile.toml`; `None` where the drives were not asked.
-    pub(crate) profile: Option<String>,
-    /// The text of `deviations.txt`: which deviations there are, and what was compared.
-    pub(crate) deviations: String,
-    /// The verdict on the drives.
-    pub(crate) verdict: Verdict,
 }
 
 /// A qualification in progress.

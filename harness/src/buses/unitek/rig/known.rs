@@ -32,6 +32,8 @@ pub(super) struct Known {
     pub(super) axis: Axis,
     /// What the registers read last.
     pub(super) cells: BTreeMap<u8, u32>,
+    /// What the registers read at first, before any probe.
+    pub(super) first: BTreeMap<u8, u32>,
     /// How it behaves; the default where that is not settled.
     pub(super) properties: Properties,
     /// The properties that are settled, by name.
@@ -47,6 +49,7 @@ impl Known {
         Self {
             axis,
             cells: BTreeMap::new(),
+            first: BTreeMap::new(),
             properties: Properties::default(),
             settled: BTreeSet::new(),
             replies: BTreeMap::new(),
@@ -60,7 +63,11 @@ impl Known {
     /// The link is in trouble, or the drive does not answer for its firmware.
     pub(super) fn read_all(&mut self, driver: &mut Driver<'_>) -> Result<(), Error> {
         let assigned = REGISTERS.iter().filter(|own| own.dump != UNASSIGNED);
-        self.read(driver, assigned.map(|own| own.number))
+        let read = self.read(driver, assigned.map(|own| own.number));
+        if self.first.is_empty() {
+            self.first.clone_from(&self.cells);
+        }
+        read
     }
 
     /// Reads what may have changed: registers that change without a write, and those that were written.
@@ -115,12 +122,28 @@ impl Known {
         self.cell(0xDC) & 0x0100 != 0
     }
 
+    /// The same drive with what its registers read at first.
+    pub(super) fn as_at_first(&self) -> Self {
+        Self {
+            cells: self.first.clone(),
+            ..self.clone()
+        }
+    }
+
     /// Settles a property.
     pub(super) fn settle(&mut self, name: &str, word: &str) {
         if let Some(property) = Description::of(name)
             && property.set(&mut self.properties, Setting::Word(word))
         {
             self.settled.insert(property.name);
+        }
+    }
+
+    /// Takes over how long homing took. It is settled only where time is `exact`: an adapter and a busy computer take time, too.
+    pub(super) fn measure_homing(&mut self, took: Span, exact: bool) {
+        self.properties.homing_time = took;
+        if exact {
+            self.settled.insert("homing-time");
         }
     }
 
@@ -161,6 +184,22 @@ impl Known {
             control: Some(Control::Speed),
             ..DriveSetup::new(self.axis.node)
         }
+    }
+
+    /// What the drive can be where one of its properties is open; the value that is assumed first. None for a property that can have any
+    /// value.
+    pub(super) fn values_of(&self, property: &Description) -> Vec<Properties> {
+        use harness_proto::unitek::properties::Accepts;
+        let Accepts::Words(words) = property.accepts else {
+            return Vec::new();
+        };
+        let with = |word: &&'static str| {
+            let mut other = self.properties;
+            property
+                .set(&mut other, Setting::Word(word))
+                .then_some(other)
+        };
+        words.iter().filter_map(with).collect()
     }
 
     /// The drives that this one can be: each differs from what is assumed in one property that is not settled. With the words of the

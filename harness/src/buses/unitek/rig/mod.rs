@@ -5,6 +5,7 @@ mod observed;
 mod permitted;
 mod player;
 mod probe;
+mod qualify;
 mod run;
 mod session;
 
@@ -47,7 +48,7 @@ pub(crate) const PORT: PortRow = PortRow {
     setup_mistakes: |port, source| setup(port, source).err(),
     special_register,
     run: |rig, options| Ok(Box::new(DrivesInUse::open(rig, options)?)),
-    judge: Some(|rig, allow_motion| Box::new(Judge::new(rig, allow_motion))),
+    judge: Some(|rig, allow_motion, qualifies| Box::new(Judge::new(rig, allow_motion, qualifies))),
     command: super::cli::drive,
     check: super::cli::check,
     fuzz: super::cli::fuzz::run,

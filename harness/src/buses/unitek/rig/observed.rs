@@ -11,6 +11,9 @@ use harness_sim::record::Trace;
 use std::any::Any;
 use std::collections::BTreeSet;
 
+/// The most frames of an attempt that are kept.
+const MOST_KEPT: usize = 100_000;
+
 /// A link to drives, observed. Its notes follow from what the link shows, so that a record gives the same ones.
 pub(super) struct Observed<'l> {
     link: &'l mut dyn Link,
@@ -30,6 +33,9 @@ pub(super) struct Observed<'l> {
     sent: u32,
     /// How many frames were received, and a checksum of them (FNV-1a).
     heard: (usize, u32),
+    /// The frames that were received, and how many of them before the last conversation began, all of them if none has; `None` where they are
+    /// not kept.
+    kept: Option<(Vec<Frame>, usize)>,
 }
 
 /// What an adapter and a busy computer may do to frames.
@@ -55,7 +61,22 @@ impl<'l> Observed<'l> {
             slow: None,
             sent: 0,
             heard: (0, 0x811C_9DC5),
+            kept: None,
         }
+    }
+
+    /// Keeps the frames that are received.
+    pub(super) fn keeping(mut self) -> Self {
+        self.kept = Some((Vec::new(), usize::MAX));
+        self
+    }
+
+    /// The frames that were kept: those before the last conversation, and those in it.
+    pub(super) fn kept(&self) -> [&[Frame]; 2] {
+        let kept = self.kept.as_ref();
+        kept.map_or([&[]; 2], |(frames, begun)| {
+            <[_; 2]>::from(frames.split_at(frames.len().min(*begun)))
+        })
     }
 
     /// The link made worse, for a rehearsal.
@@ -124,6 +145,9 @@ impl<'l> Observed<'l> {
             return;
         };
         self.heard.0 += 1;
+        if let Some((frames, _)) = self.kept.as_mut().filter(|own| own.0.len() < MOST_KEPT) {
+            frames.push(frame);
+        }
         for byte in frame.to_string().bytes() {
             self.heard.1 = (self.heard.1 ^ u32::from(byte)).wrapping_mul(0x0100_0193);
         }
@@ -206,6 +230,9 @@ impl Link for Observed<'_> {
 
     fn begin(&mut self) {
         self.link.begin();
+        if let Some((frames, begun)) = &mut self.kept {
+            *begun = frames.len();
+        }
         self.asked = None;
     }
 

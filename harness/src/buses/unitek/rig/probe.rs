@@ -6,9 +6,9 @@
 use super::known::Known;
 use super::observed::Observed;
 use crate::buses::unitek::driver::{Driver, Error};
-use crate::link::Line;
+use crate::link::{Line, Link as _};
 use crate::medium::{Heard, Out};
-use harness_proto::can::{self, Frame};
+use harness_proto::can::{self, BitRate, Frame};
 use harness_proto::time::{Instant, Span};
 use harness_proto::unitek::frame::{Data, Reply};
 use harness_proto::unitek::properties::MapReply;
@@ -30,6 +30,12 @@ const SLACK: Span = Span::from_millis(30);
 
 /// Nine registers, one more than there are cycles (App 8).
 const NINE: [u8; 9] = [0x1B, 0x30, 0x31, 0x90, 0x51, 0x52, 0x6D, 0x6E, 0x11];
+
+/// The function that starts homing.
+const HOMING: u8 = 0x78;
+
+/// How long homing is waited for.
+const LONGEST_HOMING: Span = Span::from_millis(10_000);
 
 /// How often a probe is made that a busy computer has disturbed.
 const TRIES: usize = 3;
@@ -63,6 +69,25 @@ pub(super) fn settle(
     let delay = probe.link.shortest();
     probe.known.reply_delay = delay.filter(|own| *own > Span::from_micros(500));
     Ok(())
+}
+
+/// Settles what shows only where the motor of a drive may turn. It is locked afterwards.
+///
+/// # Errors
+/// As [`settle`].
+pub(super) fn settle_moving(
+    known: &mut Known,
+    link: &mut Observed<'_>,
+    (patience, rate): (Span, BitRate),
+) -> Result<(), Error> {
+    let mut probe = Probe {
+        known,
+        link,
+        patience,
+    };
+    probe.homing(rate)?;
+    let lock = Data::Short(MODE_LOCK);
+    probe.write(MODE, lock)
 }
 
 struct Probe<'p, 'l> {
@@ -246,6 +271,41 @@ impl Probe<'_, '_> {
             }
             return Ok(());
         }
+        Ok(())
+    }
+
+    /// How long homing takes (ex 12): until a calibrated axis is in tolerance.
+    fn homing(&mut self, rate: BitRate) -> Result<(), Error> {
+        self.write(MODE, Data::Short(0))?;
+        let bits = self.read(STATUS)?.data.bits();
+        if bits & status::ENABLED == 0 || bits & status::TOLERANCE != 0 {
+            return Ok(());
+        }
+        self.send(&[0x3D, STATUS, 1])?;
+        let began = self.send(&[HOMING, 1, 0])?;
+        let end = began + LONGEST_HOMING;
+        let mut done = None;
+        while done.is_none() && self.link.now() < end {
+            let now = self.link.now();
+            let heard = self.listen((now + HALF).min(end))?;
+            done = heard.into_iter().find(|(at, reply)| {
+                let there = reply.data.bits() & status::TOLERANCE != 0;
+                *at > began && reply.register == STATUS && there
+            });
+        }
+        self.send(&[0x3D, STATUS, 0xFF])?;
+        let now = self.link.now();
+        self.listen(now + SLACK)?;
+        let Some((at, reply)) = done else {
+            return Ok(());
+        };
+        let frame = reply.encode(self.known.axis.tx);
+        let length = frame.map_or(Span::ZERO, |own| rate.time_of(own.wire_bits()));
+        // The drive begins with the next millisecond of its clock, and sends at the end of one.
+        let took = (at.since(began).saturating_sub(length)).as_nanos();
+        let took = Span::from_millis(took.div_ceil(1_000_000));
+        self.known
+            .measure_homing(took, self.link.time_tolerance() == Span::ZERO);
         Ok(())
     }
 

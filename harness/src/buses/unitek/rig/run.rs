@@ -1,12 +1,14 @@
 //! Scenarios on a rig of UNITEK drives, and their attempts judged again from a record.
 
-use super::player::{Own, Player, capabilities, stores};
+use super::player::{Own, Player, stores};
+use super::qualify::{conversations, qualify};
 use super::{Axis, Session, axes, limits, rate};
 use crate::buses::Bus;
 use crate::buses::unitek::driver::{Driver, Error};
-use crate::link::{Line, Link, LinkEvent, Recording, Sink, Trouble};
+use crate::buses::unitek::simulate::Bench;
+use crate::link::{Capability, Line, Link, LinkEvent, Recording, Sink, Trouble};
 use crate::rig::port_file::Port;
-use crate::rig::segment::{OnSegment, RepeatedVerdict, SegmentJudge, SegmentRun};
+use crate::rig::segment::{OnSegment, Qualified, RepeatedVerdict, SegmentJudge, SegmentRun};
 use crate::rig::{Again, Attempt, End, Keeper, Options, Played, Rig, SessionError, attempts_of};
 use crate::scenario::parse;
 use crate::scenario::run::{Outcome, Skip};
@@ -16,6 +18,7 @@ use harness_proto::time::Span;
 use harness_proto::unitek::frame::Data;
 use harness_proto::unitek::guard::Limits;
 use harness_proto::unitek::{Access, Register};
+use std::sync::Arc;
 
 /// The shortest time between two writes of 84 (UNITEK ex 7: our choice).
 const EEPROM_REST: Span = Span::from_millis(60_000);
@@ -53,8 +56,12 @@ impl DrivesInUse {
         }
         let mut session = Session::open(rig, options)?;
         let real = session.link().time_tolerance() > Span::ZERO;
+        let mut player = player(rig, limits(rig, options.allow_motion));
+        if options.ill_as_well {
+            player.qualify();
+        }
         Ok(Self {
-            player: player(rig, limits(rig, options.allow_motion)),
+            player,
             session,
             again: Again::new(real),
             notes: Vec::new(),
@@ -74,7 +81,7 @@ impl DrivesInUse {
         }
     }
 
-    fn attempt(&mut self, own: &Own, sink: &mut dyn Sink) -> Attempt {
+    fn attempt(&mut self, own: &Arc<Own>, sink: &mut dyn Sink) -> Attempt {
         let stores = own.frames().any(stores);
         if stores && self.stored {
             self.rest();
@@ -168,7 +175,7 @@ impl SegmentRun for DrivesInUse {
         mut keeper: Option<&mut dyn Keeper>,
     ) -> Result<Played, SessionError> {
         let own = match read(source) {
-            Ok(own) => own,
+            Ok(own) => Arc::new(own),
             Err(skip) => return Ok(Played::skipped(skip)),
         };
         if let Some(skip) = self.player.not_begun(&own) {
@@ -197,6 +204,15 @@ impl SegmentRun for DrivesInUse {
         }
     }
 
+    fn conversations(&self) -> Vec<Source> {
+        conversations(self.session.axes())
+    }
+
+    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
+        let rig = self.session.rig();
+        Some(qualify(&self.player, rig, began, whole))
+    }
+
     fn notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
     }
@@ -220,6 +236,7 @@ impl SegmentRun for DrivesInUse {
 pub(crate) struct Judge {
     rig: Rig,
     allow_motion: bool,
+    qualifies: bool,
     player: Player,
     tolerance: Span,
     /// The simulated rig, from the first attempt on.
@@ -227,14 +244,20 @@ pub(crate) struct Judge {
 }
 
 impl Judge {
-    /// For a run in which motors may have turned, as far as the rig's file permits it, or for one in which they may not.
-    pub(crate) fn new(rig: &Rig, allow_motion: bool) -> Self {
+    /// For a run in which motors may have turned, as far as the rig's file permits it, or for one in which they may not; of a qualification or not.
+    pub(crate) fn new(rig: &Rig, allow_motion: bool, qualifies: bool) -> Self {
         let limits = limits(rig, allow_motion);
+        let tolerance = segment(rig, limits.motion).tolerance;
+        let mut player = player(rig, limits);
+        if qualifies {
+            player.qualify();
+        }
         Self {
-            tolerance: segment(rig, limits.motion).tolerance,
+            tolerance,
             allow_motion,
+            qualifies,
             run: None,
-            player: player(rig, limits),
+            player,
             rig: rig.clone(),
         }
     }
@@ -242,12 +265,13 @@ impl Judge {
 
 impl Judge {
     /// Plays an attempt on the simulated rig again, behind those before it.
-    fn again(&mut self, own: &Own) -> Result<RepeatedVerdict, String> {
+    fn again(&mut self, own: &Arc<Own>) -> Result<RepeatedVerdict, String> {
         let mut run = match self.run.take() {
             Some(run) => run,
             None => {
                 let options = Options {
                     allow_motion: self.allow_motion,
+                    ill_as_well: self.qualifies,
                     ..Options::default()
                 };
                 // Nothing outside the folder is touched.
@@ -285,8 +309,20 @@ impl SegmentJudge for Judge {
         skip.map(Outcome::skipped)
     }
 
+    fn conversations(&self) -> Vec<Source> {
+        conversations(&self.rig.port().map(axes).unwrap_or_default())
+    }
+
+    fn qualified(&mut self, began: &str, whole: bool) -> Option<Qualified> {
+        match &mut self.run {
+            Some(run) => run.qualified(began, whole),
+            None => Some(qualify(&self.player, &self.rig, began, whole)),
+        }
+    }
+
     fn judge(&mut self, source: &Source, events: &[LinkEvent]) -> Result<RepeatedVerdict, String> {
         let own = Own::read(source).map_err(|problems| problems.to_string())?;
+        let own = Arc::new(own);
         if self.rig.is_simulated() {
             return self.again(&own);
         }
@@ -339,4 +375,19 @@ fn segment(rig: &Rig, motion: bool) -> OnSegment {
         },
         capabilities: capabilities(&all, simulated),
     }
+}
+
+/// What a rig's capabilities are within limits, beside what no record shows.
+fn capabilities(limits: &Limits, simulated: bool) -> Vec<Capability> {
+    let all = match simulated {
+        true => Bench::CAPABILITIES.as_slice(),
+        false => &[Capability::Memory, Capability::Motion, Capability::Eeprom],
+    };
+    let has = |own: &&Capability| match own {
+        Capability::Motion => limits.motion,
+        Capability::Eeprom => limits.eeprom,
+        Capability::Tap | Capability::Simulator | Capability::Power => false,
+        _ => true,
+    };
+    all.iter().filter(has).copied().collect()
 }

@@ -5,6 +5,12 @@
 //! it. A line that the rig does not meet then accuses the drive, unless a right drive with another value of a property that is not settled
 //! would not meet it either, the drive and its model read differently at rest, or the computer was late.
 
+mod note;
+mod own;
+
+pub(in crate::buses::unitek) use note::{CONVERSATION, Note, Other as DriveIs};
+pub(super) use own::{Own, stores};
+
 use super::known::Known;
 use super::observed::{Observed, Slow};
 use super::{Axis, probe};
@@ -12,29 +18,25 @@ use crate::buses::LimitSetting;
 use crate::buses::unitek::driver::{Driver, Error};
 use crate::buses::unitek::gate::guarded;
 use crate::buses::unitek::language::Unitek;
-use crate::buses::unitek::language::plan::{Act, WantedFrame, node, octet_time};
+use crate::buses::unitek::language::plan::{node, octet_time};
 use crate::buses::unitek::language::syntax::{PropertyValue, Setup};
 use crate::buses::unitek::simulate::{self, Bench};
 use crate::link::{Capability, Line, Link, LinkEvent, Recording, Replay, Trouble};
 use crate::medium::Medium;
 use crate::scenario::expression::Scope;
-use crate::scenario::parse::parse;
-use crate::scenario::pattern::Expected;
-use crate::scenario::plan::{Plan, PlannedAction, plan};
-use crate::scenario::problem::Problems;
 use crate::scenario::run::outcome::Unready;
 use crate::scenario::run::{AtMismatch, Outcome, Skip, Unlock, Why, lacks, play};
-use crate::scenario::source::Source;
 use crate::scenario::syntax::Scenario;
 use crate::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, Frame};
 use harness_proto::time::{Instant, Span};
-use harness_proto::unitek::frame::{Data, Request};
+use harness_proto::unitek::frame::Data;
 use harness_proto::unitek::guard::Limits;
-use harness_proto::unitek::properties::{Dlc4, PROFILES, PROPERTIES, Properties, Setting};
+use harness_proto::unitek::properties::{PROFILES, PROPERTIES, Properties, Setting};
 use harness_proto::unitek::words::MODE_LOCK;
 use harness_proto::unitek::{Register, guard};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 const MODE: u8 = 0x51;
 /// The commands of torque and of speed. The last one decides what the drive controls.
@@ -45,49 +47,6 @@ const BUS_SETTINGS: [u8; 3] = [0x68, 0x69, 0x73];
 
 /// Registers that show what a drive makes of its inputs: a model that explains the drive reads the same at rest.
 const AT_REST: [u8; 9] = [0x40, 0x8F, 0xCE, 0xD8, 0xE2, 0xE3, 0xEF, 0xF2, 0xF5];
-
-/// A scenario of this bus.
-pub(super) struct Own {
-    scenario: Scenario<Unitek>,
-    pub(super) plan: Plan<Unitek>,
-}
-
-impl Own {
-    /// Reads a scenario.
-    pub(super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
-        let scenario: Scenario<Unitek> = parse(source)?;
-        let plan = plan(&scenario, source, None)?;
-        Ok(Self { scenario, plan })
-    }
-
-    /// The frames that its lines send.
-    pub(super) fn frames(&self) -> impl Iterator<Item = &Frame> {
-        self.plan.steps.iter().flat_map(|step| match &step.action {
-            PlannedAction::Send(_, frames) => frames.as_slice(),
-            PlannedAction::Own(Act::Send(frame) | Act::Read { request: frame, .. }) => {
-                std::slice::from_ref(frame)
-            }
-            _ => &[],
-        })
-    }
-
-    /// The registers whose contents its lines ask for.
-    fn asks_for(&self) -> BTreeSet<u8> {
-        let first = |wanted: &WantedFrame| match wanted.data.first() {
-            Some(Expected::Byte(register)) => Some(*register),
-            _ => None,
-        };
-        let steps = self.plan.steps.iter();
-        let all = steps.flat_map(|step| match &step.action {
-            PlannedAction::Receive(_, wanted) => wanted.iter().filter_map(first).collect(),
-            PlannedAction::Own(Act::Read { register, .. }) => vec![*register],
-            PlannedAction::Own(Act::Register(_, wanted)) => vec![wanted.register],
-            PlannedAction::Own(Act::Driver(..)) => AT_REST.to_vec(),
-            _ => Vec::new(),
-        });
-        all.collect()
-    }
-}
 
 /// What drives read at rest, by number and register.
 type AtRest = Vec<(u8, u8, u32)>;
@@ -127,8 +86,18 @@ struct Rehearsal {
     denied: Option<(String, Vec<LimitSetting>)>,
 }
 
+/// How an attempt went, before it is judged.
+enum Gone {
+    /// A drive did not become ready.
+    Unanswered(Error),
+    /// The rig does not play the scenario.
+    Skipped(Skip),
+    /// It was played. With what the drives and their models read at rest.
+    Played(Box<Outcome>, [AtRest; 2]),
+}
+
 /// Plays attempts, on a rig or on a record, and judges them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Player {
     axes: Vec<Axis>,
     rate: BitRate,
@@ -140,12 +109,18 @@ pub(super) struct Player {
     remote: bool,
     /// Known from the first attempt on.
     known: Option<Vec<Known>>,
+    /// What was found out where finding out has failed.
+    partly: Vec<Known>,
     /// What has been written since the registers were read.
     written: BTreeSet<(u16, u8)>,
     /// The drives to which bus settings were written, by identifier: the guard does not let them be stored.
     moved: BTreeSet<u16>,
     /// What was received before the scenario of the last attempt; `None` where it was not begun.
     before: Option<String>,
+    /// Whether the drives are qualified.
+    qualifies: bool,
+    /// The attempts of a qualification.
+    notes: Vec<Note>,
 }
 
 impl Player {
@@ -164,10 +139,28 @@ impl Player {
             capabilities,
             remote,
             known: None,
+            partly: Vec::new(),
             written: BTreeSet::new(),
             moved: BTreeSet::new(),
             before: None,
+            qualifies: false,
+            notes: Vec::new(),
         }
+    }
+
+    /// Keeps every attempt from now on, and settles by probes what the limits permit to find out.
+    pub(super) const fn qualify(&mut self) {
+        self.qualifies = true;
+    }
+
+    /// What may be done.
+    pub(super) const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// The attempts of a qualification.
+    pub(super) fn notes(&self) -> &[Note] {
+        &self.notes
     }
 
     /// What is known of the drives; nothing before the first attempt.
@@ -228,10 +221,32 @@ impl Player {
 
     /// One attempt over a link: finds out about the drives, rehearses, makes them ready, plays and judges. With what was received
     /// before the scenario, in words.
-    pub(super) fn attempt(&mut self, own: &Own, link: &mut dyn Link) -> (Outcome, String) {
+    pub(super) fn attempt(&mut self, own: &Arc<Own>, link: &mut dyn Link) -> (Outcome, String) {
         link.begin();
+        let begun = self.qualifies.then(|| self.without_notes());
         let mut link = Observed::new(link);
-        let outcome = self.attempt_over(own, &mut link);
+        if begun.is_some() {
+            link = link.keeping();
+        }
+        let gone = self.go(own, &mut link, true);
+        if let Some(begun) = begun {
+            self.note(begun, own, &link, &gone);
+        }
+        let way = Way {
+            late: link.take_late(),
+            longest: link.longest(),
+            tolerance: link.time_tolerance(),
+        };
+        let outcome = match gone {
+            Gone::Unanswered(error) => self.unanswered(&error),
+            Gone::Skipped(skip) => Outcome::skipped(skip),
+            Gone::Played(outcome, [drives, models]) => {
+                self.judged(own, *outcome, way, &unlike(&drives, &models))
+            }
+        };
+        if let Some(note) = self.notes.last_mut() {
+            note.judge(&outcome);
+        }
         let before = match &self.before {
             Some(before) => before.clone(),
             None => link.received(),
@@ -239,21 +254,22 @@ impl Player {
         (outcome, before)
     }
 
-    fn attempt_over(&mut self, own: &Own, link: &mut Observed<'_>) -> Outcome {
+    /// Finds out about the drives, makes them ready, and plays; with `rehearses` only what their model meets.
+    fn go(&mut self, own: &Own, link: &mut Observed<'_>, rehearses: bool) -> Gone {
         self.before = None;
         if let Err(error) = self.learn(link) {
-            return self.unanswered(&error);
+            return Gone::Unanswered(error);
         }
-        let rehearsal = match self.rehearsed(own) {
-            Ok(rehearsal) => rehearsal,
-            Err(skip) => return Outcome::skipped(skip),
+        let model = match rehearses.then(|| self.rehearsed(own)).transpose() {
+            Ok(rehearsal) => rehearsal.map(|own| own.at_rest).unwrap_or_default(),
+            Err(skip) => return Gone::Skipped(skip),
         };
         let at_rest = self.prepare(own, self.limits.motion, link);
         self.before = Some(link.received());
         self.written.extend(link.written());
         let at_rest = match at_rest {
             Ok(at_rest) => at_rest,
-            Err(error) => return self.unanswered(&error),
+            Err(error) => return Gone::Unanswered(error),
         };
         link.begin();
         link.take_late();
@@ -263,13 +279,7 @@ impl Player {
             .written()
             .filter(|(_, register)| BUS_SETTINGS.contains(register));
         self.moved.extend(settings.map(|(rx, _)| rx));
-        let unlike = unlike(&at_rest, &rehearsal.at_rest);
-        let way = Way {
-            late: link.take_late(),
-            longest: link.longest(),
-            tolerance: link.time_tolerance(),
-        };
-        self.judged(own, outcome, way, &unlike)
+        Gone::Played(Box::new(outcome), [at_rest, model])
     }
 
     /// Reads the drives; the first time everything, and what the manual leaves open is settled.
@@ -278,20 +288,33 @@ impl Player {
             Some(drives) => drives,
             None => self.axes.iter().copied().map(Known::new).collect(),
         };
-        for known in &mut drives {
-            let axes = [known.axis];
-            let mut driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
-            if known.cells.is_empty() {
-                known.read_all(&mut driver)?;
-                drop(driver);
-                probe::settle(known, link, self.patience)?;
-                driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+        let learnt = drives
+            .iter_mut()
+            .try_for_each(|known| self.learn_of(known, link));
+        match learnt {
+            Ok(()) => {
+                self.written.clear();
+                self.known = Some(drives);
             }
-            known.read_again(&mut driver, &self.written)?;
+            Err(_) => self.partly = drives,
         }
-        self.written.clear();
-        self.known = Some(drives);
-        Ok(())
+        learnt
+    }
+
+    /// The same of one drive.
+    fn learn_of(&self, known: &mut Known, link: &mut Observed<'_>) -> Result<(), Error> {
+        let axes = [known.axis];
+        let mut driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+        if known.cells.is_empty() {
+            known.read_all(&mut driver)?;
+            drop(driver);
+            probe::settle(known, link, self.patience)?;
+            if self.qualifies && self.limits.motion {
+                probe::settle_moving(known, link, (self.patience, self.rate))?;
+            }
+            driver = Driver::new(Box::new(&mut *link), &axes, self.patience);
+        }
+        known.read_again(&mut driver, &self.written)
     }
 
     /// The outcome where the drives could not be made ready.
@@ -420,11 +443,7 @@ impl Player {
         bench.wait(Instant::START + other.phase);
         let mut link = guarded(bench, limits.clone(), &identifiers, false);
         if let Some(gate) = link.segment_mut() {
-            for known in self.known() {
-                let [full, limit] = [0xC8, 0x34].map(|own| (known.cell(own) & 0xFFFF) as u16);
-                gate.learn(known.axis.rx, full, limit);
-            }
-            self.moved.iter().for_each(|rx| gate.note_moved(*rx));
+            self.tell(self.known(), gate);
         }
         let mut forgotten: Vec<LinkEvent> = Vec::new();
         let mut recording = Recording::new(&mut link, &mut forgotten);
@@ -446,6 +465,15 @@ impl Player {
             at_rest,
             denied,
         }
+    }
+
+    /// Tells a model's gate what the gate in front of the drives knows of them.
+    fn tell(&self, drives: &[Known], gate: &mut guard::Gate) {
+        for known in drives {
+            let [full, limit] = [0xC8, 0x34].map(|own| (known.cell(own) & 0xFFFF) as u16);
+            gate.learn(known.axis.rx, full, limit);
+        }
+        self.moved.iter().for_each(|rx| gate.note_moved(*rx));
     }
 
     /// Makes the drives ready: locked, without commands, with the registers of the header, and released where motors may turn.
@@ -606,26 +634,4 @@ const fn permit(limits: &mut Limits, setting: LimitSetting) {
         LimitSetting::MaxSpeed => limits.max_speed = None,
         _ => {}
     }
-}
-
-/// Whether a frame may store parameters in the EEPROM.
-pub(super) fn stores(frame: &Frame) -> bool {
-    let rx = u16::try_from(frame.id().number()).unwrap_or(0);
-    let request = Request::decode(frame, rx, Dlc4::As3);
-    matches!(request, Ok(Request::Write { register: 0x84, .. }))
-}
-
-/// What a rig's capabilities are within limits, beside what no record shows.
-pub(super) fn capabilities(limits: &guard::Limits, simulated: bool) -> Vec<Capability> {
-    let all = match simulated {
-        true => Bench::CAPABILITIES.as_slice(),
-        false => &[Capability::Memory, Capability::Motion, Capability::Eeprom],
-    };
-    let has = |own: &&Capability| match own {
-        Capability::Motion => limits.motion,
-        Capability::Eeprom => limits.eeprom,
-        Capability::Tap | Capability::Simulator | Capability::Power => false,
-        _ => true,
-    };
-    all.iter().filter(has).copied().collect()
 }

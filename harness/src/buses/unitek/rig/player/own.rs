@@ -1,0 +1,72 @@
+//! A scenario of this bus, read for a rig.
+
+use super::AT_REST;
+use crate::buses::unitek::language::Unitek;
+use crate::buses::unitek::language::plan::{Act, WantedFrame};
+use crate::scenario::parse::parse;
+use crate::scenario::pattern::Expected;
+use crate::scenario::plan::{Plan, PlannedAction, plan};
+use crate::scenario::problem::Problems;
+use crate::scenario::source::Source;
+use crate::scenario::syntax::Scenario;
+use harness_proto::can::Frame;
+use harness_proto::unitek::frame::Request;
+use harness_proto::unitek::properties::Dlc4;
+use std::collections::BTreeSet;
+
+/// A scenario of this bus.
+#[derive(Debug)]
+pub(in super::super) struct Own {
+    /// The name of its source.
+    pub(super) name: String,
+    pub(super) scenario: Scenario<Unitek>,
+    pub(in super::super) plan: Plan<Unitek>,
+}
+
+impl Own {
+    /// Reads a scenario.
+    pub(in super::super) fn read(source: &Source) -> Result<Self, Box<Problems>> {
+        let scenario: Scenario<Unitek> = parse(source)?;
+        let plan = plan(&scenario, source, None)?;
+        Ok(Self {
+            name: source.name.clone(),
+            scenario,
+            plan,
+        })
+    }
+
+    /// The frames that its lines send.
+    pub(in super::super) fn frames(&self) -> impl Iterator<Item = &Frame> {
+        self.plan.steps.iter().flat_map(|step| match &step.action {
+            PlannedAction::Send(_, frames) => frames.as_slice(),
+            PlannedAction::Own(Act::Send(frame) | Act::Read { request: frame, .. }) => {
+                std::slice::from_ref(frame)
+            }
+            _ => &[],
+        })
+    }
+
+    /// The registers whose contents its lines ask for.
+    pub(super) fn asks_for(&self) -> BTreeSet<u8> {
+        let first = |wanted: &WantedFrame| match wanted.data.first() {
+            Some(Expected::Byte(register)) => Some(*register),
+            _ => None,
+        };
+        let steps = self.plan.steps.iter();
+        let all = steps.flat_map(|step| match &step.action {
+            PlannedAction::Receive(_, wanted) => wanted.iter().filter_map(first).collect(),
+            PlannedAction::Own(Act::Read { register, .. }) => vec![*register],
+            PlannedAction::Own(Act::Register(_, wanted)) => vec![wanted.register],
+            PlannedAction::Own(Act::Driver(..)) => AT_REST.to_vec(),
+            _ => Vec::new(),
+        });
+        all.collect()
+    }
+}
+
+/// Whether a frame may store parameters in the EEPROM.
+pub(in super::super) fn stores(frame: &Frame) -> bool {
+    let rx = u16::try_from(frame.id().number()).unwrap_or(0);
+    let request = Request::decode(frame, rx, Dlc4::As3);
+    matches!(request, Ok(Request::Write { register: 0x84, .. }))
+}

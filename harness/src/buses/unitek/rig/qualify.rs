@@ -1,0 +1,241 @@
+//! A qualification of UNITEK drives: the deviations that explain what they did, and the values of the open points that were settled.
+
+use super::Axis;
+use super::known::Known;
+use super::player::{CONVERSATION, DriveIs, Note, Player};
+use crate::qualify::segment::{Attempted, Attempts, qualified};
+use crate::rig::segment::Qualified;
+use crate::rig::{Profile, ProfileLines, Rig};
+use crate::scenario::source::Source;
+use harness_proto::unitek::guard::Limits;
+use harness_proto::unitek::properties::{Description, PROPERTIES};
+use harness_sim::unitek::deviation::{Deviation, deviations};
+use include_dir::{Dir, include_dir};
+use std::collections::BTreeMap;
+
+/// The conversations that are played with each drive behind the selected scenarios.
+static CONVERSATIONS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/corpora/qualify/unitek");
+
+/// What stands in a conversation for the number and the identifiers of a drive, the two bytes of the first one, and the next higher one.
+const DRIVE: [&str; 6] = ["{node}", "{rx}", "{tx}", "{low}", "{high}", "{next}"];
+
+/// What a probe needs that is not made by default.
+#[derive(Clone, Copy)]
+enum Needs {
+    /// Nothing: reads, cycles, STATUS_MASK and the lock.
+    Nothing,
+    /// Motors may turn.
+    Motion,
+    /// Identifiers may be changed, and not stored.
+    BusSettings,
+    /// The drive is switched off and on.
+    PowerUp,
+    /// Frames without an adapter between.
+    ExactTime,
+}
+
+/// What the probe of a property needs, and the conversation whose frames show it; nothing for those that are not listed.
+const NEEDS: [(&str, Needs, &str); 9] = [
+    ("event-reply", Needs::Motion, "events"),
+    ("id-change", Needs::BusSettings, "write-identifier"),
+    ("id-range", Needs::BusSettings, "write-identifier-range"),
+    ("event-mask", Needs::PowerUp, ""),
+    ("lock-at-power-up", Needs::PowerUp, ""),
+    ("power-up-mode", Needs::PowerUp, ""),
+    ("lock-clears-command", Needs::Motion, "lock-and-commands"),
+    ("homing-time", Needs::Motion, ""),
+    ("reply-delay", Needs::ExactTime, ""),
+];
+
+/// Why a property is not settled.
+fn why_open(property: &Description, limits: &Limits) -> String {
+    let needs = NEEDS.iter().find(|(name, ..)| *name == property.name);
+    let why = match needs.map_or(Needs::Nothing, |(_, needs, _)| *needs) {
+        Needs::Motion if !limits.motion => {
+            "not asked: this needs `allow_motion` in [limits] and --allow-motion"
+        }
+        Needs::Motion => {
+            "the drive did not show it: its hardware enable is open, or it is not ready"
+        }
+        Needs::BusSettings if !limits.bus_settings => {
+            "not asked: this needs `allow_bus_settings` in [limits]"
+        }
+        Needs::PowerUp => "not asked: it shows when the drive is switched on",
+        Needs::ExactTime => "not asked: the adapter and the computer take time, too",
+        Needs::Nothing | Needs::BusSettings => "the drive has shown no value that is known",
+    };
+    why.to_owned()
+}
+
+/// The conversations with these drives.
+pub(super) fn conversations(axes: &[Axis]) -> Vec<Source> {
+    let mut files: Vec<_> = CONVERSATIONS.files().collect();
+    files.sort_by_key(|file| file.path().to_owned());
+    let of_drive = |axis: &Axis| {
+        let values = [
+            axis.node.to_string(),
+            format!("{:03X}", axis.rx),
+            format!("{:03X}", axis.tx),
+            format!("{:02X}", axis.rx & 0xFF),
+            format!("{:02X}", axis.rx >> 8),
+            format!("{:03X}", axis.rx + 1),
+        ];
+        let several = axes.len() > 1;
+        let node = axis.node;
+        let sources = files.iter().filter_map(move |file| {
+            let name = file.path().file_stem()?.to_str()?;
+            let text = DRIVE.iter().zip(&values);
+            let text = text.fold(file.contents_utf8()?.to_owned(), |text, (place, value)| {
+                text.replace(place, value)
+            });
+            Some(Source {
+                name: match several {
+                    true => format!("{CONVERSATION}{name}-drive-{node}"),
+                    false => format!("{CONVERSATION}{name}"),
+                },
+                text: text.into(),
+            })
+        });
+        sources.collect::<Vec<_>>()
+    };
+    axes.iter().flat_map(of_drive).collect()
+}
+
+/// What the attempts of a player come to.
+pub(super) fn qualify(player: &Player, rig: &Rig, began: &str, whole: bool) -> Qualified {
+    let notes: Vec<_> = player
+        .notes()
+        .iter()
+        .filter(|own| own.shows_something())
+        .collect();
+    let mut known = player.known().to_vec();
+    for place in 0..known.len() {
+        settle(&mut known, place, &notes);
+    }
+    let profile = (!known.is_empty()).then(|| profile(&known, player.limits(), rig, began));
+    let named = rig.file.deviation.iter().map(|own| own.name.clone());
+    qualified(
+        &Notes(notes),
+        profile,
+        "frame",
+        &named.collect::<Vec<_>>(),
+        whole,
+    )
+}
+
+/// Settles the properties of a drive of which one value alone explains the conversation that shows it.
+fn settle(drives: &mut [Known], place: usize, notes: &[&Note]) {
+    let drive = &mut drives[place];
+    for (name, _, conversation) in NEEDS {
+        let property = Description::of(name).filter(|_| !drive.settled.contains(name));
+        let Some(property) = property else { continue };
+        let values = drive.values_of(property);
+        let shown = format!("{CONVERSATION}{conversation}");
+        let of_drive = format!("{shown}-drive-{}", drive.axis.node);
+        for note in notes {
+            let explaining = match [&shown, &of_drive].contains(&note.name()) {
+                true => note.explaining(place, &values),
+                false => continue,
+            };
+            if let [value] = explaining[..] {
+                let word = property.of_drive(value).to_string();
+                drive.settle(name, &word);
+            }
+        }
+    }
+}
+
+fn profile(drives: &[Known], limits: &Limits, rig: &Rig, began: &str) -> Profile<ProfileLines> {
+    let mut profile = Profile {
+        schema: 1,
+        rig: rig.id().to_owned(),
+        date: began.to_owned(),
+        rings: vec![u8::try_from(drives.len()).unwrap_or(u8::MAX)],
+        property: BTreeMap::new(),
+        open: BTreeMap::new(),
+    };
+    for property in PROPERTIES {
+        for drive in drives {
+            let node = drive.axis.node;
+            if drive.settled.contains(property.name) {
+                let value = property.of_drive(&drive.properties);
+                let line = format!("drive {node} property {} = {value}", property.name);
+                let section = format!("unitek {}", property.section);
+                let value = format!("drive {node}: {value}");
+                profile.settle(property.name, &section, &value, &vec![line]);
+            } else {
+                let why = why_open(property, limits);
+                profile.leave_open(property.name, &format!("drive {node}: {why}"));
+            }
+        }
+    }
+    profile
+}
+
+/// The attempts of a qualification.
+struct Notes<'n>(Vec<&'n Note>);
+
+/// A deviation of the drive at a place.
+struct Deviates {
+    place: usize,
+    node: u8,
+    deviation: &'static Deviation,
+}
+
+impl Attempts for Notes<'_> {
+    type Deviation = Deviates;
+
+    fn deviations(&self) -> Vec<Deviates> {
+        let nodes = self.0.first().into_iter().flat_map(|own| own.nodes());
+        let each = nodes.enumerate().flat_map(|(place, node)| {
+            deviations().map(move |deviation| Deviates {
+                place,
+                node,
+                deviation,
+            })
+        });
+        each.collect()
+    }
+
+    fn words(&self, own: &Deviates) -> String {
+        let Deviation {
+            name,
+            section,
+            about,
+            ..
+        } = own.deviation;
+        format!("drive {}: {name} (UNITEK {section}): {about}", own.node)
+    }
+
+    fn attempts(&self) -> Vec<Attempted> {
+        let attempted = self.0.iter().map(|own| Attempted {
+            verdict: own.verdict,
+            accuses: own.accuses,
+            exact: own.exact,
+            received: own.frames,
+        });
+        attempted.collect()
+    }
+
+    fn is_right(&self, attempt: usize) -> bool {
+        self.0[attempt].is_explained_by(DriveIs::Right)
+    }
+
+    fn explains(&self, own: &Deviates, attempt: usize) -> bool {
+        self.0[attempt].is_explained_by(DriveIs::Deviates(own.place, own.deviation))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_need_is_of_a_property_and_its_conversation_is_there() {
+        for (name, _, shown) in NEEDS {
+            assert!(Description::of(name).is_some(), "{name}");
+            let file = format!("{shown}.scn");
+            assert!(shown.is_empty() || CONVERSATIONS.contains(file), "{name}");
+        }
+    }
+}

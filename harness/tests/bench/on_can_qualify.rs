@@ -1,0 +1,110 @@
+//! Qualifications of simulated UNITEK drives: a correct drive is not blamed and its open points are settled, a wrong one is named, and the
+//! record bears both out.
+
+use crate::program::{Desk, ended, said};
+use std::process::Output;
+
+const ALL: &str = "allow_motion = true\nallow_eeprom = true\nallow_bus_settings = true\n";
+
+/// A rig with one simulated drive, set up by a line.
+fn desk(setup: &str, limits: &str) -> Desk {
+    let setup = match setup {
+        "" => String::new(),
+        line => format!("\"drive 1 {line}\""),
+    };
+    Desk::of_file(&format!(
+        "schema = 2\n[rig]\nid = \"desk\"\n[port.1]\nbus = \"unitek\"\ndrives = [{{ node = 1 }}]\n\
+         [sim]\nbus = \"unitek\"\nsetup = [{setup}]\n[limits]\n{limits}"
+    ))
+}
+
+/// Qualifies by the scenarios of example 2, and by the conversations.
+fn qualify(desk: &Desk) -> Output {
+    let fixed = ["qualify", "--rig", "desk.toml", "--evidence", "kept"];
+    desk.run(&[&fixed[..], &["--filter", "unitek-ex-2"]].concat())
+}
+
+fn kept(desk: &Desk, file: &str) -> String {
+    std::fs::read_to_string(desk.path("kept").join(file)).expect("a file of the folder")
+}
+
+/// The value of an open point is found, whatever it is, and no deviation is named.
+#[test]
+fn open_points_are_settled_and_no_correct_drive_is_blamed() {
+    for (name, value) in [
+        ("lock-clears-command", "yes"),
+        ("id-change", "restart"),
+        ("id-range", "printed"),
+        ("event-reply", "as-map-reply"),
+        ("homing-time", "700ms"),
+        ("dlc4", "ignore"),
+    ] {
+        let desk = desk(&format!("property {name} = {value}"), ALL);
+        let output = qualify(&desk);
+        let code = output.status.code();
+        assert!(matches!(code, Some(0 | 5)), "{name}: {}", said(&output));
+        let profile = kept(&desk, "profile.toml");
+        let line = format!("drive 1 property {name} = {value}");
+        assert!(profile.contains(&line), "{name}: {profile}");
+        let deviations = kept(&desk, "deviations.txt");
+        assert!(deviations.starts_with("deviations: no"), "{deviations}");
+    }
+}
+
+/// A probe that is not permitted leaves its point open, and the profile says what is missing.
+#[test]
+fn what_is_not_permitted_stays_open() {
+    let desk = desk("", "");
+    let output = qualify(&desk);
+    assert!(
+        matches!(output.status.code(), Some(0 | 5)),
+        "{}",
+        said(&output)
+    );
+    let deviations = kept(&desk, "deviations.txt");
+    assert!(deviations.starts_with("deviations: none;"), "{deviations}");
+    let profile = kept(&desk, "profile.toml");
+    for (name, why) in [
+        ("homing-time", "allow_motion"),
+        ("id-change", "allow_bus_settings"),
+        ("power-up-mode", "it shows when the drive is switched on"),
+    ] {
+        let line = profile
+            .lines()
+            .find(|line| line.starts_with(&format!("{name} =")));
+        assert!(
+            line.is_some_and(|line| line.contains(why)),
+            "{name}: {profile}"
+        );
+    }
+}
+
+/// A wrong drive is named by its deviation, and by no other.
+#[test]
+fn wrong_drives_are_named() {
+    for wrong in ["no-lock", "names-read", "ramps-swapped", "stop-answers"] {
+        let desk = desk(&format!("deviates {wrong}"), ALL);
+        let output = qualify(&desk);
+        let deviations = kept(&desk, "deviations.txt");
+        let named = format!("deviation: drive 1: {wrong} (UNITEK ");
+        assert!(deviations.starts_with(&named), "{wrong}: {deviations}");
+        assert_eq!(deviations.matches("deviation: ").count(), 1, "{deviations}");
+        assert!(
+            matches!(output.status.code(), Some(1 | 7)),
+            "{}",
+            said(&output)
+        );
+    }
+}
+
+/// The files of a qualification follow from its record.
+#[test]
+fn an_edited_profile_is_found() {
+    let desk = desk("property dlc4 = ignore", ALL);
+    let _exit = qualify(&desk);
+    ended(&desk.run(&["verify", "kept"]), 0, "0 things wrong");
+    let path = desk.path("kept").join("profile.toml");
+    let text = kept(&desk, "profile.toml").replace("dlc4 = ignore", "dlc4 = as3");
+    std::fs::write(path, text).expect("room");
+    ended(&desk.run(&["verify", "kept"]), 1, "profile.toml");
+}
