@@ -53,6 +53,7 @@ fn page_of(all: &[(Entry, Outcome, Vec<Trace>)]) -> String {
                 text: &entry.source.text,
                 outcome,
                 traces,
+                report: None,
                 rate: harness_proto::line::Rate::default(),
                 again: "",
             };
