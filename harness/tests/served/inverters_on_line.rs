@@ -111,7 +111,7 @@ fn scenarios_over_every_way_in() {
     }
 }
 
-/// An adapter whose echo is not as the file says is told with the remedy.
+/// The message about an adapter whose echo is not as the file says names the remedy.
 #[test]
 fn a_wrong_echo_is_told_with_its_remedy() {
     let heard = Desk::new("echo", "");
