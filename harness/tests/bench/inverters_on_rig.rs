@@ -46,6 +46,15 @@ fn no_right_inverter_is_accused() {
     }
 }
 
+#[test]
+fn wrong_inverters_fail() {
+    for wrong in ["no-fdl-status", "status-of-a-master"] {
+        let desk = desk(&format!("deviates {wrong}"), ALL);
+        let output = run(&desk, &["--filter", "nordac-en-1"]);
+        assert_eq!(output.status.code(), Some(1), "{wrong}: {}", said(&output));
+    }
+}
+
 const LOOKS: &str = "title Looks\nsource nordac 2.6\nbus nordac\nslave 8\n> 68 05 05 68 88 82 6C 3C 3E F0 16\n\
                      < 68 0B 0B 68 82 88 08 3E 3C 02 05 00 FF 75 31 38 16\n";
 const MOVES: &str = "title Moves\nsource nordac 3.2.1\nbus nordac\nslave 8\nstart 8 ppo 1\non 8\n";

@@ -21,13 +21,19 @@ pub(super) struct Known {
     pub(super) slave: RigSlave,
     /// What the parameters read, by number and IND.
     pub(super) values: BTreeMap<(u16, u16), u32>,
+    /// How it behaves where the manual leaves that open, as far as a conversation has shown it.
+    pub(super) properties: Properties,
+    /// How it may behave as well, each with the words of the difference.
+    pub(super) open: Vec<(String, Properties)>,
 }
 
 impl Known {
-    pub(super) const fn new(slave: RigSlave) -> Self {
+    pub(super) fn new(slave: RigSlave) -> Self {
         Self {
             slave,
             values: BTreeMap::new(),
+            properties: Properties::default(),
+            open: candidates(Properties::default()),
         }
     }
 

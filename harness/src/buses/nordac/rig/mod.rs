@@ -6,6 +6,7 @@ mod permitted;
 mod player;
 mod run;
 mod session;
+mod settle;
 pub(crate) mod talk;
 
 pub use permitted::limits;

@@ -6,8 +6,9 @@
 //! meet it either, or the computer was late.
 
 use super::RigSlave;
-use super::known::{Known, candidates};
+use super::known::Known;
 use super::observed::{Observed, Slow};
+use super::settle;
 use super::talk::{Talk, TalkError};
 use crate::buses::LimitSetting;
 use crate::buses::nordac::gate::guarded;
@@ -68,8 +69,8 @@ impl Own {
 /// What a model is beside what is known of the slaves.
 #[derive(Clone, Copy, Default)]
 struct Other {
-    /// The properties of all slaves, in place of the defaults.
-    properties: Option<Properties>,
+    /// The place of a slave and its properties, in place of those that are known.
+    properties: Option<(usize, Properties)>,
     /// What adapter and computer do to telegrams.
     slow: Option<Slow>,
 }
@@ -245,6 +246,7 @@ impl Player {
             return Ok(());
         }
         let mut all: Vec<_> = self.slaves.iter().copied().map(Known::new).collect();
+        let mut seen = Vec::new();
         let mut talk = Talk::new(Box::new(link), self.patience);
         for known in &mut all {
             let address = known.slave.address;
@@ -253,10 +255,29 @@ impl Player {
             let found = talk.configuration(address)?;
             known.slave.ppo = found.or(known.slave.ppo);
             known.read_all(&mut talk)?;
+            seen.push(settle::converse(known, &mut talk)?);
         }
         drop(talk);
+        for (known, seen) in all.iter_mut().zip(&seen) {
+            let model = |properties| self.model_replies(known, properties);
+            let (properties, open) = settle::settle(seen, model);
+            (known.properties, known.open) = (properties, open);
+        }
         self.known = Some(all);
         Ok(())
+    }
+
+    /// What a model of a slave replies in the conversation that settles what the manual leaves open.
+    fn model_replies(&self, known: &Known, properties: Properties) -> Option<settle::Replies> {
+        let setup = simulate::Setup {
+            rate: self.rate,
+            slaves: vec![known.model(properties)],
+            master: None,
+        };
+        let gated = [GuardedSlave::from(known.slave)];
+        let mut link = guarded(Bench::new(&setup), self.limits, &gated, false);
+        let mut talk = Talk::new(Box::new(&mut link), self.patience);
+        settle::converse(known, &mut talk).ok()
     }
 
     /// The outcome where the slaves could not be made ready.
@@ -307,14 +328,14 @@ impl Player {
 
     /// Plays a scenario on the model within limits.
     fn rehearse(&self, own: &Own, limits: &Limits, other: Other) -> Rehearsal {
-        let properties = other.properties.unwrap_or_default();
+        let known = self.known().iter().enumerate();
+        let slaves = known.map(|(place, known)| {
+            let other = other.properties.filter(|own| own.0 == place);
+            known.model(other.map_or(known.properties, |own| own.1))
+        });
         let setup = simulate::Setup {
             rate: self.rate,
-            slaves: self
-                .known()
-                .iter()
-                .map(|known| known.model(properties))
-                .collect(),
+            slaves: slaves.collect(),
             master: None,
         };
         let gated: Vec<_> = self
@@ -476,14 +497,18 @@ impl Player {
                 }
             }
         }
-        let mut all = candidates(Properties::default()).into_iter();
+        let known = self.known().iter().enumerate();
+        let mut all = known.flat_map(|(place, known)| {
+            let open = known.open.iter();
+            open.map(move |(words, properties)| (words, (place, *properties)))
+        });
         let found = all.find(|(_, properties)| {
             fails(Other {
                 properties: Some(*properties),
                 ..Other::default()
             })
         });
-        found.map(|(words, _)| words)
+        found.map(|(words, _)| words.clone())
     }
 }
 

@@ -199,6 +199,15 @@ impl<'l> Talk<'l> {
         }
     }
 
+    /// A request, and what the slave replies as text: `None` for nothing.
+    ///
+    /// # Errors
+    /// [`TalkError::Line`].
+    pub fn raw(&mut self, slave: u8, service: Service, data: &[u8]) -> Result<String, TalkError> {
+        let reply = self.ask(slave, service, data)?;
+        Ok(format!("{reply:?}"))
+    }
+
     /// Begins a new sequence of requests, as after the bench was opened.
     pub fn restart(&mut self, slave: u8) {
         self.requests(slave).restart();
