@@ -9,6 +9,7 @@ use crate::report::pcapng_frames::rate_of;
 use crate::scenario::source::Source;
 use crate::scenario::verdict::Verdict;
 use harness_proto::can::{BitRate, BusError, Frame};
+use harness_proto::time::Instant;
 use harness_proto::unitek::{DEFAULT_RX, DEFAULT_TX};
 use harness_sim::record::{FrameEnd, LineFrame, Trace};
 use std::collections::BTreeSet;
@@ -51,6 +52,8 @@ pub(crate) fn scenario(
     }
     text.push('\n');
     let (mut number, mut steps) = (0_u64, String::new());
+    // The frame that an error has ended, at its first attempt.
+    let mut attempt: Option<&LineFrame> = None;
     for own in frames {
         // A frame that an error ended is repeated, which is no frame of its own.
         let fault = match own.ended {
@@ -67,10 +70,13 @@ pub(crate) fn scenario(
             }
         }
         if matches!(own.ended, FrameEnd::Error(_)) {
+            attempt.get_or_insert(own);
             continue;
         }
         number += 1;
-        step(own, &mut steps);
+        let same = |first: &&LineFrame| (first.from, first.frame) == (own.from, own.frame);
+        let first = attempt.take_if(|first| same(&&**first));
+        step(own, first.unwrap_or(own).start, &mut steps);
     }
     Ok(text + &steps)
 }
@@ -123,9 +129,10 @@ pub(crate) fn judged(traces: &[Trace], setup: Option<&Source>) -> Result<JudgedF
     })
 }
 
-fn step(own: &LineFrame, steps: &mut String) {
+/// A frame that began to be sent at `start`: what an error has ended its sender repeats.
+fn step(own: &LineFrame, start: Instant, steps: &mut String) {
     let frame = &own.frame;
-    let nanos = own.start.since_start().as_nanos();
+    let nanos = start.since_start().as_nanos();
     let _infallible = match own.from {
         None => writeln!(
             steps,
@@ -181,5 +188,42 @@ fn nodes(frames: &[&LineFrame]) -> Result<BTreeSet<u16>, String> {
             "no frame of it is to or from a drive; --setup with `drive` lines expected".to_owned(),
         ),
         false => Ok(nodes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use harness_proto::time::Span;
+    use harness_sim::record::Channel;
+
+    /// A request that an error frame has ended, and its repetition: it is sent once, when it was first sent.
+    #[test]
+    fn a_repeated_frame_is_sent_at_its_first_attempt() {
+        let at = |micros| Instant::START + Span::from_micros(micros);
+        let frame = |from, start, text: &str, ended| LineFrame {
+            from,
+            start: at(start),
+            at: at(start + 150),
+            frame: text.parse().expect("a frame"),
+            ended,
+        };
+        let corrupt = FrameEnd::Error(BusError::ErrorFrame);
+        let frames = vec![
+            frame(None, 1_000, "201#3D4000", corrupt),
+            frame(None, 1_200, "201#3D4000", FrameEnd::Good),
+            frame(Some(1), 1_400, "181#40810100", FrameEnd::Good),
+            frame(None, 5_000, "201#3D4000", FrameEnd::Good),
+        ];
+        let trace = Trace {
+            channels: vec![Channel::of_frames(frames)],
+            ..Trace::empty(1)
+        };
+        let text = scenario(&[trace], "Repeated", None).expect("a scenario");
+        let sent: Vec<_> = text.lines().filter(|line| line.contains(" > ")).collect();
+        assert_eq!(sent.len(), 2, "{text}");
+        assert!(sent[0].starts_with("@1.000000ms >"), "{text}");
+        assert!(sent[1].starts_with("@5.000000ms >"), "{text}");
+        assert!(text.contains("! frame 1: corrupt"), "{text}");
     }
 }
